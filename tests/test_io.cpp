@@ -1,4 +1,7 @@
 // Oracles: Python's own reader of ZIP files and numbers, the dynamics called directly, files read back to the last bit.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -20,6 +23,7 @@
 #include "get_error_of_reading.h"
 #include "io/npz.h"
 #include "io/opensim.h"
+#include "io/plot.h"
 #include "io/text_file.h"
 #include "problem_probe.h"
 #include "robot_directory.h"
@@ -437,6 +441,27 @@ TEST_CASE("the slip is zero for feet that stand still") {
   CHECK(result.slip_position == 0);
   CHECK(result.slip_angle < 1e-15);
   CHECK(result.gap_position < 1e-12);
+}
+
+TEST_CASE("figures of values that are all the same are drawn without a complaint of gnuplot") {
+  const TemporaryDirectory directory;
+  std::vector<Plot> plots;
+  for (const PlotScale scale : {PlotScale::Free, PlotScale::Logarithmic, PlotScale::Equal, PlotScale::Polar})
+    plots.push_back({"it's flat", "x", "y", scale, {{"curve", "#000000", CurveStyle::Lines, false, {{0, 2}, {1, 2}}}}});
+  plots.push_back({"point", "x", "y", PlotScale::Free, {{"", "#000000", CurveStyle::Crosses, false, {{0, 0}}}}});
+  plots.push_back(
+      {"", "x", "y", PlotScale::Polar, {{"", "#000000", CurveStyle::LinesPoints, false, {{0, 0}, {90, 0}}}}});
+  plots.push_back({"shades", "x", "y", PlotScale::Free, {}, {}, {"value", 0.1, {{0, 0, 3}, {0, 0.1, 3}}}});
+  plots.push_back({"nothing", "x", "y"});
+  const std::string errors = directory / "errors";
+  const int before = dup(STDERR_FILENO), file = open(errors.c_str(), O_WRONLY | O_CREAT, 0600);
+  dup2(file, STDERR_FILENO);
+  const bool drawn = drawPlots(directory / "t.svg", plots);
+  dup2(before, STDERR_FILENO);
+  close(before), close(file);
+  if (!drawn) return;  // gnuplot is not installed
+  CHECK(readFile(errors).empty());
+  CHECK_THAT(readFile(directory / "t.svg"), Catch::Contains("it's flat") && Catch::Contains("no results"));
 }
 
 TEST_CASE("a place that cannot be written to is an error that says why") {

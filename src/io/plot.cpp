@@ -72,23 +72,26 @@ struct Range {
 // Of an axis whose values are all the same, about which gnuplot would warn.
 void writeFlatRange(std::ostream& script, const char* axis, const Range& range) {
   const double largest = std::max(std::abs(range.least), std::abs(range.most));
-  if (!(range.most - range.least <= kFlat * largest)) return;
+  if (range.least > range.most || range.most - range.least > kFlat * largest) return;
   const double margin = largest > 0 ? kWidening * largest : 1;
   script << "set " << axis << "range [" << range.least - margin << ":" << range.most + margin << "]\n";
 }
 
 void writeRanges(std::ostream& script, const Plot& plot, const std::vector<const Curve*>& curves) {
-  Range x, y;
+  Range x, y, shade;
   for (const Curve* curve : curves)
     for (const std::pair<double, double>& point : curve->points)
       if (isFinite(point)) x.add(point.first), y.add(point.second);
-  for (const auto& [at_x, at_y, value] : plot.shades.squares)
+  for (const auto& [at_x, at_y, value] : plot.shades.squares) {
+    shade.add(value);
     for (const double side : {-0.5, 0.5}) x.add(at_x + side * plot.shades.size), y.add(at_y + side * plot.shades.size);
+  }
   if (plot.scale == PlotScale::Polar) {
     script << "set rrange [0:" << (y.most > 0 ? "*" : "1") << "]\n";
     return;
   }
   writeFlatRange(script, "x", x);
+  writeFlatRange(script, "cb", shade);
   if (plot.y_range)
     script << "set yrange [" << plot.y_range->first << ":" << plot.y_range->second << "]\n";
   else

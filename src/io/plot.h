@@ -35,7 +35,7 @@ struct Shades {
 struct Plot {
   std::string title, x_label, y_label;  // free text
   PlotScale scale = PlotScale::Free;
-  std::vector<Curve> curves;
+  std::vector<Curve> curves = {};
   std::optional<std::pair<double, double>> y_range = std::nullopt;  // empty: that of the curves
   Shades shades = {};                                               // behind the curves
 };
