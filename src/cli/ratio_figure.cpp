@@ -45,11 +45,7 @@ Plot makeCurvePlot(const RatioReport& report) {
   plot.y_range = {negative ? -top : 0, top};
   for (const DeadPointKind kind : {DeadPointKind::Joint, DeadPointKind::Motor}) {
     const bool joint = kind == DeadPointKind::Joint;
-    Curve dead{joint ? "dead points of the joint" : "dead points of the motors",
-               joint ? "#b02020" : "#2060b0",
-               CurveStyle::Lines,
-               true,
-               {}};
+    Curve dead{joint ? "dead (joint)" : "dead (motor)", joint ? "#b02020" : "#2060b0", CurveStyle::Lines, true, {}};
     for (const RatioSample& sample : report.sweep.getDeadPoints())
       if ((sample.dead == DeadPointKind::Joint) == joint)
         dead.points.insert(
