@@ -69,7 +69,7 @@ int main(int argc, char** argv) {
   const std::string directory = argc > 1 ? argv[1] : "walk";
   WalkOptions options;
   if (argc > 2) options.speed = std::atof(argv[2]);
-  if (argc > 3) options.steps = std::atof(argv[3]);
+  if (argc > 3) options.steps = std::atoi(argv[3]);
 
   const LoadedRobot robot = loadRobot("bipetto");
   Motion motion = makeWalk(robot.model, options);

@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   walk.steps = 4;
   StairsOptions stairs;
   stairs.height = 0.05;
-  stairs.stairs = argc > 2 ? std::atof(argv[2]) : 3;
+  stairs.stairs = argc > 2 ? std::atoi(argv[2]) : 3;
   JumpOptions jump;
   jump.flight = 0.24;
   const std::vector<SequencePart> parts = {

@@ -52,8 +52,9 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   plan->commands = readCommands(file);
   plan->robot = loadRobot(request.robot);
   const Model& model = plan->robot.model;
-  LocomotionOptions options;
-  for (const auto& [name, value] : request.settings) setOption(listOptions(options), name, value);
+  OptionSet set = listOptions(LocomotionOptions());
+  for (const auto& [name, value] : request.settings) set.set(name, value);
+  auto options = readOptions<LocomotionOptions>(set);
   for (size_t i = 0; i < plan->commands.size(); ++i)
     checkCommand(model, options, plan->commands[i].velocity, file + ", command " + std::to_string(i + 1));
   freeFeet(options);
@@ -64,7 +65,7 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   summary.model = "closed";
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;
-  summary.options = listValues(listOptions(options));
+  summary.options = listOptions(options).listValues();
   const CommandSource source = [commands = plan->commands](double time) { return findCommand(commands, time); };
   const CommandedWalk walk(model, options, {}, source, makeStandingPosture(model));
   foresee(walk, request.duration > 0 ? request.duration : plan->commands.back().time, *plan);

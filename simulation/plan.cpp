@@ -18,35 +18,42 @@ constexpr double kFeedbackMargin = 0.2;
 constexpr double kStopShare = 0.5;   // of the margin to dead points that the plan keeps
 constexpr int kMaxIterations = 200;  // more than a motion takes from its own solution
 
+// Whole numbers are written without a point.
+double getNumber(const OptionValue& value) {
+  const int* whole = std::get_if<int>(&value);
+  return whole ? *whole : std::get<double>(value);
+}
+
 // Limits given by motor are recorded with the options of the motion.
 LimitOptions readLimits(const MotionSummary& summary) {
   LimitOptions limits;
   const auto read = [&summary](const std::string& prefix, std::map<std::string, double>& to) {
     for (const auto& [name, value] : summary.options)
-      if (name.rfind(prefix, 0) == 0) to[name.substr(prefix.size())] = value;
+      if (name.rfind(prefix, 0) == 0) to[name.substr(prefix.size())] = getNumber(value);
   };
   read(kEffortLimit, limits.efforts);
   read(kVelocityLimit, limits.velocities);
   read(kPowerLimit, limits.powers);
   for (const auto& [name, value] : summary.options)
-    if (name == kDeadPointMargin) limits.dead_point_margin = value;
+    if (name == kDeadPointMargin) limits.dead_point_margin = getNumber(value);
   return limits;
 }
 
 // Sets an option of a motion, or of the parts of a sequence, where it has one.
-void setWherePresent(const MotionRequest& request, const std::string& name, double value) {
-  for (const OptionEntry& entry : request.options) {
-    const bool ends = entry.name.size() > name.size() &&
-                      entry.name.compare(entry.name.size() - name.size() - 1, std::string::npos, "." + name) == 0;
-    if (entry.name == name || ends) *entry.value = value;
+void setWherePresent(const std::string& name, double value, OptionSet& options) {
+  for (const auto& [option, before] : options.listValues()) {
+    const bool ends = option.size() > name.size() &&
+                      option.compare(option.size() - name.size() - 1, std::string::npos, "." + name) == 0;
+    if (option == name || ends) options.set(option, value);
   }
 }
 
 // Feet stand where they landed, wherever that is, and land where they must.
-void freeFeet(const Ground& ground, const MotionRequest& request) {
-  setWherePresent(request, "contact_kp", 0);
-  setWherePresent(request, "foothold_room", ground.steps.empty() ? kFootholdRoom : kFootholdRoomOnSteps);
-  setWherePresent(request, "cone_margin", kFeedbackMargin);
+MotionRequest freeFeet(const Ground& ground, MotionRequest request) {
+  setWherePresent("contact_kp", 0, request.options);
+  setWherePresent("foothold_room", ground.steps.empty() ? kFootholdRoom : kFootholdRoomOnSteps, request.options);
+  setWherePresent("cone_margin", kFeedbackMargin, request.options);
+  return request;
 }
 
 LoadedRobot loadRobotOf(const MotionSummary& summary) {
@@ -106,15 +113,15 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
                 const PredictiveOptions& predictive, Plan& plan) {
   const MotionSummary& summary = plan.summary;
   const Model& model = plan.getModel();
-  const auto makeStages = [&] {
-    MotionPlan stages = request.plan(model, makeStandingPosture(model));
+  const auto makeStages = [&](const MotionRequest& made) {
+    MotionPlan stages = made.plan(model, makeStandingPosture(model));
     fixTimings(summary.timings, summary.step, stages.schedule, stages.stages);
     return stages;
   };
   ProblemOptions options(summary.formulation, summary.step);
   options.limits = readLimits(summary);
   options.objective = summary.objective;
-  Motion motion = makeMotion(model, makeStages(), options);
+  Motion motion = makeMotion(model, makeStages(request), options);
   plan.ground = motion.ground;
   plan.schedule = motion.schedule;
   plan.goals = motion.goals;
@@ -127,12 +134,12 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
       std::make_unique<Policy>(is_known ? makePolicy(motion, motion.guess)
                                         : solvePolicy(summary.file, guess.empty(), control, motion, plan.iterations));
   if (control != PlanControl::Predictive) return;
-  freeFeet(plan.ground, request);
+  const MotionRequest freed = freeFeet(plan.ground, request);
   // A plan may be closer to a dead point than motors would let it come, or start from one: without a margin there is no stop.
   PredictiveOptions stopping = predictive;
   stopping.dead_point_stop = std::min(stopping.dead_point_stop, kStopShare * options.limits.dead_point_margin);
-  plan.predictive = std::make_unique<PredictiveController>(makePredictiveMotion(model, makeStages(), options, stopping),
-                                                           motion.guess, stopping);
+  plan.predictive = std::make_unique<PredictiveController>(
+      makePredictiveMotion(model, makeStages(freed), options, stopping), motion.guess, stopping);
 }
 
 void setModel(Belief belief, MotionSummary& summary) {
@@ -158,18 +165,13 @@ void finishBelief(Plan& plan) {
   plan.serial_controller = std::make_unique<SerialController>(plan.robot.model, *plan.serial, inner, plan.belief);
 }
 
-double getOption(const MotionRequest& request, const std::string& name) {
-  for (const OptionEntry& entry : request.options)
-    if (entry.name == name) return *entry.value;
-  return 0;
-}
-
 // As many steps as there is time for.
-void chooseSteps(double duration, const MotionRequest& request) {
-  const double step = getOption(request, "single_support") + getOption(request, "double_support");
-  const double rest = getOption(request, "start_support") + getOption(request, "end_support");
+void chooseSteps(double duration, OptionSet& options) {
+  const auto get = [&options](const char* name) { return options.find(name) ? options.get<double>(name) : 0; };
+  const double step = get("single_support") + get("double_support");
+  const double rest = get("start_support") + get("end_support");
   if (duration <= 0 || step <= 0) return;
-  setOption(request.options, "steps", std::max(2.0, std::floor((duration - rest) / step)));
+  options.set("steps", std::max(2.0, std::floor((duration - rest) / step)));
 }
 
 }  // namespace
@@ -196,11 +198,9 @@ std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control
 
 std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control, const PredictiveOptions& predictive) {
   auto plan = std::make_unique<Plan>();
-  const MotionRequest motion = findMotion("", request.motion).makeRequest();
-  const bool walks = std::any_of(motion.options.begin(), motion.options.end(),
-                                 [](const OptionEntry& entry) { return entry.name == "steps"; });
-  if (walks) chooseSteps(request.duration, motion);
-  for (const auto& [name, value] : request.settings) setOption(motion.options, name, value);
+  MotionRequest motion = findMotion("", request.motion).request;
+  if (motion.options.find("steps")) chooseSteps(request.duration, motion.options);
+  for (const auto& [name, value] : request.settings) motion.options.set(name, value);
   plan->robot = loadRobot(request.robot);
   MotionSummary& summary = plan->summary;
   summary.motion = request.motion;
@@ -209,7 +209,7 @@ std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control, 
   setModel(request.belief, summary);
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;
-  summary.options = listValues(motion.options);
+  summary.options = motion.options.listValues();
   makeBelief(request.belief, *plan);
   finishPlan(motion, "", control, predictive, *plan);
   finishBelief(*plan);

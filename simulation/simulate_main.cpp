@@ -40,8 +40,10 @@ std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
   PlanRequest request{
       arguments.directory, arguments.robot, {}, arguments.execution.duration, belief.value_or(Belief::Closed)};
   if (arguments.speed) request.settings.emplace_back("speed", *arguments.speed);
-  for (const std::string& setting : arguments.settings)
-    request.settings.push_back(parseSetting("--set", setting, "steps=8"));
+  for (const std::string& setting : arguments.settings) {
+    const auto [name, value] = splitSetting("--set", setting, "steps=8");
+    request.settings.emplace_back(name, parseOption(value));
+  }
   if (!arguments.commands.empty()) return makeCommandedPlan(request, arguments.commands, arguments.predictive);
   return makePlan(request, control, arguments.predictive);
 }

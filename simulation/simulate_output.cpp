@@ -123,7 +123,8 @@ Json makeSummary(const MotionResult& result, const SimulateArguments& arguments,
     summary["plan_reachable_until"] = plan.reference.first_missed < 0 ? nullptr : Json(plan.reference.first_missed);
   if (plan.predictive) summary["solves"] = listSolves(plan.predictive->getCounts());
   for (const auto& [name, value] : plan.summary.options)
-    if (name == "speed") summary["commanded_speed"] = value;
+    if (const double* speed = std::get_if<double>(&value); name == "speed" && speed)
+      summary["commanded_speed"] = *speed;
   if (!plan.commands.empty()) {
     summary["commanded_speed"] = calcMeanSpeed(plan.commands, e.duration);
     summary["commands"] = listCommands(plan.commands);

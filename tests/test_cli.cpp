@@ -62,7 +62,7 @@ TEST_CASE("help and version are on the standard output, with examples") {
   CHECK_THAT(run({"--version"}).out, Catch::Contains("bielle 0."));
   const std::string help = run({"solve", "squat", "--help"}).out;
   SquatOptions options;
-  for (const OptionEntry& option : listOptions(options)) {
+  for (const Option& option : listOptions(options)) {
     CHECK_THAT(help, Catch::Contains("\n  " + option.name + " ") && Catch::Contains("[" + option.unit + "]") &&
                          Catch::Contains(option.help));
   }
@@ -77,7 +77,7 @@ TEST_CASE("bad input is one line of error and status 2") {
   checkRefused(run({"info", "nobody"}), "robot 'nobody': there is no robot of this name");
   checkRefused(run({"info", "/no/such.urdf"}), "there is no such file");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "depht=0.7"})), "option 'depht'");
-  checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction"})), "name=number");
+  checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction"})), "name=value");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction=0.7m"})), "name=number");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction=nan"})), "not finite");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "depth=-1"})), "option 'depth'");

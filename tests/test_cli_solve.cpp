@@ -194,7 +194,7 @@ TEST_CASE("motions that miss their differences where a linkage is near its dead 
   const OutputDirectory directory;
   REQUIRE(run({"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--quiet", "--no-check"}).status == 0);
   const Model model = loadRobot("bipetto").model;
-  const MotionRequest request = findMotion("", "squat").makeRequest();
+  const MotionRequest& request = findMotion("", "squat").request;
   const MotionRecord record = directory.readTrajectory();
   const auto disturb = [&record](int node) {
     MotionRecord disturbed = record;

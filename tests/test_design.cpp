@@ -162,11 +162,12 @@ TEST_CASE("design: parameters of a generator") {
   DesignVariable variable;
   variable.name = "thigh", variable.parameter = "thigh_length", variable.lower = 0.05, variable.upper = 0.5;
   const Parametrization robot("cleobot", {}, {variable});
-  const GeneratorRequest request = findGenerator("cleobot").makeRequest();
+  const Generator& generator = findGenerator("cleobot");
+  OptionSet parameters = generator.parameters;
   const double length = robot.start()[0];
-  setParameter(request.parameters, "thigh_length", length * 1.02);
-  CHECK(formatRobot(robot.make(1.02 * robot.start())).urdf == formatRobot(request.make()).urdf);
-  CHECK(formatRobot(robot.make(robot.start())).urdf != formatRobot(request.make()).urdf);
+  parameters.set("thigh_length", length * 1.02);
+  CHECK(formatRobot(robot.make(1.02 * robot.start())).urdf == formatRobot(generator.make(parameters)).urdf);
+  CHECK(formatRobot(robot.make(robot.start())).urdf != formatRobot(generator.make(parameters)).urdf);
 }
 
 TEST_CASE("design: measures by hand") {

@@ -199,7 +199,7 @@ TEST_CASE("every robot comes back from Drake's URDF as the same mechanism, with 
 TEST_CASE("generated robots come back from Drake's URDF") {
   for (const Generator& generator : getGenerators()) {
     CAPTURE(generator.name);
-    const Model model = generator.makeRequest().make();
+    const Model model = generator.make(generator.parameters);
     checkDrakeRoundTrip(model, findClosedConfiguration(model).q);
   }
 }

@@ -201,7 +201,7 @@ TEST_CASE("solids: inertias by their own integrals") {
 TEST_CASE("generators: every body is possible, the loops close, mobility is what Gruebler counts") {
   for (const Generator& generator : getGenerators()) {
     CAPTURE(generator.name);
-    const Model model = generator.makeRequest().make();
+    const Model model = generator.make(generator.parameters);
     double mass = 0;
     for (int i = 1; i < model.numBodies(); ++i) {
       const Inertia& inertia = model.bodies()[i].inertia;
@@ -231,7 +231,7 @@ TEST_CASE("generators: every body is possible, the loops close, mobility is what
 TEST_CASE("generators: references are assembled with the angles that they give, and those of robots that come along") {
   for (const Generator& generator : getGenerators()) {
     CAPTURE(generator.name);
-    CHECK(checkReferences({generator.makeRequest().make(), {}, "", ""}).empty());
+    CHECK(checkReferences({generator.make(generator.parameters), {}, "", ""}).empty());
   }
   for (const std::string& name : listRobots()) {
     CAPTURE(name);
@@ -243,7 +243,7 @@ TEST_CASE("generators: references are assembled with the angles that they give, 
 TEST_CASE("generators: what comes along is what they write") {
   for (const Generator& generator : getGenerators()) {
     CAPTURE(generator.name);
-    const Model model = generator.makeRequest().make();
+    const Model model = generator.make(generator.parameters);
     const RobotText text = formatRobot(model, "Written by `bielle generate " + generator.name + "`.");
     checkSameText(readFile(kRobots + generator.name + "/" + generator.name + ".urdf"), text.urdf);
     checkSameText(readFile(kRobots + generator.name + "/" + generator.name + ".yaml"), text.yaml);
@@ -318,26 +318,32 @@ TEST_CASE("writer: names are escaped, what the files cannot say is refused") {
 TEST_CASE("generators: names stay when lengths change, bounds and names are checked") {
   for (const Generator& generator : getGenerators()) {
     CAPTURE(generator.name);
-    const Model model = generator.makeRequest().make();
-    const GeneratorRequest request = generator.makeRequest();
-    for (const Parameter& p : request.parameters) {
+    const Model model = generator.make(generator.parameters);
+    generator.parameters.check();
+    OptionSet parameters = generator.parameters;
+    for (const Option& p : generator.parameters) {
       CAPTURE(p.name);
-      CHECK(p.lower <= *p.value);
-      CHECK(*p.value <= p.upper);
       CHECK_FALSE(p.help.empty());
-      *p.value *= p.name == "count" || !p.choices.empty() ? 1 : 1.01;
+      if (const double* value = std::get_if<double>(&p.value)) parameters.set(p.name, 1.01 * *value);
     }
-    const Model other = request.make();
+    const Model other = generator.make(parameters);
     REQUIRE(other.numBodies() == model.numBodies());
     for (int i = 1; i < model.numBodies(); ++i) CHECK(other.joints()[i].name == model.joints()[i].name);
     for (int m = 0; m < model.nu(); ++m) CHECK(other.motors()[m].name == model.motors()[m].name);
     CHECK(other.mass() != model.mass());
-    const Parameter& first = request.parameters.front();
-    *first.value = first.upper + 1;
-    CHECK_THROWS_WITH(request.make(), Catch::Contains("parameter '" + first.name + "'"));
-    *first.value = std::numeric_limits<double>::quiet_NaN();
-    CHECK_THROWS_AS(request.make(), ModelError);
-    CHECK_THROWS_WITH(setParameter(request.parameters, "no_such", 1), Catch::Contains(first.name));
+    const auto is_number = [](const Option& p) { return std::holds_alternative<double>(p.value); };
+    const Option number = *std::find_if(parameters.begin(), parameters.end(), is_number);
+    for (const double beyond : {number.bounds.upper + 1, std::numeric_limits<double>::quiet_NaN()}) {
+      CHECK_THROWS_WITH(parameters.set(number.name, beyond), Catch::Contains("parameter '" + number.name + "'"));
+      OptionSet unchecked;
+      for (Option p : parameters) {
+        if (p.name == number.name) p.value = beyond;
+        unchecked.add(p);
+      }
+      CHECK_THROWS_WITH(generator.make(unchecked),
+                        Catch::Contains(generator.name + ": parameter '" + number.name + "'"));
+    }
+    CHECK_THROWS_WITH(parameters.set("no_such", 1), Catch::Contains(number.name));
   }
   CHECK_THROWS_WITH(findGenerator("no_such"), Catch::Contains("cleobot"));
 }
@@ -370,7 +376,7 @@ TEST_CASE("leg biped: eighteen combinations stand, move in 18 ways, and weigh wh
   const int rows_of_knee[] = {0, 1, 3}, rows_of_ankle[] = {0, 2, 6};
   const double bare = makeLegBiped([] {
                         LegBipedParameters p;
-                        p.knee = p.ankle = 0;
+                        p.knee = KneePart::Serial, p.ankle = AnklePart::Serial;
                         return p;
                       }())
                           .mass();
@@ -379,7 +385,8 @@ TEST_CASE("leg biped: eighteen combinations stand, move in 18 ways, and weigh wh
       for (int hip = 0; hip < 2; ++hip) {
         CAPTURE(knee, ankle, hip);
         LegBipedParameters p;
-        p.knee = knee, p.ankle = ankle, p.hip = hip;
+        p.knee = static_cast<KneePart>(knee), p.ankle = static_cast<AnklePart>(ankle),
+        p.hip = static_cast<HipPart>(hip);
         const Model model = makeLegBiped(p);
         CHECK(model.mass() - bare == Approx(2 * (of_knee[knee] + of_ankle[ankle])).margin(1e-12));
         CHECK(model.nu() == 12);
@@ -412,22 +419,16 @@ TEST_CASE("leg biped: eighteen combinations stand, move in 18 ways, and weigh wh
   const Eigen::Vector2d change = close(0.04, 1.2 + 1e-3) - close(0.04, 1.2 - 1e-3);
   CHECK(change[1] / change[0] == Approx(0.05 / 0.04).epsilon(0.01));
 
-  LegBipedParameters p;
-  p.knee = 1.5;
-  CHECK_THROWS_WITH(makeLegBiped(p),
-                    Catch::Contains("parameter 'knee'") && Catch::Contains("not the number of a choice"));
-  p.knee = 3;
-  CHECK_THROWS_WITH(makeLegBiped(p), Catch::Contains("outside 0 .. 2"));
-  const std::vector<Parameter> parameters = listParameters(p);
-  const auto found =
-      std::find_if(parameters.begin(), parameters.end(), [](const auto& q) { return q.name == "ankle"; });
-  CHECK(findChoice(*found, "rsu") == 2);
-  CHECK_THROWS_WITH(findChoice(*found, "belt"), Catch::Contains("serial, differential, rsu"));
+  OptionSet parameters = findGenerator("leg_biped").parameters;
+  parameters.set("ankle", "rsu");
+  CHECK(readOptions<LegBipedParameters>(parameters).ankle == AnklePart::Rsu);
+  CHECK_THROWS_WITH(parameters.set("ankle", "belt"), Catch::Contains("serial, differential, rsu"));
+  CHECK_THROWS_WITH(parameters.set("knee", 1), Catch::Contains("parameter 'knee'") && Catch::Contains("four_bar"));
 }
 
 TEST_CASE("leg biped: motors of a 3-RRS hip by spherical trigonometry, one to one in its middle posture") {
   LegBipedParameters p;
-  p.hip = 1, p.knee = p.ankle = 0;
+  p.hip = HipPart::ThreeRrs, p.knee = KneePart::Serial, p.ankle = AnklePart::Serial;
   const Model model = makeLegBiped(p);
   const auto getIndex = [&](const std::string& joint) { return model.joints()[model.findJoint(joint)].idx_q; };
   const char* const hinges[] = {"hipz", "hipx", "hipy"};

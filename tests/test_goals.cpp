@@ -199,7 +199,7 @@ TEST_CASE("goals: a walk, one backwards and a squat that goes up achieve what wa
 TEST_CASE("goals: a sequence has those of its motions, at their nodes") {
   SquatOptions squat;
   WalkOptions walk;
-  walk.gait.rigid_landing = 1;  // its impacts are stages too
+  walk.gait.rigid_landing = true;  // its impacts are stages too
   const auto planBoth = [&](const Model& model, const VectorXd& q0) {
     return planSequence(model,
                         {{"squat", [&](const Model& m, const VectorXd& q) { return planSquat(m, squat, q); }},

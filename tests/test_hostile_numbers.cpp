@@ -16,6 +16,7 @@
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
 #include "bielle/robots/fourbar_chain.h"
+#include "change_option.h"
 #include "infinity.h"
 #include "mechanisms.h"
 
@@ -282,24 +283,23 @@ template <typename Options>
 void tryMotion(Random& rng, const Model& model, Motion (*make)(const Model&, const Options&, const ProblemOptions&),
                int& solved, int& refused) {
   Options options;
-  const std::vector<OptionEntry> entries = listOptions(options);
-  for (const OptionEntry& entry : entries) {  // few stages where nothing else is requested
-    if (entry.name == "time_step") *entry.value = 0.03;
-    if (entry.name == "duration") *entry.value = 0.3;
-    if (entry.name == "settle" || entry.name == "stand") *entry.value = 0.1;
-    if (entry.name == "steps") *entry.value = 2;
-    if (entry.name == "stairs") *entry.value = 1;
-  }
+  const OptionValues values = listOptions(options).listValues();
+  const std::pair<const char*, double> few[] = {{"time_step", 0.03}, {"duration", 0.3}, {"settle", 0.1},
+                                                {"stand", 0.1},      {"steps", 2},      {"stairs", 1}};
+  for (const auto& [name, value] : few)  // stages, where nothing else is requested
+    if (listOptions(options).find(name)) options = changeOption(options, name, value);
+  std::vector<std::pair<std::string, double>> changes;
   std::string changed;
   for (int i = 0; i < 2; ++i) {
-    const OptionEntry& entry = entries[choose(rng, static_cast<int>(entries.size()))];
-    *entry.value = pick(rng, {0.0, -1.0, 1e-300, 1e-9, 10.0, 1e9, 1e300, -1e300, kInf, std::nan("")});
-    changed += entry.name + "=" + std::to_string(*entry.value) + " ";
+    const std::string& name = values[choose(rng, static_cast<int>(values.size()))].first;
+    changes.emplace_back(name, pick(rng, {0.0, -1.0, 1e-300, 1e-9, 10.0, 1e9, 1e300, -1e300, kInf, std::nan("")}));
+    changed += name + "=" + std::to_string(changes.back().second) + " ";
   }
   ProblemOptions problem;
   problem.formulation = pick(rng, {Formulation::Full, Formulation::Reduced});
   CAPTURE(changed, getName(problem.formulation));
   try {
+    for (const auto& [name, value] : changes) options = changeOption(options, name, value);
     Motion motion = make(model, options, problem);
     if (motion.problem->numStages() > 500) return;  // allowed, and too long for here
     FddpOptions solver;

@@ -6,6 +6,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
+#include "change_option.h"
 #include "own_robots.h"
 
 using namespace bielle;
@@ -221,9 +222,7 @@ TEST_CASE("jump: what no leg can do does not pass for done, and stays finite") {
 
 TEST_CASE("jump: impossible options are refused by name") {
   const auto make = [&](const std::string& option, double value) {
-    JumpOptions options;
-    setOption(listOptions(options), option, value);
-    return makeJump(getBipetto(), options);
+    return makeJump(getBipetto(), changeOption(JumpOptions(), option, value));
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK_NOTHROW(make("stand", 0));

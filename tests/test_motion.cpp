@@ -10,6 +10,7 @@
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
+#include "change_option.h"
 #include "motion/benchmark_walk.h"
 #include "own_robots.h"
 #include "problem_probe.h"
@@ -114,9 +115,7 @@ TEST_CASE("a leg on a rail squats and jumps, and comes to rest") {
 TEST_CASE("squat: impossible options are refused, unknown ones are named") {
   const Model model = loadOwn("bipetto").model;
   const auto make = [&](const std::string& option, double value) {
-    SquatOptions options;
-    setOption(listOptions(options), option, value);
-    return makeSquat(model, options);
+    return makeSquat(model, changeOption(SquatOptions(), option, value));
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK_NOTHROW(make("depth", 0.8));

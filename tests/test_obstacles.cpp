@@ -4,6 +4,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/footholds.h"
 #include "bielle/motion/obstacles.h"
+#include "change_option.h"
 #include "measure_steps.h"
 #include "own_robots.h"
 #include "robot_directory.h"
@@ -109,7 +110,7 @@ TEST_CASE("footholds: a file's errors name the entry, impossible steps their num
 
 TEST_CASE("box: Bipetto steps onto it and down again") {
   BoxOptions options;
-  options.down = 1;
+  options.down = true;
   Motion motion = makeBox(getBipetto(), options);
   checkGround(motion);
   const Goal& height = motion.goals.at(0);
@@ -141,10 +142,8 @@ TEST_CASE("gap: the ground is missing where it was requested, and no foot stands
 
 TEST_CASE("box, gap: what cannot be done is refused by name") {
   const auto make = [](bool box, const std::string& option, double value) {
-    BoxOptions on;
-    GapOptions over;
-    setOption(box ? listOptions(on) : listOptions(over), option, value);
-    box ? makeBox(getBipetto(), on) : makeGap(getBipetto(), over);
+    box ? makeBox(getBipetto(), changeOption(BoxOptions(), option, value))
+        : makeGap(getBipetto(), changeOption(GapOptions(), option, value));
   };
   for (const auto& [box, option, value, word] :
        std::vector<std::tuple<bool, std::string, double, std::string>>{{true, "height", 0.6, "reach"},

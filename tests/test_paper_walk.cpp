@@ -12,6 +12,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
 #include "bielle/solve/fddp.h"
+#include "change_option.h"
 #include "problem_probe.h"
 #include "published_robots.h"
 
@@ -228,8 +229,8 @@ TEST_CASE("the paper's walk: a wrong weight is noticed") {
   for (const char* name : {"state_weight", "torso_weight", "control_weight", "com_height_weight", "com_velocity_weight",
                            "force_weight", "pressure_weight", "speed", "contact_kd", "contact_kp", "closure_kd"})
     expectNotice(name, [name](WalkOptions& options) {
-      for (OptionEntry& entry : listOptions(options))
-        if (entry.name == name) *entry.value = *entry.value == 0 ? 1 : 1.001 * *entry.value;
+      const double value = listOptions(options).get<double>(name);
+      options = changeOption(options, name, value == 0 ? 1 : 1.001 * value);
     });
   for (double PaperWeights::*weight :
        {&PaperWeights::fly_high, &PaperWeights::fly_high_slope, &PaperWeights::feet_distance,

@@ -231,14 +231,15 @@ namespace {
 // Bipeds of every hip, knee and ankle.
 std::vector<Model> makeLegBipeds() {
   std::vector<Model> models;
-  for (const double hip : {0, 1})
-    for (const double knee : {0, 1, 2})
-      for (const double ankle : {0, 1, 2}) {
-        const GeneratorRequest request = findGenerator("leg_biped").makeRequest();
-        setParameter(request.parameters, "hip", hip);
-        setParameter(request.parameters, "knee", knee);
-        setParameter(request.parameters, "ankle", ankle);
-        models.push_back(request.make());
+  const Generator& generator = findGenerator("leg_biped");
+  OptionSet parameters = generator.parameters;
+  for (const std::string& hip : generator.parameters.get("hip").choices)
+    for (const std::string& knee : generator.parameters.get("knee").choices)
+      for (const std::string& ankle : generator.parameters.get("ankle").choices) {
+        parameters.set("hip", hip);
+        parameters.set("knee", knee);
+        parameters.set("ankle", ankle);
+        models.push_back(generator.make(parameters));
       }
   return models;
 }

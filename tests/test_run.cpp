@@ -4,6 +4,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/motion/run.h"
+#include "change_option.h"
 #include "measure_steps.h"
 #include "motion/gait.h"
 #include "motion/quintic.h"
@@ -145,7 +146,7 @@ TEST_CASE("run, hop: which foot stands when") {
   run.steps = 8;
   CHECK(planRun(getBipetto(), run, makeStandingPosture(getBipetto())).goals.front().kind == GoalKind::Speed);
   HopOptions hop;
-  hop.foot = 1;
+  hop.foot = Side::Right;
   hop.hops = 2;
   hop.length = 0.1;
   const MotionPlan hops = planHop(getBipetto(), hop, makeStandingPosture(getBipetto()));
@@ -223,8 +224,8 @@ TEST_CASE("run: Bipetto runs as fast as requested, flies in between, and lands s
 }
 
 TEST_CASE("hop: Bipetto hops on the requested foot, and ahead") {
-  for (const auto& [foot, length] : {std::pair(0.0, 0.0), std::pair(1.0, 0.15)}) {
-    CAPTURE(foot, length);
+  for (const auto& [foot, length] : {std::pair(Side::Left, 0.0), std::pair(Side::Right, 0.15)}) {
+    CAPTURE(getName(foot), length);
     HopOptions options;
     options.foot = foot;
     options.length = length;
@@ -239,10 +240,8 @@ TEST_CASE("hop: Bipetto hops on the requested foot, and ahead") {
 
 TEST_CASE("run, hop: what cannot be done is refused by name") {
   const auto make = [](bool run, const std::string& option, double value) {
-    RunOptions running;
-    HopOptions hopping;
-    setOption(run ? listOptions(running) : listOptions(hopping), option, value);
-    run ? makeRun(getBipetto(), running) : makeHop(getBipetto(), hopping);
+    run ? makeRun(getBipetto(), changeOption(RunOptions(), option, value))
+        : makeHop(getBipetto(), changeOption(HopOptions(), option, value));
   };
   for (const auto& [run, option, value, word] :
        std::vector<std::tuple<bool, std::string, double, std::string>>{{true, "speed", 5, "reach"},

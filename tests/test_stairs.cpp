@@ -3,6 +3,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/motion/stairs.h"
+#include "change_option.h"
 #include "measure_steps.h"
 #include "own_robots.h"
 
@@ -60,9 +61,7 @@ TEST_CASE("stairs: the ground is where it was requested") {
 
 TEST_CASE("stairs: what cannot be done is refused by name") {
   const auto make = [](const std::string& option, double value) {
-    StairsOptions options;
-    setOption(listOptions(options), option, value);
-    return makeStairs(getBipetto(), options);
+    return makeStairs(getBipetto(), changeOption(StairsOptions(), option, value));
   };
   for (const auto& [option, value, word] :
        std::vector<std::tuple<std::string, double, std::string>>{{"height", 0.6, "reach"},

@@ -6,6 +6,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
+#include "change_option.h"
 #include "measure_steps.h"
 #include "motion/gait.h"
 #include "own_robots.h"
@@ -291,7 +292,7 @@ TEST_CASE("walk: feet that have room land near their footholds, and stand where 
 TEST_CASE("walk: feet that come down strike within the cone of friction") {
   WalkOptions walk;
   walk.steps = 2;
-  walk.gait.rigid_landing = 1;
+  walk.gait.rigid_landing = true;
   walk.gait.landing_speed = 0.05;
   walk.gait.friction = 0.35;
   const Model& model = getBipetto();
@@ -341,7 +342,7 @@ TEST_CASE("walk: feet that come down strike within the cone of friction") {
           stage.path_constraints.end());
   CHECK(strike(slippery, Formulation::Reduced) > 0.35);
 
-  walk.gait.rigid_landing = 0;
+  walk.gait.rigid_landing = false;
   CHECK_THROWS_WITH(planWalk(model, walk, makeStandingPosture(model)), Catch::Contains("landing_speed"));
 }
 
@@ -397,9 +398,7 @@ TEST_CASE("walk: it is called infeasible after two attempts") {
 
 TEST_CASE("walk: what cannot be done is refused by name") {
   const auto make = [](const std::string& option, double value) {
-    WalkOptions options;
-    setOption(listOptions(options), option, value);
-    return makeWalk(getBipetto(), options);
+    return makeWalk(getBipetto(), changeOption(WalkOptions(), option, value));
   };
   CHECK_NOTHROW(make("speed", -0.3));
   for (const auto& [option, value, word] :

@@ -10,7 +10,7 @@ from common import show
 
 STAIRS = ["--stairs", 4]
 STONES = common.SOURCE / "examples/stones.yaml"
-RIGID = ["--set", "rigid_landing=1"]
+RIGID = ["--set", "rigid_landing=true"]
 SOFT = [*RIGID, "--set", "landing_speed=0.05"]
 # Title, robot, motion, options.
 SQUATS = [(f"{depth}", "bipetto", "squat", ["--depth", depth]) for depth in (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.15, 1.2)]
@@ -56,7 +56,7 @@ UNEVEN = [(title if robot == "bipetto" else "Cleobot, " + title, robot, motion, 
           for robot in ("bipetto", "cleobot")
           for title, motion, options in [
               ("stones of `examples/stones.yaml`", "footholds", ["--footholds", STONES]),
-              ("box of 10 cm, up and down", "box", ["--height", 0.1, "--down", 1]),
+              ("box of 10 cm, up and down", "box", ["--height", 0.1, "--down"]),
               ("box of 15 cm", "box", ["--height", 0.15]),
               ("gap of 30 cm", "gap", ["--width", 0.3])]]
 FREE = [

@@ -53,7 +53,7 @@ def solve_request(
 def solve_sequence(
     robot: Union[str, Robot],
     sequence: Iterable[str],
-    options: Mapping[str, float] = {},
+    options: Mapping[str, Union[bool, float, str]] = {},
     problem: ProblemOptions = ProblemOptions(),
     solver: SolverOptions = SolverOptions(),
     warm_start: Optional[WarmStart] = None,
@@ -77,9 +77,7 @@ def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Resu
             raise TypeError(f"{name} has no option '{sorted(unknown)[0]}'; it has: {', '.join(options)}")
         request = Request(
             motion=motion,
-            options={
-                key: _get_number(key, value, options[key]["names"]) for key, value in keywords.items() if key in options
-            },
+            options={key: value for key, value in keywords.items() if key in options},
             files={key: str(value) for key, value in keywords.items() if key in files},
             weights=keywords.get("weights", ""),
         )
@@ -88,7 +86,7 @@ def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Resu
     name = "solve_" + motion.replace("-", "_")
     function.__name__ = function.__qualname__ = name
     function.__module__ = "bielle"
-    lines = [f"    {key}: {o['help']} [{o['unit']}], default {o['default']:g}" for key, o in options.items()]
+    lines = [f"    {key}: {o['help']} [{o['unit'] or ' or '.join(o['choices']) or 'bool'}], default {o['default']}" for key, o in options.items()]
     lines += [f"    {key}: path of a file" for key in files]
     lines += [f"    weights: {' or '.join(map(repr, presets))}"] if presets else []
     function.__doc__ = described["help"] + ".\n" + _COMMON + "\n".join(lines) + "\n"
@@ -101,15 +99,6 @@ def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Resu
         + [inspect.Parameter(key, keyword, default=None) for key in common]
     )
     return function
-
-
-def _get_number(option: str, value: Any, names: List[str]) -> float:
-    """The number of an option, which may be a choice by name."""
-    if isinstance(value, str):
-        if value not in names:
-            raise ValueError(f"{option}: expected {', '.join(map(repr, names)) or 'a number'}, got {value!r}")
-        return float(list(names).index(value))
-    return float(value)
 
 
 FUNCTIONS: Dict[str, Callable[..., Result]] = {}

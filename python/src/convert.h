@@ -2,13 +2,16 @@
 /// \file How members of structs appear in Python: `show` makes the Python object, a view where there is memory to view,
 /// `read` takes one, `same` compares two members, `type` is what stubs call their type.
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "arrays.h"
+#include "bielle/model/options.h"
 
 namespace bielle::python {
 
@@ -133,6 +136,36 @@ struct Convert<std::array<E, N>> {
     return List::same({a.begin(), a.end()}, {b.begin(), b.end()});
   }
 };
+
+/// As Python has it: bool, int, float or str.
+template <>
+struct Convert<OptionValue> {
+  static std::string type() { return "Union[bool, int, float, str]"; }
+  static py::object show(const OptionValue& member, py::handle) {
+    return std::visit([](const auto& value) -> py::object { return py::cast(value); }, member);
+  }
+  static OptionValue read(py::handle value, const std::string& what) {
+    if (py::isinstance<py::bool_>(value)) return value.cast<bool>();
+    if (py::isinstance<py::str>(value)) return value.cast<std::string>();
+    const double number = Convert<double>::read(value, what);
+    if (PyIndex_Check(value.ptr()) && std::abs(number) <= std::numeric_limits<int>::max())
+      return static_cast<int>(number);
+    return number;
+  }
+  static bool same(const OptionValue& a, const OptionValue& b) { return a == b; }
+};
+
+/// An entry of `motions` and of `generators`.
+inline py::dict describeOption(const Option& option) {
+  py::dict out;
+  out["default"] = Convert<OptionValue>::show(option.value, {});
+  out["unit"] = option.unit;
+  out["lower"] = option.bounds.lower;
+  out["upper"] = option.bounds.upper;
+  out["help"] = option.help;
+  out["choices"] = Convert<std::vector<std::string>>::show(option.choices, {});
+  return out;
+}
 
 /// Things by name, in order: a dictionary.
 template <typename Named>

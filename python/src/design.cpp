@@ -15,7 +15,7 @@ namespace {
 struct HeldParametrization {
   std::shared_ptr<Model> given;  // or
   std::string generator;         // with
-  std::vector<std::pair<std::string, double>> settings;
+  OptionValues settings;
   Parametrization robot;
 };
 
@@ -26,7 +26,7 @@ std::shared_ptr<HeldParametrization> parametrizeGiven(const std::shared_ptr<Mode
 
 std::shared_ptr<HeldParametrization> parametrizeGenerated(const std::string& generator,
                                                           const std::vector<DesignVariable>& variables,
-                                                          const std::vector<std::pair<std::string, double>>& settings) {
+                                                          const OptionValues& settings) {
   return std::make_shared<HeldParametrization>(
       HeldParametrization{nullptr, generator, settings, Parametrization(generator, settings, variables)});
 }
@@ -118,7 +118,7 @@ void bindParametrization(py::module_& module) {
   type.def(py::init(&parametrizeGiven), py::arg("model"), py::arg("variables"),
            "Raises ModelError for unknown names, places on different bodies, bounds that exclude the model.")
       .def_static("generated", &parametrizeGenerated, py::arg("generator"), py::arg("variables"),
-                  py::arg("settings") = std::vector<std::pair<std::string, double>>(),
+                  py::arg("settings") = OptionValues(),
                   "Parametrizes a generator (see `generators`); settings: its other parameters by name and value.")
       .def_property_readonly(
           "variables", [](const HeldParametrization& p) { return show(p.robot.variables(), py::cast(p)); },
@@ -154,7 +154,7 @@ void bindParametrization(py::module_& module) {
             const auto variables = read<std::vector<DesignVariable>>(state[3], "variables");
             if (!state[0].is_none()) return parametrizeGiven(state[0].cast<std::shared_ptr<Model>>(), variables);
             return parametrizeGenerated(state[1].cast<std::string>(), variables,
-                                        read<std::vector<std::pair<std::string, double>>>(state[2], "settings"));
+                                        read<OptionValues>(state[2], "settings"));
           }));
 }
 

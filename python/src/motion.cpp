@@ -12,22 +12,20 @@
 namespace bielle::python {
 
 MotionRequest Request::make() const {
-  MotionRequest request = sequence.empty() ? findMotion("", motion).makeRequest() : makeSequenceRequest(sequence);
+  MotionRequest request = sequence.empty() ? findMotion("", motion).request : makeSequenceRequest(sequence);
   if (!weights.empty()) {
     const auto preset = std::find_if(request.presets.begin(), request.presets.end(),
                                      [this](const MotionPreset& p) { return p.name == weights; });
     if (preset == request.presets.end())
       throw ModelError("", "weights '" + weights + "'", "motion '" + motion + "' has no weights of this name",
                        request.presets.empty() ? "leave them out" : "choose '" + request.presets.front().name + "'");
-    preset->apply();
+    preset->apply(request);
   }
-  for (const auto& [name, value] : options) setOption(request.options, name, value);
-  for (const OptionEntry& option : request.options)
-    requireOption(std::isfinite(*option.value), option.name, "it is not finite", "give a number");
-  for (const MotionFile& file : request.files) {
+  for (const auto& [name, value] : options) request.options.set(name, value);
+  for (const MotionFile& file : std::vector<MotionFile>(request.files)) {
     if (!files.count(file.name))
       throw ModelError("", "file '" + file.name + "'", "motion '" + motion + "' needs it", "give a path: " + file.help);
-    file.read(files.at(file.name));
+    file.read(files.at(file.name), request);
   }
   return request;
 }
@@ -224,7 +222,7 @@ py::dict getCosts(const HeldMotion& held, int node) {
 void bindRequests(py::module_& module) {
   Value<Request>(module, "Request", "A motion by name, with its options: the input of `bielle solve`.")
       .field("motion", &Request::motion, "name, one of `motions`; empty for a sequence")
-      .field("options", &Request::options, "numbers by name")
+      .field("options", &Request::options, "values by name: bool, int, float, or the name of a choice")
       .field("sequence", &Request::sequence, "names of motions that follow one another; options are \"NAME.option\"")
       .field("weights", &Request::weights, "name of a preset, e.g. \"paper\"; or empty")
       .field("files", &Request::files, "paths by name, e.g. \"footholds\"");
@@ -233,16 +231,9 @@ void bindRequests(py::module_& module) {
       [] {
         py::dict out;
         for (const MotionEntry& entry : getMotions()) {
-          const MotionRequest request = entry.makeRequest();
+          const MotionRequest& request = entry.request;
           py::dict options;
-          for (const OptionEntry& option : request.options) {
-            py::dict described;
-            described["default"] = *option.value;
-            described["unit"] = option.unit;
-            described["help"] = option.help;
-            described["names"] = show(option.names, {});
-            options[py::str(option.name)] = described;
-          }
+          for (const Option& option : request.options) options[py::str(option.name)] = describeOption(option);
           py::dict motion;
           motion["help"] = entry.help;
           motion["options"] = options;

@@ -14,7 +14,7 @@ namespace bielle::python {
 struct Request {
   std::string motion;                     // of the registry; of a sequence empty
   std::vector<std::string> sequence;      // names of its motions
-  std::map<std::string, double> options;  // by name
+  std::map<std::string, OptionValue> options;  // by name
   std::string weights;                    // name of a preset, or empty
   std::map<std::string, std::string> files;
 

@@ -23,11 +23,12 @@ Robot load(const std::string& name, const std::optional<std::string>& base) {
   return {name, std::make_shared<Model>(std::move(loaded.model)), loaded.file, loaded.directory, loaded.warnings};
 }
 
-Robot generate(const std::string& name, const std::string& directory, const std::map<std::string, double>& parameters) {
-  const GeneratorRequest request = findGenerator(name).makeRequest();
-  for (const auto& [parameter, value] : parameters) setParameter(request.parameters, parameter, value);
-  checkParameters(name, request.parameters);
-  auto model = std::make_shared<Model>(request.make());
+Robot generate(const std::string& name, const std::string& directory,
+               const std::map<std::string, OptionValue>& parameters) {
+  const Generator& generator = findGenerator(name);
+  OptionSet options = generator.parameters;
+  for (const auto& [parameter, value] : parameters) options.set(parameter, value);
+  auto model = std::make_shared<Model>(generator.make(options));
   if (directory.empty()) return {name, std::move(model), "", "", {}};
   writeRobot(*model, directory);
   return load(directory, {});
@@ -37,16 +38,7 @@ py::dict describeGenerators() {
   py::dict out;
   for (const Generator& generator : getGenerators()) {
     py::dict parameters;
-    const GeneratorRequest request = generator.makeRequest();
-    for (const Parameter& p : request.parameters) {
-      py::dict parameter;
-      parameter["default"] = *p.value;
-      parameter["unit"] = p.unit;
-      parameter["lower"] = p.lower;
-      parameter["upper"] = p.upper;
-      parameter["help"] = p.help;
-      parameters[py::str(p.name)] = parameter;
-    }
+    for (const Option& p : generator.parameters) parameters[py::str(p.name)] = describeOption(p);
     out[py::str(generator.name)] = parameters;
   }
   return out;
@@ -94,13 +86,14 @@ void bindRobots(py::module_& module) {
   module.def(
       "generate_robot",
       [](const std::string& name, const std::string& directory, const py::kwargs& parameters) {
-        const auto values = read<std::map<std::string, double>>(parameters, "parameters");
+        const auto values = read<std::map<std::string, OptionValue>>(parameters, "parameters");
         const py::gil_scoped_release release;
         return generate(name, directory, values);
       },
       py::arg("name"), py::arg("directory") = "",
       "Makes a robot from named lengths, angles and masses (see `generators`), with files if a directory is given.");
-  module.def("generators", &describeGenerators, "Parameters of every generator by name: default, unit, bounds, help.");
+  module.def("generators", &describeGenerators,
+             "Parameters of every generator by name: default, unit, bounds, help, choices.");
   module.def("list_robots", &listRobots, "Names of the robots that can be loaded by name.");
   module.def("robot_directories", &getRobotDirectories, "Where robots are looked up by name.");
 }

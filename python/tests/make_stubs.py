@@ -23,7 +23,7 @@ RESULTS = {
     "Model.impact_derivatives": "ImpactDerivatives", "Model.mobility": "Dict[str, Any]", "Controller.counts": "Dict[str, int]",
     "Controller.reference": "Tuple[Array, Array]", "World.reset": "WorldState", "World.step": "WorldState",
     "World.count": "Optional[int]", "generators": "Dict[str, Dict[str, Dict[str, Any]]]", "motions": "Dict[str, Dict[str, Any]]",
-    "Motion.goals": "Tuple[Goal, ...]", "Motion.options": "Dict[str, float]",
+    "Motion.goals": "Tuple[Goal, ...]", "Motion.options": "Dict[str, Union[bool, int, float, str]]",
     "Model.shape_pairs": "List[Tuple[int, int, bool]]", "Model.joint_forces": "Tuple[JointForce, ...]", "Model.point_springs": "Tuple[PointSpring, ...]",
     "Motion.request": "Optional[Request]", "Motion.summary": "Optional[Summary]", "Robot.info": "Dict[str, Any]",
     "Parametrization.variables": "Tuple[DesignVariable, ...]", "Estimator.contacts": "Dict[str, bool]", "Motion.costs": "Dict[str, float]", "LibraryResidual.origin": "Optional[Tuple[str, Tuple[Any, ...]]]",
@@ -202,11 +202,11 @@ def make_motions():
              "Callback = Callable[[Iteration], Optional[bool]]", "WarmStart = Union[str, Record, Result]",
              "FUNCTIONS: Dict[str, Callable[..., Result]]", f"__all__ = {names!r}", "",
              f"def solve_request(robot: Union[str, Robot], request: Request, {COMMON}) -> Result: ...",
-             "def solve_sequence(robot: Union[str, Robot], sequence: Iterable[str], options: Mapping[str, float] = ..., "
+             "def solve_sequence(robot: Union[str, Robot], sequence: Iterable[str], options: Mapping[str, Union[bool, float, str]] = ..., "
              f"{COMMON}) -> Result: ..."]  # fmt: skip
     for name, motion in bielle.motions().items():
         function = getattr(bielle, "solve_" + name.replace("-", "_"))
-        options = [f"{key}: {'Union[str, float]' if o['names'] else 'float'} = ..." for key, o in motion["options"].items()]
+        options = [f"{key}: {type(o['default']).__name__} = ..." for key, o in motion["options"].items()]
         options += [f"{key}: str" for key in motion["files"]] + (["weights: str = ..."] if motion["weights"] else [])
         lines += ["", f"def {function.__name__}(robot: Union[str, Robot], *, {', '.join(options)}, {COMMON}) -> Result:"]
         lines += make_doc(function.__doc__, "    ") + ["    ..."]

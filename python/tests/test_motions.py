@@ -52,8 +52,14 @@ def test_options_are_those_of_the_registry(robot):
     with pytest.raises(bielle.ModelError) as caught:
         bielle.solve_squat(robot, depth=-1)
     assert "depth" in caught.value.element
-    with pytest.raises(ValueError, match="foot: expected 'left', 'right'"):
+    with pytest.raises(bielle.ModelError, match="option 'foot': 'middle' is not one of its choices; .*left, right"):
         bielle.solve_hop(robot, foot="middle")
+    with pytest.raises(bielle.ModelError, match="option 'steps': it is not a whole number"):
+        bielle.solve_walk(robot, steps=2.5)
+    with pytest.raises(bielle.ModelError, match="option 'rigid_landing': .*true or false"):
+        bielle.solve_walk(robot, rigid_landing=1)
+    defaults = {name: option["default"] for name, option in bielle.motions()["hop"]["options"].items()}
+    assert defaults["foot"] == "left" and defaults["hops"] == 1 and defaults["rigid_landing"] is False
 
 
 def test_threads_do_not_matter(robot, squat):

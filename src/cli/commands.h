@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "bielle/model/options.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
 
@@ -55,8 +56,8 @@ struct RobotArgument {
 std::vector<std::string> listFiles(const LoadedRobot& robot);
 void addFixedBase(CLI::App& command, RobotArgument& robot);
 
-// An option of a motion: a number, or a choice by name.
-void addOption(CLI::App& command, const OptionEntry& option);
+// An option by its own flag. \param set  receives what the command line gives
+void addOption(CLI::App& command, const Option& option, const std::function<void(const OptionValue&)>& set);
 
 // Sets the command line that results record.
 void setCommandLine(int argc, char** argv);

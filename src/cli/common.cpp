@@ -40,21 +40,19 @@ void addFixedBase(CLI::App& command, RobotArgument& robot) {
   command.add_flag("--fixed-base", robot.fixed_base, "fix the root link to the ground");
 }
 
-void addOption(CLI::App& command, const OptionEntry& option) {
-  if (option.names.empty()) {
-    command.add_option(makeFlag(option.name), *option.value, option.help + " [" + option.unit + "]")
-        ->capture_default_str();
+void addOption(CLI::App& command, const Option& option, const std::function<void(const OptionValue&)>& set) {
+  const std::string flag = makeFlag(option.name);
+  if (std::holds_alternative<bool>(option.value)) {
+    command.add_flag_callback(
+        flag, [set] { set(true); }, option.help);
     return;
   }
-  command
-      .add_option_function<std::string>(
-          makeFlag(option.name),
-          [option](const std::string& name) {
-            *option.value = std::find(option.names.begin(), option.names.end(), name) - option.names.begin();
-          },
-          option.help)
-      ->check(CLI::IsMember(option.names))
-      ->default_str(option.names.at(static_cast<size_t>(*option.value)));
+  CLI::Option* added = command.add_option_function<std::string>(
+      flag, [set](const std::string& text) { set(parseOption(text)); },
+      option.help + (option.unit.empty() ? "" : " [" + option.unit + "]"));
+  added->default_str(formatOption(option.value));
+  if (!option.unit.empty()) added->type_name(std::holds_alternative<int>(option.value) ? "INT" : "FLOAT");
+  if (!option.choices.empty()) added->check(CLI::IsMember(option.choices));
 }
 
 void setCommandLine(int argc, char** argv) { command_line.assign(argv, argv + argc); }

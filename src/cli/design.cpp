@@ -25,22 +25,15 @@ struct DesignArguments {
   TaskArguments tasks;
 };
 
-// Every call makes its own request, because several threads make plans.
 DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion) {
-  const auto make = [file, motion] {
-    const MotionRequest request = findMotion(file, motion.motion).makeRequest();
-    for (const auto& [name, value] : motion.settings) setOption(request.options, name, value);
-    return request;
-  };
-  make();  // names are checked now
-  const auto make_usual = [file, motion] {
-    const MotionRequest request = findMotion(file, motion.motion).makeRequest();
-    for (const auto& [name, value] : motion.settings)
-      if (name != "time_step") setOption(request.options, name, value);
-    return request;
-  };
-  return {motion.motion, [make](const Model& model, const VectorXd& q0) { return make().plan(model, q0); },
-          motion.weight, motion.payload, make_usual};
+  MotionRequest request = findMotion(file, motion.motion).request;
+  MotionRequest usual = request;
+  for (const auto& [name, value] : motion.settings) {
+    request.options.set(name, value);
+    if (name != "time_step") usual.options.set(name, value);
+  }
+  return {motion.motion, [request](const Model& model, const VectorXd& q0) { return request.plan(model, q0); },
+          motion.weight, motion.payload, usual};
 }
 
 // One design, for others that search.

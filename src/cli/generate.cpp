@@ -18,41 +18,25 @@ struct GenerateArguments {
   std::string directory;
 };
 
-std::string formatRange(const Parameter& p) {
-  if (p.choices.empty()) return formatNumber(p.lower) + " .. " + formatNumber(p.upper);
-  std::string text;
-  for (const std::string& choice : p.choices) text += (text.empty() ? "" : ", ") + choice;
-  return text;
-}
-
-// name=number, or the name of a choice.
-std::pair<std::string, double> readSetting(const std::vector<Parameter>& parameters, const std::string& setting) {
-  const size_t equals = setting.find('=');
-  for (const Parameter& p : parameters)
-    if (!p.choices.empty() && setting.substr(0, equals) == p.name && equals != std::string::npos)
-      return {p.name, findChoice(p, setting.substr(equals + 1))};
-  return parseSetting("--set", setting, parameters.front().name + "=0.1");
-}
-
 std::string formatParameters(const Generator& generator) {
   std::vector<Row> rows;
-  for (const Parameter& p : generator.makeRequest().parameters)
-    rows.push_back({p.name, p.choices.empty() ? formatNumber(*p.value) : p.choices[static_cast<size_t>(*p.value)],
-                    p.choices.empty() ? "[" + p.unit + "]" : "", formatRange(p), p.help});
+  for (const Option& p : generator.parameters)
+    rows.push_back(
+        {p.name, formatOption(p.value), p.unit.empty() ? "" : "[" + p.unit + "]", p.describeValues(), p.help});
   std::ostringstream text;
   printTable(text, rows);
   return text.str();
 }
 
 int generate(const Generator& generator, const GenerateArguments& arguments) {
-  const GeneratorRequest request = generator.makeRequest();
+  OptionSet parameters = generator.parameters;
   std::string changes;
   for (const std::string& setting : arguments.settings) {
-    const auto [name, value] = readSetting(request.parameters, setting);
-    setParameter(request.parameters, name, value);
+    const auto [name, value] = splitSetting("--set", setting, generator.parameters.begin()->name + "=0.1");
+    parameters.set(name, parseOption(value));
     changes += (changes.empty() ? " with " : ", ") + setting;
   }
-  const Model model = request.make();
+  const Model model = generator.make(parameters);
   writeRobot(model, arguments.directory, "Written by `bielle generate " + generator.name + "`" + changes + ".");
   std::cout << model.name() << ": " << formatNumber(model.mass()) << " kg, nv " << model.nv() << ", " << model.nu()
             << " motors, " << model.closures().size() << " closures\n  " << arguments.directory << "\n";

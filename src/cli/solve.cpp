@@ -55,9 +55,9 @@ LimitOptions makeLimits(const SolveArguments& arguments) {
 
 std::string formatOptionList(const MotionEntry& motion) {
   std::vector<Row> rows;
-  const MotionRequest request = motion.makeRequest();
-  for (const OptionEntry& option : request.options)
-    rows.push_back({option.name, formatNumber(*option.value), "[" + option.unit + "]", option.help});
+  for (const Option& option : motion.request.options)
+    rows.push_back({option.name, formatOption(option.value),
+                    "[" + (option.unit.empty() ? option.describeValues() : option.unit) + "]", option.help});
   std::ostringstream text;
   printTable(text, rows);
   return text.str();
@@ -166,10 +166,10 @@ RequestObserver makeObserver(const SolveArguments& arguments) {
   return observer;
 }
 
-int solve(const SolveArguments& arguments, const MotionRequest& request) {
+int solve(const SolveArguments& arguments, MotionRequest request) {
   for (const std::string& setting : arguments.settings) {
-    const auto [name, value] = parseSetting("--set", setting, "com_weight=1e5");
-    setOption(request.options, name, value);
+    const auto [name, value] = splitSetting("--set", setting, "com_weight=1e5");
+    request.options.set(name, parseOption(value));
   }
   requireApart(arguments.directory, {arguments.warm_start});
   const LoadedRobot robot = arguments.robot.load();
@@ -212,15 +212,17 @@ void addPresets(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
          "--weights",
          [request](const std::string& name) {
            for (const MotionPreset& preset : request->presets)
-             if (preset.name == name) preset.apply();
+             if (preset.name == name) preset.apply(*request);
          },
          help)
       ->check(CLI::IsMember(names));
 }
 
-void addFiles(CLI::App& sub, const MotionRequest& request) {
-  for (const MotionFile& file : request.files)
-    sub.add_option_function<std::string>("--" + file.name, file.read, file.help)->required();
+void addFiles(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
+  for (const MotionFile& file : request->files)
+    sub.add_option_function<std::string>(
+           "--" + file.name, [request, read = file.read](const std::string& path) { read(path, *request); }, file.help)
+        ->required();
 }
 
 void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
@@ -307,12 +309,13 @@ constexpr const char* kOutcome =
 void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   CLI::App& sub = *command.add_subcommand(motion.name, motion.help);
   const auto arguments = std::make_shared<SolveArguments>();
-  const auto request = std::make_shared<MotionRequest>(motion.makeRequest());
+  const auto request = std::make_shared<MotionRequest>(motion.request);
   addOutput(sub, arguments);
-  addFiles(sub, *request);
+  addFiles(sub, request);
   addPresets(sub, request);
-  for (const OptionEntry& option : request->options)
-    if (std::find(motion.flags.begin(), motion.flags.end(), option.name) != motion.flags.end()) addOption(sub, option);
+  for (const std::string& flag : motion.flags)
+    addOption(sub, request->options.get(flag),
+              [request, flag](const OptionValue& value) { request->options.set(flag, value); });
   addSolverOptions(sub, arguments);
   sub.footer("Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " +
              motion.example + "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" + kOutcome);
@@ -331,7 +334,7 @@ void addSequence(CLI::App& command, Action& action) {
   std::vector<std::string> names;
   std::string known;
   for (const MotionEntry& motion : getMotions()) {
-    if (!motion.makeRequest().files.empty()) continue;
+    if (!motion.request.files.empty()) continue;
     names.push_back(motion.name);
     known += (known.empty() ? "" : ", ") + motion.name;
   }

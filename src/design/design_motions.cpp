@@ -181,8 +181,10 @@ MotionOutcome solveUsually(const Model& model, const DesignMotion& motion, const
                            ShootingTrajectory& trajectory) {
   MotionOutcome out = load(model, motion);
   MotionRequest request;
-  request.plan = motion.plan;
-  if (motion.request) request = motion.request();
+  request.planner = [plan = motion.plan](const Model& robot, const VectorXd& q0, const OptionSet&) {
+    return plan(robot, q0);
+  };
+  if (motion.request) request = *motion.request;
   const MotionResult result = RequestSolver(request, *out.loaded, {}).solve({model.name(), "", {}});
   out.message = describeFailure(motion.name, result.solver);
   if (!result.converged()) return out;

@@ -18,8 +18,8 @@ struct DesignMotion {
   std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;  ///< called by several threads; the model is loaded
   double weight = 1;     ///< its share in objectives and in sums over motions, 0 or more
   Payload payload = {};  ///< that the robot carries in it
-  /// As `bielle solve` makes it without being told the length of steps; called by one thread. None: of the plan alone.
-  std::function<MotionRequest()> request = {};
+  /// As `bielle solve` makes it without being told the length of steps. None: of the plan alone.
+  std::optional<MotionRequest> request = {};
 };
 
 /// With its payload, and its weight unless that is 1.

@@ -109,14 +109,13 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
   finish();
 }
 
-Parametrization::Parametrization(const std::string& generator, std::vector<std::pair<std::string, double>> settings,
+Parametrization::Parametrization(const std::string& generator, OptionValues settings,
                                  std::vector<DesignVariable> variables, std::string source)
     : source_(std::move(source)),
       generator_(generator),
       settings_(std::move(settings)),
       variables_(std::move(variables)) {
-  const GeneratorRequest request = findGenerator(generator_).makeRequest();
-  for (const auto& [name, value] : settings_) setParameter(request.parameters, name, value);
+  const OptionSet parameters = getParameters();
   start_ = VectorXd::Zero(static_cast<Eigen::Index>(variables_.size()));
   for (size_t i = 0; i < variables_.size(); ++i) {
     const DesignVariable& variable = variables_[i];
@@ -126,42 +125,52 @@ Parametrization::Parametrization(const std::string& generator, std::vector<std::
                        "give `parameter`, `ratio` or `motor`; `length` and `shift` are for given robots");
     if (variable.parameter.empty()) continue;
     double& start = start_[static_cast<Eigen::Index>(i)];
-    for (const Parameter& parameter : request.parameters) {
-      if (parameter.name != variable.parameter) continue;
-      start = *parameter.value;
-      if (!variable.isChoice() && !(variable.lower >= parameter.lower && variable.upper <= parameter.upper))
-        throw ModelError(source_, "variable '" + variable.name + "'",
-                         "its bounds " + describeRange(variable.lower, variable.upper) +
-                             " go beyond those of parameter '" + parameter.name + "', " +
-                             describeRange(parameter.lower, parameter.upper) +
-                             (parameter.unit == "1" ? "" : " " + parameter.unit),
-                         "narrow them");
-      for (size_t k = 0; k < variable.choices.size(); ++k)
-        if (findChoice(parameter, variable.choices[k]) == *parameter.value) start = static_cast<double>(k);
-      if (variable.isChoice() && variable.choices[static_cast<size_t>(getChoice(variable, start))] !=
-                                     parameter.choices[static_cast<size_t>(*parameter.value)])
-        start = 0;
+    const Option& parameter = parameters.get(variable.parameter);
+    if (variable.isChoice()) {
+      const auto begin = variable.choices.begin(),
+                 chosen = std::find(begin, variable.choices.end(), formatOption(parameter.value));
+      start = chosen == variable.choices.end() ? 0 : static_cast<double>(chosen - begin);
+      continue;
     }
-    if (!variable.isChoice()) setParameter(request.parameters, variable.parameter, start);  // refuses unknown names
+    const double* value = std::get_if<double>(&parameter.value);
+    if (!value)
+      throw ModelError(source_, "variable '" + variable.name + "'",
+                       "parameter '" + parameter.name + "' does not vary continuously",
+                       "give it `choices`, or set it for all designs");
+    start = *value;
+    const OptionBounds& bounds = parameter.bounds;
+    if (!(variable.lower >= bounds.lower && variable.upper <= bounds.upper))
+      throw ModelError(source_, "variable '" + variable.name + "'",
+                       "its bounds " + describeRange(variable.lower, variable.upper) +
+                           " go beyond those of parameter '" + parameter.name + "', " +
+                           describeRange(bounds.lower, bounds.upper) +
+                           (parameter.unit == "1" ? "" : " " + parameter.unit),
+                       "narrow them");
   }
   finish();
 }
 
+// Of the robot before the variables change them.
+OptionSet Parametrization::getParameters() const {
+  OptionSet parameters = findGenerator(generator_).parameters;
+  for (const auto& [name, value] : settings_) parameters.set(name, value);
+  return parameters;
+}
+
 Model Parametrization::generate(const VectorXd& x) const {
-  const GeneratorRequest request = findGenerator(generator_).makeRequest();
-  for (const auto& [name, value] : settings_) setParameter(request.parameters, name, value);
+  OptionSet parameters = getParameters();
   for (size_t i = 0; i < variables_.size(); ++i) {
     const DesignVariable& variable = variables_[i];
     const double value = x[static_cast<Eigen::Index>(i)];
     const size_t choice = variable.isChoice() ? static_cast<size_t>(getChoice(variable, value)) : 0;
-    if (!variable.mass.empty()) setParameter(request.parameters, variable.mass, variable.types[choice].drive.mass);
+    if (!variable.mass.empty()) parameters.set(variable.mass, variable.types[choice].drive.mass);
     if (variable.parameter.empty()) continue;
-    if (!variable.isChoice()) setParameter(request.parameters, variable.parameter, value);
-    for (const Parameter& parameter : request.parameters)
-      if (variable.isChoice() && parameter.name == variable.parameter)
-        *parameter.value = findChoice(parameter, variable.choices[choice]);
+    if (variable.isChoice())
+      parameters.set(variable.parameter, variable.choices[choice]);
+    else
+      parameters.set(variable.parameter, value);
   }
-  return request.make();
+  return findGenerator(generator_).make(parameters);
 }
 
 // Types come before ratios, whatever the order of the variables.

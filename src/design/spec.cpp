@@ -80,21 +80,18 @@ void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& s
   if (spec.robot.generator.empty())
     choices.fail("a given robot has no parts to choose, and its links include the masses of its motors",
                  "give the `ratio` of its motors, or a generator");
-  const std::vector<Parameter> parameters = findGenerator(spec.robot.generator).makeRequest().parameters;
-  const auto getParameter = [&](const Entry& entry) -> const Parameter& {
-    for (const Parameter& parameter : parameters)
-      if (parameter.name == entry.getText()) return parameter;
+  const OptionSet& parameters = findGenerator(spec.robot.generator).parameters;
+  const auto getParameter = [&](const Entry& entry) -> const Option& {
+    if (const Option* parameter = parameters.find(entry.getText())) return *parameter;
     entry.fail("the generator has no parameter '" + entry.getText() + "'",
                "`bielle generate " + spec.robot.generator + " --help` lists them");
   };
   if (const Entry* parameter = find(fields, "parameter"))
     for (const Entry& name : choices.getList()) {
-      try {
-        findChoice(getParameter(*parameter), name.getText());
-      } catch (const ModelError& error) {
+      const std::vector<std::string>& known = getParameter(*parameter).choices;
+      if (std::find(known.begin(), known.end(), name.getText()) == known.end())
         name.fail("'" + name.getText() + "' is not one of the choices of '" + parameter->getText() + "'",
                   "`bielle generate " + spec.robot.generator + " --help` lists them");
-      }
     }
   if (!find(fields, "motor")) return;
   variable.types = readMotorTypes(choices.getList(), spec.path, catalogues);
@@ -156,11 +153,11 @@ DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const En
 void readArchitecture(const Entry& entry, DesignSpec& spec) {
   if (spec.robot.generator.empty())
     entry.fail("a given robot has one architecture", "give a generator of parts, e.g. leg_biped");
-  const std::vector<Parameter> parameters = findGenerator(spec.robot.generator).makeRequest().parameters;
+  const OptionSet& parameters = findGenerator(spec.robot.generator).parameters;
   std::map<std::string, DesignVariable> parts;
   std::map<std::string, int> count;  // of parameters with such a choice
   std::string known;
-  for (const Parameter& p : parameters)
+  for (const Option& p : parameters)
     for (const std::string& choice : p.choices) {
       known += (known.empty() ? "" : ", ") + choice + "_" + p.name;
       ++count[choice];
@@ -170,7 +167,7 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
                "give one that does, e.g. leg_biped");
   for (const Entry& item : entry.getList()) {
     bool found = false;
-    for (const Parameter& p : parameters)
+    for (const Option& p : parameters)
       for (const std::string& choice : p.choices) {
         if (choice + "_" + p.name != item.getText() && (choice != item.getText() || count[choice] > 1)) continue;
         found = true;
@@ -181,11 +178,11 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
       }
     if (!found) item.fail("there is no part '" + item.getText() + "'", "use some of " + known);
   }
-  for (const Parameter& p : parameters) {
+  for (const Option& p : parameters) {
     if (!parts.count(p.name)) continue;
     DesignVariable& part = parts[p.name];
     if (part.choices.size() == 1) {
-      spec.robot.settings.emplace_back(p.name, findChoice(p, part.choices.front()));
+      spec.robot.settings.emplace_back(p.name, part.choices.front());
       continue;
     }
     part.name = part.parameter = p.name;
@@ -235,7 +232,8 @@ DriveTable readDrives(const Entry& entry) {
   DriveTable drives;
   if (const Entry* constant = find(fields, "motor_constant")) drives.motor_constant = constant->getNumber();
   if (const Entry* share = find(fields, "regeneration")) drives.regeneration = share->getNumber();
-  if (const Entry* motors = find(fields, "motors")) drives.motor_constants = readSettings(*motors);
+  if (const Entry* motors = find(fields, "motors"))
+    for (const auto& [name, value] : motors->getMap()) drives.motor_constants.emplace_back(name, value.getNumber());
   return drives;
 }
 

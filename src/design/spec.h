@@ -58,23 +58,21 @@
 #include <vector>
 
 #include "bielle/design/search.h"
+#include "bielle/model/options.h"
 #include "design/evaluation.h"
 #include "design/front_search.h"
 #include "model/payload.h"
 
 namespace bielle {
 
-/// Numbers by name.
-using Settings = std::vector<std::pair<std::string, double>>;
-
 struct RobotSpec {
   std::string name, generator;  ///< either of them; a name may be a path
-  Settings settings;            ///< of the generator
+  OptionValues settings;        ///< of the generator
 };
 
 struct MotionSpec {
   std::string motion;
-  Settings settings;
+  OptionValues settings;
   double weight = 1;     ///< DesignMotion
   Payload payload = {};  ///< likewise
 };

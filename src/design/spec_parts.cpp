@@ -11,9 +11,9 @@ namespace fs = std::filesystem;
 
 namespace bielle {
 
-Settings readSettings(const YamlEntry& entry) {
-  Settings settings;
-  for (const auto& [name, value] : entry.getMap()) settings.emplace_back(name, value.getNumber());
+OptionValues readSettings(const YamlEntry& entry) {
+  OptionValues settings;
+  for (const auto& [name, value] : entry.getMap()) settings.emplace_back(name, parseOption(value.getText()));
   return settings;
 }
 
@@ -25,13 +25,7 @@ RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map) {
     map.fail("it does not name exactly one robot or generator", "give one of `robot` and `generator`");
   if (const YamlEntry* set = find(fields, "set")) {
     if (spec.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
-    const std::vector<Parameter> parameters = findGenerator(spec.generator).makeRequest().parameters;
-    for (const auto& [name, value] : set->getMap()) {
-      const auto parameter = std::find_if(parameters.begin(), parameters.end(),
-                                          [&name = name](const Parameter& p) { return p.name == name; });
-      const bool choice = parameter != parameters.end() && !parameter->choices.empty();
-      spec.settings.emplace_back(name, choice ? findChoice(*parameter, value.getText()) : value.getNumber());
-    }
+    spec.settings = readSettings(*set);
   }
   return spec;
 }
@@ -82,9 +76,10 @@ std::string findRobotDirectory(const RobotSpec& spec, const std::string& file) {
 
 Model makeRobot(const RobotSpec& spec, const std::string& file) {
   if (spec.generator.empty()) return loadRobot(locateRobot(spec, file)).model;
-  const GeneratorRequest request = findGenerator(spec.generator).makeRequest();
-  for (const auto& [name, value] : spec.settings) setParameter(request.parameters, name, value);
-  return request.make();
+  const Generator& generator = findGenerator(spec.generator);
+  OptionSet parameters = generator.parameters;
+  for (const auto& [name, value] : spec.settings) parameters.set(name, value);
+  return generator.make(parameters);
 }
 
 }  // namespace bielle

@@ -9,7 +9,7 @@
 
 namespace bielle {
 
-Settings readSettings(const YamlEntry& entry);
+OptionValues readSettings(const YamlEntry& entry);
 
 // The keys `robot` or `generator` and `set` of a map.
 RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map);

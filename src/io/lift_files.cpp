@@ -24,7 +24,7 @@ SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& 
     if (k == stages) break;
     if (problem.spec(k).kind == StageKind::Impact)
       throw ModelError(model.name(), "stage " + std::to_string(k), "it is a rigid impact, which cannot be lifted",
-                       "solve the serial motion with `--set rigid_landing=0`");
+                       "solve the serial motion with `--set rigid_landing=false`");
     out.a.push_back(record.a.row(k));
     out.dt.push_back(problem.spec(k).dt);
     const ConstraintSet& set = problem.spec(k).constraints;

@@ -22,39 +22,67 @@ struct Preset {
   void (*apply)(Options&);
 };
 
-// The request owns its options; listOptions() is found by their type.
 template <typename Options>
-std::function<MotionRequest()> makeRequests(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&),
-                                            const std::vector<Preset<Options>>& presets = {}) {
-  return [=] {
-    const auto options = std::make_shared<Options>();
-    MotionRequest request;
-    request.options = listOptions(*options);
-    for (const Preset<Options>& preset : presets)
-      request.presets.push_back({preset.name, preset.help, [=] { preset.apply(*options); }});
-    request.plan = [=](const Model& model, const VectorXd& q0) { return plan(model, *options, q0); };
-    return request;
+MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&), const Options& others) {
+  return [=](const Model& model, const VectorXd& q0, const OptionSet& options) {
+    return plan(model, readOptions(options, others), q0);
   };
 }
 
+// describe() is found by the type of the options.
+template <typename Options>
+MotionRequest makeRequest(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&),
+                          const std::vector<Preset<Options>>& presets = {}) {
+  MotionRequest request{listOptions(Options()), {}, {}, makePlanner(plan, Options()), {}};
+  for (const Preset<Options>& preset : presets)
+    request.presets.push_back({preset.name, preset.help, [=](MotionRequest& changed) {
+                                 auto options = readOptions<Options>(changed.options);
+                                 preset.apply(options);
+                                 changed.options = listOptions(options);
+                                 changed.planner = makePlanner(plan, options);
+                               }});
+  return request;
+}
+
 MotionRequest makeFootholdsRequest() {
-  const auto options = std::make_shared<FootholdsOptions>();
-  MotionRequest request;
-  request.options = listOptions(*options);
+  MotionRequest request = makeRequest(planFootholds);
   request.files.push_back(
       {"footholds",
        "YAML file, a list `footholds` of {foot: left or right, x, y, z [m], yaw, pitch, roll [rad]}, "
        "relative to the middle of the feet at the start",
-       [=](const std::string& path) { options->footholds = readFootholds(path); }});
-  request.plan = [=](const Model& model, const VectorXd& q0) { return planFootholds(model, *options, q0); };
+       [](const std::string& path, MotionRequest& changed) {
+         FootholdsOptions options;
+         options.footholds = readFootholds(path);
+         changed.planner = makePlanner(planFootholds, options);
+       }});
   return request;
+}
+
+// The options of a part of a sequence, under their names there.
+OptionSet selectPart(const OptionSet& options, const std::string& part) {
+  OptionSet selected;
+  for (Option option : options) {
+    if (option.name.rfind(part + ".", 0) != 0) continue;
+    option.name.erase(0, part.size() + 1);
+    selected.add(std::move(option));
+  }
+  return selected;
 }
 
 constexpr const char* kPaper = "the problem published with the paper: a velocity instead of footholds";
 constexpr const char* kPaperJump = "the problem published with the paper: only the height at mid-flight, no foot paths";
 
+std::vector<SequencePart> listParts(const std::vector<std::pair<std::string, MotionPlanner>>& planners,
+                                    const OptionSet& options) {
+  std::vector<SequencePart> parts;
+  for (const auto& [name, planner] : planners)
+    parts.push_back({name, [planner = planner, own = selectPart(options, name)](
+                               const Model& model, const VectorXd& q0) { return planner(model, q0, own); }});
+  return parts;
+}
+
 // The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
-std::vector<std::string> listParts(const std::vector<std::pair<std::string, double>>& options) {
+std::vector<std::string> listPartMotions(const OptionValues& options) {
   std::vector<std::string> labels, motions;
   for (const auto& [name, value] : options) {
     const size_t dot = name.find('.');
@@ -75,57 +103,57 @@ const std::vector<MotionEntry>& getMotions() {
        "go down and up again with feet flat; the height of the centre of mass follows a sine",
        "bielle solve squat --robot bipetto --depth 0.7 -o squat",
        {"depth", "duration"},
-       makeRequests<SquatOptions>(planSquat)},
+       makeRequest(planSquat)},
       {"walk",
        "steps forward or backward on level ground, from standing to standing",
        "bielle solve walk --robot bipetto --speed 0.5 -o walk",
        {"speed", "steps", "single_support", "double_support", "swing_height"},
-       makeRequests<WalkOptions>(planWalk, {{"paper", kPaper, setPaperWeights}})},
+       makeRequest<WalkOptions>(planWalk, {{"paper", kPaper, setPaperWeights}})},
       {"side-walk",
        "steps to the left or to the right",
        "bielle solve side-walk --robot bipetto --speed -0.2 -o side",
        {"speed", "steps", "single_support", "double_support", "swing_height"},
-       makeRequests<SideWalkOptions>(planSideWalk, {{"paper", kPaper, setPaperWeights}})},
+       makeRequest<SideWalkOptions>(planSideWalk, {{"paper", kPaper, setPaperWeights}})},
       {"turn",
        "steps on the spot or along an arc, to another heading",
        "bielle solve turn --robot bipetto --angle 1.57 --radius 0.5 -o turn",
        {"angle", "radius", "steps", "single_support", "double_support", "swing_height"},
-       makeRequests<TurnOptions>(planTurn)},
+       makeRequest(planTurn)},
       {"stairs",
        "climb or descend stairs, one foot per step",
        "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
        {"height", "depth", "slope", "stairs", "speed", "width", "double_support", "swing_height"},
-       makeRequests<StairsOptions>(planStairs, {{"paper", kPaper, setPaperWeights}})},
+       makeRequest<StairsOptions>(planStairs, {{"paper", kPaper, setPaperWeights}})},
       {"footholds",
        "steps on uneven footholds from a file",
        "bielle solve footholds --robot bipetto --footholds stones.yaml -o stones",
        {"rim", "single_support", "double_support", "swing_height"},
-       makeFootholdsRequest},
+       makeFootholdsRequest()},
       {"box",
        "a step onto a box, and down again if requested",
-       "bielle solve box --robot bipetto --height 0.1 --down 1 -o box",
+       "bielle solve box --robot bipetto --height 0.1 --down -o box",
        {"height", "length", "width", "distance", "down", "single_support", "swing_height"},
-       makeRequests<BoxOptions>(planBox)},
+       makeRequest(planBox)},
       {"gap",
        "a step over a gap in the ground",
        "bielle solve gap --robot bipetto --width 0.2 -o gap",
        {"width", "distance", "depth", "single_support", "swing_height"},
-       makeRequests<GapOptions>(planGap)},
+       makeRequest(planGap)},
       {"jump",
        "push off, fly for a given time, land; the time determines the height of the centre of mass at mid-flight",
        "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
        {"flight", "length"},
-       makeRequests<JumpOptions>(planJump, {{"paper", kPaperJump, setPaperWeights}})},
+       makeRequest<JumpOptions>(planJump, {{"paper", kPaperJump, setPaperWeights}})},
       {"run",
        "steps with flights between them, from standing to standing",
        "bielle solve run --robot bipetto --speed 1 -o run",
        {"speed", "steps", "flight", "stance", "swing_height"},
-       makeRequests<RunOptions>(planRun)},
+       makeRequest(planRun)},
       {"hop",
        "lift one foot, take off and land on the other one",
        "bielle solve hop --robot bipetto --foot left --flight 0.15 -o hop",
        {"foot", "hops", "flight", "length", "stance", "swing_height"},
-       makeRequests<HopOptions>(planHop)},
+       makeRequest(planHop)},
   };
   return motions;
 }
@@ -143,20 +171,22 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
   MotionRequest request;
   std::map<std::string, int> times;
   for (const std::string& motion : motions) {
-    const MotionRequest part = findMotion("", motion).makeRequest();
+    const MotionRequest& part = findMotion("", motion).request;
     const int time = ++times[motion];
     const std::string name = time == 1 ? motion : motion + std::to_string(time);
-    for (OptionEntry option : part.options) {
+    for (Option option : part.options) {
       option.name = name + "." + option.name;
-      request.options.push_back(option);
+      request.options.add(std::move(option));
     }
-    request.parts.push_back({name, part.plan});
+    request.parts.emplace_back(name, part.planner);
   }
-  request.plan = [parts = request.parts](const Model& model, const VectorXd& q0) {
-    return planSequence(model, parts, q0);
+  request.planner = [parts = request.parts](const Model& model, const VectorXd& q0, const OptionSet& options) {
+    return planSequence(model, listParts(parts, options), q0);
   };
   return request;
 }
+
+std::vector<SequencePart> listParts(const MotionRequest& request) { return listParts(request.parts, request.options); }
 
 Motion makeRequested(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
   Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
@@ -170,15 +200,15 @@ Motion makeRequested(const MotionRequest& request, const Model& model, const Pro
 }
 
 MotionRequest remakeRequest(const MotionSummary& summary) {
-  const MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listParts(summary.options))
-                                                            : findMotion(summary.file, summary.motion).makeRequest();
+  MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listPartMotions(summary.options))
+                                                      : findMotion(summary.file, summary.motion).request;
   const auto isLimit = [](const std::string& name) {
     for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit, kDeadPointMargin})
       if (name.rfind(prefix, 0) == 0) return true;
     return false;
   };
   for (const auto& [name, value] : summary.options)
-    if (!isLimit(name)) setOption(request.options, name, value);
+    if (!isLimit(name)) request.options.set(name, value);
   return request;
 }
 

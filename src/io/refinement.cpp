@@ -26,13 +26,6 @@ MotionRecord halveSteps(const MotionRecord& record) {
   return out;
 }
 
-// The option for the length of stages; null for motions that have none.
-double* findTimeStep(const MotionRequest& request) {
-  for (const OptionEntry& option : request.options)
-    if (option.name == "time_step") return option.value;
-  return nullptr;
-}
-
 struct StepError {
   double share = 0;        // of the largest acceleration
   Eigen::Index stage = 0;  // where it is largest
@@ -122,15 +115,15 @@ double calcStageExcess(const Model& model, const MotionResult& result) {
                   (result.slip_position + reach * result.slip_angle) / kLargestSlip);
 }
 
-std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
-                                   const Motion& solved, const MotionResult& result) {
+std::optional<RefinedMotion> refineStages(MotionRequest request, const Model& model, const ProblemOptions& problem,
+                                          const Motion& solved, const MotionResult& result) {
   if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
-  double* step = findTimeStep(request);
-  if (!step || *step != 0 || calcStageExcess(model, result) <= 1) return {};
-  *step = solved.schedule.phases.front().dt / 2;
+  if (!request.options.find("time_step") || request.options.get<double>("time_step") != 0) return {};
+  if (calcStageExcess(model, result) <= 1) return {};
+  request.options.set("time_step", solved.schedule.phases.front().dt / 2);
   Motion motion = makeRequested(request, model, problem);
   setGuess(halveSteps(result.record), motion);
-  return motion;
+  return RefinedMotion{std::move(request), std::move(motion)};
 }
 
 std::optional<Motion> avoidDeadPoints(const MotionRequest& request, const Model& model, ProblemOptions problem,

@@ -61,10 +61,11 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
       result.solver.message += describeDeadPoints(result.record);
     return result;
   }
-  std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result);
-  if (refined) improve(*refined, again, "with stages half as long", run, result);
-  refined = avoidDeadPoints(request_, model_, options_.problem, result.record);
-  if (refined) improve(*refined, from_plan, "with linkages farther from dead points", run, result);
+  std::optional<RefinedMotion> refined = refineStages(request_, model_, options_.problem, motion_, result);
+  if (refined) improve(refined->motion, again, "with stages half as long", run, result);
+  std::optional<Motion> apart =
+      avoidDeadPoints(refined ? refined->request : request_, model_, options_.problem, result.record);
+  if (apart) improve(*apart, from_plan, "with linkages farther from dead points", run, result);
   refuseLongStages(result);
   return result;
 }
@@ -142,7 +143,7 @@ void RequestSolver::startFromParts() {
   parts.report = [this](const std::string& part, const FddpSummary& summary) {
     tell(part + " alone: " + format(summary));
   };
-  motion_.guess = solveParts(model_, request_.parts, makeStandingPosture(model_), parts);
+  motion_.guess = solveParts(model_, listParts(request_), makeStandingPosture(model_), parts);
   fitTimings(*motion_.problem, motion_.guess);
 }
 

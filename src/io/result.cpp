@@ -44,6 +44,13 @@ void calcSlip(const Motion& motion, const MotionTrack& track, MotionResult& resu
   }
 }
 
+Json listOptionValues(const OptionValues& options) {
+  Json out = Json::object();
+  for (const auto& [name, value] : options)
+    std::visit([&out, &name = name](const auto& held) { out[name] = held; }, value);
+  return out;
+}
+
 Json listByName(const std::vector<std::pair<std::string, double>>& values) {
   Json json = Json::object();
   for (const auto& [name, value] : values) json[name] = value;
@@ -153,7 +160,7 @@ Json makeSummary(const MotionResult& result) {
           {"step", getName(result.step)},
           {"command", result.run.command},
           {"goals", makeGoals(result)},
-          {"options", listByName(result.options)},
+          {"options", listOptionValues(result.options)},
           {"versions", {{"bielle", build.bielle}, {"eigen", build.eigen}, {"compiler", build.compiler}}},
           {"converged", result.converged()},
           {"interrupted", result.interrupted()},

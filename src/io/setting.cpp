@@ -6,6 +6,15 @@
 
 namespace bielle {
 
+std::pair<std::string, std::string> splitSetting(const std::string& flag, const std::string& setting,
+                                                 const std::string& example) {
+  const size_t equals = setting.find('=');
+  if (equals == std::string::npos)
+    throw ModelError("", flag + " '" + setting + "'", "it is not of the form name=value",
+                     "e.g. " + flag + " " + example);
+  return {setting.substr(0, equals), setting.substr(equals + 1)};
+}
+
 std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
                                             const std::string& example) {
   const size_t equals = setting.find('=');

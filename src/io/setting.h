@@ -5,6 +5,10 @@
 
 namespace bielle {
 
+// name=value. \throws ModelError that shows the example
+std::pair<std::string, std::string> splitSetting(const std::string& flag, const std::string& setting,
+                                                 const std::string& example);
+
 // name=number. \throws ModelError that shows the example
 std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
                                             const std::string& example);

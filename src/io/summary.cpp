@@ -1,3 +1,4 @@
+#include <cmath>
 #include <filesystem>
 #include <limits>
 
@@ -8,6 +9,14 @@
 
 namespace bielle {
 namespace {
+
+OptionValue readOption(const Json& json) {
+  if (json.is_boolean()) return json.get<bool>();
+  if (json.is_string()) return json.get<std::string>();
+  if (json.is_number_integer() && std::abs(json.get<double>()) <= std::numeric_limits<int>::max())
+    return json.get<int>();
+  return json.get<double>();
+}
 
 // A number of nodes, or the index of one.
 int readCount(const Json& json) {
@@ -81,7 +90,7 @@ MotionSummary read(const Json& json) {
   summary.objective = readObjective(json.at("objective"));
   summary.objective.regeneration = json.at("electrical_energy").at("regeneration");
   summary.converged = json.at("converged");
-  for (const auto& [name, value] : json.at("options").items()) summary.options.emplace_back(name, value);
+  for (const auto& [name, value] : json.at("options").items()) summary.options.emplace_back(name, readOption(value));
   for (const Json& entry : json.at("goals")) summary.goals.push_back(readGoal(entry));
   for (const Json& entry : json.at("phases")) {
     MotionSummary::Phase phase{

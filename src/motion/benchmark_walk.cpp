@@ -172,7 +172,7 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   plan.guess.xs.assign(stages.size(), x0);
   plan.q_start = plan.q_end = scene.q0;
   plan.limited = false;
-  plan.options = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", double(o.total_nodes)}};
+  plan.options = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", o.total_nodes}};
   return makeMotion(model, std::move(plan), {formulation, StepRule::Euler});
 }
 

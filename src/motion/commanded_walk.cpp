@@ -12,7 +12,8 @@ constexpr double kTimeStep = 0.012;  // s
 constexpr int kForeseenSteps = 2;    // beyond that whose stages are made; one more brings the feet together
 
 LocomotionOptions complete(LocomotionOptions options) {
-  options.timing.flight = options.rigid_landing = options.landing_speed = options.published = 0;
+  options.timing.flight = options.landing_speed = 0;
+  options.rigid_landing = options.published = false;
   if (options.timing.time_step == 0) options.timing.time_step = kTimeStep;
   return options;
 }

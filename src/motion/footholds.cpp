@@ -107,10 +107,9 @@ LocomotionOptions FootholdsOptions::makeGaitDefaults() {
   return gait;
 }
 
-std::vector<OptionEntry> listOptions(FootholdsOptions& o) {
-  std::vector<OptionEntry> entries = {{"rim", &o.rim, "m", "width of the stones around the soles"}};
-  for (OptionEntry& entry : listOptions(o.gait)) entries.push_back(std::move(entry));
-  return entries;
+void describe(OptionFields& f, FootholdsOptions& o) {
+  f.number("rim", o.rim, "m", {0, 1}, "width of the stones around the soles");
+  describe(f, o.gait);
 }
 
 std::vector<Footstep> readFootholds(const std::string& path) {
@@ -130,13 +129,12 @@ std::vector<Footstep> readFootholds(const std::string& path) {
 MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const VectorXd& q0) {
   if (o.footholds.empty())
     throw ModelError("", "footholds", "none are given", "give a file with footholds (`--footholds FILE.yaml`)");
-  requireOption(o.rim >= 0 && o.rim <= 1, "rim", "it is outside 0 .. 1 m", "give metres, e.g. 0.02");
+  listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, q0);
   Course course{"footholds", makeSteps(stance, o.footholds), {}};
   course.ground = makeGround(model, stance, course.steps, o.rim);
   MotionPlan plan = planCourse(model, stance, course, o.gait);
-  FootholdsOptions copy = o;
-  plan.options = listValues(listOptions(copy));
+  plan.options = listOptions(o).listValues();
   return plan;
 }
 

@@ -22,12 +22,6 @@ double calcGapAlong(const ContactFrame& a, const SE3& X_Wa, const ContactFrame& 
 
 double calcHeading(const SE3& X) { return std::atan2(X.R(1, 0), X.R(0, 0)); }
 
-int countSteps(const std::string& option, double value) {
-  if (!(value >= 2 && value <= 200 && value == std::floor(value)))
-    throw ModelError("", "option '" + option + "'", "it is not a whole number from 2 to 200", "give a number of steps");
-  return static_cast<int>(value);
-}
-
 std::array<SE3, 2> FootstepPlan::getStance(int count) const {
   std::array<SE3, 2> stance = start;
   for (int i = 0; i < count; ++i) stance[static_cast<int>(steps[i].side)] = steps[i].X_WF;

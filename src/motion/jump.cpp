@@ -68,7 +68,7 @@ StageSpec makeStage(const JumpScene& scene, const std::vector<ContactTarget>& co
   StageSpec stage;
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
-  if (o.published == 0) setClosureGains(scene.gains, stage.constraints);
+  if (!o.published) setClosureGains(scene.gains, stage.constraints);
   stage.state = {o.state_weight, scene.q0, VectorXd::Zero(model.nv()), scene.state_weights};
   stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
   return stage;
@@ -100,7 +100,7 @@ void addHeightCost(const JumpScene& scene, const std::string& name, double weigh
 
 // Node i of n in flight. The first one is where the feet stood.
 void addFlightConstraints(const JumpScene& scene, int i, int n, StageSpec& stage) {
-  if (i == 0 || scene.options.published != 0) return;
+  if (i == 0 || scene.options.published) return;
   Ground ground;
   ground.height = scene.before.front().X_WT.p.z();
   for (const ContactTarget& start : scene.before)
@@ -112,7 +112,7 @@ void addTouchdown(const JumpScene& scene, StageSpec& stage) {
   const double h = stage.dt;
   for (const ContactTarget& target : scene.after) {
     const ContactFrame& contact = scene.model.contacts()[target.contact];
-    if (scene.options.published == 0)
+    if (!scene.options.published)
       addLanding(contact, target.X_WT, 0, 0, stage);
     else
       addFreeLanding({contact.body, contact.X_BF}, target.X_WT,
@@ -125,7 +125,7 @@ StageSpec makeTerminalStage(const JumpScene& scene) {
   StageSpec stage = makeStage(scene, {});
   stage.constraints = {};
   stage.control.weight = 0;
-  if (o.published != 0) {
+  if (o.published) {
     const VectorXd selected = selectMainJoints(scene.model);
     stage.state.weight = o.paper.terminal;
     stage.state.weights << selected, selected;
@@ -143,7 +143,7 @@ JumpScene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0
   JumpScene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {},
                   {},    {}};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
-  if (o.published != 0) {  // hips count like other joints, the heading does not
+  if (o.published) {  // hips count like other joints, the heading does not
     scene.state_weights.head(model.nv()) = selectMainJoints(model);
     if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3) << o.torso_weight, o.torso_weight, 0;
   }
@@ -169,7 +169,7 @@ JumpScene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0
 double calcLoad(const JumpScene& scene, JumpPhase phase, double com_acceleration) {
   const double m = scene.model.mass(), g = scene.model.gravity().norm();
   const JumpFigures& f = scene.figures;
-  if (scene.options.published == 0) return m * (g + com_acceleration);
+  if (!scene.options.published) return m * (g + com_acceleration);
   if (phase == JumpPhase::Push) return m * (g + f.take_off / f.push);
   if (phase == JumpPhase::Land) return m * (g + f.take_off / f.land);
   return m * g;
@@ -203,13 +203,10 @@ std::vector<Goal> makeGoals(const JumpScene& scene, int nodes) {
 }
 
 void check(const Model& model, const JumpOptions& o) {
-  JumpOptions copy = o;
-  requireNotNegative(listOptions(copy), {"length"});
-  requirePositive(listOptions(copy), {"time_step", "push", "land", "friction"});
+  listOptions(o).check();
   requireOption(o.flight >= 2 * o.time_step && o.flight <= 2, "flight", "it is outside two time steps .. 2 s",
                 "give seconds, e.g. 0.3");
   requireStages(o.stand + o.push + o.flight + o.land + o.settle, o.time_step);
-  requireOption(std::abs(o.length) <= 2, "length", "it is not within 2 m", "give metres, negative to jump backwards");
   if (model.contacts().empty())
     throw ModelError(model.name(), "contacts", "a jump needs feet, but the robot has no contact frames",
                      "add `contacts` to its YAML file");
@@ -241,37 +238,40 @@ JumpHeight calcJumpHeight(const JumpOptions& o, double gravity, double t) {
   return {};
 }
 
-std::vector<OptionEntry> listOptions(JumpOptions& o) {
-  return {
-      {"flight", &o.flight, "s", "time in the air, rounded to an even number of time steps; the height follows"},
-      {"length", &o.length, "m", "distance from take-off to landing, forward"},
-      {"stand", &o.stand, "s", "time at rest before the push"},
-      {"push", &o.push, "s", "time of acceleration with the feet on the ground"},
-      {"land", &o.land, "s", "time from touchdown until the body is braked"},
-      {"settle", &o.settle, "s", "time to come back to rest"},
-      {"stretch", &o.stretch, "m", "height of the centre of mass at take-off and touchdown above that at the start"},
-      {"clearance", &o.clearance, "m", "least height of the soles at mid-flight"},
-      {"friction", &o.friction, "1", "friction coefficient"},
-      {"cone_margin", &o.cone_margin, "1", "share of friction and soles that wrenches leave unused"},
-      {"time_step", &o.time_step, "s", "length of a shooting stage"},
-      {"published", &o.published, "0 or 1", "1: the paper's problem, with feet free in flight; 0: Bielle's costs"},
-      {"apex_weight", &o.apex_weight, "1/m^2", "height of the centre of mass at mid-flight"},
-      {"com_weight", &o.com_weight, "1/m^2", "height of the centre of mass on the ground"},
-      {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
-      {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
-      {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
-      {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
-      {"force_weight", &o.force_weight, "1",
-       "share the load evenly between the feet and over time, relative to (m g)^2"},
-      {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-      {"swing_weight", &o.swing_weight, "1/m^2", "follow the path of the feet in flight"},
-      {"swing_rotation_weight", &o.swing_rotation_weight, "1", "keep the soles level in flight"},
-      {"terminal_weight", &o.terminal_weight, "1/m^2", "position of the centre of mass at the end"},
-      {"contact_kp", &o.contact_kp, "1/s^2",
-       "position gain of the stabilisation of contacts and closures (at most 1/(3 h^2) with the time step h; Euler "
-       "steps: 1/(2 h^2))"},
-      {"contact_kd", &o.contact_kd, "1/s",
-       "velocity gain of the stabilisation of contacts and closures (at most 1/h)"}};
+void describe(OptionFields& f, JumpOptions& o) {
+  f.number("flight", o.flight, "s", kNotNegative,
+           "time in the air, rounded to an even number of time steps; the height follows");
+  f.number("length", o.length, "m", {-2, 2}, "distance from take-off to landing, forward");
+  f.number("stand", o.stand, "s", kNotNegative, "time at rest before the push");
+  f.number("push", o.push, "s", kPositive, "time of acceleration with the feet on the ground");
+  f.number("land", o.land, "s", kPositive, "time from touchdown until the body is braked");
+  f.number("settle", o.settle, "s", kNotNegative, "time to come back to rest");
+  f.number("stretch", o.stretch, "m", kNotNegative,
+           "height of the centre of mass at take-off and touchdown above that at the start");
+  f.number("clearance", o.clearance, "m", kNotNegative, "least height of the soles at mid-flight");
+  f.number("friction", o.friction, "1", kPositive, "friction coefficient");
+  f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
+  f.number("time_step", o.time_step, "s", kPositive, "length of a shooting stage");
+  f.flag("published", o.published, "the paper's problem, with feet free in flight, instead of Bielle's costs");
+  f.number("apex_weight", o.apex_weight, "1/m^2", kNotNegative, "height of the centre of mass at mid-flight");
+  f.number("com_weight", o.com_weight, "1/m^2", kNotNegative, "height of the centre of mass on the ground");
+  f.number("state_weight", o.state_weight, "1", kNotNegative, "stay near the standing posture, at rest");
+  f.number("torso_weight", o.torso_weight, "1", kNotNegative,
+           "keep the torso upright, within the state regularization");
+  f.number("motor_weight", o.motor_weight, "1", kNotNegative, "keep motors slow, within the state regularization");
+  f.number("control_weight", o.control_weight, "1/(N m)^2", kNotNegative, "keep motor torques small");
+  f.number("force_weight", o.force_weight, "1", kNotNegative,
+           "share the load evenly between the feet and over time, relative to (m g)^2");
+  f.number("pressure_weight", o.pressure_weight, "1", kNotNegative,
+           "keep the centre of pressure in the middle of the sole");
+  f.number("swing_weight", o.swing_weight, "1/m^2", kNotNegative, "follow the path of the feet in flight");
+  f.number("swing_rotation_weight", o.swing_rotation_weight, "1", kNotNegative, "keep the soles level in flight");
+  f.number("terminal_weight", o.terminal_weight, "1/m^2", kNotNegative, "position of the centre of mass at the end");
+  f.number("contact_kp", o.contact_kp, "1/s^2", kNotNegative,
+           "position gain of the stabilisation of contacts and closures (at most 1/(3 h^2) with the time step h; Euler "
+           "steps: 1/(2 h^2))");
+  f.number("contact_kd", o.contact_kd, "1/s", kNotNegative,
+           "velocity gain of the stabilisation of contacts and closures (at most 1/h)");
 }
 
 void setPaperWeights(JumpOptions& o) {
@@ -285,7 +285,7 @@ void setPaperWeights(JumpOptions& o) {
   o.torso_weight = 2500;
   o.motor_weight = 0;
   o.control_weight = 0.05;
-  o.published = 1;
+  o.published = true;
   o.force_weight = 500;
   o.pressure_weight = 5;
   o.swing_weight = o.swing_rotation_weight = 0;
@@ -300,11 +300,11 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   plan.name = "jump";
   plan.ground.height = scene.before.front().X_WT.p.z();
   plan.ground.friction = options.friction;
-  plan.limited = options.published == 0;
+  plan.limited = !options.published;
   std::vector<StageSpec>& stages = plan.stages;
   const double g = model.gravity().norm();
   const GroundCosts ground{options.force_weight, options.pressure_weight,
-                           options.published != 0 ? ForceAxes::World : ForceAxes::Contact};
+                           options.published ? ForceAxes::World : ForceAxes::Contact};
   for (JumpPhase phase : {JumpPhase::Stand, JumpPhase::Push, JumpPhase::Flight, JumpPhase::Land, JumpPhase::Settle}) {
     const bool over = phase == JumpPhase::Land || phase == JumpPhase::Settle;
     const std::vector<ContactTarget> none,
@@ -320,7 +320,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
       StageSpec& stage = stages.back();
       const double load = calcLoad(scene, phase, com.acceleration);
       addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
-      if (options.published == 0) addWrenchCones(model, options.friction, options.cone_margin, stage);
+      if (!options.published) addWrenchCones(model, options.friction, options.cone_margin, stage);
       if (phase != JumpPhase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, false, stage);
       if (phase == JumpPhase::Flight && 2 * i == nodes)
         addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, true, stage);
@@ -335,8 +335,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   plan.guess.xs.push_back(makeGuess(scene, JumpPhase::Settle, 0));
   plan.q_start = q0;
   plan.q_end = carryPosture(model, q0, {Matrix3d::Identity(), scene.shift});
-  JumpOptions copy = options;
-  plan.options = listValues(listOptions(copy));
+  plan.options = listOptions(options).listValues();
   plan.goals = makeGoals(scene, plan.schedule.numStages());
   return plan;
 }

@@ -18,17 +18,14 @@ namespace bielle {
 namespace {
 
 void check(const LocomotionOptions& o) {
-  LocomotionOptions copy = o;
-  requireNotNegative(listOptions(copy));
+  listOptions(o).check();
   requireOption(std::abs(o.stretch) <= 0.5, "stretch", "it is not within 0.5 m", "give metres, e.g. 0");
-  requirePositive(listOptions(copy), {"friction"});
   requireOption(o.swing.apex > 0 && o.swing.apex < 1, "swing_apex", "it is not between 0 and 1", "e.g. 0.5");
   requireOption(o.swing.leave < o.swing.arrive, "swing_leave", "it is not before swing_arrive", "e.g. 0 and 1");
-  requireOption(o.landing_speed == 0 || o.rigid_landing != 0, "landing_speed",
-                "without an impact nothing stops a landing foot", "add rigid_landing=1, or leave it out");
+  requireOption(o.landing_speed == 0 || o.rigid_landing, "landing_speed",
+                "without an impact nothing stops a landing foot", "add rigid_landing=true, or leave it out");
   requireOption(o.landing_speed < 0.1, "landing_speed", "feet that land at 0.1 m/s or more do not pass the check",
                 "give a lower speed, e.g. 0.05");
-  requireOption(o.swing.arrive <= 1, "swing_arrive", "it is over 1", "give a fraction of the swing, e.g. 1");
 }
 
 // Rejects requests that no motor torques can satisfy.
@@ -149,7 +146,7 @@ Gait makeStartingGait(const Model& model, const Stance& stance, const Locomotion
   }
 }
 
-Side getFirstFoot(const LocomotionOptions& options) { return options.published != 0 ? Side::Left : Side::Right; }
+Side getFirstFoot(const LocomotionOptions& options) { return options.published ? Side::Left : Side::Right; }
 
 std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
                                  int steps_per_cycle) {
@@ -204,7 +201,7 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   plan.name = task.name;
   plan.ground = task.ground;
   plan.ground.friction = options.friction;
-  plan.limited = options.published == 0;
+  plan.limited = !options.published;
   const std::vector<VectorXd> guess = makeGuesses(scene);
   size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
@@ -212,7 +209,7 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
     const VectorXd u = phase.flies() || NeighbourPlans::get()
                            ? VectorXd::Zero(model.nu()).eval()
                            : calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
-    if (scene.gait.nodes[node].landed >= 0 && options.rigid_landing != 0) {
+    if (scene.gait.nodes[node].landed >= 0 && options.rigid_landing) {
       plan.schedule.phases.push_back({"impact", 1, 0, contacts});
       plan.stages.push_back(makeImpact(scene, scene.gait.nodes[node], contacts));
       plan.guess.us.push_back(VectorXd::Zero(model.nu()));

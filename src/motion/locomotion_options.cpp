@@ -3,52 +3,65 @@
 
 namespace bielle {
 
-std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
-  return {
-      {"start_support", &o.timing.start, "s", "least duration of double support before the first step"},
-      {"start_pressure", &o.start_pressure, "1",
-       "start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never"},
-      {"single_support", &o.timing.single, "s", "duration with one foot on the ground"},
-      {"double_support", &o.timing.both, "s", "duration with both feet on the ground between two steps"},
-      {"end_support", &o.timing.end, "s", "duration of double support after the last step"},
-      {"time_step", &o.timing.time_step, "s",
-       "length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings"},
-      {"swing_height", &o.swing.height, "m", "apex of the swing foot above the higher end of its path"},
-      {"swing_apex", &o.swing.apex, "1", "time of the apex as a fraction of the swing, from 0 to 1"},
-      {"swing_leave", &o.swing.leave, "1", "time at which the swing foot starts to move horizontally, from 0 to 1"},
-      {"swing_arrive", &o.swing.arrive, "1", "time at which the swing foot is above its foothold, from 0 to 1"},
-      {"friction", &o.friction, "1", "friction coefficient"},
-      {"cone_margin", &o.cone_margin, "1", "share of friction and soles that wrenches leave unused"},
-      {"published", &o.published, "0 or 1",
-       "1: the paper's problem, with free landing places; 0: footholds and Bielle's costs"},
-      {"rigid_landing", &o.rigid_landing, "0 or 1", "1: a rigid impact at every landing, as a separate stage; 0: none"},
-      {"landing_speed", &o.landing_speed, "m/s",
-       "with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest"},
-      {"foothold_room", &o.foothold_room, "m",
-       "largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it"},
-      {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
-      {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
-      {"heading_weight", &o.heading_weight, "1", "keep the heading of the feet, within the state regularization"},
-      {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
-      {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
-      {"com_weight", &o.com_weight, "1/m^2", "horizontal position of the centre of mass"},
-      {"com_height_weight", &o.com_height_weight, "1/m^2", "height of the centre of mass"},
-      {"com_velocity_weight", &o.com_velocity_weight, "s^2/m^2",
-       "velocity of the centre of mass in the direction of travel"},
-      {"swing_weight", &o.swing_weight, "1/m^2", "path of the swing foot"},
-      {"swing_velocity_weight", &o.swing_velocity_weight, "s^2/m^2", "velocity of the swing foot along its path"},
-      {"swing_rotation_weight", &o.swing_rotation_weight, "1", "orientation of the swing foot"},
-      {"foothold_weight", &o.foothold_weight, "1/m^2",
-       "with foothold_room: land near the foothold, swing near its horizontal path"},
-      {"force_weight", &o.force_weight, "1", "transfer the weight evenly between the feet, relative to (m g)^2"},
-      {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-      {"feet_distance", &o.feet_distance, "m", "least distance between the soles, or that of the footholds if smaller"},
-      {"terminal_weight", &o.terminal_weight, "1/m^2", "position of the centre of mass at the end"},
-      {"contact_kp", &o.contact_kp, "1/s^2",
-       "position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2))"},
-      {"contact_kd", &o.contact_kd, "1/s", "velocity gain of the stabilisation of contacts (at most 1/h)"},
-      {"closure_kp", &o.closure_kp, "1/s^2", "position gain of the stabilisation of closures (full formulation)"},
-      {"closure_kd", &o.closure_kd, "1/s", "velocity gain of the stabilisation of closures (full formulation)"}};
+void describe(OptionFields& f, LocomotionOptions& o) {
+  f.number("start_support", o.timing.start, "s", kNotNegative,
+           "least duration of double support before the first step");
+  f.number("start_pressure", o.start_pressure, "1", kNotNegative,
+           "start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never");
+  f.number("single_support", o.timing.single, "s", kNotNegative, "duration with one foot on the ground");
+  f.number("double_support", o.timing.both, "s", kNotNegative,
+           "duration with both feet on the ground between two steps");
+  f.number("end_support", o.timing.end, "s", kNotNegative, "duration of double support after the last step");
+  f.number("time_step", o.timing.time_step, "s", kNotNegative,
+           "length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings");
+  f.number("swing_height", o.swing.height, "m", kNotNegative,
+           "apex of the swing foot above the higher end of its path");
+  f.number("swing_apex", o.swing.apex, "1", kNotNegative, "time of the apex as a fraction of the swing, from 0 to 1");
+  f.number("swing_leave", o.swing.leave, "1", kNotNegative,
+           "time at which the swing foot starts to move horizontally, from 0 to 1");
+  f.number("swing_arrive", o.swing.arrive, "1", {0, 1},
+           "time at which the swing foot is above its foothold, from 0 to 1");
+  f.number("friction", o.friction, "1", kPositive, "friction coefficient");
+  f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
+  f.flag("published", o.published,
+         "the paper's problem, with free landing places, instead of footholds and Bielle's costs");
+  f.flag("rigid_landing", o.rigid_landing, "a rigid impact at every landing, as a separate stage");
+  f.number("landing_speed", o.landing_speed, "m/s", kNotNegative,
+           "with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest");
+  f.number("foothold_room", o.foothold_room, "m", kNotNegative,
+           "largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it");
+  f.number("state_weight", o.state_weight, "1", kNotNegative, "stay near the standing posture, at rest");
+  f.number("torso_weight", o.torso_weight, "1", kNotNegative,
+           "keep the torso upright, within the state regularization");
+  f.number("heading_weight", o.heading_weight, "1", kNotNegative,
+           "keep the heading of the feet, within the state regularization");
+  f.number("motor_weight", o.motor_weight, "1", kNotNegative, "keep motors slow, within the state regularization");
+  f.number("control_weight", o.control_weight, "1/(N m)^2", kNotNegative, "keep motor torques small");
+  f.number("com_weight", o.com_weight, "1/m^2", kNotNegative, "horizontal position of the centre of mass");
+  f.number("com_height_weight", o.com_height_weight, "1/m^2", kNotNegative, "height of the centre of mass");
+  f.number("com_velocity_weight", o.com_velocity_weight, "s^2/m^2", kNotNegative,
+           "velocity of the centre of mass in the direction of travel");
+  f.number("swing_weight", o.swing_weight, "1/m^2", kNotNegative, "path of the swing foot");
+  f.number("swing_velocity_weight", o.swing_velocity_weight, "s^2/m^2", kNotNegative,
+           "velocity of the swing foot along its path");
+  f.number("swing_rotation_weight", o.swing_rotation_weight, "1", kNotNegative, "orientation of the swing foot");
+  f.number("foothold_weight", o.foothold_weight, "1/m^2", kNotNegative,
+           "with foothold_room: land near the foothold, swing near its horizontal path");
+  f.number("force_weight", o.force_weight, "1", kNotNegative,
+           "transfer the weight evenly between the feet, relative to (m g)^2");
+  f.number("pressure_weight", o.pressure_weight, "1", kNotNegative,
+           "keep the centre of pressure in the middle of the sole");
+  f.number("feet_distance", o.feet_distance, "m", kNotNegative,
+           "least distance between the soles, or that of the footholds if smaller");
+  f.number("terminal_weight", o.terminal_weight, "1/m^2", kNotNegative, "position of the centre of mass at the end");
+  f.number("contact_kp", o.contact_kp, "1/s^2", kNotNegative,
+           "position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2))");
+  f.number("contact_kd", o.contact_kd, "1/s", kNotNegative,
+           "velocity gain of the stabilisation of contacts (at most 1/h)");
+  f.number("closure_kp", o.closure_kp, "1/s^2", kNotNegative,
+           "position gain of the stabilisation of closures (full formulation)");
+  f.number("closure_kd", o.closure_kd, "1/s", kNotNegative,
+           "velocity gain of the stabilisation of closures (full formulation)");
 }
 
 void setPaperWeights(LocomotionOptions& o) {
@@ -58,7 +71,7 @@ void setPaperWeights(LocomotionOptions& o) {
   o.timing.single = 26 * h;  // 0.4 s
   o.timing.both = h;
   o.timing.end = 14 * h;  // h + 0.2 s
-  o.published = 1;
+  o.published = true;
   o.start_pressure = 0;
   o.state_weight = 1;
   o.torso_weight = 2500;

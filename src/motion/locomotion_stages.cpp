@@ -196,7 +196,7 @@ StageSpec makeStage(const Scene& scene, int k, const std::vector<ContactTarget>&
   addForceCosts(scene, node, stage);
   for (int step : phase.steps)
     if (step >= 0) addSwingCosts(scene, node, scene.task.plan.steps[step], stage);
-  if (node.landed >= 0 && o.rigid_landing == 0) addLanding(scene, scene.task.plan.steps[node.landed], stage);
+  if (node.landed >= 0 && !o.rigid_landing) addLanding(scene, scene.task.plan.steps[node.landed], stage);
   addSwingConstraints(scene, node, k, stage);
   return stage;
 }

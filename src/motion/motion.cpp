@@ -16,25 +16,6 @@
 
 namespace bielle {
 
-void setOption(const std::vector<OptionEntry>& options, const std::string& name, double value) {
-  std::string known;
-  for (const OptionEntry& option : options) {
-    if (option.name == name) {
-      requireOption(std::isfinite(value), name, "it is not finite", "give a number");
-      *option.value = value;
-      return;
-    }
-    known += (known.empty() ? "" : ", ") + option.name;
-  }
-  throw ModelError("", "option '" + name + "'", "there is no such option", "choose one of: " + known);
-}
-
-std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionEntry>& options) {
-  std::vector<std::pair<std::string, double>> values;
-  for (const OptionEntry& option : options) values.emplace_back(option.name, *option.value);
-  return values;
-}
-
 void requireStages(double seconds, double time_step) {
   requireOption(seconds <= 1e5 * time_step, "time_step", "it divides the motion into more than 100000 stages",
                 "give longer stages, e.g. 0.01 s, or a shorter motion");
@@ -42,21 +23,6 @@ void requireStages(double seconds, double time_step) {
 
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
   if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
-}
-
-void requireNotNegative(const std::vector<OptionEntry>& options, const std::vector<std::string>& any_sign) {
-  for (const OptionEntry& option : options) {
-    requireOption(std::isfinite(*option.value), option.name, "it is not a finite number", "give a number");
-    if (std::find(any_sign.begin(), any_sign.end(), option.name) == any_sign.end())
-      requireOption(*option.value >= 0, option.name, "it is negative", "give 0 or more");
-  }
-}
-
-void requirePositive(const std::vector<OptionEntry>& options, const std::vector<std::string>& names) {
-  for (const OptionEntry& option : options)
-    if (std::find(names.begin(), names.end(), option.name) != names.end())
-      requireOption(*option.value > 0, option.name, "it is not positive",
-                    "give a number above 0 [" + option.unit + "]");
 }
 
 namespace {

@@ -30,27 +30,17 @@ std::vector<Footstep> moveTogether(const Stance& stance, const std::vector<Vecto
 }
 
 void checkBox(const Model& model, const Stance& stance, const BoxOptions& o) {
-  requireOption(o.height > 0 && o.height <= 10, "height", "it is outside 0 .. 10 m", "give metres, e.g. 0.1");
+  listOptions(o).check();
   const ContactFrame& foot = model.contacts()[stance.contacts[0]];
-  requireOption(o.length >= 2 * calcHalfLength(model, stance) && o.length <= 10, "length",
-                "the box is shorter than the sole, or longer than 10 m", "give metres, e.g. 0.2");
-  requireOption(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width && o.width <= 100, "width",
-                "the box is too narrow for the feet, or wider than 100 m", "give metres, e.g. 0.8");
-  requireOption(o.distance >= 0 && std::isfinite(o.distance), "distance", "it is negative or not finite",
-                "give the distance from the soles to the box in metres, e.g. 0.05");
-  requireOption(o.down == 0 || o.down == 1, "down", "it is neither 0 nor 1", "give 1 to step down again");
+  requireOption(o.length >= 2 * calcHalfLength(model, stance), "length", "the box is shorter than the sole",
+                "give metres, e.g. 0.2");
+  requireOption(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width, "width",
+                "the box is too narrow for the feet", "give metres, e.g. 0.8");
 }
 
 void checkGap(const GapOptions& o) {
-  requireOption(o.width > 0 && o.width < kBank, "width", "it is outside 0 .. 1.2 m", "give metres, e.g. 0.15");
-  requireOption(o.distance >= 0 && std::isfinite(o.distance), "distance", "it is negative or not finite",
-                "give the distance from the soles to the gap in metres, e.g. 0.02");
-  requireOption(o.depth > 0 && o.depth <= 100, "depth", "it is outside 0 .. 100 m", "give metres, e.g. 0.3");
-}
-
-template <typename Options>
-std::vector<std::pair<std::string, double>> listOptionValues(Options options) {
-  return listValues(listOptions(options));
+  listOptions(o).check();
+  requireOption(o.width < kBank, "width", "it is 1.2 m or more", "give metres, e.g. 0.15");
 }
 
 }  // namespace
@@ -63,23 +53,20 @@ LocomotionOptions BoxOptions::makeGaitDefaults() {
   return gait;
 }
 
-std::vector<OptionEntry> listOptions(BoxOptions& o) {
-  std::vector<OptionEntry> entries = {{"height", &o.height, "m", "height of the box"},
-                                      {"length", &o.length, "m", "length of its top; the feet stand in the middle"},
-                                      {"width", &o.width, "m", "width of the box"},
-                                      {"distance", &o.distance, "m", "distance from the soles to the box"},
-                                      {"down", &o.down, "0 or 1", "1: step down again behind the box"}};
-  for (OptionEntry& entry : listOptions(o.gait)) entries.push_back(std::move(entry));
-  return entries;
+void describe(OptionFields& f, BoxOptions& o) {
+  f.number("height", o.height, "m", {0, 10, true}, "height of the box");
+  f.number("length", o.length, "m", {0, 10}, "length of its top; the feet stand in the middle");
+  f.number("width", o.width, "m", {0, 100}, "width of the box");
+  f.number("distance", o.distance, "m", kNotNegative, "distance from the soles to the box");
+  f.flag("down", o.down, "step down again behind the box");
+  describe(f, o.gait);
 }
 
-std::vector<OptionEntry> listOptions(GapOptions& o) {
-  std::vector<OptionEntry> entries = {
-      {"width", &o.width, "m", "width of the gap in the direction of travel"},
-      {"distance", &o.distance, "m", "distance of the soles from its edges, on both sides"},
-      {"depth", &o.depth, "m", "depth of the gap's floor below its banks"}};
-  for (OptionEntry& entry : listOptions(o.gait)) entries.push_back(std::move(entry));
-  return entries;
+void describe(OptionFields& f, GapOptions& o) {
+  f.number("width", o.width, "m", kPositive, "width of the gap in the direction of travel");
+  f.number("distance", o.distance, "m", kNotNegative, "distance of the soles from its edges, on both sides");
+  f.number("depth", o.depth, "m", {0, 100, true}, "depth of the gap's floor below its banks");
+  describe(f, o.gait);
 }
 
 MotionPlan planBox(const Model& model, const BoxOptions& o, const VectorXd& q0) {
@@ -89,11 +76,11 @@ MotionPlan planBox(const Model& model, const BoxOptions& o, const VectorXd& q0) 
   const double stride = calcHalfLength(model, stance) + o.distance + o.length / 2;
   const Vector3d top(stride, 0, o.height), behind(2 * stride, 0, 0);
   Course course{"box", moveTogether(stance, {top}), {}};
-  if (o.down != 0) course.steps = moveTogether(stance, {top, behind});
+  if (o.down) course.steps = moveTogether(stance, {top, behind});
   course.ground.height = start.p.z();
   course.ground.steps = {{start.act(top), o.length, o.width, calcHeading(start)}};
   MotionPlan plan = planCourse(model, stance, course, o.gait);
-  plan.options = listOptionValues(o);
+  plan.options = listOptions(o).listValues();
   const Goal height =
       makeCourseGoal(model, stance, "height", o.height, Vector3d::UnitZ(), listLandings(plan.schedule)[1]);
   plan.goals.insert(plan.goals.begin(), height);
@@ -110,7 +97,7 @@ MotionPlan planGap(const Model& model, const GapOptions& o, const VectorXd& q0) 
   for (double middle : {edge - kBank / 2, edge + o.width + kBank / 2})
     course.ground.steps.push_back({start.act(Vector3d(middle, 0, 0)), kBank, kBankWidth, calcHeading(start)});
   MotionPlan plan = planCourse(model, stance, course, o.gait);
-  plan.options = listOptionValues(o);
+  plan.options = listOptions(o).listValues();
   const Goal across = makeCourseGoal(model, stance, "across", stride, start.R.col(0), plan.schedule.numStages());
   plan.goals.insert(plan.goals.begin(), across);
   return plan;

@@ -12,13 +12,12 @@ namespace {
 constexpr int kSteadySteps = 8;  // shorter runs do not reach their speed: the steps at both ends are half as long
 
 // Supports and flights have options of their own.
-std::vector<OptionEntry> joinGait(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
-  for (OptionEntry& entry : listOptions(gait))
-    if (entry.name != "single_support" && entry.name != "double_support" && entry.name != "published")
-      entries.push_back(std::move(entry));
-  entries.push_back({"stretch", &gait.stretch, "m",
-                     "height of the centre of mass at take-off and touchdown above that at the start"});
-  return entries;
+void describeGait(OptionFields& f, LocomotionOptions& gait) {
+  f.omit({"single_support", "double_support", "published"});
+  describe(f, gait);
+  f.omit({});
+  f.number("stretch", gait.stretch, "m", {-0.5, 0.5},
+           "height of the centre of mass at take-off and touchdown above that at the start");
 }
 
 // Every foot lands by `displacements` ahead of where it stood at the start, along x of the feet.
@@ -35,11 +34,10 @@ std::vector<Footstep> moveAhead(const Stance& stance, const std::vector<std::pai
 
 // Steps with flights along x of the feet at the start.
 template <typename Options>
-MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask task, Options options) {
+MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask task, const Options& options) {
   LocomotionOptions gait = options.gait;
   gait.timing.flight = options.flight;
   gait.timing.single = options.stance;
-  requireOption(options.flight > 0, "flight", "it is not positive", "give seconds, e.g. 0.1");
   if (gait.timing.time_step == 0) gait.timing.time_step = chooseTimeStep(task, gait.timing, gait.swing);
   requireOption(options.stance >= 4 * gait.timing.time_step, "stance", "it is shorter than four time steps",
                 "give seconds, e.g. 0.25");
@@ -47,7 +45,7 @@ MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask 
   task.ground.height = start.p.z();
   task.direction = start.R.col(0);
   MotionPlan plan = planLocomotion(model, stance, task, gait);
-  plan.options = listValues(listOptions(options));
+  plan.options = listOptions(options).listValues();
   return plan;
 }
 
@@ -74,26 +72,27 @@ LocomotionOptions HopOptions::makeGaitDefaults() {
   return gait;
 }
 
-std::vector<OptionEntry> listOptions(RunOptions& o) {
-  return joinGait({{"speed", &o.speed, "m/s", "speed of the steady steps; negative: backward"},
-                   {"steps", &o.steps, "1", "number of steps; the last one brings the feet together"},
-                   {"flight", &o.flight, "s", "time in the air between two steps"},
-                   {"stance", &o.stance, "s", "time with one foot on the ground"}},
-                  o.gait);
+void describe(OptionFields& f, RunOptions& o) {
+  f.number("speed", o.speed, "m/s", {}, "speed of the steady steps; negative: backward");
+  f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
+  f.number("flight", o.flight, "s", kPositive, "time in the air between two steps");
+  f.number("stance", o.stance, "s", kNotNegative, "time with one foot on the ground");
+  describeGait(f, o.gait);
 }
 
-std::vector<OptionEntry> listOptions(HopOptions& o) {
-  return joinGait(
-      {{"foot", &o.foot, "0 or 1", "foot to hop on; 0: left, 1: right", {"left", "right"}},
-       {"hops", &o.hops, "1", "number of flights"},
-       {"flight", &o.flight, "s", "time in the air of each hop"},
-       {"length", &o.length, "m", "length of each hop, forward; negative: backward"},
-       {"stance", &o.stance, "s", "time on one foot before the first flight, between flights and after the last one"}},
-      o.gait);
+void describe(OptionFields& f, HopOptions& o) {
+  f.choice("foot", o.foot, {"left", "right"}, "foot to hop on");
+  f.integer("hops", o.hops, {1, 100}, "number of flights");
+  f.number("flight", o.flight, "s", kPositive, "time in the air of each hop");
+  f.number("length", o.length, "m", {}, "length of each hop, forward; negative: backward");
+  f.number("stance", o.stance, "s", kNotNegative,
+           "time on one foot before the first flight, between flights and after the last one");
+  describeGait(f, o.gait);
 }
 
 MotionPlan planRun(const Model& model, const RunOptions& o, const VectorXd& q0) {
-  const int steps = countSteps("steps", o.steps);
+  listOptions(o).check();
+  const int steps = o.steps;
   const Stance stance = makeStance(model, o.gait, q0);
   const double length = o.speed * (o.stance + o.flight);
   std::vector<std::pair<Side, double>> landings;
@@ -115,13 +114,10 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const VectorXd& q0) 
 }
 
 MotionPlan planHop(const Model& model, const HopOptions& o, const VectorXd& q0) {
-  requireOption(o.foot == 0 || o.foot == 1, "foot", "it is neither 0 nor 1",
-                "give 0 for the left foot, 1 for the right foot");
-  requireOption(o.hops >= 1 && o.hops <= 100 && o.hops == std::floor(o.hops), "hops",
-                "it is not a whole number from 1 to 100", "give one, e.g. 1");
+  listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, q0);
-  const Side side = o.foot == 0 ? Side::Left : Side::Right;
-  const int hops = static_cast<int>(o.hops);
+  const Side side = o.foot;
+  const int hops = o.hops;
   std::vector<std::pair<Side, double>> landings;
   for (int i = 1; i <= hops; ++i) landings.emplace_back(side, i * o.length);
   landings.emplace_back(getOther(side), hops * o.length);

@@ -12,11 +12,7 @@ namespace bielle {
 namespace {
 
 void check(const Model& model, const SquatOptions& o) {
-  requireOption(o.depth >= 0.05 && o.depth <= 2, "depth", "it is outside 0.05 .. 2",
-                "give the lowest height of the centre of mass divided by its initial height, e.g. 0.7");
-  SquatOptions copy = o;
-  requireNotNegative(listOptions(copy));
-  requirePositive(listOptions(copy), {"duration", "time_step", "friction"});
+  listOptions(o).check();
   requireOption(o.time_step <= o.duration / 4, "time_step", "it exceeds a quarter of the motion",
                 "give seconds, e.g. 0.015");
   requireStages(o.duration + 2 * o.settle, o.time_step);
@@ -50,25 +46,29 @@ std::string nameSupport(size_t feet) {
 
 }  // namespace
 
-std::vector<OptionEntry> listOptions(SquatOptions& o) {
-  return {{"depth", &o.depth, "1", "lowest height of the centre of mass divided by its initial height"},
-          {"duration", &o.duration, "s", "time to go down and come back"},
-          {"settle", &o.settle, "s", "time at rest before and after"},
-          {"time_step", &o.time_step, "s", "length of a shooting stage"},
-          {"com_weight", &o.com_weight, "1/m^2", "follow the height of the centre of mass"},
-          {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
-          {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
-          {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
-          {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
-          {"force_weight", &o.force_weight, "1", "share the weight evenly between the feet, relative to (m g)^2"},
-          {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-          {"friction", &o.friction, "1", "friction coefficient"},
-          {"cone_margin", &o.cone_margin, "1", "share of friction and soles that wrenches leave unused"},
-          {"contact_kp", &o.contact_kp, "1/s^2",
-           "position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2))"},
-          {"contact_kd", &o.contact_kd, "1/s", "velocity gain of the stabilisation of contacts (at most 1/h)"},
-          {"closure_kp", &o.closure_kp, "1/s^2", "position gain of the stabilisation of closures"},
-          {"closure_kd", &o.closure_kd, "1/s", "velocity gain of the stabilisation of closures"}};
+void describe(OptionFields& f, SquatOptions& o) {
+  f.number("depth", o.depth, "1", {0.05, 2}, "lowest height of the centre of mass divided by its initial height");
+  f.number("duration", o.duration, "s", kPositive, "time to go down and come back");
+  f.number("settle", o.settle, "s", kNotNegative, "time at rest before and after");
+  f.number("time_step", o.time_step, "s", kPositive, "length of a shooting stage");
+  f.number("com_weight", o.com_weight, "1/m^2", kNotNegative, "follow the height of the centre of mass");
+  f.number("state_weight", o.state_weight, "1", kNotNegative, "stay near the standing posture, at rest");
+  f.number("torso_weight", o.torso_weight, "1", kNotNegative,
+           "keep the torso upright, within the state regularization");
+  f.number("motor_weight", o.motor_weight, "1", kNotNegative, "keep motors slow, within the state regularization");
+  f.number("control_weight", o.control_weight, "1/(N m)^2", kNotNegative, "keep motor torques small");
+  f.number("force_weight", o.force_weight, "1", kNotNegative,
+           "share the weight evenly between the feet, relative to (m g)^2");
+  f.number("pressure_weight", o.pressure_weight, "1", kNotNegative,
+           "keep the centre of pressure in the middle of the sole");
+  f.number("friction", o.friction, "1", kPositive, "friction coefficient");
+  f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
+  f.number("contact_kp", o.contact_kp, "1/s^2", kNotNegative,
+           "position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2))");
+  f.number("contact_kd", o.contact_kd, "1/s", kNotNegative,
+           "velocity gain of the stabilisation of contacts (at most 1/h)");
+  f.number("closure_kp", o.closure_kp, "1/s^2", kNotNegative, "position gain of the stabilisation of closures");
+  f.number("closure_kd", o.closure_kd, "1/s", kNotNegative, "velocity gain of the stabilisation of closures");
 }
 
 double calcSquatHeight(const SquatOptions& o, double t) {
@@ -112,8 +112,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Vect
   plan.guess.xs.assign(nodes + 1, x0);
   plan.guess.us.assign(nodes, calcStaticTorques(model, makeConstraintSet(model, contacts), q0).u);
   plan.q_start = plan.q_end = q0;
-  SquatOptions copy = options;
-  plan.options = listValues(listOptions(copy));
+  plan.options = listOptions(options).listValues();
   Goal depth{GoalKind::Height, "depth", options.depth, calcTolerance(1 - options.depth, 0.01), 0, nodes};
   depth.contacts = getContactNames(model, contacts);
   plan.goals = {depth};

@@ -8,30 +8,26 @@
 namespace bielle {
 namespace {
 
-int check(const Model& model, const Stance& stance, const StairsOptions& o) {
+void check(const Model& model, const Stance& stance, const StairsOptions& o) {
   const ContactFrame& foot = model.contacts()[stance.contacts[0]];
-  requireOption(std::isfinite(o.height), "height", "it is not finite", "give metres, e.g. 0.06, or -0.06 to go down");
+  listOptions(o).check();
   requireOption(o.depth > 2 * foot.half_length, "depth", "it is shorter than the sole", "give metres, e.g. 0.2");
-  requireOption(o.stairs >= 1 && o.stairs <= 100 && o.stairs == std::floor(o.stairs), "stairs",
-                "it is not a whole number from 1 to 100", "give a number of steps");
-  requireOption(o.speed > 0, "speed", "it is not positive", "give m/s, e.g. 0.3");
   requireOption(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width, "width",
                 "the stairs are too narrow for the feet", "give metres, e.g. 0.8");
   const double single = o.depth / o.speed - o.gait.timing.both;
   requireOption(single >= 0.2 && single <= 3, "speed",
                 "a step of this depth takes " + formatNumber(single) + " s on one foot, outside 0.2 .. 3 s",
                 "change speed, depth or double_support");
-  return static_cast<int>(o.stairs);
 }
 
 // Foot i on step i; both end on the last one.
-FootstepPlan planFootholds(const Stance& stance, const StairsOptions& o, int stairs) {
+FootstepPlan planFootholds(const Stance& stance, const StairsOptions& o) {
   FootstepPlan plan{stance.feet, {}};
   const Vector3d up = calcMiddle(stance.feet[0], stance.feet[1]).R * Vector3d(o.depth, 0, o.height);
   Side side = getFirstFoot(o.gait);
-  for (int i = 1; i <= stairs + 1; ++i, side = getOther(side)) {
+  for (int i = 1; i <= o.stairs + 1; ++i, side = getOther(side)) {
     SE3 X = stance.feet[static_cast<int>(side)];
-    X.p += std::min(i, stairs) * up;
+    X.p += std::min(i, o.stairs) * up;
     plan.steps.push_back({side, X});
   }
   return plan;
@@ -56,17 +52,16 @@ LocomotionOptions StairsOptions::makeGaitDefaults() {
   return gait;
 }
 
-std::vector<OptionEntry> listOptions(StairsOptions& o) {
-  std::vector<OptionEntry> entries = {
-      {"height", &o.height, "m", "height of a step; negative: down"},
-      {"depth", &o.depth, "m", "depth of a step"},
-      {"slope", &o.slope, "1", "height over depth; replaces the height unless 0"},
-      {"stairs", &o.stairs, "1", "number of steps of the staircase"},
-      {"speed", &o.speed, "m/s", "forward speed; with the depth it determines the duration of a step"},
-      {"width", &o.width, "m", "width of the stairs"}};
-  for (OptionEntry& entry : listOptions(o.gait))
-    if (entry.name != "single_support") entries.push_back(std::move(entry));
-  return entries;
+void describe(OptionFields& f, StairsOptions& o) {
+  f.number("height", o.height, "m", {}, "height of a step; negative: down");
+  f.number("depth", o.depth, "m", kNotNegative, "depth of a step");
+  f.number("slope", o.slope, "1", {}, "height over depth; replaces the height unless 0");
+  f.integer("stairs", o.stairs, {1, 100}, "number of steps of the staircase");
+  f.number("speed", o.speed, "m/s", kPositive, "forward speed; with the depth it determines the duration of a step");
+  f.number("width", o.width, "m", kNotNegative, "width of the stairs");
+  f.omit({"single_support"});
+  describe(f, o.gait);
+  f.omit({});
 }
 
 void setPaperWeights(StairsOptions& o) {
@@ -90,10 +85,9 @@ void setPaperWeights(StairsOptions& o) {
 }
 
 Ground makeStairsGround(const StairsOptions& o, const SE3& X_WP) {
-  const int stairs = static_cast<int>(o.stairs);
   Ground ground;
-  ground.height = X_WP.p.z() + std::min(0.0, stairs * o.height);
-  for (int i = o.height < 0 ? 0 : 1; i <= stairs; ++i)
+  ground.height = X_WP.p.z() + std::min(0.0, o.stairs * o.height);
+  for (int i = o.height < 0 ? 0 : 1; i <= o.stairs; ++i)
     ground.steps.push_back({X_WP.act(i * Vector3d(o.depth, 0, o.height)), o.depth, o.width, calcHeading(X_WP)});
   return ground;
 }
@@ -103,19 +97,19 @@ MotionPlan planStairs(const Model& model, const StairsOptions& options, const Ve
   if (o.slope != 0) o.height = o.slope * o.depth;
   const Stance stance = makeStance(model, o.gait, q0);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
-  const int stairs = check(model, stance, o);
+  check(model, stance, o);
   o.gait.timing.single = o.depth / o.speed - o.gait.timing.both;
   LocomotionTask task;
   task.name = "stairs";
-  task.plan = planFootholds(stance, o, stairs);
+  task.plan = planFootholds(stance, o);
   task.ground = makeStairsGround(o, start);
   task.direction = start.R * Vector3d::UnitX();
   task.speed = o.speed;
   MotionPlan plan = planLocomotion(model, stance, task, o.gait);
-  plan.options = listValues(listOptions(o));
+  plan.options = listOptions(o).listValues();
   const std::vector<Goal> speed = makeSpeedGoals(plan.schedule, o.speed, start.R.col(0));
   plan.goals.insert(plan.goals.begin(), speed.begin(), speed.end());
-  plan.goals.insert(plan.goals.begin(), makeClimbGoal(model, stance, stairs * o.height, plan.schedule.numStages()));
+  plan.goals.insert(plan.goals.begin(), makeClimbGoal(model, stance, o.stairs * o.height, plan.schedule.numStages()));
   return plan;
 }
 

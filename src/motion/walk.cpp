@@ -18,18 +18,17 @@ struct StepsPlan {
 template <typename Options>
 StepsPlan planSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& direction,
                     double speed, Side first, const Options& options, const VectorXd& q0) {
-  const int steps = countSteps("steps", options.steps);
+  listOptions(options).check();
   const Stance stance = makeStance(model, options.gait, q0);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   LocomotionTask task;
   task.name = name;
-  task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, steps, first);
+  task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, options.steps, first);
   task.ground.height = start.p.z();
   task.direction = start.R * direction;
   task.speed = speed;
   MotionPlan plan = planLocomotion(model, stance, task, options.gait);
-  Options copy = options;
-  plan.options = listValues(listOptions(copy));
+  plan.options = listOptions(options).listValues();
   return {std::move(plan), start};
 }
 
@@ -37,30 +36,25 @@ void addGoals(std::vector<Goal> goals, MotionPlan& plan) {
   plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
 }
 
-std::vector<OptionEntry> joinGaitOptions(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
-  for (OptionEntry& entry : listOptions(gait)) entries.push_back(std::move(entry));
-  return entries;
-}
-
 }  // namespace
 
-std::vector<OptionEntry> listOptions(WalkOptions& o) {
-  return joinGaitOptions({{"speed", &o.speed, "m/s", "speed of the steady steps; negative: backward"},
-                          {"steps", &o.steps, "1", "number of steps; the last one brings the feet together"}},
-                         o.gait);
+void describe(OptionFields& f, WalkOptions& o) {
+  f.number("speed", o.speed, "m/s", {}, "speed of the steady steps; negative: backward");
+  f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
+  describe(f, o.gait);
 }
 
-std::vector<OptionEntry> listOptions(SideWalkOptions& o) {
-  return joinGaitOptions({{"speed", &o.speed, "m/s", "speed of the steady steps to the left; negative: to the right"},
-                          {"steps", &o.steps, "1", "number of steps: one opens the stance, the next one closes it"}},
-                         o.gait);
+void describe(OptionFields& f, SideWalkOptions& o) {
+  f.number("speed", o.speed, "m/s", {}, "speed of the steady steps to the left; negative: to the right");
+  f.integer("steps", o.steps, {2, 200}, "number of steps: one opens the stance, the next one closes it");
+  describe(f, o.gait);
 }
 
-std::vector<OptionEntry> listOptions(TurnOptions& o) {
-  return joinGaitOptions({{"angle", &o.angle, "rad", "angle to turn to the left; negative: to the right"},
-                          {"radius", &o.radius, "m", "radius of the arc to walk along; 0: turn on the spot"},
-                          {"steps", &o.steps, "1", "number of steps; the last one brings the feet together"}},
-                         o.gait);
+void describe(OptionFields& f, TurnOptions& o) {
+  f.number("angle", o.angle, "rad", {}, "angle to turn to the left; negative: to the right");
+  f.number("radius", o.radius, "m", kNotNegative, "radius of the arc to walk along; 0: turn on the spot");
+  f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
+  describe(f, o.gait);
 }
 
 void setPaperWeights(WalkOptions& o) {
@@ -87,16 +81,13 @@ MotionPlan planWalk(const Model& model, const WalkOptions& o, const VectorXd& q0
 MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const VectorXd& q0) {
   const Side opening = o.speed > 0 ? Side::Left : Side::Right;
   StepsPlan plan = planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d::UnitY(),
-                             o.speed, o.gait.published != 0 ? getFirstFoot(o.gait) : opening, o, q0);
+                             o.speed, o.gait.published ? getFirstFoot(o.gait) : opening, o, q0);
   addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(1), 2), plan.motion);
   return std::move(plan.motion);
 }
 
 MotionPlan planTurn(const Model& model, const TurnOptions& o, const VectorXd& q0) {
-  if (!(o.radius >= 0))
-    throw ModelError("", "option 'radius'", "it is negative",
-                     "give metres; to turn to the right, give a negative angle");
-  const double yaw = o.angle / std::max(1, countSteps("steps", o.steps) - 1);
+  const double yaw = o.angle / std::max(1, o.steps - 1);
   requireOption(std::abs(yaw) <= kPi, "angle", "it is more than half a turn per step",
                 "give a smaller one, or more steps");
   StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(), 0,

@@ -15,24 +15,24 @@ Joint makeHip(const std::string& name, const Vector3d& place, const Vector3d& ax
 
 }  // namespace
 
-std::vector<Parameter> listSerialParameters(SerialBipedParameters& p) {
-  return {
-      {"hip_offset", &p.hip_offset, "m", 0.05, 0.4, "distance of a hip from the middle plane"},
-      {"trunk_height", &p.trunk_height, "m", 0, 0.5, "height of the trunk's frame above the hips"},
-      {"thigh_length", &p.thigh_length, "m", 0.05, 1, "distance from hip to knee"},
-      {"shank_length", &p.shank_length, "m", 0.05, 1, "distance from knee to ankle"},
-      {"ankle_height", &p.ankle_height, "m", 0.03, 0.3, "height of the ankle above the sole"},
-      {"hip_height", &p.hip_height, "m", 0.1, 2, "height of the hips above the soles in the reference half_sitting"},
-      {"sole_length", &p.sole_length, "m", 0.02, 0.5, "length of the sole, along x"},
-      {"sole_offset", &p.sole_offset, "m", -0.2, 0.2, "distance of the middle of the sole in front of the ankle"},
-      {"sole_width", &p.sole_width, "m", 0.02, 0.3, "width of the sole, along y"},
-      {"trunk_mass", &p.trunk_mass, "kg", 0.1, 100, "mass of the trunk without motors"},
-      {"motor_mass", &p.motor_mass, "kg", 0.01, 10, "mass of each motor"},
-      {"hip_link_mass", &p.hip_link_mass, "kg", 0.01, 10, "mass of each of the two links of a hip, without motors"},
-      {"link_density", &p.link_density, "kg/m", 0.01, 50, "mass per length of thigh and shank, without motors"},
-      {"foot_mass", &p.foot_mass, "kg", 0.01, 10, "mass of one foot"},
-      {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor"},
-  };
+void describeSerial(OptionFields& f, SerialBipedParameters& p, const std::string& motor_mass) {
+  f.number("hip_offset", p.hip_offset, "m", {0.05, 0.4}, "distance of a hip from the middle plane");
+  f.number("trunk_height", p.trunk_height, "m", {0, 0.5}, "height of the trunk's frame above the hips");
+  f.number("thigh_length", p.thigh_length, "m", {0.05, 1}, "distance from hip to knee");
+  f.number("shank_length", p.shank_length, "m", {0.05, 1}, "distance from knee to ankle");
+  f.number("ankle_height", p.ankle_height, "m", {0.03, 0.3}, "height of the ankle above the sole");
+  f.number("hip_height", p.hip_height, "m", {0.1, 2},
+           "height of the hips above the soles in the reference half_sitting");
+  f.number("sole_length", p.sole_length, "m", {0.02, 0.5}, "length of the sole, along x");
+  f.number("sole_offset", p.sole_offset, "m", {-0.2, 0.2}, "distance of the middle of the sole in front of the ankle");
+  f.number("sole_width", p.sole_width, "m", {0.02, 0.3}, "width of the sole, along y");
+  f.number("trunk_mass", p.trunk_mass, "kg", {0.1, 100}, "mass of the trunk without motors");
+  f.number("motor_mass", p.motor_mass, "kg", {0.01, 10}, motor_mass);
+  f.number("hip_link_mass", p.hip_link_mass, "kg", {0.01, 10},
+           "mass of each of the two links of a hip, without motors");
+  f.number("link_density", p.link_density, "kg/m", {0.01, 50}, "mass per length of thigh and shank, without motors");
+  f.number("foot_mass", p.foot_mass, "kg", {0.01, 10}, "mass of one foot");
+  f.number("armature", p.armature, "kg m^2", {0, 1}, "rotor inertia of every motor");
 }
 
 Vector3d getHip(const BipedSide& side, const SerialBipedParameters& p) {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/robots/generators.h"
+#include "robots/check_parameters.h"
 #include "robots/solid.h"
 
 namespace bielle {
@@ -27,7 +27,9 @@ struct SerialBipedParameters {
   double foot_mass = 0.5;      // kg
   double armature = 1e-3;      // of every motor, kg m^2
 };
-std::vector<Parameter> listSerialParameters(SerialBipedParameters& parameters);
+// \param motor_mass  its help
+void describeSerial(OptionFields& fields, SerialBipedParameters& parameters,
+                    const std::string& motor_mass = "mass of each motor");
 
 // A leg's side. Frames are parallel to the trunk's in the neutral configuration.
 struct BipedSide {

@@ -152,43 +152,42 @@ std::vector<Solid> makeTrunk(const std::vector<Side>& sides) {
 
 }  // namespace
 
-std::vector<Parameter> listParameters(CleobotParameters& p) {
-  return {
-      {"hip_height", &p.hip_height, "m", 0.2, 1.5, "height of the hips above the soles, standing"},
-      {"hip_offset", &p.hip_offset, "m", 0.05, 0.4, "distance of a hip from the middle plane"},
-      {"trunk_height", &p.trunk_height, "m", 0, 0.5, "height of the trunk's frame above the hips"},
-      {"hip_arm", &p.hip_arm, "m", 0.02, 0.2, "lever arm of the vertical hip rods about the pitch axis"},
-      {"hip_half_width", &p.hip_half_width, "m", 0.02, 0.2, "lever arm of the vertical hip rods about the roll axis"},
-      {"hip_rod", &p.hip_rod, "m", 0.03, 0.5, "length of the vertical hip rods"},
-      {"hip_crank", &p.hip_crank, "m", 0.02, 0.3, "length of their cranks"},
-      {"yaw_arm", &p.yaw_arm, "m", 0.02, 0.2, "lever arm of the horizontal hip rod about the yaw axis"},
-      {"yaw_rod", &p.yaw_rod, "m", 0.03, 0.5, "length of the horizontal hip rod"},
-      {"yaw_crank", &p.yaw_crank, "m", 0.02, 0.3, "length of its crank"},
-      {"thigh_length", &p.thigh_length, "m", 0.02, 0.5, "distance from the hip down to the motors of the lower leg"},
-      {"base_radius", &p.base_radius, "m", 0.02, 0.3, "distance of these motors from the axis of the thigh"},
-      {"base_angle", &p.base_angle, "rad", 0.2, 1.4, "angle of the front motors from the middle plane of the leg"},
-      {"limb_heading", &p.limb_heading, "rad", 0.1, 1.4, "heading of the planes of the front limbs"},
-      {"upper_length", &p.upper_length, "m", 0.05, 1, "distance from motor to knee"},
-      {"shank_length", &p.shank_length, "m", 0.05, 1, "distance from knee to ball"},
-      {"platform_inset", &p.platform_inset, "m", -0.2, 0.2,
-       "inward distance of the foot's balls from the points below the motors"},
-      {"ankle_height", &p.ankle_height, "m", 0.03, 0.3, "height of the balls above the sole"},
-      {"sole_length", &p.sole_length, "m", 0.02, 0.5, "length of the sole, along x"},
-      {"sole_width", &p.sole_width, "m", 0.02, 0.3, "width of the sole, along y"},
-      {"trunk_mass", &p.trunk_mass, "kg", 0.1, 100, "mass of the trunk without motors"},
-      {"hip_motor_mass", &p.hip_motor_mass, "kg", 0.01, 10, "mass of each motor on the trunk"},
-      {"leg_motor_mass", &p.leg_motor_mass, "kg", 0.01, 10, "mass of each motor on the thigh"},
-      {"thigh_mass", &p.thigh_mass, "kg", 0.01, 20, "mass of the thigh without motors"},
-      {"limb_density", &p.limb_density, "kg/m", 0.01, 20, "mass per length of upper rods and shanks"},
-      {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "mass per length of the rods and cranks of the hip"},
-      {"foot_mass", &p.foot_mass, "kg", 0.01, 10, "mass of one foot"},
-      {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor"},
-  };
+void describe(OptionFields& f, CleobotParameters& p) {
+  f.number("hip_height", p.hip_height, "m", {0.2, 1.5}, "height of the hips above the soles, standing");
+  f.number("hip_offset", p.hip_offset, "m", {0.05, 0.4}, "distance of a hip from the middle plane");
+  f.number("trunk_height", p.trunk_height, "m", {0, 0.5}, "height of the trunk's frame above the hips");
+  f.number("hip_arm", p.hip_arm, "m", {0.02, 0.2}, "lever arm of the vertical hip rods about the pitch axis");
+  f.number("hip_half_width", p.hip_half_width, "m", {0.02, 0.2},
+           "lever arm of the vertical hip rods about the roll axis");
+  f.number("hip_rod", p.hip_rod, "m", {0.03, 0.5}, "length of the vertical hip rods");
+  f.number("hip_crank", p.hip_crank, "m", {0.02, 0.3}, "length of their cranks");
+  f.number("yaw_arm", p.yaw_arm, "m", {0.02, 0.2}, "lever arm of the horizontal hip rod about the yaw axis");
+  f.number("yaw_rod", p.yaw_rod, "m", {0.03, 0.5}, "length of the horizontal hip rod");
+  f.number("yaw_crank", p.yaw_crank, "m", {0.02, 0.3}, "length of its crank");
+  f.number("thigh_length", p.thigh_length, "m", {0.02, 0.5},
+           "distance from the hip down to the motors of the lower leg");
+  f.number("base_radius", p.base_radius, "m", {0.02, 0.3}, "distance of these motors from the axis of the thigh");
+  f.number("base_angle", p.base_angle, "rad", {0.2, 1.4}, "angle of the front motors from the middle plane of the leg");
+  f.number("limb_heading", p.limb_heading, "rad", {0.1, 1.4}, "heading of the planes of the front limbs");
+  f.number("upper_length", p.upper_length, "m", {0.05, 1}, "distance from motor to knee");
+  f.number("shank_length", p.shank_length, "m", {0.05, 1}, "distance from knee to ball");
+  f.number("platform_inset", p.platform_inset, "m", {-0.2, 0.2},
+           "inward distance of the foot's balls from the points below the motors");
+  f.number("ankle_height", p.ankle_height, "m", {0.03, 0.3}, "height of the balls above the sole");
+  f.number("sole_length", p.sole_length, "m", {0.02, 0.5}, "length of the sole, along x");
+  f.number("sole_width", p.sole_width, "m", {0.02, 0.3}, "width of the sole, along y");
+  f.number("trunk_mass", p.trunk_mass, "kg", {0.1, 100}, "mass of the trunk without motors");
+  f.number("hip_motor_mass", p.hip_motor_mass, "kg", {0.01, 10}, "mass of each motor on the trunk");
+  f.number("leg_motor_mass", p.leg_motor_mass, "kg", {0.01, 10}, "mass of each motor on the thigh");
+  f.number("thigh_mass", p.thigh_mass, "kg", {0.01, 20}, "mass of the thigh without motors");
+  f.number("limb_density", p.limb_density, "kg/m", {0.01, 20}, "mass per length of upper rods and shanks");
+  f.number("rod_density", p.rod_density, "kg/m", {0.01, 20}, "mass per length of the rods and cranks of the hip");
+  f.number("foot_mass", p.foot_mass, "kg", {0.01, 10}, "mass of one foot");
+  f.number("armature", p.armature, "kg m^2", {0, 1}, "rotor inertia of every motor");
 }
 
-Model makeCleobot(const CleobotParameters& parameters) {
-  CleobotParameters p = parameters;
-  checkParameters("cleobot", listParameters(p));
+Model makeCleobot(const CleobotParameters& p) {
+  checkParameters("cleobot", p);
   const std::vector<Side> sides = {{{1, "_left"}, p}, {{-1, "_right"}, p}};
   ModelBuilder builder("cleobot");
   addTrunk(makeTrunk(sides), builder);

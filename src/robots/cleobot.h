@@ -26,7 +26,7 @@
 /// dead point where its crank and rod are aligned; the hip is singular where the moments of the three rods are
 /// dependent.
 #include "bielle/model/model.h"
-#include "bielle/robots/generators.h"
+#include "robots/check_parameters.h"
 
 namespace bielle {
 
@@ -63,7 +63,7 @@ struct CleobotParameters {
   double armature = 1e-3;       ///< of every motor, kg m^2
 };
 
-std::vector<Parameter> listParameters(CleobotParameters& parameters);
+void describe(OptionFields& fields, CleobotParameters& parameters);
 
 /// \throws ModelError when a parameter is outside its bounds, or the limbs do not reach the foot
 Model makeCleobot(const CleobotParameters& parameters = {});

@@ -55,22 +55,21 @@ void addArm(const DeltaParameters& p, const DeltaArm& arm, const std::string& na
 
 }  // namespace
 
-std::vector<Parameter> listParameters(DeltaParameters& p) {
-  return {{"base_radius", &p.base_radius, "m", 0.01, 2, "distance of the motors from the middle"},
-          {"platform_radius", &p.platform_radius, "m", 0.005, 2, "distance of the platform's joints from its middle"},
-          {"upper_length", &p.upper_length, "m", 0.01, 2, "length of the arms that the motors turn"},
-          {"forearm_length", &p.forearm_length, "m", 0.01, 3, "length of the parallelograms"},
-          {"half_width", &p.half_width, "m", 0.005, 0.5, "half the width of the parallelograms"},
-          {"arm_angle", &p.arm_angle, "rad", -1.5, 1.5, "angle of the upper arms below the horizontal, neutral"},
-          {"rod_density", &p.rod_density, "kg/m", 0.01, 20,
-           "mass per length of the rods; the upper arms have twice as much"},
-          {"platform_mass", &p.platform_mass, "kg", 0.01, 20, "mass of the platform"},
-          {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor"}};
+void describe(OptionFields& f, DeltaParameters& p) {
+  f.number("base_radius", p.base_radius, "m", {0.01, 2}, "distance of the motors from the middle");
+  f.number("platform_radius", p.platform_radius, "m", {0.005, 2}, "distance of the platform's joints from its middle");
+  f.number("upper_length", p.upper_length, "m", {0.01, 2}, "length of the arms that the motors turn");
+  f.number("forearm_length", p.forearm_length, "m", {0.01, 3}, "length of the parallelograms");
+  f.number("half_width", p.half_width, "m", {0.005, 0.5}, "half the width of the parallelograms");
+  f.number("arm_angle", p.arm_angle, "rad", {-1.5, 1.5}, "angle of the upper arms below the horizontal, neutral");
+  f.number("rod_density", p.rod_density, "kg/m", {0.01, 20},
+           "mass per length of the rods; the upper arms have twice as much");
+  f.number("platform_mass", p.platform_mass, "kg", {0.01, 20}, "mass of the platform");
+  f.number("armature", p.armature, "kg m^2", {0, 1}, "rotor inertia of every motor");
 }
 
-Model makeDelta(const DeltaParameters& parameters) {
-  DeltaParameters p = parameters;
-  checkParameters("delta", listParameters(p));
+Model makeDelta(const DeltaParameters& p) {
+  checkParameters("delta", p);
   const double reach = p.base_radius + p.upper_length * std::cos(p.arm_angle) - p.platform_radius;
   const double square = p.forearm_length * p.forearm_length - reach * reach;
   if (!(square > 0))

@@ -15,7 +15,7 @@
 /// circumscribed circles are R = 0.567 / (2 sqrt 3) and r = 0.076 / sqrt 3; arms of 0.524 and 1.244 m, parallelograms
 /// 0.131 m wide. Neutral posture, masses and radii are ours.
 #include "bielle/model/model.h"
-#include "bielle/robots/generators.h"
+#include "robots/check_parameters.h"
 
 namespace bielle {
 
@@ -31,7 +31,7 @@ struct DeltaParameters {
   double armature = 0.01;             ///< of a motor behind its gear, kg m^2
 };
 
-std::vector<Parameter> listParameters(DeltaParameters& parameters);
+void describe(OptionFields& fields, DeltaParameters& parameters);
 
 /// \throws ModelError when a parameter is outside its bounds, or the forearms do not reach the platform
 Model makeDelta(const DeltaParameters& parameters = {});

@@ -22,20 +22,19 @@ void addSide(const FiveBarLegParameters& p, const std::string& name, double sign
 
 }  // namespace
 
-std::vector<Parameter> listParameters(FiveBarLegParameters& p) {
-  return {{"upper_length", &p.upper_length, "m", 0.01, 2, "distance from motor to knee"},
-          {"lower_length", &p.lower_length, "m", 0.01, 2, "distance from knee to foot"},
-          {"stand_angle", &p.stand_angle, "rad", 0.05, 3, "angle of the upper rods from straight down, standing"},
-          {"body_mass", &p.body_mass, "kg", 0.01, 100, "mass of the body on the rail, without motors"},
-          {"motor_mass", &p.motor_mass, "kg", 0.01, 10, "mass of each motor"},
-          {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "mass per length of the rods"},
-          {"foot_mass", &p.foot_mass, "kg", 0.001, 5, "mass of the foot"},
-          {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor"}};
+void describe(OptionFields& f, FiveBarLegParameters& p) {
+  f.number("upper_length", p.upper_length, "m", {0.01, 2}, "distance from motor to knee");
+  f.number("lower_length", p.lower_length, "m", {0.01, 2}, "distance from knee to foot");
+  f.number("stand_angle", p.stand_angle, "rad", {0.05, 3}, "angle of the upper rods from straight down, standing");
+  f.number("body_mass", p.body_mass, "kg", {0.01, 100}, "mass of the body on the rail, without motors");
+  f.number("motor_mass", p.motor_mass, "kg", {0.01, 10}, "mass of each motor");
+  f.number("rod_density", p.rod_density, "kg/m", {0.01, 20}, "mass per length of the rods");
+  f.number("foot_mass", p.foot_mass, "kg", {0.001, 5}, "mass of the foot");
+  f.number("armature", p.armature, "kg m^2", {0, 1}, "rotor inertia of every motor");
 }
 
-Model makeFiveBarLeg(const FiveBarLegParameters& parameters) {
-  FiveBarLegParameters p = parameters;
-  checkParameters("fivebar_leg", listParameters(p));
+Model makeFiveBarLeg(const FiveBarLegParameters& p) {
+  checkParameters("fivebar_leg", p);
   const double side = p.upper_length * std::sin(p.stand_angle), square = p.lower_length * p.lower_length - side * side;
   const double depth = square > 0 ? p.upper_length * std::cos(p.stand_angle) + std::sqrt(square) : 0;
   if (!(depth > 0))

@@ -10,7 +10,7 @@
 /// Lengths of the Minitaur robot: l1 = 0.1 m, l2 = 0.2 m (Kenneally, De, Koditschek, "Design principles for a family of
 /// direct-drive legged robots", IEEE Robotics and Automation Letters 1, 2016). Masses and radii are ours.
 #include "bielle/model/model.h"
-#include "bielle/robots/generators.h"
+#include "robots/check_parameters.h"
 
 namespace bielle {
 
@@ -25,7 +25,7 @@ struct FiveBarLegParameters {
   double armature = 1e-4;     ///< of a motor, kg m^2
 };
 
-std::vector<Parameter> listParameters(FiveBarLegParameters& parameters);
+void describe(OptionFields& fields, FiveBarLegParameters& parameters);
 
 /// \throws ModelError when a parameter is outside its bounds, or the lower rods do not meet
 Model makeFiveBarLeg(const FiveBarLegParameters& parameters = {});

@@ -48,31 +48,26 @@ void addArm(const HumanoidArm& arm, ModelBuilder& builder) {
 
 }  // namespace
 
-std::vector<Parameter> listParameters(HumanoidParameters& p) {
-  std::vector<Parameter> parameters = listRsuParameters(p);
-  for (Parameter& parameter : parameters)
-    if (parameter.name == "motor_mass") parameter.help = "mass of each motor of the legs";
-  const std::vector<Parameter> own = {
-      {"shoulder_height", &p.shoulder_height, "m", 0, 1, "height of the shoulders above the trunk's frame"},
-      {"shoulder_offset", &p.shoulder_offset, "m", 0.05, 0.5, "distance of a shoulder from the middle plane"},
-      {"upper_arm_length", &p.upper_arm_length, "m", 0.05, 1, "distance from shoulder to elbow"},
-      {"forearm_length", &p.forearm_length, "m", 0.05, 1, "distance from elbow to hand"},
-      {"finger_length", &p.finger_length, "m", 0.01, 0.2, "length of each of the two links of a finger"},
-      {"finger_ratio", &p.finger_ratio, "1", 0.1, 3,
-       "backward turns of a fingertip per turn of its finger; 1: tips stay parallel"},
-      {"arm_density", &p.arm_density, "kg/m", 0.01, 50, "mass per length of upper arm and forearm, without motors"},
-      {"arm_motor_mass", &p.arm_motor_mass, "kg", 0.01, 10, "mass of each motor of an arm; a hand has half of it"},
-      {"finger_mass", &p.finger_mass, "kg", 0.001, 1, "mass of each link of a finger"},
-      {"finger_armature", &p.finger_armature, "kg m^2", 0, 1, "rotor inertia of the gripper's motor"},
-  };
-  parameters.insert(parameters.end(), own.begin(), own.end());
-  return parameters;
+void describe(OptionFields& f, HumanoidParameters& p) {
+  describeRsu(f, p, "mass of each motor of the legs");
+  f.number("shoulder_height", p.shoulder_height, "m", {0, 1}, "height of the shoulders above the trunk's frame");
+  f.number("shoulder_offset", p.shoulder_offset, "m", {0.05, 0.5}, "distance of a shoulder from the middle plane");
+  f.number("upper_arm_length", p.upper_arm_length, "m", {0.05, 1}, "distance from shoulder to elbow");
+  f.number("forearm_length", p.forearm_length, "m", {0.05, 1}, "distance from elbow to hand");
+  f.number("finger_length", p.finger_length, "m", {0.01, 0.2}, "length of each of the two links of a finger");
+  f.number("finger_ratio", p.finger_ratio, "1", {0.1, 3},
+           "backward turns of a fingertip per turn of its finger; 1: tips stay parallel");
+  f.number("arm_density", p.arm_density, "kg/m", {0.01, 50},
+           "mass per length of upper arm and forearm, without motors");
+  f.number("arm_motor_mass", p.arm_motor_mass, "kg", {0.01, 10}, "mass of each motor of an arm; a hand has half of it");
+  f.number("finger_mass", p.finger_mass, "kg", {0.001, 1}, "mass of each link of a finger");
+  f.number("finger_armature", p.finger_armature, "kg m^2", {0, 1}, "rotor inertia of the gripper's motor");
 }
 
 Model makeHumanoid(const HumanoidParameters& parameters) {
+  checkParameters("humanoid", parameters);
   HumanoidParameters p = parameters;
-  checkParameters("humanoid", listParameters(p));
-  p.knee = static_cast<double>(KneePart::Serial), p.ankle = static_cast<double>(AnklePart::Rsu);
+  p.knee = KneePart::Serial, p.ankle = AnklePart::Rsu;
   p.knee_motor_mass = p.ankle_motor_mass = p.motor_mass;
   ModelBuilder builder("humanoid");
   addLegBiped(p, builder);

@@ -26,7 +26,7 @@ struct HumanoidParameters : LegBipedParameters {
   double finger_mass = 0.03;       ///< of each link, kg
   double finger_armature = 1e-4;   ///< of the gripper's motor, kg m^2
 };
-std::vector<Parameter> listParameters(HumanoidParameters& parameters);
+void describe(OptionFields& fields, HumanoidParameters& parameters);
 
 /// \throws ModelError as makeRsuBiped() does
 Model makeHumanoid(const HumanoidParameters& parameters = {});

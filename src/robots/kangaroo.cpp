@@ -201,8 +201,8 @@ void addLeg(KangarooLeg& leg, const Vector3d& hip) {
   addSole(leg, {p.sole_offset, 0, -p.ankle_height}, p.sole_length, p.sole_width, leg.builder);
 }
 
-void check(const std::string& robot, KangarooParameters& p) {
-  checkParameters(robot, listParameters(p));
+void check(const std::string& robot, const KangarooParameters& p) {
+  checkParameters(robot, p);
   if (!(p.lower_crank_height < p.upper_crank_height && p.upper_crank_height + p.ankle_arm < p.shank_length))
     throw ModelError(robot, "parameter 'upper_crank_height'", "the upper cranks are not between lower cranks and knee",
                      "give more than lower_crank_height, and less than shank_length without ankle_arm");
@@ -241,39 +241,33 @@ KangarooParameters::KangarooParameters() {
   armature = 8;
 }
 
-std::vector<Parameter> listParameters(KangarooParameters& p) {
-  std::vector<Parameter> parameters = listSerialParameters(p);
-  for (Parameter& parameter : parameters) {
-    if (parameter.name != "armature") continue;
-    parameter = {"armature", &p.armature, "kg",
-                 0,          1000,        "rotor inertia of every motor, reflected to its screw: (2 pi / lead)^2 J"};
-  }
-  const std::vector<Parameter> own = {
-      {"yaw_arm", &p.yaw_arm, "m", 0.02, 0.2, "distance of the yaw link from its axis"},
-      {"yaw_screw", &p.yaw_screw, "m", 0.05, 0.5, "length of the yaw screw, neutral"},
-      {"hip_screw_place", &p.hip_screw_place, "m", 0.02, 0.3, "distance of the hip screws in front of the hip"},
-      {"hip_screw_width", &p.hip_screw_width, "m", 0.01, 0.2,
-       "sideways distance of the hip screws from the middle of the thigh"},
-      {"hip_screw_top", &p.hip_screw_top, "m", 0.02, 0.5, "height of their upper ends above the hip"},
-      {"hip_screw_drop", &p.hip_screw_drop, "m", 0.02, 0.5, "distance of their lower ends below the hip"},
-      {"knee_arm", &p.knee_arm, "m", 0.01, 0.2, "lever arms of bell crank and shank"},
-      {"knee_angle", &p.knee_angle, "rad", -1.2, 1.2, "angle of these arms below the horizontal, legs straight"},
-      {"knee_crank_height", &p.knee_crank_height, "m", 0.02, 0.5, "height of the bell crank above the knee"},
-      {"knee_screw_drop", &p.knee_screw_drop, "m", 0, 0.5, "distance of the knee screw's upper end below the hip"},
-      {"ankle_arm", &p.ankle_arm, "m", 0.01, 0.2, "length of the cranks of ankle and heel"},
-      {"ankle_angle", &p.ankle_angle, "rad", -1.2, 1.2, "angle of these arms above the horizontal, legs straight"},
-      {"ankle_half_width", &p.ankle_half_width, "m", 0.01, 0.2, "sideways distance of the links from the ankle"},
-      {"upper_crank_height", &p.upper_crank_height, "m", 0.03, 0.9, "height of the upper cranks above the ankle"},
-      {"lower_crank_height", &p.lower_crank_height, "m", 0.02, 0.9, "height of the lower cranks above the ankle"},
-      {"rod_density", &p.rod_density, "kg/m", 0.01, 20,
-       "mass per length of rods and cranks; screws have twice as much"},
-  };
-  parameters.insert(parameters.end(), own.begin(), own.end());
-  return parameters;
+void describe(OptionFields& f, KangarooParameters& p) {
+  f.omit({"armature"});
+  describeSerial(f, p);
+  f.omit({});
+  f.number("armature", p.armature, "kg", {0, 1000},
+           "rotor inertia of every motor, reflected to its screw: (2 pi / lead)^2 J");
+  f.number("yaw_arm", p.yaw_arm, "m", {0.02, 0.2}, "distance of the yaw link from its axis");
+  f.number("yaw_screw", p.yaw_screw, "m", {0.05, 0.5}, "length of the yaw screw, neutral");
+  f.number("hip_screw_place", p.hip_screw_place, "m", {0.02, 0.3}, "distance of the hip screws in front of the hip");
+  f.number("hip_screw_width", p.hip_screw_width, "m", {0.01, 0.2},
+           "sideways distance of the hip screws from the middle of the thigh");
+  f.number("hip_screw_top", p.hip_screw_top, "m", {0.02, 0.5}, "height of their upper ends above the hip");
+  f.number("hip_screw_drop", p.hip_screw_drop, "m", {0.02, 0.5}, "distance of their lower ends below the hip");
+  f.number("knee_arm", p.knee_arm, "m", {0.01, 0.2}, "lever arms of bell crank and shank");
+  f.number("knee_angle", p.knee_angle, "rad", {-1.2, 1.2}, "angle of these arms below the horizontal, legs straight");
+  f.number("knee_crank_height", p.knee_crank_height, "m", {0.02, 0.5}, "height of the bell crank above the knee");
+  f.number("knee_screw_drop", p.knee_screw_drop, "m", {0, 0.5}, "distance of the knee screw's upper end below the hip");
+  f.number("ankle_arm", p.ankle_arm, "m", {0.01, 0.2}, "length of the cranks of ankle and heel");
+  f.number("ankle_angle", p.ankle_angle, "rad", {-1.2, 1.2}, "angle of these arms above the horizontal, legs straight");
+  f.number("ankle_half_width", p.ankle_half_width, "m", {0.01, 0.2}, "sideways distance of the links from the ankle");
+  f.number("upper_crank_height", p.upper_crank_height, "m", {0.03, 0.9}, "height of the upper cranks above the ankle");
+  f.number("lower_crank_height", p.lower_crank_height, "m", {0.02, 0.9}, "height of the lower cranks above the ankle");
+  f.number("rod_density", p.rod_density, "kg/m", {0.01, 20},
+           "mass per length of rods and cranks; screws have twice as much");
 }
 
-Model makeKangaroo(const KangarooParameters& parameters) {
-  KangarooParameters p = parameters;
+Model makeKangaroo(const KangarooParameters& p) {
   check("kangaroo", p);
   ModelBuilder builder("kangaroo");
   KangarooLeg legs[] = {{p, 1, builder}, {p, -1, builder}};
@@ -285,8 +279,7 @@ Model makeKangaroo(const KangarooParameters& parameters) {
   return builder.build();
 }
 
-Model makeKangarooLeg(const KangarooParameters& parameters) {
-  KangarooParameters p = parameters;
+Model makeKangarooLeg(const KangarooParameters& p) {
   check("kangaroo_leg", p);
   ModelBuilder builder("kangaroo_leg");
   Joint rail;

@@ -53,7 +53,7 @@ struct KangarooParameters : SerialBipedParameters {
   double rod_density = 0.5;         ///< of rods, cranks and screws, kg/m
 };
 
-std::vector<Parameter> listParameters(KangarooParameters& parameters);
+void describe(OptionFields& fields, KangarooParameters& parameters);
 
 /// Free in space, on two legs.
 /// \throws ModelError when a parameter is outside its bounds, or the legs do not reach from hip_height to the ground

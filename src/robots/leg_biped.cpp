@@ -232,12 +232,9 @@ void addLeg(const ComposedLeg& leg, ModelBuilder& builder) {
 }
 
 void addBiped(const LegBipedParameters& p, bool motors_on_joints, ModelBuilder& builder) {
-  const auto hip = static_cast<HipPart>(p.hip);
-  const auto knee = static_cast<KneePart>(p.knee);
-  const auto ankle = static_cast<AnklePart>(p.ankle);
   std::vector<ComposedLeg> legs;
   for (const BipedSide& side : {BipedSide{1, "_left"}, BipedSide{-1, "_right"}})
-    legs.push_back({side, p, hip, knee, ankle, motors_on_joints});
+    legs.push_back({side, p, p.hip, p.knee, p.ankle, motors_on_joints});
   std::vector<Solid> trunk = makeSerialTrunk(p);
   for (const Solid& motor : makeHipMotors(legs)) trunk.push_back(motor);
   addTrunk(trunk, builder);
@@ -254,88 +251,89 @@ Model makeBiped(const std::string& robot, const LegBipedParameters& p, bool moto
 // A biped of certain parts, its parameters checked.
 template <typename Parameters>
 Model makeOf(KneePart knee, AnklePart ankle, const std::string& robot, Parameters p, bool motors_on_joints) {
-  checkParameters(robot, listParameters(p));
-  p.knee = static_cast<double>(knee), p.ankle = static_cast<double>(ankle), p.hip = 0;
+  checkParameters(robot, p);
+  p.knee = knee, p.ankle = ankle, p.hip = HipPart::Serial;
   p.knee_motor_mass = p.ankle_motor_mass = p.motor_mass;
   return makeBiped(robot, p, motors_on_joints);
 }
 
-// Those of all bipeds, and some more.
-std::vector<Parameter> listSome(LegBipedParameters& p, const std::set<std::string>& own) {
-  std::vector<Parameter> some = listSerialParameters(p);
-  for (const Parameter& parameter : listParameters(p))
-    if (own.count(parameter.name)) some.push_back(parameter);
-  return some;
+void describeParts(OptionFields& f, LegBipedParameters& p) {
+  f.choice("knee", p.knee, {"serial", "belt", "four_bar"}, "part that moves the knee");
+  f.choice("ankle", p.ankle, {"serial", "differential", "rsu"}, "part that moves the ankle");
+  f.choice("hip", p.hip, {"serial", "three_rrs"}, "part that moves the hip");
+  f.number("knee_motor_mass", p.knee_motor_mass, "kg", {0.01, 10}, "mass of each motor of the knees");
+  f.number("ankle_motor_mass", p.ankle_motor_mass, "kg", {0.01, 10}, "mass of each motor of the ankles");
+  f.number("hip_radius", p.hip_radius, "m", {0.03, 0.2},
+           "3-RRS limbs: distance of their hinges and balls from the hip");
+  f.number("hip_middle", p.hip_middle, "rad", {-1.5, 1.5},
+           "3-RRS limbs: angle of hipy at which all are at right angles");
+  f.number("knee_ratio", p.knee_ratio, "1", {0.1, 20}, "belt: turns of the knee's motor per turn of the knee");
+  f.number("knee_crank", p.knee_crank, "m", {0.01, 0.2}, "four-bar: length of the crank at the hip");
+  f.number("knee_arm", p.knee_arm, "m", {0.01, 0.2}, "four-bar: length of the arm at the knee");
+  f.number("knee_middle", p.knee_middle, "rad", {0, 2},
+           "four-bar: angle of the knee at which crank and arm are perpendicular to the rod");
+  f.number("ankle_ratio", p.ankle_ratio, "1", {0.1, 20},
+           "differential: mean turns of the ankle's motors per turn of the ankle");
+  f.number("ankle_motor_drop", p.ankle_motor_drop, "m", {0, 0.5},
+           "differential: distance of the ankle motors below the knee");
+  f.number("pulley_mass", p.pulley_mass, "kg", {0.001, 2}, "belt and differential: mass of each motor's pulley");
+  f.number("ankle_arm", p.ankle_arm, "m", {0.01, 0.2}, "rods (RSU): distance of their balls behind the ankle");
+  f.number("ankle_crank", p.ankle_crank, "m", {0.01, 0.2}, "rods (RSU): length of the cranks");
+  f.number("ankle_half_width", p.ankle_half_width, "m", {0.01, 0.2}, "rods (RSU): sideways distance from the ankle");
+  f.number("motor_height", p.motor_height, "m", {0.05, 0.8}, "rods (RSU): height of the ankle motors above the ankle");
+  f.number("arm_angle", p.arm_angle, "rad", {-1.2, 1.2},
+           "rods (RSU): angle of cranks and arms above the horizontal, legs straight");
+  f.number("rod_density", p.rod_density, "kg/m", {0.01, 20}, "mass per length of cranks and rods");
+}
+
+// Those of all bipeds, and some of the parts.
+void describeSome(OptionFields& f, LegBipedParameters& p, const std::set<std::string>& own,
+                  const std::string& motor_mass = "mass of each motor") {
+  describeSerial(f, p, motor_mass);
+  f.restrictTo(own);
+  describeParts(f, p);
+  f.restrictTo({});
 }
 
 }  // namespace
 
-std::vector<Parameter> listParameters(LegBipedParameters& p) {
-  std::vector<Parameter> parameters = listSerialParameters(p);
-  for (Parameter& parameter : parameters)
-    if (parameter.name == "motor_mass") parameter.help = "mass of each motor of the hips";
-  const std::vector<Parameter> own = {
-      {"knee", &p.knee, "1", 0, 2, "part that moves the knee", {"serial", "belt", "four_bar"}},
-      {"ankle", &p.ankle, "1", 0, 2, "part that moves the ankle", {"serial", "differential", "rsu"}},
-      {"hip", &p.hip, "1", 0, 1, "part that moves the hip", {"serial", "three_rrs"}},
-      {"knee_motor_mass", &p.knee_motor_mass, "kg", 0.01, 10, "mass of each motor of the knees"},
-      {"ankle_motor_mass", &p.ankle_motor_mass, "kg", 0.01, 10, "mass of each motor of the ankles"},
-      {"hip_radius", &p.hip_radius, "m", 0.03, 0.2, "3-RRS limbs: distance of their hinges and balls from the hip"},
-      {"hip_middle", &p.hip_middle, "rad", -1.5, 1.5, "3-RRS limbs: angle of hipy at which all are at right angles"},
-      {"knee_ratio", &p.knee_ratio, "1", 0.1, 20, "belt: turns of the knee's motor per turn of the knee"},
-      {"knee_crank", &p.knee_crank, "m", 0.01, 0.2, "four-bar: length of the crank at the hip"},
-      {"knee_arm", &p.knee_arm, "m", 0.01, 0.2, "four-bar: length of the arm at the knee"},
-      {"knee_middle", &p.knee_middle, "rad", 0, 2,
-       "four-bar: angle of the knee at which crank and arm are perpendicular to the rod"},
-      {"ankle_ratio", &p.ankle_ratio, "1", 0.1, 20,
-       "differential: mean turns of the ankle's motors per turn of the ankle"},
-      {"ankle_motor_drop", &p.ankle_motor_drop, "m", 0, 0.5,
-       "differential: distance of the ankle motors below the knee"},
-      {"pulley_mass", &p.pulley_mass, "kg", 0.001, 2, "belt and differential: mass of each motor's pulley"},
-      {"ankle_arm", &p.ankle_arm, "m", 0.01, 0.2, "rods (RSU): distance of their balls behind the ankle"},
-      {"ankle_crank", &p.ankle_crank, "m", 0.01, 0.2, "rods (RSU): length of the cranks"},
-      {"ankle_half_width", &p.ankle_half_width, "m", 0.01, 0.2, "rods (RSU): sideways distance from the ankle"},
-      {"motor_height", &p.motor_height, "m", 0.05, 0.8, "rods (RSU): height of the ankle motors above the ankle"},
-      {"arm_angle", &p.arm_angle, "rad", -1.2, 1.2,
-       "rods (RSU): angle of cranks and arms above the horizontal, legs straight"},
-      {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "mass per length of cranks and rods"},
-  };
-  parameters.insert(parameters.end(), own.begin(), own.end());
-  return parameters;
+void describe(OptionFields& f, LegBipedParameters& p) {
+  describeSerial(f, p, "mass of each motor of the hips");
+  describeParts(f, p);
 }
 
 void addLegBiped(const LegBipedParameters& p, ModelBuilder& builder) { addBiped(p, true, builder); }
 
-Model makeLegBiped(const LegBipedParameters& parameters) {
-  LegBipedParameters p = parameters;
-  checkParameters("leg_biped", listParameters(p));
+Model makeLegBiped(const LegBipedParameters& p) {
+  checkParameters("leg_biped", p);
   return makeBiped("leg_biped", p);
 }
 
-std::vector<Parameter> listParameters(BeltBipedParameters& p) {
-  return listSome(p, {"knee_ratio", "ankle_ratio", "ankle_motor_drop", "pulley_mass"});
+void describe(OptionFields& f, BeltBipedParameters& p) {
+  describeSome(f, p, {"knee_ratio", "ankle_ratio", "ankle_motor_drop", "pulley_mass"});
 }
 Model makeBeltBiped(const BeltBipedParameters& p) {
   return makeOf(KneePart::Belt, AnklePart::Differential, "belt_biped", p, true);
 }
 
-std::vector<Parameter> listParameters(RsuBipedParameters& p) { return listRsuParameters(p); }
-std::vector<Parameter> listRsuParameters(LegBipedParameters& p) {
-  return listSome(p, {"ankle_arm", "ankle_crank", "ankle_half_width", "motor_height", "arm_angle", "rod_density"});
+void describe(OptionFields& f, RsuBipedParameters& p) { describeRsu(f, p, "mass of each motor"); }
+void describeRsu(OptionFields& f, LegBipedParameters& p, const std::string& motor_mass) {
+  describeSome(f, p, {"ankle_arm", "ankle_crank", "ankle_half_width", "motor_height", "arm_angle", "rod_density"},
+               motor_mass);
 }
 Model makeRsuBiped(const RsuBipedParameters& p) {
   return makeOf(KneePart::Serial, AnklePart::Rsu, "rsu_biped", p, true);
 }
 
-std::vector<Parameter> listParameters(BeltKneeParameters& p) {
-  return listSome(p, {"knee_ratio", "ankle_motor_drop", "pulley_mass"});
+void describe(OptionFields& f, BeltKneeParameters& p) {
+  describeSome(f, p, {"knee_ratio", "ankle_motor_drop", "pulley_mass"});
 }
 Model makeBeltKnee(const BeltKneeParameters& p) {
   return makeOf(KneePart::Belt, AnklePart::Serial, "belt_knee", p, false);
 }
 
-std::vector<Parameter> listParameters(DifferentialAnkleParameters& p) {
-  return listSome(p, {"ankle_ratio", "ankle_motor_drop", "pulley_mass"});
+void describe(OptionFields& f, DifferentialAnkleParameters& p) {
+  describeSome(f, p, {"ankle_ratio", "ankle_motor_drop", "pulley_mass"});
 }
 Model makeDifferentialAnkle(const DifferentialAnkleParameters& p) {
   return makeOf(KneePart::Serial, AnklePart::Differential, "differential_ankle", p, false);

@@ -57,7 +57,9 @@ enum class KneePart { Serial, Belt, FourBar };
 enum class AnklePart { Serial, Differential, Rsu };
 
 struct LegBipedParameters : SerialBipedParameters {
-  double knee = 2, ankle = 1, hip = 0;  ///< KneePart, AnklePart, HipPart
+  KneePart knee = KneePart::FourBar;
+  AnklePart ankle = AnklePart::Differential;
+  HipPart hip = HipPart::Serial;
 
   double knee_motor_mass = 0.8, ankle_motor_mass = 0.8;  ///< each, kg; motor_mass is that of the hips'
 
@@ -80,7 +82,7 @@ struct LegBipedParameters : SerialBipedParameters {
   double arm_angle = 0.6;          ///< delta, rad
   double rod_density = 0.5;        ///< of cranks and rods, kg/m
 };
-std::vector<Parameter> listParameters(LegBipedParameters& parameters);
+void describe(OptionFields& fields, LegBipedParameters& parameters);
 
 /// Trunk, legs and soles, for a robot with more on its trunk.
 void addLegBiped(const LegBipedParameters& parameters, ModelBuilder& builder);
@@ -90,23 +92,23 @@ Model makeLegBiped(const LegBipedParameters& parameters = {});
 
 /// Bipeds of certain parts, with one mass for all motors. BeltBiped: belt and differential; RsuBiped: serial and rsu.
 struct BeltBipedParameters : LegBipedParameters {};
-std::vector<Parameter> listParameters(BeltBipedParameters& parameters);
+void describe(OptionFields& fields, BeltBipedParameters& parameters);
 Model makeBeltBiped(const BeltBipedParameters& parameters = {});
 
 struct RsuBipedParameters : LegBipedParameters {};
-std::vector<Parameter> listParameters(RsuBipedParameters& parameters);
-/// Those of a biped with serial knees and RSU ankles.
-std::vector<Parameter> listRsuParameters(LegBipedParameters& parameters);
+void describe(OptionFields& fields, RsuBipedParameters& parameters);
+/// Those of a biped with serial knees and RSU ankles. \param motor_mass  its help
+void describeRsu(OptionFields& fields, LegBipedParameters& parameters, const std::string& motor_mass);
 Model makeRsuBiped(const RsuBipedParameters& parameters = {});
 
 /// The belt biped with its belts or its differentials alone. The other motors act on the joints, but their masses stay in their
 /// places: what changes are the transmission and its pulleys.
 struct BeltKneeParameters : LegBipedParameters {};
-std::vector<Parameter> listParameters(BeltKneeParameters& parameters);
+void describe(OptionFields& fields, BeltKneeParameters& parameters);
 Model makeBeltKnee(const BeltKneeParameters& parameters = {});
 
 struct DifferentialAnkleParameters : LegBipedParameters {};
-std::vector<Parameter> listParameters(DifferentialAnkleParameters& parameters);
+void describe(OptionFields& fields, DifferentialAnkleParameters& parameters);
 Model makeDifferentialAnkle(const DifferentialAnkleParameters& parameters = {});
 
 }  // namespace bielle

@@ -71,30 +71,24 @@ SpringBipedParameters::SpringBipedParameters() {
   heel_stiffness = 1250;
 }
 
-std::vector<Parameter> listParameters(SpringBipedParameters& p) {
-  std::vector<Parameter> parameters = listParameters(static_cast<SpringLegParameters&>(p));
-  for (Parameter& parameter : parameters)
-    if (parameter.name == "armature") parameter.help = "rotor inertia of the roll and yaw motors, after their gears";
-  const std::vector<Parameter> own = {
-      {"crank_spread", &p.crank_spread, "m", 0.01, 0.3, "distance between the two cranks of a toe"},
-      {"toe_cross_mass", &p.toe_cross_mass, "kg", 0.001, 5, "mass of the part between the axes of a toe"},
-      {"trunk_mass", &p.trunk_mass, "kg", 0.1, 100, "mass of the trunk without legs"},
-      {"hip_offset", &p.hip_offset, "m", 0.05, 0.4, "distance of a hip from the middle plane"},
-      {"hip_place", &p.hip_place, "m", -0.5, 0.5, "distance of the hips in front of the trunk's frame"},
-      {"trunk_place", &p.trunk_place, "m", -0.5, 0.5, "distance of the trunk's centre of mass in front of its frame"},
-      {"trunk_height", &p.trunk_height, "m", -0.5, 0.5, "height of the trunk's centre of mass above its frame"},
-      {"stand_height", &p.stand_height, "m", 0.1, 3,
-       "height of the trunk's frame above the soles in the reference half_sitting"},
-      {"leg_armature", &p.leg_armature, "kg m^2", 0, 1, "rotor inertia of the hip pitch and knee motors"},
-      {"toe_armature", &p.toe_armature, "kg m^2", 0, 1, "rotor inertia of each toe motor"},
-  };
-  parameters.insert(parameters.end(), own.begin(), own.end());
-  return parameters;
+void describe(OptionFields& f, SpringBipedParameters& p) {
+  describeSpringLeg(f, p, "rotor inertia of the roll and yaw motors, after their gears");
+  f.number("crank_spread", p.crank_spread, "m", {0.01, 0.3}, "distance between the two cranks of a toe");
+  f.number("toe_cross_mass", p.toe_cross_mass, "kg", {0.001, 5}, "mass of the part between the axes of a toe");
+  f.number("trunk_mass", p.trunk_mass, "kg", {0.1, 100}, "mass of the trunk without legs");
+  f.number("hip_offset", p.hip_offset, "m", {0.05, 0.4}, "distance of a hip from the middle plane");
+  f.number("hip_place", p.hip_place, "m", {-0.5, 0.5}, "distance of the hips in front of the trunk's frame");
+  f.number("trunk_place", p.trunk_place, "m", {-0.5, 0.5},
+           "distance of the trunk's centre of mass in front of its frame");
+  f.number("trunk_height", p.trunk_height, "m", {-0.5, 0.5}, "height of the trunk's centre of mass above its frame");
+  f.number("stand_height", p.stand_height, "m", {0.1, 3},
+           "height of the trunk's frame above the soles in the reference half_sitting");
+  f.number("leg_armature", p.leg_armature, "kg m^2", {0, 1}, "rotor inertia of the hip pitch and knee motors");
+  f.number("toe_armature", p.toe_armature, "kg m^2", {0, 1}, "rotor inertia of each toe motor");
 }
 
-Model makeSpringBiped(const SpringBipedParameters& parameters) {
-  SpringBipedParameters p = parameters;
-  checkParameters("spring_biped", listParameters(p));
+Model makeSpringBiped(const SpringBipedParameters& p) {
+  checkParameters("spring_biped", p);
   ModelBuilder builder("spring_biped");
   Joint root;
   root.name = "root_joint";

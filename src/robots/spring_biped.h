@@ -29,7 +29,7 @@ struct SpringBipedParameters : SpringLegParameters {
   double toe_armature = 0.01225;  ///< of each of the toe's, kg m^2
 };
 
-std::vector<Parameter> listParameters(SpringBipedParameters& parameters);
+void describe(OptionFields& fields, SpringBipedParameters& parameters);
 
 /// \throws ModelError as makeSpringLeg()
 Model makeSpringBiped(const SpringBipedParameters& parameters = {});

@@ -185,46 +185,50 @@ void addToe(const SpringLeg& leg) {
 
 }  // namespace
 
-std::vector<Parameter> listParameters(SpringLegParameters& p) {
-  return {
-      {"thigh_length", &p.thigh_length, "m", 0.02, 1, "distance from the hip pitch axis to the knee"},
-      {"shin_length", &p.shin_length, "m", 0.05, 2, "distance from knee to tarsus joint"},
-      {"tarsus_length", &p.tarsus_length, "m", 0.05, 2, "distance from tarsus joint to toe"},
-      {"heel_length", &p.heel_length, "m", 0.02, 1, "distance from the tarsus joint to the end of the heel rod"},
-      {"heel_bend", &p.heel_bend, "rad", -1, 1, "angle between the heel and the line of the tarsus"},
-      {"heel_rod_length", &p.heel_rod_length, "m", 0.05, 2, "distance from the hip pitch axis to the heel"},
-      {"rod_offset", &p.rod_offset, "m", -0.2, 0.2, "distance of the rod's upper end from the plane of the leg"},
-      {"crank_place", &p.crank_place, "m", 0.005, 1, "distance from the tarsus joint to the pivot of the toe's crank"},
-      {"crank_bend", &p.crank_bend, "rad", -1, 1, "angle of that pivot behind the line of the tarsus"},
-      {"crank_length", &p.crank_length, "m", 0.01, 0.3, "length of the toe's crank"},
-      {"plantar_length", &p.plantar_length, "m", 0.02, 2, "length of the rod from crank to lever"},
-      {"lever_length", &p.lever_length, "m", 0.01, 0.3, "length of the toe's lever"},
-      {"lever_angle", &p.lever_angle, "rad", -3, 0,
-       "angle of the lever from straight down, forward positive, sole level"},
-      {"ankle_height", &p.ankle_height, "m", 0.021, 0.3, "height of the toe's pivot above the sole"},
-      {"sole_offset", &p.sole_offset, "m", -0.2, 0.2, "distance of the middle of the sole in front of that pivot"},
-      {"toe_length", &p.toe_length, "m", 0.02, 0.5, "length of the sole"},
-      {"toe_width", &p.toe_width, "m", 0.005, 0.3, "width of the sole"},
-      {"yaw_offset", &p.yaw_offset, "m", -0.3, 0.3, "distance of the yaw axis behind the middle of the roll axis"},
-      {"yaw_drop", &p.yaw_drop, "m", 0.01, 0.5, "distance of the yaw axis' frame below the roll axis"},
-      {"pitch_drop", &p.pitch_drop, "m", 0.01, 0.5, "distance of the pitch axis below that frame"},
-      {"thigh_angle", &p.thigh_angle, "rad", -1.5, 1.5,
-       "angle of the thigh from straight down, forward positive, neutral"},
-      {"shin_angle", &p.shin_angle, "rad", -1.5, 1.5, "angle of the shin, likewise; that of the tarsus follows"},
-      {"hip_roll_mass", &p.hip_roll_mass, "kg", 0.01, 20, "mass of the link after the roll axis"},
-      {"hip_yaw_mass", &p.hip_yaw_mass, "kg", 0.01, 20, "mass of the link after the yaw axis"},
-      {"thigh_mass", &p.thigh_mass, "kg", 0.01, 20, "mass of the thigh with the knee motor"},
-      {"shin_mass", &p.shin_mass, "kg", 0.01, 20, "mass of the shin"},
-      {"tarsus_mass", &p.tarsus_mass, "kg", 0.01, 20, "mass of the tarsus with the toe motor"},
-      {"foot_mass", &p.foot_mass, "kg", 0.01, 10, "mass of the foot"},
-      {"heel_rod_mass", &p.heel_rod_mass, "kg", 0.001, 5, "mass of the heel rod"},
-      {"crank_mass", &p.crank_mass, "kg", 0.001, 5, "mass of the toe's crank"},
-      {"plantar_mass", &p.plantar_mass, "kg", 0.001, 5, "mass of the plantar rod"},
-      {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor, after its gear"},
-      {"shin_stiffness", &p.shin_stiffness, "N m/rad", 0, 1e9,
-       "stiffness of the leaf spring between knee and shin; 0: rigid"},
-      {"heel_stiffness", &p.heel_stiffness, "N m/rad", 0, 1e9,
-       "stiffness of the leaf spring between tarsus and heel; 0: rigid"}};
+void describeSpringLeg(OptionFields& f, SpringLegParameters& p, const std::string& armature) {
+  f.number("thigh_length", p.thigh_length, "m", {0.02, 1}, "distance from the hip pitch axis to the knee");
+  f.number("shin_length", p.shin_length, "m", {0.05, 2}, "distance from knee to tarsus joint");
+  f.number("tarsus_length", p.tarsus_length, "m", {0.05, 2}, "distance from tarsus joint to toe");
+  f.number("heel_length", p.heel_length, "m", {0.02, 1}, "distance from the tarsus joint to the end of the heel rod");
+  f.number("heel_bend", p.heel_bend, "rad", {-1, 1}, "angle between the heel and the line of the tarsus");
+  f.number("heel_rod_length", p.heel_rod_length, "m", {0.05, 2}, "distance from the hip pitch axis to the heel");
+  f.number("rod_offset", p.rod_offset, "m", {-0.2, 0.2}, "distance of the rod's upper end from the plane of the leg");
+  f.number("crank_place", p.crank_place, "m", {0.005, 1},
+           "distance from the tarsus joint to the pivot of the toe's crank");
+  f.number("crank_bend", p.crank_bend, "rad", {-1, 1}, "angle of that pivot behind the line of the tarsus");
+  f.number("crank_length", p.crank_length, "m", {0.01, 0.3}, "length of the toe's crank");
+  f.number("plantar_length", p.plantar_length, "m", {0.02, 2}, "length of the rod from crank to lever");
+  f.number("lever_length", p.lever_length, "m", {0.01, 0.3}, "length of the toe's lever");
+  f.number("lever_angle", p.lever_angle, "rad", {-3, 0},
+           "angle of the lever from straight down, forward positive, sole level");
+  f.number("ankle_height", p.ankle_height, "m", {0.021, 0.3}, "height of the toe's pivot above the sole");
+  f.number("sole_offset", p.sole_offset, "m", {-0.2, 0.2}, "distance of the middle of the sole in front of that pivot");
+  f.number("toe_length", p.toe_length, "m", {0.02, 0.5}, "length of the sole");
+  f.number("toe_width", p.toe_width, "m", {0.005, 0.3}, "width of the sole");
+  f.number("yaw_offset", p.yaw_offset, "m", {-0.3, 0.3}, "distance of the yaw axis behind the middle of the roll axis");
+  f.number("yaw_drop", p.yaw_drop, "m", {0.01, 0.5}, "distance of the yaw axis' frame below the roll axis");
+  f.number("pitch_drop", p.pitch_drop, "m", {0.01, 0.5}, "distance of the pitch axis below that frame");
+  f.number("thigh_angle", p.thigh_angle, "rad", {-1.5, 1.5},
+           "angle of the thigh from straight down, forward positive, neutral");
+  f.number("shin_angle", p.shin_angle, "rad", {-1.5, 1.5}, "angle of the shin, likewise; that of the tarsus follows");
+  f.number("hip_roll_mass", p.hip_roll_mass, "kg", {0.01, 20}, "mass of the link after the roll axis");
+  f.number("hip_yaw_mass", p.hip_yaw_mass, "kg", {0.01, 20}, "mass of the link after the yaw axis");
+  f.number("thigh_mass", p.thigh_mass, "kg", {0.01, 20}, "mass of the thigh with the knee motor");
+  f.number("shin_mass", p.shin_mass, "kg", {0.01, 20}, "mass of the shin");
+  f.number("tarsus_mass", p.tarsus_mass, "kg", {0.01, 20}, "mass of the tarsus with the toe motor");
+  f.number("foot_mass", p.foot_mass, "kg", {0.01, 10}, "mass of the foot");
+  f.number("heel_rod_mass", p.heel_rod_mass, "kg", {0.001, 5}, "mass of the heel rod");
+  f.number("crank_mass", p.crank_mass, "kg", {0.001, 5}, "mass of the toe's crank");
+  f.number("plantar_mass", p.plantar_mass, "kg", {0.001, 5}, "mass of the plantar rod");
+  f.number("armature", p.armature, "kg m^2", {0, 1}, armature);
+  f.number("shin_stiffness", p.shin_stiffness, "N m/rad", {0, 1e9},
+           "stiffness of the leaf spring between knee and shin; 0: rigid");
+  f.number("heel_stiffness", p.heel_stiffness, "N m/rad", {0, 1e9},
+           "stiffness of the leaf spring between tarsus and heel; 0: rigid");
+}
+
+void describe(OptionFields& f, SpringLegParameters& p) {
+  describeSpringLeg(f, p, "rotor inertia of every motor, after its gear");
 }
 
 void addSpringLeg(const std::string& robot, const SpringLegParameters& p, const SpringLegMount& mount,
@@ -251,9 +255,8 @@ Vector3d calcSolePlace(const std::string& robot, const SpringLegParameters& p) {
          Vector3d(p.sole_offset, 0, -p.ankle_height);
 }
 
-Model makeSpringLeg(const SpringLegParameters& parameters) {
-  SpringLegParameters p = parameters;
-  checkParameters("spring_leg", listParameters(p));
+Model makeSpringLeg(const SpringLegParameters& p) {
+  checkParameters("spring_leg", p);
   ModelBuilder builder("spring_leg");
   addSpringLeg("spring_leg", p, {}, builder);
   for (const char* joint : {"hip_roll", "hip_yaw", "hip_pitch", "knee", "motor_toe"})

@@ -24,7 +24,7 @@
 /// rod; the toe only pitches, and its two cranks and rods are merged into one with the mass of both. Toe, posture,
 /// radii and armature are ours.
 #include "bielle/model/builder.h"
-#include "bielle/robots/generators.h"
+#include "robots/check_parameters.h"
 
 namespace bielle {
 
@@ -72,7 +72,9 @@ struct SpringLegParameters {
   double heel_stiffness = 0;  ///< of the leaf between tarsus and heel, N m/rad; 0: rigid
 };
 
-std::vector<Parameter> listParameters(SpringLegParameters& parameters);
+void describe(OptionFields& fields, SpringLegParameters& parameters);
+/// \param armature  its help
+void describeSpringLeg(OptionFields& fields, SpringLegParameters& parameters, const std::string& armature);
 
 /// \throws ModelError when a parameter is outside its bounds, a rod does not reach, or the crank is beyond the toe
 Model makeSpringLeg(const SpringLegParameters& parameters = {});

@@ -94,7 +94,7 @@ double calcTrunkFactor(const ArchitectureSpec& spec, const std::string& name, co
 
 std::string makeName(const MotionSpec& motion) {
   std::string text = motion.motion;
-  for (const auto& [option, value] : motion.settings) text += "-" + option + "-" + formatValue(value);
+  for (const auto& [option, value] : motion.settings) text += "-" + option + "-" + formatOption(value);
   return text;
 }
 
@@ -129,7 +129,7 @@ Case makeArchitectureCase(const Contender& contender, const MotionSpec& motion) 
                                     "--threads", "1",           "--quiet", "--no-report"};
   for (const auto& [option, value] : motion.settings) {
     solve.push_back("--set");
-    solve.push_back(option + "=" + formatValue(value));
+    solve.push_back(option + "=" + formatOption(value));
   }
   solve.insert(solve.end(), {"-o", std::string("@") + kMotion});
   return {contender.name + "-" + makeName(motion), {solve}, contender.directory};

@@ -65,13 +65,13 @@ CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
   motion.robot = require(fields, "robot", entry).getText();
   if (motion.robot.find('/') != std::string::npos) motion.robot = locate(motion.robot, file).string();
   const std::string solve = require(fields, "solve", entry).getText();
-  const MotionRequest request = findMotion(file, solve).makeRequest();
+  OptionSet known = findMotion(file, solve).request.options;
   motion.solve = {"solve", solve, "--robot", motion.robot};
   if (const YamlEntry* set = find(fields, "set"))
     for (const auto& [name, value] : readSettings(*set)) {
-      setOption(request.options, name, value);  // checks the name
+      known.set(name, value);  // checks it
       motion.solve.push_back("--set");
-      motion.solve.push_back(name + "=" + formatExact(value));
+      motion.solve.push_back(name + "=" + formatOption(value));
     }
   if (const YamlEntry* options = find(fields, "options"))
     for (const auto& [name, value] : options->getMap()) {

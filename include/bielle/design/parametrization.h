@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bielle/dynamics/variation.h"
+#include "bielle/model/options.h"
 
 namespace bielle {
 
@@ -56,7 +57,7 @@ class Parametrization {
   Parametrization(Model model, std::vector<DesignVariable> variables, std::string source = "");
   /// A generated robot; `settings` are the values of other parameters of the generator. Bounds beyond those of a
   /// parameter are refused as well.
-  Parametrization(const std::string& generator, std::vector<std::pair<std::string, double>> settings,
+  Parametrization(const std::string& generator, OptionValues settings,
                   std::vector<DesignVariable> variables, std::string source = "");
 
   const std::vector<DesignVariable>& variables() const { return variables_; }
@@ -79,13 +80,14 @@ class Parametrization {
  private:
   void readStart();
   void refuseSharedTargets(const Model& robot) const;
+  OptionSet getParameters() const;
   Model generate(const VectorXd& x) const;
   Model changePlaces(const VectorXd& x) const;
   Model changeMotors(Model model, const VectorXd& x) const;
   void finish();
 
   std::string source_, generator_;
-  std::vector<std::pair<std::string, double>> settings_;
+  OptionValues settings_;
   std::vector<DesignVariable> variables_;
   Model model_;
   VectorXd start_, lower_, upper_;

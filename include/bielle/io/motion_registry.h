@@ -1,7 +1,6 @@
 #pragma once
 /// \file The motions that `bielle solve` knows, by name: one entry each.
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,31 +9,37 @@
 
 namespace bielle {
 
+struct MotionRequest;
+
 /// Values of many options under one name (`--weights NAME`).
 struct MotionPreset {
   std::string name, help;
-  std::function<void()> apply;
+  std::function<void(MotionRequest&)> apply;
 };
 
 /// Data of a motion that come from a file (`--NAME FILE`).
 struct MotionFile {
   std::string name, help;
-  std::function<void(const std::string& path)> read;  ///< throws ModelError
+  std::function<void(const std::string& path, MotionRequest&)> read;  ///< throws ModelError
 };
 
-/// One request: the options, and the functions that make the motion from them.
+using MotionPlanner = std::function<MotionPlan(const Model&, const VectorXd& q0, const OptionSet& options)>;
+
+/// A motion by name with its options, a value.
 struct MotionRequest {
-  std::vector<OptionEntry> options;
+  OptionSet options;
   std::vector<MotionPreset> presets;
   std::vector<MotionFile> files;
-  std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;
-  std::vector<SequencePart> parts;  ///< of a sequence
+  MotionPlanner planner;
+  std::vector<std::pair<std::string, MotionPlanner>> parts;  ///< of a sequence, by name
+
+  MotionPlan plan(const Model& model, const VectorXd& q0) const { return planner(model, q0, options); }
 };
 
 struct MotionEntry {
   std::string name, help, example;
-  std::vector<std::string> flags;              ///< options with their own flag, besides --set
-  std::function<MotionRequest()> makeRequest;  ///< with every option at its default
+  std::vector<std::string> flags;  ///< options with their own flag, besides --set
+  MotionRequest request;           ///< with every option at its default
 };
 
 const std::vector<MotionEntry>& getMotions();
@@ -46,6 +51,8 @@ const MotionEntry& findMotion(const std::string& file, const std::string& name);
 /// \throws ModelError when there is no such motion
 inline constexpr const char* kSequence = "sequence";
 MotionRequest makeSequenceRequest(const std::vector<std::string>& motions);
+/// The motions of a sequence; none of another request.
+std::vector<SequencePart> listParts(const MotionRequest& request);
 
 /// Prefixes of limits given by motor among the options of a motion, followed by the name of the motor.
 inline constexpr const char *kEffortLimit = "limit ", *kVelocityLimit = "velocity-limit ",

@@ -21,12 +21,15 @@ inline constexpr double kLargestStepError = 0.004, kAllowedStepError = 0.005;
 double calcStageExcess(const Model& model, const MotionResult& result);
 inline constexpr double kLargestSlip = 1e-4;  // m, of a corner, at most
 
+struct RefinedMotion {
+  MotionRequest request;  ///< with its `time_step`
+  Motion motion;
+};
 /// The motion of a request with stages half as long and the solution as its guess. Made only if `time_step` was 0, no
-/// duration is free, the objective is not the peak torque, and calcStageExcess() of the solution exceeds 1. Sets
-/// `time_step`.
+/// duration is free, the objective is not the peak torque, and calcStageExcess() of the solution exceeds 1.
 /// \param result  the solution of `solved`
-std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
-                                   const Motion& solved, const MotionResult& result);
+std::optional<RefinedMotion> refineStages(MotionRequest request, const Model& model, const ProblemOptions& problem,
+                                          const Motion& solved, const MotionResult& result);
 
 /// The motion of least effort of a request, again from its plan, with linkages farther from their dead points
 /// (kWideDeadPointMargin). Not for sequences. Made only if no duration is free and calcStepError() exceeds

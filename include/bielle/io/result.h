@@ -23,10 +23,10 @@ struct MotionResult {
   std::string motion;
   Formulation formulation = Formulation::Full;
   StepRule step = StepRule::Euler;
-  std::vector<std::pair<std::string, double>> options;  ///< every option of the motion by name
-  std::vector<GoalOutcome> goals;                       ///< requested and achieved values
-  ContactSchedule schedule;                             ///< with the final time steps
-  std::vector<PhaseTiming> timings;                     ///< of the phases of free duration
+  OptionValues options;              ///< every option of the motion by name
+  std::vector<GoalOutcome> goals;    ///< requested and achieved values
+  ContactSchedule schedule;          ///< with the final time steps
+  std::vector<PhaseTiming> timings;  ///< of the phases of free duration
   Ground ground;
   FddpSummary solver;
   MotionRecord record;
@@ -73,7 +73,7 @@ struct MotionSummary {
   StepRule step = StepRule::Euler;
   ObjectiveOptions objective;
   bool converged = false;
-  std::vector<std::pair<std::string, double>> options;
+  OptionValues options;
   std::vector<GoalOutcome> goals;
   std::vector<Phase> phases;
   std::vector<PhaseTiming> timings;  ///< of the phases of free duration

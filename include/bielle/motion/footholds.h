@@ -23,8 +23,8 @@ struct FootholdsOptions {
   static LocomotionOptions makeGaitDefaults();
 };
 
-/// The numbers that can be set besides the footholds.
-std::vector<OptionEntry> listOptions(FootholdsOptions& options);
+/// What can be set besides the footholds.
+void describe(OptionFields& fields, FootholdsOptions& options);
 
 /// \throws ModelError naming file, entry and line
 std::vector<Footstep> readFootholds(const std::string& path);

@@ -24,10 +24,6 @@ struct Footstep {
   SE3 X_WF;  ///< placement of the contact frame on the ground
 };
 
-/// An option that counts steps.
-/// \throws ModelError when it is not a whole number from 2 to 200
-int countSteps(const std::string& option, double value);
-
 /// The initial placements of the two feet and the steps they take in turn.
 struct FootstepPlan {
   std::array<SE3, 2> start;  ///< left, right

@@ -50,7 +50,7 @@ struct JumpOptions {
   double clearance = 0.04;           ///< least height of the soles at mid-flight, m
   double friction = 0.7;             ///< coefficient, 1
   double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
-  double published = 0;              ///< 1: the paper's problem, see above; 0: our costs
+  bool published = false;            ///< the paper's problem, see above, instead of our costs
   double time_step = 0.002;          ///< s
 
   double apex_weight = 1e4;            ///< of the CoM's height at mid-flight, over h, 1/m^2
@@ -69,8 +69,7 @@ struct JumpOptions {
   double contact_kd = 200;  ///< 1/s; likewise
 };
 
-/// Every number of the options by name, pointing into `options`.
-std::vector<OptionEntry> listOptions(JumpOptions& options);
+void describe(OptionFields& fields, JumpOptions& options);
 
 /// The paper's problem with the weights and durations of its jump (its example code), as far as they can be read from
 /// its figures.

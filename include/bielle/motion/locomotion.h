@@ -79,10 +79,10 @@ struct LocomotionOptions {
   SwingShape swing;
   double friction = 0.7;             ///< coefficient, 1
   double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
-  double published = 0;              ///< 1: the paper's problem, see above; 0: on footholds
-  /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. 0: the contact's
+  bool published = false;            ///< the paper's problem, see above, instead of footholds
+  /// Every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. Otherwise the contact's
   /// stabilisation stops any remaining velocity of a foot.
-  double rigid_landing = 0;
+  bool rigid_landing = false;
   double landing_speed = 0;  ///< with rigid_landing: at which a foot comes down, m/s; 0: at rest
   double foothold_room = 0;  ///< largest distance of a landing foot from its foothold along each of its axes, m
 
@@ -111,7 +111,7 @@ struct LocomotionOptions {
   std::string left = "foot_left", right = "foot_right";  ///< contact frames
 };
 
-std::vector<OptionEntry> listOptions(LocomotionOptions& options);
+void describe(OptionFields& fields, LocomotionOptions& options);
 
 /// The paper's problem with the weights and durations of its walk (its example code).
 void setPaperWeights(LocomotionOptions& options);

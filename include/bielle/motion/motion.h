@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bielle/model/options.h"
 #include "bielle/motion/goal.h"
 #include "bielle/motion/limits.h"
 #include "bielle/motion/objective.h"
@@ -15,30 +16,8 @@
 
 namespace bielle {
 
-/// One number that can be set by name (`--set name=value`).
-struct OptionEntry {
-  std::string name;
-  double* value = nullptr;
-  std::string unit;
-  std::string help;
-  std::vector<std::string> names{};  ///< of the values 0, 1 and so on, if it is a choice
-};
-
-/// Sets an option by name.
-/// \throws ModelError listing the options, or when the value is not finite
-void setOption(const std::vector<OptionEntry>& options, const std::string& name, double value);
-
-/// The current values of the options.
-std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionEntry>& options);
-
 /// \throws ModelError naming the option unless `ok`
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy);
-
-/// \throws ModelError naming the first option that is not finite, or negative and not in `any_sign`
-void requireNotNegative(const std::vector<OptionEntry>& options, const std::vector<std::string>& any_sign = {});
-
-/// \throws ModelError naming the first of these options that is not positive
-void requirePositive(const std::vector<OptionEntry>& options, const std::vector<std::string>& names);
 
 /// \throws ModelError when a motion of this duration has more than 100000 stages, which may exceed the memory
 void requireStages(double seconds, double time_step);
@@ -52,8 +31,8 @@ struct MotionPlan {
   ShootingTrajectory guess;       ///< quasi-static
   VectorXd q_start, q_end;        ///< standing postures, nq
   bool limited = true;            ///< whether limits of the robot apply: not in the paper's problems
-  std::vector<std::pair<std::string, double>> options;  ///< every option of the motion by name
-  std::vector<Goal> goals;                              ///< requested quantities, to be measured on the trajectory
+  OptionValues options;           ///< every option of the motion by name
+  std::vector<Goal> goals;        ///< requested quantities, to be measured on the trajectory
 };
 
 /// A problem ready to be solved, with the data that reports need.
@@ -62,10 +41,10 @@ struct Motion {
   ContactSchedule schedule;
   Ground ground;
   std::unique_ptr<RobotProblem> problem;
-  ShootingTrajectory guess;                             ///< quasi-static
-  std::vector<std::pair<std::string, double>> options;  ///< every option of the motion by name
-  std::vector<Goal> goals;                              ///< requested quantities, to be measured on the trajectory
-  bool bounded = false;  ///< a torque or a duration is limited: to be solved with ControlBounds::Enforce
+  ShootingTrajectory guess;  ///< quasi-static
+  OptionValues options;      ///< every option of the motion by name
+  std::vector<Goal> goals;   ///< requested quantities, to be measured on the trajectory
+  bool bounded = false;      ///< a torque or a duration is limited: to be solved with ControlBounds::Enforce
   ObjectiveOptions objective{};
   VectorXd peak_limits{};      ///< of the peak torque, nu (getPeakLimits); empty for other objectives
   bool within_limits = false;  ///< whether torques are limited, at s = 1 of the peak torque

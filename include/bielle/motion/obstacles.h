@@ -12,7 +12,7 @@ struct BoxOptions {
   double length = 0.2;     ///< of its top, m
   double width = 0.8;      ///< m
   double distance = 0.05;  ///< from the soles at the start to the front of the box, m
-  double down = 0;         ///< 1: step down again on the other side, as far from its back
+  bool down = false;       ///< step down again on the other side, as far from its back
   LocomotionOptions gait = makeGaitDefaults();
 
   static LocomotionOptions makeGaitDefaults();
@@ -26,8 +26,8 @@ struct GapOptions {
   LocomotionOptions gait;
 };
 
-std::vector<OptionEntry> listOptions(BoxOptions& options);
-std::vector<OptionEntry> listOptions(GapOptions& options);
+void describe(OptionFields& fields, BoxOptions& options);
+void describe(OptionFields& fields, GapOptions& options);
 
 /// From the standing posture q0. \throws ModelError when the request is impossible: sizes, a swing that would touch the
 /// box, and see locomotion.h

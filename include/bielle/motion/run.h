@@ -18,7 +18,7 @@ namespace bielle {
 
 struct RunOptions {
   double speed = 1;      ///< forward, of the steady steps; negative: backward, m/s
-  double steps = 8;      ///< the last one brings the feet together
+  int steps = 8;         ///< the last one brings the feet together
   double flight = 0.08;  ///< time in the air of every step but the last, rounded to time steps, s
   double stance = 0.24;  ///< time on the ground of each foot, s
   LocomotionOptions gait = makeGaitDefaults();
@@ -27,18 +27,18 @@ struct RunOptions {
 };
 
 struct HopOptions {
-  double foot = 0;       ///< 0: the left one, 1: the right one
-  double hops = 1;       ///< number of flights
-  double flight = 0.15;  ///< time in the air of each, rounded to time steps, s
-  double length = 0;     ///< of each hop, forward, m
-  double stance = 0.3;   ///< time on one foot before, between and after flights, s
+  Side foot = Side::Left;  ///< to hop on
+  int hops = 1;            ///< number of flights
+  double flight = 0.15;    ///< time in the air of each, rounded to time steps, s
+  double length = 0;       ///< of each hop, forward, m
+  double stance = 0.3;     ///< time on one foot before, between and after flights, s
   LocomotionOptions gait = makeGaitDefaults();
 
   static LocomotionOptions makeGaitDefaults();
 };
 
-std::vector<OptionEntry> listOptions(RunOptions& options);
-std::vector<OptionEntry> listOptions(HopOptions& options);
+void describe(OptionFields& fields, RunOptions& options);
+void describe(OptionFields& fields, HopOptions& options);
 
 /// From the standing posture q0. \throws ModelError when the request is impossible (see locomotion.h)
 MotionPlan planRun(const Model& model, const RunOptions& options, const VectorXd& q0);

@@ -25,8 +25,7 @@ struct SquatOptions {
   double closure_kd = 0;             ///< 1/s
 };
 
-/// Every number of the options by name, pointing into `options`.
-std::vector<OptionEntry> listOptions(SquatOptions& options);
+void describe(OptionFields& fields, SquatOptions& options);
 
 /// A squat on all contacts of the robot, from the standing posture q0.
 /// \throws ModelError when the request is impossible (depth, durations, no contact)

@@ -12,7 +12,7 @@ struct StairsOptions {
   double height = 0.06;  ///< of a step; negative: down, m
   double depth = 0.2;    ///< of a step, m
   double slope = 0;      ///< height over depth, replaces the height unless it is 0, 1
-  double stairs = 4;     ///< number of steps of the stairs
+  int stairs = 4;        ///< number of steps of the stairs
   double speed = 0.3;    ///< forward speed of the CoM; with the depth it determines the duration of a step, m/s
   double width = 0.8;    ///< of the stairs, m
   LocomotionOptions gait = makeGaitDefaults();
@@ -20,8 +20,8 @@ struct StairsOptions {
   static LocomotionOptions makeGaitDefaults();
 };
 
-/// They omit the duration of single support, which follows from depth and speed.
-std::vector<OptionEntry> listOptions(StairsOptions& options);
+/// Without the duration of single support, which follows from depth and speed.
+void describe(OptionFields& fields, StairsOptions& options);
 
 /// Weights and durations of the paper's stairs.
 void setPaperWeights(StairsOptions& options);

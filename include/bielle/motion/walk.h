@@ -8,26 +8,26 @@ namespace bielle {
 
 struct WalkOptions {
   double speed = 0.5;  ///< forward, of the steady steps; negative: backward, m/s
-  double steps = 6;    ///< the last one brings the feet together
+  int steps = 6;       ///< the last one brings the feet together
   LocomotionOptions gait;
 };
 
 struct SideWalkOptions {
   double speed = 0.2;  ///< to the left, of the steady steps; negative: to the right, m/s
-  double steps = 6;    ///< every other one opens the stance, the next one closes it
+  int steps = 6;       ///< every other one opens the stance, the next one closes it
   LocomotionOptions gait;
 };
 
 struct TurnOptions {
   double angle = 1.57;  ///< to the left; negative: to the right, rad
   double radius = 0;    ///< of the arc that the middle of the feet follows; 0: on the spot, m
-  double steps = 8;     ///< the last one brings the feet together
+  int steps = 8;        ///< the last one brings the feet together
   LocomotionOptions gait;
 };
 
-std::vector<OptionEntry> listOptions(WalkOptions& options);
-std::vector<OptionEntry> listOptions(SideWalkOptions& options);
-std::vector<OptionEntry> listOptions(TurnOptions& options);
+void describe(OptionFields& fields, WalkOptions& options);
+void describe(OptionFields& fields, SideWalkOptions& options);
+void describe(OptionFields& fields, TurnOptions& options);
 
 /// Weights and durations of the paper's walk and side walk.
 void setPaperWeights(WalkOptions& options);

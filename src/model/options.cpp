@@ -1,0 +1,150 @@
+#include "bielle/model/options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+
+#include "bielle/model/error.h"
+#include "model/number_text.h"
+
+namespace bielle {
+namespace {
+
+// The least number of letters to insert, remove or change (V. Levenshtein, 1966).
+size_t calcDistance(const std::string& a, const std::string& b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (size_t i = 1; i <= a.size(); ++i) {
+    size_t diagonal = std::exchange(row[0], i);
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const size_t changed = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, changed}));
+    }
+  }
+  return row[b.size()];
+}
+
+template <typename T>
+bool parse(const std::string& text, T& value) {
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && stop == end;
+}
+
+std::string joinNames(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+// In the type of the option where that loses nothing.
+OptionValue convert(const Option& option, const OptionValue& value) {
+  if (const int* whole = std::get_if<int>(&value); whole && std::holds_alternative<double>(option.value))
+    return static_cast<double>(*whole);
+  if (const double* number = std::get_if<double>(&value); number && std::holds_alternative<int>(option.value))
+    if (*number == std::floor(*number) && std::abs(*number) <= std::numeric_limits<int>::max())
+      return static_cast<int>(*number);
+  return value;
+}
+
+}  // namespace
+
+std::string formatOption(const OptionValue& value) {
+  if (const bool* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
+  if (const int* whole = std::get_if<int>(&value)) return std::to_string(*whole);
+  if (const std::string* name = std::get_if<std::string>(&value)) return *name;
+  const double number = std::get<double>(value);
+  double read = 0;
+  const std::string brief = formatNumber(number);
+  return parse(brief, read) && read == number ? brief : formatNumber(number, "%.17g");
+}
+
+OptionValue parseOption(const std::string& text) {
+  if (text == "true" || text == "false") return text == "true";
+  int whole = 0;
+  double number = 0;
+  if (parse(text, whole)) return whole;
+  if (parse(text, number)) return number;
+  return text;
+}
+
+std::string Option::describeValues() const {
+  if (std::holds_alternative<bool>(value)) return "true or false";
+  if (!choices.empty()) return joinNames(choices);
+  if (std::isfinite(bounds.lower) && std::isfinite(bounds.upper))
+    return (bounds.open ? "above " : "") + formatNumber(bounds.lower) + " .. " + formatNumber(bounds.upper);
+  if (std::isfinite(bounds.lower))
+    return bounds.open ? "above " + formatNumber(bounds.lower) : formatNumber(bounds.lower) + " or more";
+  return std::isfinite(bounds.upper) ? formatNumber(bounds.upper) + " or less" : "";
+}
+
+const Option* OptionSet::find(const std::string& name) const {
+  const auto found = std::find_if(options_.begin(), options_.end(), [&](const Option& o) { return o.name == name; });
+  return found == options_.end() ? nullptr : &*found;
+}
+
+const Option& OptionSet::get(const std::string& name) const {
+  if (const Option* option = find(name)) return *option;
+  std::vector<std::string> names;
+  for (const Option& option : options_) names.push_back(option.name);
+  const auto nearest = std::min_element(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
+    return calcDistance(name, a) < calcDistance(name, b);
+  });
+  throw ModelError(
+      owner_, noun_ + " '" + name + "'", "there is no such " + noun_,
+      names.empty() ? "leave it out" : "the nearest is '" + *nearest + "'; choose one of: " + joinNames(names));
+}
+
+Option& OptionSet::getMutable(const std::string& name) {
+  return options_[static_cast<size_t>(&get(name) - options_.data())];
+}
+
+void OptionSet::fail(const Option& option, const std::string& problem) const {
+  const std::string allowed = option.describeValues(),
+                    kind = std::holds_alternative<int>(option.value) ? "a whole number" : "a number";
+  const std::string unit = option.unit.empty() || option.unit == "1" ? "" : " [" + option.unit + "]";
+  const bool named = option.unit.empty();
+  throw ModelError(owner_, noun_ + " '" + option.name + "'", problem,
+                   "give " + (named ? (option.choices.empty() ? "" : "one of ") + allowed
+                                    : kind + (allowed.empty() ? "" : ", " + allowed) + unit));
+}
+
+void OptionSet::check(const Option& option, const OptionValue& value) const {
+  if (value.index() != option.value.index())
+    fail(option, std::holds_alternative<int>(option.value) && std::holds_alternative<double>(value)
+                     ? "it is not a whole number"
+                     : "'" + formatOption(value) + "' is of another kind");
+  if (const std::string* name = std::get_if<std::string>(&value)) {
+    if (std::find(option.choices.begin(), option.choices.end(), *name) == option.choices.end())
+      fail(option, "'" + *name + "' is not one of its choices");
+    return;
+  }
+  if (std::holds_alternative<bool>(value)) return;
+  const double number = std::holds_alternative<int>(value) ? std::get<int>(value) : std::get<double>(value);
+  if (!std::isfinite(number)) fail(option, "it is not finite");
+  const OptionBounds& bounds = option.bounds;
+  if (bounds.lower == 0 && number < 0) fail(option, "it is negative");
+  if (number < bounds.lower || number > bounds.upper || (bounds.open && number == bounds.lower))
+    fail(option, formatNumber(number) + (option.unit == "1" ? "" : " " + option.unit) +
+                     (bounds.open ? " is not " : " is outside ") + option.describeValues());
+}
+
+void OptionSet::set(const std::string& name, const OptionValue& value) {
+  Option& option = getMutable(name);
+  const OptionValue converted = convert(option, value);
+  check(option, converted);
+  option.value = converted;
+}
+
+OptionValues OptionSet::listValues() const {
+  OptionValues values;
+  for (const Option& option : options_) values.emplace_back(option.name, option.value);
+  return values;
+}
+
+void OptionSet::check() const {
+  for (const Option& option : options_) check(option, option.value);
+}
+
+}  // namespace bielle
