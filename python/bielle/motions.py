@@ -86,7 +86,7 @@ def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Resu
     name = "solve_" + motion.replace("-", "_")
     function.__name__ = function.__qualname__ = name
     function.__module__ = "bielle"
-    lines = [f"    {key}: {o['help']} [{o['unit'] or ' or '.join(o['choices']) or 'bool'}], default {o['default']}" for key, o in options.items()]
+    lines = [f"    {key}: {o['help']} [{_get_kind(o)}], default {_format(o['default'])}" for key, o in options.items()]
     lines += [f"    {key}: path of a file" for key in files]
     lines += [f"    weights: {' or '.join(map(repr, presets))}"] if presets else []
     function.__doc__ = described["help"] + ".\n" + _COMMON + "\n".join(lines) + "\n"
@@ -99,6 +99,15 @@ def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Resu
         + [inspect.Parameter(key, keyword, default=None) for key in common]
     )
     return function
+
+
+def _get_kind(option: Dict[str, Any]) -> str:
+    """The unit of a number, or the values of another option."""
+    return str(option["unit"]) or " or ".join(option["choices"]) or "bool"
+
+
+def _format(value: Union[bool, int, float, str]) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 FUNCTIONS: Dict[str, Callable[..., Result]] = {}

@@ -10,7 +10,7 @@ FUNCTIONS: Dict[str, Callable[..., Result]]
 __all__ = ['FUNCTIONS', 'motions', 'solve_request', 'solve_sequence', 'solve_squat', 'solve_walk', 'solve_side_walk', 'solve_turn', 'solve_stairs', 'solve_footholds', 'solve_box', 'solve_gap', 'solve_jump', 'solve_run', 'solve_hop']
 
 def solve_request(robot: Union[str, Robot], request: Request, problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result: ...
-def solve_sequence(robot: Union[str, Robot], sequence: Iterable[str], options: Mapping[str, float] = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result: ...
+def solve_sequence(robot: Union[str, Robot], sequence: Iterable[str], options: Mapping[str, Union[bool, float, str]] = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result: ...
 
 def solve_squat(robot: Union[str, Robot], *, depth: float = ..., duration: float = ..., settle: float = ..., time_step: float = ..., com_weight: float = ..., state_weight: float = ..., torso_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., friction: float = ..., cone_margin: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """go down and up again with feet flat; the height of the centre of mass follows a sine.
@@ -40,7 +40,7 @@ def solve_squat(robot: Union[str, Robot], *, depth: float = ..., duration: float
     """
     ...
 
-def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps forward or backward on level ground, from standing to standing.
 
     robot: a Robot, or the name of one
@@ -62,8 +62,8 @@ def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: float = .
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
@@ -90,7 +90,7 @@ def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: float = .
     """
     ...
 
-def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps to the left or to the right.
 
     robot: a Robot, or the name of one
@@ -112,8 +112,8 @@ def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: floa
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
@@ -140,7 +140,7 @@ def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: floa
     """
     ...
 
-def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = ..., steps: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps on the spot or along an arc, to another heading.
 
     robot: a Robot, or the name of one
@@ -163,8 +163,8 @@ def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = 
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
@@ -190,7 +190,7 @@ def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = 
     """
     ...
 
-def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float = ..., slope: float = ..., stairs: float = ..., speed: float = ..., width: float = ..., start_support: float = ..., start_pressure: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float = ..., slope: float = ..., stairs: int = ..., speed: float = ..., width: float = ..., start_support: float = ..., start_pressure: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """climb or descend stairs, one foot per step.
 
     robot: a Robot, or the name of one
@@ -215,8 +215,8 @@ def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float 
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.9
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
@@ -243,7 +243,7 @@ def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float 
     """
     ...
 
-def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., footholds: str, problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., footholds: str, problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps on uneven footholds from a file.
 
     robot: a Robot, or the name of one
@@ -264,8 +264,8 @@ def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.85
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
@@ -292,7 +292,7 @@ def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support
     """
     ...
 
-def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = ..., width: float = ..., distance: float = ..., down: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = ..., width: float = ..., distance: float = ..., down: bool = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """a step onto a box, and down again if requested.
 
     robot: a Robot, or the name of one
@@ -304,7 +304,7 @@ def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = 
     length: length of its top; the feet stand in the middle [m], default 0.2
     width: width of the box [m], default 0.8
     distance: distance from the soles to the box [m], default 0.05
-    down: 1: step down again behind the box [0 or 1], default 0
+    down: step down again behind the box [bool], default False
     start_support: least duration of double support before the first step [s], default 0.3
     start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
     single_support: duration with one foot on the ground [s], default 0.6
@@ -317,8 +317,8 @@ def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = 
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.75
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
@@ -344,7 +344,7 @@ def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = 
     """
     ...
 
-def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float = ..., depth: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float = ..., depth: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """a step over a gap in the ground.
 
     robot: a Robot, or the name of one
@@ -367,8 +367,8 @@ def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float =
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
@@ -394,7 +394,7 @@ def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float =
     """
     ...
 
-def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float = ..., stand: float = ..., push: float = ..., land: float = ..., settle: float = ..., stretch: float = ..., clearance: float = ..., friction: float = ..., cone_margin: float = ..., time_step: float = ..., published: float = ..., apex_weight: float = ..., com_weight: float = ..., state_weight: float = ..., torso_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., swing_weight: float = ..., swing_rotation_weight: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float = ..., stand: float = ..., push: float = ..., land: float = ..., settle: float = ..., stretch: float = ..., clearance: float = ..., friction: float = ..., cone_margin: float = ..., time_step: float = ..., published: bool = ..., apex_weight: float = ..., com_weight: float = ..., state_weight: float = ..., torso_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., swing_weight: float = ..., swing_rotation_weight: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """push off, fly for a given time, land; the time determines the height of the centre of mass at mid-flight.
 
     robot: a Robot, or the name of one
@@ -413,7 +413,7 @@ def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float =
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
     time_step: length of a shooting stage [s], default 0.002
-    published: 1: the paper's problem, with feet free in flight; 0: Bielle's costs [0 or 1], default 0
+    published: the paper's problem, with feet free in flight, instead of Bielle's costs [bool], default False
     apex_weight: height of the centre of mass at mid-flight [1/m^2], default 10000
     com_weight: height of the centre of mass on the ground [1/m^2], default 1000
     state_weight: stay near the standing posture, at rest [1], default 0.02
@@ -431,7 +431,7 @@ def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float =
     """
     ...
 
-def solve_run(robot: Union[str, Robot], *, speed: float = ..., steps: float = ..., flight: float = ..., stance: float = ..., start_support: float = ..., start_pressure: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., stretch: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_run(robot: Union[str, Robot], *, speed: float = ..., steps: int = ..., flight: float = ..., stance: float = ..., start_support: float = ..., start_pressure: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., stretch: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps with flights between them, from standing to standing.
 
     robot: a Robot, or the name of one
@@ -453,7 +453,7 @@ def solve_run(robot: Union[str, Robot], *, speed: float = ..., steps: float = ..
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 1
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
@@ -480,7 +480,7 @@ def solve_run(robot: Union[str, Robot], *, speed: float = ..., steps: float = ..
     """
     ...
 
-def solve_hop(robot: Union[str, Robot], *, foot: Union[str, float] = ..., hops: float = ..., flight: float = ..., length: float = ..., stance: float = ..., start_support: float = ..., start_pressure: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., stretch: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_hop(robot: Union[str, Robot], *, foot: str = ..., hops: int = ..., flight: float = ..., length: float = ..., stance: float = ..., start_support: float = ..., start_pressure: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., stretch: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """lift one foot, take off and land on the other one.
 
     robot: a Robot, or the name of one
@@ -488,7 +488,7 @@ def solve_hop(robot: Union[str, Robot], *, foot: Union[str, float] = ..., hops: 
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    foot: foot to hop on; 0: left, 1: right [0 or 1], default 0
+    foot: foot to hop on [left or right], default left
     hops: number of flights [1], default 1
     flight: time in the air of each hop [s], default 0.15
     length: length of each hop, forward; negative: backward [m], default 0
@@ -503,7 +503,7 @@ def solve_hop(robot: Union[str, Robot], *, foot: Union[str, float] = ..., hops: 
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 1
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1

@@ -77,12 +77,10 @@ int run(int argc, char** argv) {
   });
   try {
     app.parse(argc, argv);
+    return action();
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     return fail(describe(app, error, argc, argv), kBadInput);
-  }
-  try {
-    return action();
   } catch (const bielle::ModelError& error) {
     return fail(error.what(), kBadInput);
   } catch (const std::exception& error) {

@@ -73,7 +73,8 @@ std::string Option::describeValues() const {
   if (std::holds_alternative<bool>(value)) return "true or false";
   if (!choices.empty()) return joinNames(choices);
   if (std::isfinite(bounds.lower) && std::isfinite(bounds.upper))
-    return (bounds.open ? "above " : "") + formatNumber(bounds.lower) + " .. " + formatNumber(bounds.upper);
+    return bounds.open ? "above " + formatNumber(bounds.lower) + ", up to " + formatNumber(bounds.upper)
+                       : formatNumber(bounds.lower) + " .. " + formatNumber(bounds.upper);
   if (std::isfinite(bounds.lower))
     return bounds.open ? "above " + formatNumber(bounds.lower) : formatNumber(bounds.lower) + " or more";
   return std::isfinite(bounds.upper) ? formatNumber(bounds.upper) + " or less" : "";
@@ -127,7 +128,8 @@ void OptionSet::check(const Option& option, const OptionValue& value) const {
   if (bounds.lower == 0 && number < 0) fail(option, "it is negative");
   if (number < bounds.lower || number > bounds.upper || (bounds.open && number == bounds.lower))
     fail(option, formatNumber(number) + (option.unit == "1" ? "" : " " + option.unit) +
-                     (bounds.open ? " is not " : " is outside ") + option.describeValues());
+                     (std::isfinite(bounds.lower + bounds.upper) && !bounds.open ? " is outside " : " is not ") +
+                     option.describeValues());
 }
 
 void OptionSet::set(const std::string& name, const OptionValue& value) {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "bielle/model/error.h"
 #include "math/constants.h"
 #include "math/so3.h"
 

@@ -1,8 +1,7 @@
 #include "bielle/motion/obstacles.h"
 
-#include <cmath>
+#include <algorithm>
 
-#include "bielle/model/error.h"
 #include "bielle/motion/stairs.h"
 #include "motion/course.h"
 #include "motion/gait.h"

@@ -1,9 +1,7 @@
 #include "bielle/motion/run.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "bielle/model/error.h"
 #include "motion/gait.h"
 
 namespace bielle {

@@ -1,8 +1,7 @@
 #include "bielle/motion/stairs.h"
 
-#include <cmath>
+#include <algorithm>
 
-#include "bielle/model/error.h"
 #include "model/number_text.h"
 
 namespace bielle {

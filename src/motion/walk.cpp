@@ -1,8 +1,8 @@
 #include "bielle/motion/walk.h"
 
+#include <algorithm>
 #include <cmath>
 
-#include "bielle/model/error.h"
 #include "math/constants.h"
 
 namespace bielle {

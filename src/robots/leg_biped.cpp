@@ -1,6 +1,5 @@
 #include "robots/leg_biped.h"
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 
