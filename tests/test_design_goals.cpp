@@ -123,12 +123,9 @@ TEST_CASE("design goals: the log has what was requested and achieved, and why a 
   const MotionOutcome stopped = remakeMotion(robot.startModel(), makeAskedSquat(0.8, 0.02), nullptr, hasty, {});
   CHECK(stopped.missing == 1);
   DesignMotion odd = makeAskedSquat(0.8, 0.02);
-  odd.request = [] {
-    MotionRequest request;
-    request.plan = [](const Model&, const VectorXd&) -> MotionPlan {
-      throw ModelError("leg", "depth", "it is too large");
-    };
-    return request;
+  odd.request.emplace();
+  odd.request->planner = [](const Model&, const VectorXd&, const OptionSet&) -> MotionPlan {
+    throw ModelError("leg", "depth", "it is too large");
   };
   const DesignEvaluator impossible(robot, {odd}, kPeak);
   CHECK(impossible.start().status == DesignStatus::Feasible);
