@@ -78,7 +78,7 @@ TEST_CASE("bad input is one line of error and status 2") {
   checkRefused(run({"info", "/no/such.urdf"}), "there is no such file");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "depht=0.7"})), "option 'depht'");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction"})), "name=value");
-  checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction=0.7m"})), "name=number");
+  checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction=0.7m"})), "'0.7m' is not a number");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction=nan"})), "not finite");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "depth=-1"})), "option 'depth'");
   checkRefused(run(makeShortSquat(directory.str(), {"--formulation", "best"})), "best");

@@ -54,7 +54,7 @@ def test_options_are_those_of_the_registry(robot):
     assert "depth" in caught.value.element
     with pytest.raises(bielle.ModelError, match="option 'foot': 'middle' is not one of its choices; .*left, right"):
         bielle.solve_hop(robot, foot="middle")
-    with pytest.raises(bielle.ModelError, match="option 'steps': it is not a whole number"):
+    with pytest.raises(bielle.ModelError, match="option 'steps': '2.5' is not a whole number"):
         bielle.solve_walk(robot, steps=2.5)
     with pytest.raises(bielle.ModelError, match="option 'rigid_landing': .*true or false"):
         bielle.solve_walk(robot, rigid_landing=1)

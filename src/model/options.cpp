@@ -48,6 +48,12 @@ OptionValue convert(const Option& option, const OptionValue& value) {
   return value;
 }
 
+std::string describeKind(const Option& option) {
+  if (!option.choices.empty()) return "one of its choices";
+  if (std::holds_alternative<bool>(option.value)) return "true or false";
+  return std::holds_alternative<int>(option.value) ? "a whole number" : "a number";
+}
+
 }  // namespace
 
 std::string formatOption(const OptionValue& value) {
@@ -103,19 +109,16 @@ Option& OptionSet::getMutable(const std::string& name) {
 
 void OptionSet::fail(const Option& option, const std::string& problem) const {
   const std::string allowed = option.describeValues(),
-                    kind = std::holds_alternative<int>(option.value) ? "a whole number" : "a number";
-  const std::string unit = option.unit.empty() || option.unit == "1" ? "" : " [" + option.unit + "]";
-  const bool named = option.unit.empty();
-  throw ModelError(owner_, noun_ + " '" + option.name + "'", problem,
-                   "give " + (named ? (option.choices.empty() ? "" : "one of ") + allowed
-                                    : kind + (allowed.empty() ? "" : ", " + allowed) + unit));
+                    unit = option.unit.empty() || option.unit == "1" ? "" : " [" + option.unit + "]";
+  const std::string remedy = !option.choices.empty() ? "one of " + allowed
+                             : option.unit.empty()   ? allowed
+                                                     : describeKind(option) + (allowed.empty() ? "" : ", " + allowed);
+  throw ModelError(owner_, noun_ + " '" + option.name + "'", problem, "give " + remedy + unit);
 }
 
 void OptionSet::check(const Option& option, const OptionValue& value) const {
   if (value.index() != option.value.index())
-    fail(option, std::holds_alternative<int>(option.value) && std::holds_alternative<double>(value)
-                     ? "it is not a whole number"
-                     : "'" + formatOption(value) + "' is of another kind");
+    fail(option, "'" + formatOption(value) + "' is not " + describeKind(option));
   if (const std::string* name = std::get_if<std::string>(&value)) {
     if (std::find(option.choices.begin(), option.choices.end(), *name) == option.choices.end())
       fail(option, "'" + *name + "' is not one of its choices");
