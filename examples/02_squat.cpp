@@ -15,7 +15,7 @@
 
 #include "bielle/io/names.h"
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/squat.h"
 
 using namespace bielle;

@@ -20,7 +20,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/walk.h"
 
 using namespace bielle;

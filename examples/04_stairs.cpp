@@ -18,7 +18,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/stairs.h"
 
 using namespace bielle;

@@ -17,7 +17,7 @@
 
 #include "bielle/io/names.h"
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/jump.h"
 
 using namespace bielle;

@@ -18,7 +18,7 @@
 #include <cstdlib>
 
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/squat.h"
 
 using namespace bielle;

@@ -16,7 +16,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/footsteps.h"
 #include "bielle/motion/walk.h"
 

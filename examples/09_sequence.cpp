@@ -14,7 +14,7 @@
 #include <iostream>
 
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/stairs.h"

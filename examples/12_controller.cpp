@@ -9,7 +9,7 @@
 #include <cstdio>
 
 #include "bielle/control/predictive_controller.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/walk.h"
 #include "simulation/make_world.h"
 

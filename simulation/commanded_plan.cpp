@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
 
 namespace bielle::simulation {

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "bielle/io/motion_registry.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
 #include "io/interrupt.h"
 

@@ -2,7 +2,8 @@
 // The robots of this project, whatever $BIELLE_ROBOTS names.
 #include <string>
 
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
+
 
 namespace bielle::testing {
 

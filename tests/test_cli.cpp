@@ -9,7 +9,7 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/motion.h"
 #include "bielle/motion/squat.h"
 #include "cli_command.h"

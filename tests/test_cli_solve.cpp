@@ -9,7 +9,7 @@
 
 #include "bielle/io/record.h"
 #include "bielle/io/refinement.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/squat.h"
 #include "cli_command.h"
 #include "robot_directory.h"

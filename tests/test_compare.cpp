@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bielle/io/record.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "read_table.h"
 #include "robot_directory.h"
 #include "run_command.h"

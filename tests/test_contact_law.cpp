@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 #include <random>
 
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "simulation/contact_law.h"
 
 namespace bielle::simulation {

@@ -8,10 +8,10 @@
 #include <fstream>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/generators.h"
 #include "design/draft.h"

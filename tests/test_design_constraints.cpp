@@ -4,10 +4,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
 #include "design/run.h"
 #include "design_trials.h"

@@ -7,8 +7,8 @@
 #include <set>
 #include <sstream>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "design/front_search.h"
 #include "design/run.h"
 #include "robot_directory.h"

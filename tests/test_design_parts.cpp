@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <set>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "design/draft.h"
 #include "design/front_search.h"
 #include "design/motor_change.h"

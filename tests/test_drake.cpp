@@ -6,8 +6,8 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
-#include "bielle/model/reader.h"
 #include "bielle/robots/generators.h"
 #include "get_error.h"
 #include "io/drake.h"

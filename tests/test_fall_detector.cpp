@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/motion.h"
 #include "simulation/fall_detector.h"
 #include "simulation/robot_errors.h"

@@ -7,10 +7,11 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
 #include "bielle/io/robot_info.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/robots/generators.h"
 #include "math/so3.h"
 #include "robot_directory.h"
@@ -29,27 +30,6 @@ using namespace bielle::testing;
 namespace {
 
 const std::string kRobots = std::string(BIELLE_SOURCE_DIR) + "/robots/";
-
-// The same text, numbers to their rounding: the last digit is the compiler's.
-void checkSameText(const std::string& a, const std::string& b) {
-  const auto next = [](const std::string& text, size_t& at) {
-    const size_t begin = at;
-    at = std::min(text.find_first_of(" \n\",[]", at + 1), text.size());
-    return text.substr(begin, at - begin);
-  };
-  size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    const std::string x = next(a, i), y = next(b, j);
-    if (x == y) continue;
-    char *end_x = nullptr, *end_y = nullptr;
-    const double number_x = std::strtod(x.c_str() + 1, &end_x), number_y = std::strtod(y.c_str() + 1, &end_y);
-    INFO("'" + x + "' against '" + y + "'");
-    REQUIRE((x.size() > 1 && y.size() > 1 && *end_x == 0 && *end_y == 0));
-    REQUIRE(std::abs(number_x - number_y) < 1e-11 * (1 + std::abs(number_x)));
-  }
-  CHECK(i == a.size());
-  CHECK(j == b.size());
-}
 
 // Same bodies, joints, closures, motors and feet; placements and inertias to the rounding of the files.
 void checkSame(const Model& a, const Model& b) {
@@ -240,18 +220,94 @@ TEST_CASE("generators: references are assembled with the angles that they give, 
   }
 }
 
-TEST_CASE("generators: what comes along is what they write") {
+TEST_CASE("generators: robots that come along name theirs, and are the same from the files that it writes") {
   for (const Generator& generator : getGenerators()) {
     CAPTURE(generator.name);
-    const Model model = generator.make(generator.parameters);
-    const RobotText text = formatRobot(model, "Written by `bielle generate " + generator.name + "`.");
-    checkSameText(readFile(kRobots + generator.name + "/" + generator.name + ".urdf"), text.urdf);
-    checkSameText(readFile(kRobots + generator.name + "/" + generator.name + ".yaml"), text.yaml);
-    CHECK(std::filesystem::exists(kRobots + generator.name + "/README.md"));
+    const std::string place = kRobots + generator.name + "/";
+    CHECK(std::filesystem::exists(place + "README.md"));
+    CHECK_FALSE(std::filesystem::exists(place + generator.name + ".urdf"));
     const LoadedRobot loaded = loadRobot(kRobots + generator.name);
     CHECK(loaded.warnings.empty());
+    CHECK(loaded.file == place + generator.name + ".yaml");
+    const Model model = generator.make(generator.parameters);
+    CHECK(loaded.model.name() == model.name());
     checkSame(model, loaded.model);
+    const RobotDirectory directory;
+    writeRobot(model, directory.path() + "/written");
+    const LoadedRobot written = loadRobot(directory.path() + "/written");
+    CHECK(written.warnings.empty());
+    checkSame(model, written.model);
+    CHECK(written.model.gravity() == loaded.model.gravity());
+    const auto calcMassMatrix = [](const Model& of) {
+      Workspace ws(of);
+      updatePositions(of, ws, of.makeNeutral());
+      updateMassMatrix(of, ws);
+      return ws.M;
+    };
+    CHECK(calcMassMatrix(written.model) == calcMassMatrix(loaded.model));
+    const RobotText a = formatRobot(written.model), b = formatRobot(loaded.model);
+    CHECK(a.urdf == b.urdf);
+    CHECK(a.yaml == b.yaml);
   }
+}
+
+TEST_CASE("files that name a generator: parameters by number and choice, a fixed base, keys that complete them") {
+  const RobotDirectory files;
+  files.write("mine/mine.yaml", "generator: leg_biped\nset:\n  knee: belt\n  thigh_length: 0.25\n");
+  LegBipedParameters p;
+  for (const Parameter& parameter : listParameters(p)) {
+    if (parameter.name == "knee") *parameter.value = findChoice(parameter, "belt");
+    if (parameter.name == "thigh_length") *parameter.value = 0.25;
+  }
+  const LoadedRobot mine = loadRobot(files.path() + "/mine");
+  CHECK(mine.warnings.empty());
+  checkSame(makeLegBiped(p), mine.model);
+  CHECK(mine.model.hasFreeFlyer());
+  LoadOptions fixed;
+  fixed.base = BaseKind::Fixed;
+  CHECK(loadRobot(files.path() + "/mine/mine.yaml", fixed).model.nv() == mine.model.nv() - 6);
+  // Beside the generator, and in a file that completes the one with it.
+  const std::string spring = "joint_forces: {knee_left: {stiffness: 20}}\n";
+  files.write("springy/springy.yaml", "generator: leg_biped\nset: {knee: belt}\nbase: fixed\n" + spring);
+  files.write("other/other.yaml", "model: ../mine\n" + spring);
+  files.write("by_name/by_name.yaml", "model: rsu_biped\n" + spring);
+  for (const std::string name : {"springy", "other", "by_name"}) {
+    CAPTURE(name);
+    const Model model = loadRobot(files.path() + "/" + name).model;
+    REQUIRE(model.jointForces().size() == 1);
+    CHECK(model.jointForces()[0].stiffness == 20);
+    CHECK(model.hasFreeFlyer() == (name != "springy"));
+    CHECK(model.nu() == 12);
+  }
+}
+
+TEST_CASE("files that name a generator: errors give the file, the line, the parameter and what to do") {
+  const RobotDirectory files;
+  const auto refuse = [&](const std::string& text, const std::string& place, const std::string& problem) {
+    CAPTURE(text);
+    const std::string file = files.write("bad/bad.yaml", text);
+    CHECK_THROWS_WITH(loadRobot(file), Catch::StartsWith(file + ": ") && Catch::Contains(place) &&
+                                           Catch::Contains(problem));
+  };
+  refuse("generator: no_such\n", "key 'generator' (line 1)", "no such generator; choose one of: cleobot");
+  refuse("generator: [leg_biped]\n", "key 'generator' (line 1)", "not a name");
+  refuse("generator: leg_biped\nset:\n  nee: belt\n", "key 'set': key 'nee' (line 3)",
+         "no such parameter; choose one of");
+  refuse("generator: leg_biped\nset: {knee: chain}\n", "key 'knee' (line 2)", "choose one of: ");
+  refuse("generator: leg_biped\nset: {thigh_length: long}\n", "key 'thigh_length' (line 2)", "not a number");
+  refuse("generator: leg_biped\nset: {thigh_length: 50}\n", "key 'thigh_length' (line 2)",
+         "give a value within its bounds");
+  refuse("generator: leg_biped\nset: {thigh_length: .nan}\n", "key 'thigh_length' (line 2)", "not finite");
+  refuse("generator: leg_biped\nset: [knee]\n", "key 'set' (line 2)", "not a map");
+  refuse("generator: rsu_biped\nset: {hip_height: 0.8}\n", "key 'generator' (line 1)", "do not reach the ground");
+  refuse("set: {knee: belt}\n", "key 'set' (line 1)", "there is no generator");
+  refuse("generator: rsu_biped\nmodel: bipetto\n", "key 'generator' (line 1)", "keep one of them");
+  refuse("generator: rsu_biped\nparts: 1\n", "key 'parts' (line 2)", "known keys are");
+  refuse("base: free\n", "key 'model'", "as is `generator`");
+  files.write("bad/bad.yaml", "generator: rsu_biped\n");
+  files.write("bad/bad.urdf", kToyUrdf);
+  CHECK_THROWS_WITH(loadRobot(files.path() + "/bad"),
+                    Catch::Contains("key 'generator'") && Catch::Contains("URDF beside"));
 }
 
 TEST_CASE("writer: robots that were read are written and read again") {

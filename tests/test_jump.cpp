@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
 #include "change_option.h"
 #include "own_robots.h"

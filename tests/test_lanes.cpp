@@ -4,8 +4,8 @@
 #include <numeric>
 #include <random>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/math/se3.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
 #include "dynamics/reduction.h"
 #include "math/small_dense.h"

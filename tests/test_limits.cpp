@@ -5,9 +5,9 @@
 #include <functional>
 #include <regex>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"

@@ -5,7 +5,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "engines/mujoco_model.h"
 #include "mechanisms.h"
 #include "published_robots.h"

@@ -4,8 +4,8 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
 #include "count_allocations.h"
 #include "engines/mujoco_model.h"

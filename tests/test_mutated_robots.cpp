@@ -8,6 +8,7 @@
 #include <regex>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/io/robot_loader.h"
 #include "io/mjcf.h"
 #include "robot_directory.h"
 #include "robot_trial.h"

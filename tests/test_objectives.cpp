@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/squat.h"
 
 using namespace bielle;

@@ -5,7 +5,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/ocp/cost.h"
 #include "bielle/ocp/ground_distance.h"
 #include "check_derivative.h"

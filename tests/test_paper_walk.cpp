@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/walk.h"
 #include "bielle/solve/fddp.h"
 #include "change_option.h"

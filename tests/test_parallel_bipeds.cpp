@@ -6,7 +6,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/record.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/motion/walk.h"
 #include "design/conditioning.h"
 #include "measure_steps.h"
@@ -217,7 +217,6 @@ TEST_CASE("spring biped: squat, walks and a hop are solved and checked; its leav
 }
 
 TEST_CASE("belt biped: springs, dampers and friction are in the energy that the check counts") {
-  const std::string place = std::string(BIELLE_SOURCE_DIR) + "/robots/belt_biped/belt_biped.";
   const RobotDirectory files;
   std::string forces = "joint_forces:\n";
   for (const std::string side : {"_left", "_right"})
@@ -230,7 +229,8 @@ TEST_CASE("belt biped: springs, dampers and friction are in the energy that the 
         "], points: [[-0.04, 0, -0.05], [-0.04, 0, -0.06]], stiffness: 300, rest: 0.2, preload: 2, damping: 3}\n" +
         "  heel" + side + ": {frames: [shank" + side + ", foot" + side +
         "], points: [[-0.03, 0, -0.1], [-0.06, 0, 0.01]], stiffness: 200, rest: 0.15, damping: 2}\n";
-  const std::string robot = files.writeRobot(readTextFile(place + "urdf"), readTextFile(place + "yaml") + forces);
+  files.write("springy/springy.yaml", "generator: belt_biped\n" + forces);
+  const std::string robot = files.path() + "/springy";
   REQUIRE(loadRobot(robot).model.pointSprings().size() == 4);
   REQUIRE(loadRobot(robot).model.jointForces().size() == 6);
   for (const std::vector<std::string>& motion :
@@ -289,6 +289,12 @@ TEST_CASE("bielle generate writes a robot that every command takes, and refuses 
   CHECK(run({"info", place}).status == 0);
   CHECK_THAT(run({"generate", "cleobot", "--help"}).out,
              Catch::Contains("upper_length") && Catch::Contains("[kg m^2]") && Catch::Contains("0.05 .. 1"));
+
+  // What completes a robot may complete a generated one.
+  CHECK(run({"adopt", "rsu_biped", "-o", directory.path() + "/adopted"}).status == 0);
+  CHECK(loadRobot(directory.path() + "/adopted").model.nu() == 12);
+  CHECK_THAT(run({"adopt", directory.path() + "/adopted", "-o", directory.path() + "/again"}).err,
+             Catch::Contains("already completes another robot"));
 
   const auto refuse = [&](const std::string& kind, const std::string& setting, const std::string& text) {
     const CommandResult result = run({"generate", kind, "--set", setting, "-o", directory.path() + "/none"});

@@ -7,9 +7,9 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/ocp/residual.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/transmission/ratio.h"

@@ -3,8 +3,8 @@
 #include <iostream>
 #include <sstream>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "get_error.h"
 #include "robot_directory.h"
 

@@ -6,8 +6,8 @@
 #include <random>
 #include <sstream>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
-#include "bielle/model/reader.h"
 #include "robot_directory.h"
 
 using namespace bielle;

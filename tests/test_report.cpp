@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "bielle/io/result.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "bielle/report/report.h"
 #include "robot_directory.h"

@@ -6,9 +6,9 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
-#include "bielle/model/reader.h"
 #include "get_error.h"
 #include "io/sdf.h"
 

@@ -7,9 +7,9 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "bielle/transmission/lift.h"
 

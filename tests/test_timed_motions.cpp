@@ -3,8 +3,8 @@
 #include <filesystem>
 
 #include "bielle/io/result.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/walk.h"
 

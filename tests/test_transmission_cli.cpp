@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/model/reader.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/transmission/ratio.h"
 #include "robot_directory.h"
 #include "run_bielle.h"

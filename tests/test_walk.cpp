@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/impact.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
 #include "change_option.h"
 #include "measure_steps.h"

@@ -9,6 +9,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
 

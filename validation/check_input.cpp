@@ -6,8 +6,8 @@
 #include <set>
 
 #include "bielle/io/names.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/transmission/serial_model.h"
 
 namespace bielle::validation {

@@ -9,8 +9,8 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/io/names.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "check.h"
 #include "robot_directory.h"

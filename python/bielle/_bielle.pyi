@@ -1129,7 +1129,7 @@ class Robot:
         ...
     @property
     def file(self) -> str:
-        """absolute path of the .urdf, or of the .yaml that completes one elsewhere; or empty"""
+        """absolute path of the .urdf, or of the .yaml without a URDF beside it; or empty"""
         ...
     @property
     def directory(self) -> str:

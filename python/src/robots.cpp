@@ -1,9 +1,9 @@
 #include <pybind11/stl.h>
 
 #include "bielle/io/robot_info.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/report/view.h"
 #include "bielle/robots/generators.h"
 #include "bind.h"
@@ -67,7 +67,7 @@ void bindRobots(py::module_& module) {
                "A robot: its model, and where it came from. `load_robot` and `generate_robot` make them.")
       .field("name", &Robot::name, "as requested")
       .field("model", &Robot::model, "Model")
-      .field("file", &Robot::file, "absolute path of the .urdf, or of the .yaml that completes one elsewhere; or empty")
+      .field("file", &Robot::file, "absolute path of the .urdf, or of the .yaml without a URDF beside it; or empty")
       .field("directory", &Robot::directory, "where the files are; or empty")
       .field("warnings", &Robot::warnings, "valid but suspicious: \"file: element: problem\"")
       .type()

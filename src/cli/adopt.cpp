@@ -8,6 +8,7 @@
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "io/text_file.h"
+#include "model/robot_files.h"
 
 namespace fs = std::filesystem;
 
@@ -16,7 +17,7 @@ namespace {
 
 int adopt(const RobotArgument& argument, const std::string& directory) {
   const LoadedRobot robot = argument.load();
-  if (fs::path(robot.file).extension() == ".yaml")
+  if (fs::path(robot.file).extension() == ".yaml" && !readYaml(robot.file).models.empty())
     throw ModelError(robot.file, "robot", "it already completes another robot", "edit it");
   const fs::path place = fs::absolute(directory).lexically_normal();
   const std::string name = (place.has_filename() ? place : place.parent_path()).filename().string();
@@ -40,7 +41,7 @@ void addAdopt(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("adopt", "Complete a published robot: feet, soles, posture, motors");
   const auto robot = std::make_shared<RobotArgument>();
   const auto directory = std::make_shared<std::string>();
-  command.add_option("ROBOT", robot->name, "name, directory, .urdf or MuJoCo .xml file")->required();
+  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
   command.add_option("-o,--output", *directory, "directory of the new robot; its last part names the robot's file")
       ->required();
   command.footer(

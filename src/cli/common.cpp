@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/loop_conflict.h"
 #include "bielle/io/robot_info.h"
+#include "bielle/io/robot_loader.h"
 #include "cli/commands.h"
 
 namespace bielle::cli {

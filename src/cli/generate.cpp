@@ -67,7 +67,10 @@ void addGenerate(CLI::App& app, Action& action) {
       "Examples:\n"
       "  bielle generate cleobot --set upper_length=0.25 -o longer\n"
       "  bielle info longer\n"
-      "`bielle generate ROBOT --help` lists the parameters.");
+      "`bielle generate ROBOT --help` lists the parameters. The URDF and YAML files written are for editing, and for\n"
+      "other programs. A short file longer/longer.yaml is the same robot for Bielle:\n"
+      "  generator: cleobot\n"
+      "  set: {upper_length: 0.25}");
 }
 
 }  // namespace bielle::cli

@@ -74,7 +74,7 @@ int run(const RatioArguments& arguments) {
 void addRatio(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("ratio", "Reduction ratio between motors and a joint along its range");
   const auto arguments = std::make_shared<RatioArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
+  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
   command
       .add_option("--joint", arguments->joints,
                   "joint to sweep; then the other joints of its linkage, unless the robot's serial joints name them")

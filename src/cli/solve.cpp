@@ -246,7 +246,7 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
 }
 
 void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
-  sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
+  sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
   sub.add_option("-o,--output", arguments->directory,
                  "directory for trajectory.csv, trajectory.npz, summary.json and report.html; created if necessary")
       ->required();

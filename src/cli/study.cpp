@@ -98,7 +98,7 @@ void addStudy(CLI::App& app, Action& action) {
   addTaskOptions(command, "cases at a time, each in its own process", arguments->tasks);
   command
       .add_option("--robot", arguments->robot,
-                  "name, directory, .urdf or MuJoCo .xml file of a robot with an approximate serial model")
+                  "name, directory, .urdf, .yaml or MuJoCo .xml file of a robot with an approximate serial model")
       ->capture_default_str();
   command.add_option("--values", arguments->values, "values of the parameter of one study, instead of its own");
   command.footer("Studies:\n" + list +

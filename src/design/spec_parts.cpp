@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/robots/generators.h"
 
 namespace fs = std::filesystem;

@@ -78,12 +78,6 @@ void setImportance(const YamlFile& yaml, UrdfFile& urdf) {
   }
 }
 
-// The files of a robot: a URDF with its YAML file, and possibly a file that completes them.
-struct RobotFiles {
-  UrdfFile urdf;
-  YamlFile yaml;
-};
-
 // Keys of the file that completes a robot take precedence over what the robot's own files say.
 void complete(const YamlFile& own, YamlFile& yaml) {
   const auto replace = [](const auto& from, auto& to) {
@@ -120,31 +114,40 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
     return {std::move(file.tree), std::move(file.settings)};
   }
   RobotFiles files;
-  files.urdf = readUrdf(path.string(), files.yaml);
+  files.urdf = parseUrdf(readRobotText(path.string()), path.string(), files.yaml);
   std::filesystem::path settings = path;
   settings.replace_extension(".yaml");
   if (!std::filesystem::exists(settings)) return files;
   const YamlFile own = readYaml(settings.string());
-  if (!own.models.empty())
-    throw ModelError(own.path, "key 'model'", "there is a URDF beside this file, " + path.string(),
+  if (!own.models.empty() || own.generator)
+    throw ModelError(own.path, own.generator ? "key 'generator'" : "key 'model'",
+                     "there is a URDF beside this file, " + path.string(),
                      "remove the key, or move the file to another directory");
   complete(own, files.yaml);
   return files;
 }
 
-RobotFiles readRobotFiles(const std::filesystem::path& path) {
-  if (path.extension() != ".yaml") return readUrdfAndYaml(path);
-  const YamlFile own = readYaml(path.string());
-  const std::string urdf = findModel(own);
-  if (urdf.empty()) {
+using Generate = std::function<RobotFiles(const YamlFile&)>;
+
+RobotFiles readRobotFiles(const std::filesystem::path& path, const Generate& generate);
+
+RobotFiles readCompleted(const YamlFile& own, const Generate& generate) {
+  const std::string model = findModel(own);
+  if (model.empty()) {
     std::string models;
-    for (const std::string& model : own.models) models += (models.empty() ? "" : ", ") + model;
+    for (const std::string& name : own.models) models += (models.empty() ? "" : ", ") + name;
     throw ModelError(own.path, "key 'model'",
-                     models.empty() ? "it is missing, and there is no URDF beside this file"
+                     models.empty() ? "it is missing, as is `generator`, and there is no URDF beside this file"
                                     : "the robot that this file completes was not found: " + models,
                      "put its directory into one of those in BIELLE_ROBOTS, or correct the key");
   }
-  RobotFiles files = readUrdfAndYaml(urdf);
+  return readRobotFiles(model, generate);
+}
+
+RobotFiles readRobotFiles(const std::filesystem::path& path, const Generate& generate) {
+  if (path.extension() != ".yaml") return readUrdfAndYaml(path);
+  const YamlFile own = readYaml(path.string());
+  RobotFiles files = own.generator ? generate(own) : readCompleted(own, generate);
   complete(own, files.yaml);
   return files;
 }
@@ -280,9 +283,9 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
 
 }  // namespace
 
-LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {
+LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options, const Generate& generate) {
   const std::filesystem::path path = findRobotFile(name_or_path);
-  auto [urdf, yaml] = readRobotFiles(path);
+  auto [urdf, yaml] = readRobotFiles(path, generate);
   retypeJoints(yaml, urdf);
   if (yaml.cross_inertia) splitUniversalJoints(*yaml.cross_inertia, urdf);
   setImportance(yaml, urdf);

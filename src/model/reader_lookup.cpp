@@ -58,10 +58,14 @@ std::string findByName(const std::string& name) {
   return "";
 }
 
-// Whether this is a file that completes a robot, and the robot is there.
-bool completesModel(const fs::path& path) {
+bool hasGenerator(const fs::path& path) {
+  return path.extension() == ".yaml" && isFile(path) && readYaml(path.string()).generator;
+}
+
+// Whether this is a file that names a generator, or completes a robot that is there.
+bool isRobotByItself(const fs::path& path) {
   try {
-    return isFile(path) && !findModel(readYaml(path.string())).empty();
+    return hasGenerator(path) || (isFile(path) && !findModel(readYaml(path.string())).empty());
   } catch (const ModelError&) {
     return false;  // reported when the robot is requested
   }
@@ -108,10 +112,11 @@ std::vector<std::string> getRobotDirectories() {
 std::string findModel(const YamlFile& yaml) {
   for (const std::string& model : yaml.models) {
     const fs::path place = fs::path(yaml.path).parent_path() / model;
-    if (isFile(place) && isTree(place)) return place.string();
-    if (isDirectory(place) && isTree(findInDirectory(place))) return findInDirectory(place);
-    const std::string file = findByName(model);
-    if (isTree(file)) return file;
+    std::string beside;
+    if (isFile(place)) beside = place.string();
+    if (isDirectory(place)) beside = findInDirectory(place);
+    for (const std::string& file : {beside, findByName(model)})
+      if (isTree(file) || hasGenerator(file)) return file;
   }
   return "";
 }
@@ -123,7 +128,7 @@ std::vector<std::string> listRobots() {
     for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
       const std::string name = it->path().filename().string();
       if (isFile(it->path() / (name + ".urdf")) || isFile(it->path() / (name + ".xml")) ||
-          completesModel(it->path() / (name + ".yaml")))
+          isRobotByItself(it->path() / (name + ".yaml")))
         names.insert(name);
     }
   }

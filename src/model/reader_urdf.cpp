@@ -327,8 +327,7 @@ std::string warnOfMeshes(const std::vector<std::string>& unread, const std::stri
 
 }  // namespace
 
-UrdfFile readUrdf(const std::string& path, YamlFile& settings) {
-  std::string xml = readRobotText(path);
+UrdfFile parseUrdf(std::string xml, const std::string& path, YamlFile& settings) {
   TiXmlDocument document;
   parseXml(xml, path, document);
   const TiXmlElement& robot = getRobot(document, path);

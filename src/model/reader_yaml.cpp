@@ -252,11 +252,22 @@ BaseKind readBase(const Entry& entry) {
   return base == "free" ? BaseKind::Free : BaseKind::Fixed;
 }
 
+void readGenerator(const Fields& fields, YamlFile& file) {
+  const Entry *generator = find(fields, "generator"), *settings = find(fields, "set");
+  if (settings && !generator) settings->fail("there is no generator", "name it under `generator`, or remove the key");
+  if (!generator) return;
+  if (!file.models.empty()) generator->fail("there is a key 'model' as well", "keep one of them");
+  generator->getText();
+  file.generator = *generator;
+  if (settings) file.settings = *settings;
+}
+
 void readRoot(const Entry& root, YamlFile& file) {
   const Fields fields = root.getFields(
       {"closed_loop", "type",         "closure_name",  "closures",   "name_mot",   "motors",        "motor_catalogue",
        "armature",    "joint_forces", "point_springs", "joint_name", "joint_type", "cross_inertia", "base",
-       "contacts",    "references",   "serial_joints", "importance", "gravity",    "model"});
+       "contacts",    "references",   "serial_joints", "importance", "gravity",    "model",         "generator",
+       "set"});
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
   if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
@@ -272,15 +283,18 @@ void readRoot(const Entry& root, YamlFile& file) {
   if (const Entry* entry = find(fields, "base")) file.base = readBase(*entry);
   if (const Entry* entry = find(fields, "model"))
     file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};
+  readGenerator(fields, file);
 }
 
 }  // namespace
 
-YamlFile readYaml(const std::string& path) {
+YamlFile parseYaml(const std::string& text, const std::string& path) {
   YamlFile file;
   file.path = path;
-  readYamlDocument(path, readRobotText(path), [&](const Entry& root) { readRoot(root, file); });
+  readYamlDocument(path, text, [&](const Entry& root) { readRoot(root, file); });
   return file;
 }
+
+YamlFile readYaml(const std::string& path) { return parseYaml(readRobotText(path), path); }
 
 }  // namespace bielle

@@ -1,6 +1,7 @@
 #pragma once
-/// \file The contents of the two files of a robot before they are combined (private to the reader).
+/// \file The contents of the two files of a robot before they are combined (for the readers).
 #include <array>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "bielle/model/model.h"
 #include "bielle/model/reader.h"
+#include "model/yaml_entry.h"
 
 namespace bielle {
 
@@ -79,6 +81,7 @@ struct ContactSpec {
 struct YamlFile {
   std::string path;
   std::vector<std::string> models;  ///< of the robot that this file completes, in the order in which they are tried
+  std::optional<YamlEntry> generator, settings;  ///< of the robot that this file is, or completes; names and values as given
   std::optional<BaseKind> base;
   std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file
   std::optional<double> cross_inertia;                             ///< of universal joints, kg m^2
@@ -96,11 +99,13 @@ struct YamlFile {
   std::vector<std::string> warnings;
 };
 
-/// \param settings  gets what elements of Drake in the file say
+/// \param path  named in errors, and the place of meshes
+/// \param settings  gets what elements of Drake say
 /// \throws ModelError for anything but one tree of named links with finite numbers
-UrdfFile readUrdf(const std::string& path, YamlFile& settings);
+UrdfFile parseUrdf(std::string xml, const std::string& path, YamlFile& settings);
 
 /// \throws ModelError for unknown keys, wrong types, lists that do not match
+YamlFile parseYaml(const std::string& text, const std::string& path);
 YamlFile readYaml(const std::string& path);
 
 /// A file of MuJoCo as the contents of both files.
@@ -115,7 +120,19 @@ MjcfFile readMjcf(const std::string& path);
 /// The whole content of a file. \throws ModelError when it cannot be read, or is too large
 std::string readRobotText(const std::string& path);
 
-/// The URDF or MJCF of the robot that a file with the key `model` completes; empty if none of them exists.
+/// The URDF, the MJCF or the YAML file with a generator of the robot that a file with the key `model` completes; empty if none of
+/// them exists.
 std::string findModel(const YamlFile& yaml);
+
+/// A URDF with its YAML file, or what stands for them, and possibly a file that completes them.
+struct RobotFiles {
+  UrdfFile urdf;
+  YamlFile yaml;
+};
+
+/// A robot as loadRobot (io/robot_loader.h) describes.
+/// \param generate  the files of the robot that a YAML file with the key `generator` describes
+LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options,
+                      const std::function<RobotFiles(const YamlFile&)>& generate);
 
 }  // namespace bielle

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "bielle/io/robot_loader.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
 #include "design/draft.h"

@@ -9,8 +9,8 @@
 #include <set>
 
 #include "bielle/io/result.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "io/line_log.h"
 #include "model/text_file.h"
 #include "study/campaign_command.h"

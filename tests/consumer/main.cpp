@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <string>
 
+#include "bielle/io/robot_loader.h"
+
 int main(int argc, char** argv) {
   setenv("BIELLE_ROBOTS", ROBOTS, 1);
   const bielle::LoadedRobot robot = bielle::loadRobot("bipetto");

@@ -1,4 +1,5 @@
 // A URDF for Drake: a model that is one again after it is written for Drake, or one clear error.
+#include "bielle/io/robot_loader.h"
 #include "io/drake.h"
 #include "robot_trial.h"
 #include "scratch.h"

@@ -54,7 +54,9 @@
 /// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
 /// - `model: NAME or path relative to this file`, or a list of them: this file, with no URDF beside it, completes the
 ///   first of these published robots that exists; names are looked up in the directories of robots. Its keys take
-///   precedence over those of that robot's YAML file. It may be one in MuJoCo's format.
+///   precedence over those of that robot's YAML file. It may be one in MuJoCo's format, or a generated one.
+/// - `generator: NAME, set: {parameter: number or name of a choice, ...}`: this file, with no URDF beside it, is the robot that
+///   `bielle generate NAME` writes with these parameters, the others at their defaults. Further keys complete it likewise.
 ///
 /// ## MuJoCo files (MJCF, .xml), of version 2.2.2 and later
 /// The reader supports bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with
@@ -89,16 +91,10 @@ struct LoadedRobot {
   Model model;
   std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
   std::string directory;              ///< where the files were found
-  std::string file;  ///< absolute path of the .urdf or .xml, or of the .yaml that completes one elsewhere
+  std::string file;  ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
 };
 
-/// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf, bipetto.yaml or .xml in the directories of
-/// getRobotDirectories()), by directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf,
-/// else the .yaml or .xml named as the directory), by .urdf file, by .xml file of MuJoCo or by .yaml file with the key `model`.
-/// \throws ModelError naming the file, the element and the remedy, and no other exception, whatever the files contain
-LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options = {});
-
-/// The file of a robot by name or path, as loadRobot finds it. \throws ModelError listing the places searched
+/// The file of a robot by name or path, as loadRobot (io/robot_loader.h) finds it. \throws ModelError listing the places searched
 std::string findRobotFile(const std::string& name_or_path);
 
 /// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),

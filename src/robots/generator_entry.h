@@ -1,0 +1,18 @@
+#pragma once
+/// \file The generated robot that a YAML file names, with the parameters that it sets.
+#include "bielle/robots/generators.h"
+#include "model/yaml_entry.h"
+
+namespace bielle {
+
+struct GeneratorEntry {
+  const Generator* generator = nullptr;
+  OptionSet parameters;
+};
+
+/// \param name      of the generator
+/// \param settings  a map from parameters to numbers, or to names of choices; null for none
+/// \throws ModelError naming file, line, parameter and remedy
+GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settings);
+
+}  // namespace bielle
