@@ -94,7 +94,7 @@ TEST_CASE("the transmission of an optimal control problem is the inverse of the 
     const Robot robot(std::string(joint) == "knee_right" ? "bipetto" : "rsu_biped", {joint});
     const std::vector<Transmission> all = listTransmissions(robot.model, robot.q);
     const auto own = std::find_if(all.begin(), all.end(), [&](const Transmission& linkage) {
-      return linkage.joints.find(joint) != std::string::npos;
+      return linkage.output.find(joint) != std::string::npos;
     });
     REQUIRE(own != all.end());
     const auto residual = makeTransmission(*own);

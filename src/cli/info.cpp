@@ -47,6 +47,8 @@ void printInfo(const Json& robot) {
                             shapes["fitted"].dump() + " fitted to visuals";
   printSection(robot, "distances", title.c_str(), {"between", "distance", "body1", "body2", "posture"});
   printSection(robot, "references", "references", {"name", "closed", "message"});
+  printSection(robot, "dead_points", "distances of linkages from their nearest dead points (rad, m where prismatic)",
+               {"reference", "linkage", "distance", "of"});
   printSection(robot, "reference_joints", "joints of references, as given and as assembled (rad, m)",
                {"reference", "joint", "given", "assembled"});
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
@@ -56,50 +57,13 @@ StepError findStepError(const Model& model, const MotionRecord& record) {
 // Whether a linkage is near the margin that keeps it from its dead points, within two nodes of a stage.
 bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Index stage, double margin) {
   constexpr double kNear = 1.5;  // over the margin
-  const ConstraintSet closures = makeConstraintSet(model);
-  const VectorXd none;
-  VectorXd value(1);
-  Workspace ws(model);
   const Eigen::Index first = std::max<Eigen::Index>(0, stage - 2), last = std::min(record.q.rows(), stage + 4);
-  for (const Transmission& transmission : listTransmissions(model, record.q.row(0).transpose())) {
-    const std::unique_ptr<Residual> residual = makeTransmission(transmission);
+  for (const Transmission& transmission : listTransmissions(model, record.q.row(0).transpose()))
     for (Eigen::Index k = first; k < last; ++k) {
-      updatePositions(model, ws, record.q.row(k).transpose());
-      residual->calc({model, ws, closures, none, none}, value);
-      if (std::min(value[0], 1 / value[0]) < kNear * margin) return true;
+      const double value = calcTransmission(transmission, model, record.q.row(k).transpose());
+      if (std::min(value, 1 / value) < kNear * margin) return true;
     }
-  }
   return false;
-}
-
-// Of each linkage, by the slope of its transmission: the motion of the motors that takes it to zero or, as much, to infinity, and
-// what the serial joints do meanwhile.
-VectorXd calcDistances(const Model& model, const std::vector<Transmission>& transmissions, ConstVectorRef q) {
-  constexpr double kRankTolerance = 1e-9;
-  const ConstraintSet closures = makeConstraintSet(model);
-  Workspace ws(model);
-  updatePositions(model, ws, q);
-  MatrixXd A = MatrixXd::Zero(closures.rows + model.nu(), model.nv());
-  for (size_t c = 0; c < closures.closures.size(); ++c)
-    calcClosureJacobian(ws, closures.closures[c],
-                        A.middleRows(closures.offsets[c], getRows(closures.closures[c].kind)));
-  for (int m = 0; m < model.nu(); ++m) A(closures.rows + m, model.motors()[m].dof) = 1;
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
-  factors.setThreshold(kRankTolerance);
-  factors.compute(A);
-  VectorXd distances = VectorXd::Constant(transmissions.size(), HUGE_VAL), gradient(model.nu()),
-           way = VectorXd::Zero(A.rows());
-  for (size_t t = 0; t < transmissions.size(); ++t) {
-    const double value = calcTransmission(transmissions[t], model, q, gradient);
-    if (!(gradient.squaredNorm() > 0)) continue;
-    way.tail(model.nu()) = gradient * (value / gradient.squaredNorm());
-    const VectorXd v = factors.solve(way);
-    double largest = way.cwiseAbs().maxCoeff();
-    for (int i : model.serialJoints())
-      largest = std::max(largest, v.segment(model.joints()[i].idx_v, model.joints()[i].nv).cwiseAbs().maxCoeff());
-    distances[static_cast<Eigen::Index>(t)] = largest;
-  }
-  return distances;
 }
 
 }  // namespace
@@ -138,24 +102,21 @@ std::optional<Motion> avoidDeadPoints(const MotionRequest& request, const Model&
   return makeRequested(request, model, problem);
 }
 
-std::vector<DeadPoint> findDeadPoints(const Model& model, const MotionRecord& record, Eigen::Index first,
-                                      Eigen::Index last) {
-  const std::vector<Transmission> transmissions = listTransmissions(model, record.q.row(0).transpose());
-  std::vector<DeadPoint> nearest;
-  for (Eigen::Index k = first; k <= last; ++k) {
-    const VectorXd distances = calcDistances(model, transmissions, record.q.row(k).transpose());
-    for (size_t t = 0; t < transmissions.size(); ++t) {
-      const DeadPoint here = {transmissions[t].joints, distances[static_cast<Eigen::Index>(t)], record.time[k]};
-      if (k == first)
-        nearest.push_back(here);
-      else if (here.distance < nearest[t].distance)
-        nearest[t] = here;
+std::vector<LinkageDistance> findDeadPoints(const Model& model, const MotionRecord& record, Eigen::Index first,
+                                            Eigen::Index last) {
+  std::vector<LinkageDistance> nearest;
+  for (const Transmission& transmission : listTransmissions(model, record.q.row(0).transpose())) {
+    LinkageDistance least{transmission.output, std::numeric_limits<double>::infinity(), record.time[first]};
+    for (Eigen::Index k = first; k <= last; ++k) {
+      const double distance = findDeadPoint(transmission, model, record.q.row(k).transpose()).distance;
+      if (distance < least.distance) least = {transmission.output, distance, record.time[k]};
     }
+    nearest.push_back(least);
   }
   return nearest;
 }
 
-std::vector<DeadPoint> findDeadPoints(const Model& model, ConstVectorRef q) {
+std::vector<LinkageDistance> findDeadPoints(const Model& model, ConstVectorRef q) {
   MotionRecord record;
   record.q = q.transpose();
   record.time = VectorXd::Zero(1);

@@ -16,9 +16,9 @@ std::string format(const FddpSummary& summary) {
 
 bool areKeptFromDeadPoints(const LimitOptions& limits) { return limits.enforced && limits.dead_point_margin > 0; }
 
-std::string formatDistance(const DeadPoint& of) {
-  constexpr double kFar = 1;  // where slopes say nothing
-  return of.distance < kFar ? formatNumber(of.distance, "%.2g") : "over 1";
+std::string formatDistance(const LinkageDistance& of) {
+  const bool far = of.distance > kFarthestDeadPoint;
+  return far ? "over " + formatNumber(kFarthestDeadPoint, "%.2g") : formatNumber(of.distance, "%.2g");
 }
 
 // The second solve, with the iterations and the time of both.
@@ -73,13 +73,13 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
 void RequestSolver::tellDeadPoints() const {
   if (!areKeptFromDeadPoints(options_.problem.limits)) return;
   std::string list, near;
-  for (const DeadPoint& start : findDeadPoints(model_, motion_.problem->initialState().head(model_.nq()))) {
-    list += (list.empty() ? "" : "; ") + start.joints + " " + formatDistance(start);
+  for (const LinkageDistance& start : findDeadPoints(model_, motion_.problem->initialState().head(model_.nq()))) {
+    list += (list.empty() ? "" : "; ") + start.output + " " + formatDistance(start);
     if (start.distance < kNearDeadPoint)
-      near += (near.empty() ? "" : "; ") + start.joints + " " + formatDistance(start);
+      near += (near.empty() ? "" : "; ") + start.output + " " + formatDistance(start);
   }
   if (!list.empty())
-    tell("distance from dead points at the start (rad or m, extrapolated from the transmission): " + list);
+    tell("distance from dead points at the start (rad or m): " + list);
   const double margin = options_.problem.limits.dead_point_margin;
   if (!near.empty() && observer_.warn)
     observer_.warn("warning: this motion starts near a dead point, where motor and joint hardly move each other (" +
@@ -90,12 +90,12 @@ void RequestSolver::tellDeadPoints() const {
 // What a failure may come from: linkages that are near a dead point where the motion is nearest to one; empty for none.
 std::string RequestSolver::describeDeadPoints(const MotionRecord& record) const {
   if (!areKeptFromDeadPoints(options_.problem.limits) || !record.q.allFinite()) return "";
-  const std::vector<DeadPoint> start = findDeadPoints(model_, record, 0, 0),
+  const std::vector<LinkageDistance> start = findDeadPoints(model_, record, 0, 0),
                                nearest = findDeadPoints(model_, record, 0, record.q.rows() - 1);
   std::string near;
   for (size_t i = 0; i < start.size(); ++i)
     if (nearest[i].distance < kNearDeadPoint)
-      near += (near.empty() ? "" : ", ") + nearest[i].joints + " " + formatDistance(nearest[i]) + " at " +
+      near += (near.empty() ? "" : ", ") + nearest[i].output + " " + formatDistance(nearest[i]) + " at " +
               formatNumber(nearest[i].time, "%.3g") + " s, " + formatDistance(start[i]) + " at the start";
   return near.empty()
              ? ""

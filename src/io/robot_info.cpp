@@ -8,6 +8,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/transmission.h"
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
 #include "bielle/ocp/ground_distance.h"
@@ -234,6 +235,30 @@ std::vector<std::string> checkReferences(const LoadedRobot& robot) {
   return warnings;
 }
 
+namespace {
+
+// Of every linkage; a posture at a dead point has none to measure from.
+void addDeadPoints(const Model& model, const Posture& posture, Json& out) {
+  std::vector<Transmission> transmissions;
+  try {
+    transmissions = listTransmissions(model, posture.q);
+  } catch (const ModelError& error) {
+    out.push_back({{"reference", posture.name}, {"linkage", error.element()}, {"distance", 0}, {"of", error.problem()}});
+  }
+  for (const Transmission& transmission : transmissions) {
+    const DeadPoint nearest = findDeadPoint(transmission, model, posture.q);
+    const bool found = nearest.kind != DeadPoint::Kind::None;
+    out.push_back({{"reference", posture.name},
+                   {"linkage", transmission.output},
+                   {"distance", orNull(nearest.distance)},
+                   {"of", !found                                      ? "none within " + formatNumber(kFarthestDeadPoint)
+                          : nearest.kind == DeadPoint::Kind::Output ? "output"
+                                                                    : "motors"}});
+  }
+}
+
+}  // namespace
+
 std::string makeRobotInfo(const LoadedRobot& robot) {
   const Model& model = robot.model;
   const std::vector<Posture> postures = makePostures(model);
@@ -259,6 +284,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"contacts", Json::array()},
                {"references", Json::array()},
                {"reference_joints", Json::array()},
+               {"dead_points", Json::array()},
                {"warnings", robot.warnings}};
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
@@ -290,6 +316,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
   for (size_t i = 1; i < postures.size(); ++i) {
     json["references"].push_back(
         {{"name", postures[i].name}, {"closed", postures[i].closed}, {"message", postures[i].message}});
+    if (postures[i].closed) addDeadPoints(model, postures[i], json["dead_points"]);
     for (const ReferenceJoint& joint : listReferenceJoints(model, model.references()[i - 1], postures[i].q))
       json["reference_joints"].push_back({{"reference", postures[i].name},
                                           {"joint", model.joints()[joint.joint].name},

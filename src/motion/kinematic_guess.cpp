@@ -18,9 +18,7 @@ SE3 getBase(const VectorXd& q) {
 class FeetPlacer {
  public:
   FeetPlacer(const Model& model, const Stance& stance)
-      : model_(model), stance_(stance), ws_(model), closures_(makeConstraintSet(model)) {
-    for (const Transmission& transmission : listTransmissions(model, stance.q))
-      transmissions_.push_back(makeTransmission(transmission));
+      : model_(model), stance_(stance), transmissions_(listTransmissions(model, stance.q)) {
     height_ = stance.com.z() - 0.5 * (stance.feet[0].p.z() + stance.feet[1].p.z());
     options_.step = AssemblyStep::Shortest;
     options_.max_iterations = 15;
@@ -134,13 +132,10 @@ class FeetPlacer {
   }
 
   double calcTransmission(const VectorXd& q) {
-    updatePositions(model_, ws_, q);
-    const VectorXd none;
-    VectorXd value(1);
     double least = std::numeric_limits<double>::infinity();
-    for (const std::unique_ptr<Residual>& transmission : transmissions_) {
-      transmission->calc({model_, ws_, closures_, none, none}, value);
-      least = std::min({least, value[0], 1 / value[0]});
+    for (const Transmission& transmission : transmissions_) {
+      const double value = bielle::calcTransmission(transmission, model_, q);
+      least = std::min({least, value, 1 / value});
     }
     return least;
   }
@@ -156,9 +151,7 @@ class FeetPlacer {
 
   const Model& model_;
   const Stance& stance_;
-  Workspace ws_;
-  ConstraintSet closures_;
-  std::vector<std::unique_ptr<Residual>> transmissions_;
+  std::vector<Transmission> transmissions_;
   double height_ = 0;  // of the centre of mass over the feet
   AssemblyOptions options_;
 };

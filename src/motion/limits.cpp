@@ -119,7 +119,7 @@ bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& 
     for (const Bound& bound : ranges) addConstraint(bound, makeJointPosition(model, {bound.index}), stage);
     for (const Bound& bound : velocities) addConstraint(bound, makeJointVelocity({bound.index}), stage);
     for (const Transmission& t : transmissions)
-      addConstraint({"dead points of " + t.joints, 0, margin, 1 / margin, 1}, makeTransmission(t), stage);
+      addConstraint({"dead points of " + t.output, 0, margin, 1 / margin, 1}, makeTransmission(t), stage);
     for (size_t i = 0; step && i < powers.size(); ++i)
       addConstraint(powers[i], makeMotorPower(model, {powers[i].index}), stage);
   }

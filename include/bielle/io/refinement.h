@@ -39,19 +39,18 @@ std::optional<Motion> avoidDeadPoints(const MotionRequest& request, const Model&
                                       const MotionRecord& record);
 inline constexpr double kWideDeadPointMargin = 0.4;
 
-/// How far a linkage is from a dead point of its joints or of its motors.
-struct DeadPoint {
-  std::string joints;   ///< names of the serial joints that the linkage moves
-  double distance = 0;  ///< largest way of a motor or a joint to there, rad (m where prismatic)
+/// How far a linkage is from its nearest dead point (transmission.h).
+struct LinkageDistance {
+  std::string output;   ///< names of what the linkage moves
+  double distance = 0;  ///< rad (m where prismatic); infinite beyond kFarthestDeadPoint
   double time = 0;      ///< s
 };
 
-/// Of every linkage of listTransmissions(), where it comes nearest in the rows first .. last of a motion. Distances follow from the
-/// slope of the transmission, so they are the more exact the shorter they are: to an eighth at 0.2 rad in a four-bar.
-std::vector<DeadPoint> findDeadPoints(const Model& model, const MotionRecord& record, Eigen::Index first,
-                                      Eigen::Index last);
+/// Of every linkage of listTransmissions(), where it comes nearest to a dead point in the rows first .. last of a motion.
+std::vector<LinkageDistance> findDeadPoints(const Model& model, const MotionRecord& record, Eigen::Index first,
+                                            Eigen::Index last);
 /// The same of a single configuration (nq).
-std::vector<DeadPoint> findDeadPoints(const Model& model, ConstVectorRef q);
+std::vector<LinkageDistance> findDeadPoints(const Model& model, ConstVectorRef q);
 /// Nearer than this motors turn far for little motion of the joint, or the other way round, rad.
 inline constexpr double kNearDeadPoint = 0.1;
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/transmission.h"
 #include "bielle/ocp/contact_schedule.h"
 
 namespace bielle {
@@ -27,6 +28,8 @@ struct NodeView {
   /// nu, speeds of the motors at the instant to which the torques belong (robot_problem.h); null where no residual of the
   /// node needs them.
   const VectorXd* speeds = nullptr;
+  /// Of the closed configuration of the node, where they are known; else null.
+  const LoopBases* loops = nullptr;
 };
 
 /// Row block of the stacked residual Jacobians of a node. Entries never written stay zero.
@@ -109,20 +112,7 @@ std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constrain
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
 /// Velocity coordinates (n), rad/s or m/s.
 std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);
-/// A loop cluster with as many motors and serial joints as it has mobility (up to 6), and the transmission between them: with
-/// v_J = Q v_M the speeds of the joints by those of the motors, det Q / det Q_0, Q_0 being that of a reference. It is 1 there,
-/// and 0 at a dead point of the joints, which motors cannot move; at a dead point of the motors, which cannot hold the
-/// joints, it is infinite.
-struct Transmission {
-  std::string joints;                                 ///< names of the serial joints
-  std::shared_ptr<const class TransmissionMap> data;  ///< shared by all residuals of it
-};
-/// The transmissions of all such clusters. \param q_reference  nq, closed
-/// \throws ModelError when the reference is open or a dead point
-std::vector<Transmission> listTransmissions(const Model& model, ConstVectorRef q_reference);
-/// det Q / det Q_0 at a closed configuration (nq). \param gradient  nu: by the motors, which the other joints follow
-double calcTransmission(const Transmission& transmission, const Model& model, ConstVectorRef q, VectorRef gradient);
-/// det Q / det Q_0 (1).
+/// The transmission of a linkage, over that at its reference (1): 0 or infinite at its dead points (transmission.h).
 std::unique_ptr<Residual> makeTransmission(const Transmission& transmission);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);

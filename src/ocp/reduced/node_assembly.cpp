@@ -380,7 +380,8 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
     if (costs.needsSpeeds()) jacobians_.speeds.middleRows<kLane>(i).setZero();
   }
   jacobians_.s.head(rows).setZero();
-  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda, at.time_scale, &at.speeds}, counted_,
+  const NodeBases bases(reduction_, at);
+  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases}, counted_,
                       jacobians_);
   PaddedMap Rt = shapePadded(Rt_, columns, rows), scaled = shapePadded(Rt_scaled_, columns, rows);
   updateResidualDerivatives(costs, contacts, at, view, Rt);

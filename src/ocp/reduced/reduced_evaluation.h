@@ -1,7 +1,7 @@
 #pragma once
 // A node of the reduced formulation as a value, and the layout of a problem's nodes, known before evaluation.
 #include "bielle/dynamics/impact.h"
-#include "dynamics/reduction.h"
+#include "dynamics/loop_bases.h"
 #include "dynamics/saddle_point.h"
 #include "ocp/transcription.h"
 
@@ -38,6 +38,18 @@ struct ReducedEvaluation : RobotEvaluation {
   SaddlePointFactors factors;                 // of reduced_kernel.h, Eq. (b)
   std::unique_ptr<ImpactWorkspace> impact;    // only of an impact
   std::unique_ptr<ReducedMidpoint> midpoint;  // only of a midpoint step
+};
+
+// The bases at its state.
+class NodeBases : public LoopBases {
+ public:
+  NodeBases(const Reduction& reduction, const ReducedEvaluation& at) : reduction_(reduction), at_(at) {}
+  const ReducedCluster& getCluster(int index) const override { return reduction_.clusters[index]; }
+  const ClusterBasis& getBasis(int index) const override { return at_.clusters[index].at; }
+
+ private:
+  const Reduction& reduction_;
+  const ReducedEvaluation& at_;
 };
 
 // Contacts of one node. A slot holds one contact, always on the same body; two contacts of a body take two slots.
