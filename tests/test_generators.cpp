@@ -255,10 +255,8 @@ TEST_CASE("files that name a generator: parameters by number and choice, a fixed
   const RobotDirectory files;
   files.write("mine/mine.yaml", "generator: leg_biped\nset:\n  knee: belt\n  thigh_length: 0.25\n");
   LegBipedParameters p;
-  for (const Parameter& parameter : listParameters(p)) {
-    if (parameter.name == "knee") *parameter.value = findChoice(parameter, "belt");
-    if (parameter.name == "thigh_length") *parameter.value = 0.25;
-  }
+  p.knee = KneePart::Belt;
+  p.thigh_length = 0.25;
   const LoadedRobot mine = loadRobot(files.path() + "/mine");
   CHECK(mine.warnings.empty());
   checkSame(makeLegBiped(p), mine.model);

@@ -263,7 +263,7 @@ TEST_CASE("names that are not in UTF-8 are refused where they are, in every form
     CHECK(error.find("UTF-8") != std::string::npos);
   };
   // A letter of Latin-1, an overlong form, half a surrogate pair, a lead byte without its successors.
-  for (const std::string& bad : {"\xe9", "\xc0\xaf", "\xed\xa0\x80", "\xf5\x80\x80\x80", "\xe2\x82"}) {
+  for (const std::string bad : {"\xe9", "\xc0\xaf", "\xed\xa0\x80", "\xf5\x80\x80\x80", "\xe2\x82"}) {
     check(getErrorOfLoading(directory.writeRobot(replaceOnce(urdf, "\"wrist\"", "\"wr" + bad + "st\""), yaml)),
           directory.path() + "/robot.urdf: line 30: ");
     check(getErrorOfLoading(directory.writeRobot(urdf, yaml + "# " + bad + "\n")),
