@@ -290,12 +290,13 @@ TEST_CASE("files that name a generator: errors give the file, the line, the para
   refuse("generator: no_such\n", "key 'generator' (line 1)", "no such generator; choose one of: cleobot");
   refuse("generator: [leg_biped]\n", "key 'generator' (line 1)", "not a name");
   refuse("generator: leg_biped\nset:\n  nee: belt\n", "key 'set': key 'nee' (line 3)",
-         "no such parameter; choose one of");
-  refuse("generator: leg_biped\nset: {knee: chain}\n", "key 'knee' (line 2)", "choose one of: ");
+         "no such parameter; the nearest is 'knee'");
+  refuse("generator: leg_biped\nset: {knee: chain}\n", "key 'knee' (line 2)",
+         "not one of its choices; give one of serial, belt, four_bar");
   refuse("generator: leg_biped\nset: {thigh_length: long}\n", "key 'thigh_length' (line 2)", "not a number");
   refuse("generator: leg_biped\nset: {thigh_length: 50}\n", "key 'thigh_length' (line 2)",
-         "give a value within its bounds");
-  refuse("generator: leg_biped\nset: {thigh_length: .nan}\n", "key 'thigh_length' (line 2)", "not finite");
+         "50 m is outside 0.05 .. 1");
+  refuse("generator: leg_biped\nset: {thigh_length: .nan}\n", "key 'thigh_length' (line 2)", "not a number");
   refuse("generator: leg_biped\nset: [knee]\n", "key 'set' (line 2)", "not a map");
   refuse("generator: rsu_biped\nset: {hip_height: 0.8}\n", "key 'generator' (line 1)", "do not reach the ground");
   refuse("set: {knee: belt}\n", "key 'set' (line 1)", "there is no generator");

@@ -305,7 +305,7 @@ TEST_CASE("bielle generate writes a robot that every command takes, and refuses 
   };
   refuse("cleobot", "uper_length=0.2", "choose one of: hip_height");
   refuse("cleobot", "upper_length=-1", "outside 0.05 .. 1");
-  refuse("cleobot", "upper_length=long", "not of the form name=number");
+  refuse("cleobot", "upper_length=long", "'long' is not a number");
   refuse("cleobot", "shank_length=0.15", "do not meet");
   refuse("delta", "forearm_length=0.1", "do not reach the platform");
   refuse("fivebar_leg", "lower_length=0.05", "do not meet");

@@ -335,3 +335,47 @@ TEST_CASE("joints without a linkage of their own: direct, or refused") {
   refuse("fivebar", {"elbow_left"}, "name 2 joints of this linkage");
   refuse("bipetto", {}, "none are named");
 }
+
+TEST_CASE("the nearest dead point is that of the sweep, by the way of joint or motor; far away there is none") {
+  for (const char* name : {"fourbar", "bipetto"}) {
+    const Robot robot(name, {std::string(name) == "fourbar" ? "rocker_joint" : "knee_right"});
+    const std::vector<Transmission> all = listTransmissions(robot.model, robot.q);
+    const auto own = std::find_if(all.begin(), all.end(), [&](const Transmission& linkage) {
+      return linkage.output == robot.linkage.joint_names.front();
+    });
+    REQUIRE(own != all.end());
+    const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+    int near = 0, far = 0;
+    for (size_t i = 0; i < sweep.samples.size(); i += 5) {
+      const RatioSample& sample = sweep.samples[i];
+      if (sample.loses_rank || sample.dead != DeadPointKind::None) continue;
+      // To the dead points next to the sample on either side: along the sweep all coordinates move at once.
+      double least = std::numeric_limits<double>::infinity();
+      const auto look = [&](int step) {
+        double joint = 0, motor = 0;  // largest ways
+        for (int k = static_cast<int>(i); k >= 0 && k < static_cast<int>(sweep.samples.size()); k += step) {
+          const RatioSample& at = sweep.samples[static_cast<size_t>(k)];
+          joint = std::abs(at.joints[0] - sample.joints[0]);
+          motor = std::abs(at.motors[0] - sample.motors[0]);
+          if (at.dead == DeadPointKind::None) continue;
+          least = std::min(least, std::max(joint, motor));
+          return;
+        }
+      };
+      look(1);
+      look(-1);
+      CAPTURE(name, sample.joints[0], least);
+      const DeadPoint found = findDeadPoint(*own, robot.model, robot.getWhole(sample));
+      if (least < 0.99 * kFarthestDeadPoint) {
+        CHECK(found.distance == Approx(least).epsilon(1e-6));
+        CHECK(found.kind == DeadPoint::Kind::Output);
+        ++near;
+      } else if (least > 1.01 * kFarthestDeadPoint && std::isfinite(least)) {
+        CHECK(found.kind == DeadPoint::Kind::None);
+        ++far;
+      }
+    }
+    CHECK(near > 10);
+    CHECK(far > 0);
+  }
+}

@@ -175,7 +175,9 @@ class TransmissionMap {
   };
 
   int countMotors() const { return static_cast<int>(motors_.size()); }
-  const ReducedCluster& getCluster(const LoopBases* bases) const { return bases ? bases->getCluster(index_) : cluster_; }
+  const ReducedCluster& getCluster(const LoopBases* bases) const {
+    return bases ? bases->getCluster(index_) : cluster_;
+  }
   const ClusterBasis* getBasis(const LoopBases* bases) const { return bases ? &bases->getBasis(index_) : nullptr; }
 
   template <typename Out>
@@ -289,7 +291,7 @@ class TransmissionMap {
     for (int j = 0; j < m; ++j) {
       updateDrift(s, s.T.col(j));
       for (int i = 0; i < cluster.rank; ++i)
-        s.derivative.noalias() -= rho * s.y(i, j) * s.drift.row(static_cast<Eigen::Index>(s.basis->rows[i])).transpose();
+        s.derivative.noalias() -= rho * s.y(i, j) * s.drift.row(s.basis->rows[i]).transpose();
       if (joints_.empty()) s.derivative.noalias() += rho * (s.turn.transpose() * s.Q_inverse.row(j).transpose());
     }
   }
@@ -355,7 +357,10 @@ class TransmissionMap {
     for (int step = 0; step < kMostSteps; ++step) {
       const double volume = calcVolume(here, kind, gradient);
       const MatrixXd& N = here.point.basis().N;
-      if (volume < kDead) return calcWay(start, here.point.basis().q);
+      if (volume < kDead) {
+        const double distance = calcWay(start, here.point.basis().q);
+        return distance <= kFarthestDeadPoint ? distance : kNone;
+      }
       const double slope = gradient.norm();
       if (countMotors() > 1 || near) {
         if (!(slope > 1e-6 * volume)) return kNone;
