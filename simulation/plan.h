@@ -65,9 +65,9 @@ std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control
 
 /// A motion by its name (`bielle solve`), solved when it is carried out.
 struct PlanRequest {
-  std::string motion, robot;                             ///< the latter a name or a directory
-  OptionValues settings;  ///< options by name
-  double duration = 0;  ///< s; motions of steps take as many as there is time for; 0: their default
+  std::string motion, robot;  ///< the latter a name or a directory
+  OptionValues settings;      ///< options by name
+  double duration = 0;        ///< s; motions of steps take as many as there is time for; 0: their default
   Belief belief = Belief::Closed;
 };
 /// \throws ModelError when robot, motion or an option do not exist, or it does not converge

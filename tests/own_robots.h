@@ -4,7 +4,6 @@
 
 #include "bielle/io/robot_loader.h"
 
-
 namespace bielle::testing {
 
 inline LoadedRobot loadOwn(const std::string& name) { return loadRobot(BIELLE_SOURCE_DIR "/robots/" + name); }

@@ -12,10 +12,10 @@ namespace bielle::python {
 
 /// A motion by name, with its options: the input of `bielle solve`.
 struct Request {
-  std::string motion;                     // of the registry; of a sequence empty
-  std::vector<std::string> sequence;      // names of its motions
+  std::string motion;                          // of the registry; of a sequence empty
+  std::vector<std::string> sequence;           // names of its motions
   std::map<std::string, OptionValue> options;  // by name
-  std::string weights;                    // name of a preset, or empty
+  std::string weights;                         // name of a preset, or empty
   std::map<std::string, std::string> files;
 
   /// \throws ModelError when motion, option, preset or file do not exist

@@ -78,8 +78,7 @@ void RequestSolver::tellDeadPoints() const {
     if (start.distance < kNearDeadPoint)
       near += (near.empty() ? "" : "; ") + start.output + " " + formatDistance(start);
   }
-  if (!list.empty())
-    tell("distance from dead points at the start (rad or m): " + list);
+  if (!list.empty()) tell("distance from dead points at the start (rad or m): " + list);
   const double margin = options_.problem.limits.dead_point_margin;
   if (!near.empty() && observer_.warn)
     observer_.warn("warning: this motion starts near a dead point, where motor and joint hardly move each other (" +
@@ -91,7 +90,7 @@ void RequestSolver::tellDeadPoints() const {
 std::string RequestSolver::describeDeadPoints(const MotionRecord& record) const {
   if (!areKeptFromDeadPoints(options_.problem.limits) || !record.q.allFinite()) return "";
   const std::vector<LinkageDistance> start = findDeadPoints(model_, record, 0, 0),
-                               nearest = findDeadPoints(model_, record, 0, record.q.rows() - 1);
+                                     nearest = findDeadPoints(model_, record, 0, record.q.rows() - 1);
   std::string near;
   for (size_t i = 0; i < start.size(); ++i)
     if (nearest[i].distance < kNearDeadPoint)

@@ -125,6 +125,36 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
           {"mobility", mobility.mobility}};
 }
 
+std::string describe(DeadPoint::Kind kind) {
+  switch (kind) {
+    case DeadPoint::Kind::Output:
+      return "output";
+    case DeadPoint::Kind::Motors:
+      return "motors";
+    case DeadPoint::Kind::None:
+      break;
+  }
+  return "none within " + formatNumber(kFarthestDeadPoint);
+}
+
+// Of every linkage; a posture at a dead point has none to measure from.
+void addDeadPoints(const Model& model, const Posture& posture, Json& out) {
+  std::vector<Transmission> transmissions;
+  try {
+    transmissions = listTransmissions(model, posture.q);
+  } catch (const ModelError& error) {
+    out.push_back(
+        {{"reference", posture.name}, {"linkage", error.element()}, {"distance", 0}, {"of", error.problem()}});
+  }
+  for (const Transmission& transmission : transmissions) {
+    const DeadPoint nearest = findDeadPoint(transmission, model, posture.q);
+    out.push_back({{"reference", posture.name},
+                   {"linkage", transmission.output},
+                   {"distance", orNull(nearest.distance)},
+                   {"of", describe(nearest.kind)}});
+  }
+}
+
 // Least distances of shapes between two legs, within legs and trunk, and to the ground under the feet, which are left out.
 Json describeDistances(const Model& model, const Posture& posture) {
   Workspace ws(model);
@@ -234,30 +264,6 @@ std::vector<std::string> checkReferences(const LoadedRobot& robot) {
   }
   return warnings;
 }
-
-namespace {
-
-// Of every linkage; a posture at a dead point has none to measure from.
-void addDeadPoints(const Model& model, const Posture& posture, Json& out) {
-  std::vector<Transmission> transmissions;
-  try {
-    transmissions = listTransmissions(model, posture.q);
-  } catch (const ModelError& error) {
-    out.push_back({{"reference", posture.name}, {"linkage", error.element()}, {"distance", 0}, {"of", error.problem()}});
-  }
-  for (const Transmission& transmission : transmissions) {
-    const DeadPoint nearest = findDeadPoint(transmission, model, posture.q);
-    const bool found = nearest.kind != DeadPoint::Kind::None;
-    out.push_back({{"reference", posture.name},
-                   {"linkage", transmission.output},
-                   {"distance", orNull(nearest.distance)},
-                   {"of", !found                                      ? "none within " + formatNumber(kFarthestDeadPoint)
-                          : nearest.kind == DeadPoint::Kind::Output ? "output"
-                                                                    : "motors"}});
-  }
-}
-
-}  // namespace
 
 std::string makeRobotInfo(const LoadedRobot& robot) {
   const Model& model = robot.model;

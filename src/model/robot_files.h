@@ -81,7 +81,8 @@ struct ContactSpec {
 struct YamlFile {
   std::string path;
   std::vector<std::string> models;  ///< of the robot that this file completes, in the order in which they are tried
-  std::optional<YamlEntry> generator, settings;  ///< of the robot that this file is, or completes; names and values as given
+  std::optional<YamlEntry> generator,
+      settings;  ///< of the robot that this file is, or completes; names and values as given
   std::optional<BaseKind> base;
   std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file
   std::optional<double> cross_inertia;                             ///< of universal joints, kg m^2

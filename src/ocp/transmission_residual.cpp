@@ -1,5 +1,3 @@
-#include "bielle/dynamics/transmission.h"
-
 #include "bielle/ocp/residual.h"
 
 namespace bielle {

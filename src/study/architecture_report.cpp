@@ -13,11 +13,6 @@
 namespace bielle::study {
 namespace {
 
-const char* const kContenderColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd",
-                                        "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
-
-const char* getColor(size_t robot) { return kContenderColors[robot % std::size(kContenderColors)]; }
-
 struct Row {
   std::string name, key;  // for the page; for the columns of the table
   int digits;
@@ -165,7 +160,8 @@ std::vector<Plot> makeMotionPlots(const std::vector<Contender>& contenders, cons
                              {"Height of the centre of mass", "time [s]", "height [m]", PlotScale::Free, {}}};
   for (size_t r = 0; r < contenders.size(); ++r) {
     const Feat& feat = results.motions[r][motion];
-    for (Plot& plot : plots) plot.curves.push_back({contenders[r].name, getColor(r), CurveStyle::Lines, false, {}});
+    for (Plot& plot : plots)
+      plot.curves.push_back({contenders[r].name, getCurveColor(r), CurveStyle::Lines, false, {}});
     for (size_t k = 0; k < feat.trace.time.size(); ++k) {
       const Eigen::Index stage = static_cast<Eigen::Index>(k);
       plots[0].curves.back().points.emplace_back(feat.trace.time[k],
@@ -186,7 +182,7 @@ std::vector<Plot> makeSpeedPlots(const ArchitectureSpec& spec, const std::vector
                              {"Electrical cost of transport", label, "cost of transport", PlotScale::Free, {}}};
   for (size_t r = 0; r < contenders.size(); ++r) {
     for (Plot& plot : plots)
-      plot.curves.push_back({contenders[r].name, getColor(r), CurveStyle::LinesPoints, false, {}});
+      plot.curves.push_back({contenders[r].name, getCurveColor(r), CurveStyle::LinesPoints, false, {}});
     for (size_t i = 0; i < spec.speeds.size(); ++i) {
       const Feat& feat = results.speeds[r][i];
       if (!feat.done) continue;

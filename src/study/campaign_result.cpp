@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "io/process.h"
 #include "study/campaign.h"
 #include "study/cases.h"
 
@@ -54,7 +55,7 @@ Json pickCampaignResult(const Json& summary) {
 Json readCampaignResult(const tasks::Task& task, int status) {
   const std::string log = tasks::getOutput(task, task.log), error = findError(log);
   if (status == 2 && !error.empty()) return {{"outcome", kRefused}, {"outcome_message", error}};
-  if (status == 127) throw std::runtime_error("it could not be started" + describeLog(log));
+  if (status == kNotStarted) throw std::runtime_error("it could not be started" + describeLog(log));
   if (status >= 128)
     throw std::runtime_error("terminated by signal " + std::to_string(status - 128) + describeLog(log));
   if (status >= 2 || status < 0) throw std::runtime_error("exit status " + std::to_string(status) + describeLog(log));

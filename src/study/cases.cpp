@@ -17,6 +17,7 @@
 #include "bielle/model/error.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"
+#include "io/process.h"
 #include "io/text_file.h"
 #include "model/text_file.h"
 #include "study/case_task.h"
@@ -82,7 +83,7 @@ std::string describeOutcome(const CaseOutcome& outcome) {
   char time[32];
   std::snprintf(time, sizeof time, " (%.1f s)", seconds);
   if (last.status >= 128) return "terminated by signal " + std::to_string(last.status - 128) + time;
-  if (last.status == 127) return std::string("the command could not be started") + time;
+  if (last.status == kNotStarted) return std::string("the command could not be started") + time;
   if (last.status == kNoResult) return "no result: " + last.error + time;
   if (last.status >= 2) return "refused: " + last.error + time;
   for (const StepOutcome& step : outcome.steps)
@@ -167,7 +168,7 @@ class CaseRunner {
           submit(std::move(entry));
           return;
         }
-        if (status < 127) status = kNoResult;
+        if (status < kNotStarted) status = kNoResult;
         error = problem;
       }
     CaseOutcome& outcome = outcome_.cases[entry.index];

@@ -57,8 +57,8 @@ class Parametrization {
   Parametrization(Model model, std::vector<DesignVariable> variables, std::string source = "");
   /// A generated robot; `settings` are the values of other parameters of the generator. Bounds beyond those of a
   /// parameter are refused as well.
-  Parametrization(const std::string& generator, OptionValues settings,
-                  std::vector<DesignVariable> variables, std::string source = "");
+  Parametrization(const std::string& generator, OptionValues settings, std::vector<DesignVariable> variables,
+                  std::string source = "");
 
   const std::vector<DesignVariable>& variables() const { return variables_; }
   const VectorXd& start() const { return start_; }  ///< the robot as it is

@@ -91,7 +91,7 @@ struct LoadedRobot {
   Model model;
   std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
   std::string directory;              ///< where the files were found
-  std::string file;  ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
+  std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
 };
 
 /// The file of a robot by name or path, as loadRobot (io/robot_loader.h) finds it. \throws ModelError listing the places searched

@@ -123,8 +123,8 @@ void ReducedTranscription::finishEvaluation(int node, const LaneView& view, Robo
   if (at.status != StepStatus::Ok) return;
   if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
   const NodeBases bases(reduction_, static_cast<const ReducedEvaluation&>(at));
-  costs_[node].calc(
-      {model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases}, at);
+  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases},
+                    at);
   if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = StepStatus::Failed;
 }
 
