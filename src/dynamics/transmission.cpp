@@ -37,7 +37,7 @@ std::vector<int> findCarriers(const Model& model, const ReducedCluster& cluster)
 }
 
 template <typename Out>
-void selectRows(const MatrixXd& all, const std::vector<int>& rows, Out& out) {
+void takeRows(const MatrixXd& all, const std::vector<int>& rows, Out& out) {
   for (size_t i = 0; i < rows.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = all.row(rows[i]);
 }
 
@@ -110,8 +110,8 @@ double TransmissionMap::calc(const Model& model, ConstVectorRef q, const LoopBas
   if (bases && !joints_.empty()) {  // needs no kinematics
     const MatrixXd& N = bases->getBasis(index_).N;
     Small N_M(countMotors(), countMotors()), N_O(N_M);
-    selectRows(N, motors_, N_M);
-    selectRows(N, joints_, N_O);
+    takeRows(N, motors_, N_M);
+    takeRows(N, joints_, N_O);
     return N_O.determinant() / N_M.determinant() / reference_volume_;
   }
   const Lease lease(*this);
@@ -191,14 +191,14 @@ bool TransmissionMap::updateTangent(Scratch& s, const ReducedCluster& cluster, c
     if (!s.point.update(cluster, s.q)) return false;
     s.basis = &s.point.basis();
   }
-  selectRows(s.basis->N, motors_, s.N_M);
+  takeRows(s.basis->N, motors_, s.N_M);
   s.inverse = s.N_M.inverse();
   s.T.noalias() = s.basis->N * s.inverse;
   if (joints_.empty()) {
     updateOutputs(s.point.workspace(), s.O);
     s.Q.noalias() = s.O * s.T;
   } else {
-    selectRows(s.T, joints_, s.Q);
+    takeRows(s.T, joints_, s.Q);
   }
   return s.Q.allFinite();
 }
