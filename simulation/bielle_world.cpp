@@ -63,7 +63,7 @@ class BielleWorld : public World {
   double calcElasticEnergy(double* of_stops = nullptr) const;
   bool fail(const std::string& why);
 
-  const Model& model_;
+  Model model_;
   const double time_step_;
   const std::atomic<bool>* const interrupt_;
   const Terrain terrain_;

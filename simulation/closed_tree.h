@@ -19,7 +19,7 @@ namespace bielle::simulation {
 /// No function allocates after the constructor, except to describe a failure.
 class ClosedTree {
  public:
-  /// \param model  must outlive it   \param q  closed configuration at which ranks are determined   \param tips  bodies
+  /// \param q  closed configuration at which ranks are determined   \param tips  bodies
   /// whose velocities and loads are of interest
   /// \throws ModelError as makeReduction() does
   ClosedTree(const Model& model, ConstVectorRef q, const std::vector<int>& tips);
@@ -77,7 +77,7 @@ class ClosedTree {
   void updateVelocity();
   void addReduced(const VectorXd& dw, VectorXd& v) const;
 
-  const Model& model_;
+  Model model_;
   const Reduction reduction_;
   std::vector<Cluster> clusters_;
   std::vector<ClusterLift> lifts_;

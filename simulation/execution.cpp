@@ -92,7 +92,7 @@ class Recorder {
           Eigen::Quaterniond(foothold.X_WF.R).coeffs().transpose();
   }
 
-  const Model& model_;
+  Model model_;
   Workspace ws_;
   MotionRecord record_;
   int node_ = 0;
@@ -173,7 +173,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   VectorXd u = VectorXd::Zero(model.nu());
   Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
   plan.getReference(0, measurement.q, measurement.v);
-  if (&model == &plan.getModel()) {
+  if (model.isCopyOf(plan.getModel())) {
     world.reset(measurement.q, measurement.v);
   } else {
     const VectorXd q = assembleMachine(plan.getModel(), model, measurement.q);

@@ -26,7 +26,7 @@ struct FallCriterion {
 /// Compares a robot with its plan.
 class FallDetector {
  public:
-  /// \param model  of the robot, which may differ from that of the plan, \param plan  must outlive it
+  /// \param model  of the robot, which may differ from that of the plan   \param plan  must outlive it
   /// \param q  closed configuration of the robot (nq)   \param ground  of the world   \param planned_ground  of the plan
   FallDetector(const Model& model, const Policy& plan, const VectorXd& q, const FallCriterion& criterion,
                const Ground& ground, const Ground& planned_ground);
@@ -41,7 +41,7 @@ class FallDetector {
   bool followsBack(const VectorXd& q);
   double calcDeviation(const Joint& joint, const VectorXd& q) const;
 
-  const Model& model_;
+  Model model_;
   const Policy& plan_;
   const FallCriterion criterion_;
   const Terrain ground_, planned_ground_;

@@ -9,7 +9,6 @@ namespace bielle::simulation {
 /// Names for makeWorld(): those that were built.
 std::vector<std::string> listWorlds();
 
-/// \param model  must outlive the world
 /// \throws ModelError when there is no world of this name, or it cannot carry the robot
 std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options = {});
 

@@ -39,7 +39,7 @@ class MujocoGround {
   };
   void show(mjModel& mj, int geom, const Box& box) const;
 
-  const Model& model_;
+  Model model_;
   double height_;
   std::vector<Box> boxes_;
   std::vector<int> geoms_;  // of the boxes that MuJoCo has

@@ -76,7 +76,7 @@ class MujocoWorld : public World {
   void book(double h);
   void addSoleForces(double share);
 
-  const Model& model_;
+  Model model_;
   MujocoGround ground_;
   const MjcfOptions options_;
   const std::atomic<bool>* const interrupt_;

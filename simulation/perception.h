@@ -25,7 +25,7 @@ struct EstimationErrors {
 
 class Perception {
  public:
-  /// \param model  that the controller believes in; must outlive it
+  /// \param model  that the controller believes in
   Perception(const Model& model, const PerceptionOptions& options);
 
   /// From the state in which the world is. The estimator starts from q and v (nq, nv), where the plan does; the robot has stood
@@ -41,7 +41,7 @@ class Perception {
   const std::vector<int>& getPlanned(double time) const;
   void addErrors(const World& world);
 
-  const Model& model_;
+  Model model_;
   struct Period {
     double end = 0;  // s
     std::vector<int> contacts;

@@ -44,7 +44,7 @@ class Sensors {
   Vector3d drawNoise(const Vector3d& deviations);
   void readEncoders(const World& world);
 
-  const Model& model_;
+  Model model_;
   const SensorOptions options_;
   std::mt19937 generator_;
   Vector3d gyro_offset_ = Vector3d::Zero(), accelerometer_offset_ = Vector3d::Zero();

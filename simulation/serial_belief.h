@@ -28,7 +28,7 @@ const char* getName(Belief belief);
 
 class SerialController : public Controller {
  public:
-  /// \param closed, serial, inner  must outlive it. `inner` controls the serial model.
+  /// \param serial, inner  must outlive it. `inner` controls the serial model.
   SerialController(const Model& closed, const SerialModel& serial, Controller& inner, Belief belief);
   ~SerialController() override;
 

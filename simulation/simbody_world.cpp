@@ -173,7 +173,7 @@ class SimbodyWorld : public World {
   void readState();
   void noteChange();
 
-  const Model& model_;
+  Model model_;
   SimbodyTree tree_;
   WorldForces* forces_;                                // owned by the tree's system
   std::vector<std::pair<MobilizedBody, int>> rotors_;  // with the dof of their motor

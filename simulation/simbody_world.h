@@ -22,7 +22,6 @@ struct SimbodyWorldOptions {
   bool as_modelled = false;  ///< loops cut where the model cuts them: the same motion, with more rows of constraints
 };
 
-/// \param model  must outlive the world
 std::unique_ptr<World> makeSimbodyWorld(const Model& model, const SimbodyWorldOptions& options = {});
 
 }  // namespace bielle::simulation

@@ -25,7 +25,7 @@ class SoleTrack {
  private:
   void updateFoot(size_t contact, const SE3& X_WF);
 
-  const Model& model_;
+  Model model_;
   std::vector<FootReport> reports_;
   std::vector<Vector6d> wrenches_;    // about the origin of the world
   std::vector<Vector3d> touchdowns_;  // of the centres of the soles, m (world)

@@ -19,7 +19,7 @@ namespace bielle {
 
 class DeadPointStop {
  public:
-  /// \param model  must outlive it   \param q  nq: closed, where all transmissions are 1   \param stop  s_0; 0: no stops
+  /// \param q  nq: closed, where all transmissions are 1   \param stop  s_0; 0: no stops
   /// \throws ModelError when there are stops and q is open or a dead point
   DeadPointStop(const Model& model, ConstVectorRef q, double stop);
   /// Adds (2) to the torques (nu). It neither allocates nor throws.
@@ -28,7 +28,7 @@ class DeadPointStop {
  private:
   void brake(double s, double ds, const Measurement& measurement, VectorRef u) const;
 
-  const Model& model_;
+  Model model_;
   const double stop_;
   std::vector<Transmission> transmissions_;
   VectorXd inertia_;   // of each motor with what follows it (nu)

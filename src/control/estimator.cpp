@@ -36,7 +36,7 @@ struct Estimator::Parts {
   void updateFeet(const std::vector<int>& planned);
   SE3 getSeenFoot(size_t contact) const;
 
-  const Model& model;
+  const Model model;
   const EstimatorOptions options;
   const bool floats;  // on a free-flyer
   const double weight;

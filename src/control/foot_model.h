@@ -41,7 +41,7 @@ class FootModel {
  private:
   void updateRows(const PassiveJoints& joints, size_t contact);
 
-  const Model& model_;
+  Model model_;
   const int trunk_;  // rows of the free-flyer: 6 or 0
   Workspace ws_;
   std::vector<int> offsets_;  // of the rows of contacts

@@ -74,7 +74,7 @@ class WindowPlanner {
   const PredictiveOptions options_;
   const std::unique_ptr<Horizon> horizon_;
   RobotProblem& problem_;
-  const Model& model_;
+  Model model_;
   Window window_;
   RobotEvaluator evaluator_;
   ImpactWorkspace impact_;

@@ -9,7 +9,6 @@ namespace bielle {
 
 class RobotDraft {
  public:
-  /// The model must outlive the draft.
   explicit RobotDraft(const Model& model);
 
   /// A point fixed in a body, in the body's frame (m).
@@ -47,7 +46,7 @@ class RobotDraft {
   int findFrameAt(int body, const Vector3d& p) const;
   std::string getLink(int body) const { return body == 0 ? "world" : model_.bodies()[body].name; }
 
-  const Model& model_;
+  Model model_;
   std::vector<SE3> joints_, frames_;
   std::vector<Inertia> inertias_;
   std::vector<Visual> visuals_;

@@ -89,7 +89,7 @@ class ReducedTreeOf {
   SpringEnds makeSpringEnds(const PointSpring& spring) const;
   void addPointSpring(const WorkspaceOf<T>& ws, const PointSpring& spring, const SpringEnds& ends,
                       typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) const;
-  const Model& model_;
+  Model model_;
   const Reduction& reduction_;
   std::vector<Link> links_;
   std::vector<Tip> tips_;

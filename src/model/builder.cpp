@@ -15,13 +15,13 @@ constexpr double kBeyondRobots = 1e12;
 }  // namespace
 
 ModelBuilder::ModelBuilder(std::string name, std::string source) : source_(std::move(source)) {
-  model_.name_ = std::move(name);
+  model_.data_->name = std::move(name);
   Joint world;
   world.name = "world";
   world.parent = -1;
-  model_.joints_.push_back(world);
-  model_.bodies_.push_back({"world", {}});
-  model_.frames_.push_back({"world", 0, {}});
+  model_.data_->joints.push_back(world);
+  model_.data_->bodies.push_back({"world", {}});
+  model_.data_->frames.push_back({"world", 0, {}});
   frames_["world"] = {0, {}};
   limits_.push_back({});
 }
@@ -50,11 +50,11 @@ void ModelBuilder::addLink(const std::string& link, const std::string& parent_li
   if (joint.kind == JointKind::Fixed) {
     const SE3 X_BF = parent.X_BF * joint.X_PJ;
     frames_[link] = {parent.body, X_BF};
-    model_.frames_.push_back({link, parent.body, X_BF});
+    model_.data_->frames.push_back({link, parent.body, X_BF});
     addInertia(link, inertia);
     return;
   }
-  for (const Joint& other : model_.joints_)
+  for (const Joint& other : model_.joints())
     if (other.name == joint.name) fail(element, "two joints have this name", "rename one of them");
   for (Vector3d* axis : {&joint.axis, &joint.axis2}) {
     const double norm = axis->norm();
@@ -67,10 +67,10 @@ void ModelBuilder::addLink(const std::string& link, const std::string& parent_li
   joint.X_PJ = parent.X_BF * joint.X_PJ;
   joint.nq = getNq(joint.kind);
   joint.nv = getNv(joint.kind);
-  joint.idx_q = model_.nq_;
-  joint.idx_v = model_.nv_;
-  model_.nq_ += joint.nq;
-  model_.nv_ += joint.nv;
+  joint.idx_q = model_.nq();
+  joint.idx_v = model_.nv();
+  model_.data_->nq += joint.nq;
+  model_.data_->nv += joint.nv;
   for (const VectorXd* bound : {&limits.lower, &limits.upper, &limits.velocity})
     if (bound->size() != 0 && bound->size() != joint.nv)
       fail(
@@ -78,9 +78,9 @@ void ModelBuilder::addLink(const std::string& link, const std::string& parent_li
           "its limits have " + std::to_string(bound->size()) + " entries, its velocity has " + std::to_string(joint.nv),
           "give one limit per velocity coordinate, or none");
   const int body = model_.numBodies();
-  model_.joints_.push_back(joint);
-  model_.bodies_.push_back({link, {}});
-  model_.frames_.push_back({link, body, {}});
+  model_.data_->joints.push_back(joint);
+  model_.data_->bodies.push_back({link, {}});
+  model_.data_->frames.push_back({link, body, {}});
   frames_[link] = {body, {}};
   limits_.push_back(limits);
   addInertia(link, inertia);
@@ -90,7 +90,7 @@ void ModelBuilder::addInertia(const std::string& link, const Inertia& inertia) {
   const FramePlace place = getFrame(link, "link '" + link + "'");
   link_inertias_.emplace_back(link, inertia);
   if (place.body == 0) return;  // the ground has no dynamics
-  Body& body = model_.bodies_[place.body];
+  Body& body = model_.data_->bodies[place.body];
   body.inertia = body.inertia + inertia.transformed(place.X_BF);
 }
 
@@ -99,7 +99,7 @@ void ModelBuilder::addFrame(const std::string& name, const std::string& link, co
     fail("frame '" + name + "'", "it is declared twice", "give every link and frame a unique name");
   const FramePlace place = getFrame(link, "frame '" + name + "'");
   frames_[name] = {place.body, place.X_BF * X_LF};
-  model_.frames_.push_back({name, place.body, place.X_BF * X_LF});
+  model_.data_->frames.push_back({name, place.body, place.X_BF * X_LF});
 }
 
 void ModelBuilder::addMotor(const std::string& joint, double armature, double effort_limit, double velocity_limit,
@@ -112,7 +112,7 @@ void ModelBuilder::addMotor(Motor motor) {
   motor.joint = model_.findJoint(motor.name);
   if (motor.joint < 0)
     fail(element, "there is no moving joint of this name", "name a joint of the robot that is not fixed");
-  const Joint& j = model_.joints_[motor.joint];
+  const Joint& j = model_.joints()[motor.joint];
   if (j.nv != 1)
     fail(element, "it is on a " + std::string(getName(j.kind)) + " joint of " + std::to_string(j.nv) + " coordinates",
          "motors drive revolute, continuous or prismatic joints");
@@ -128,7 +128,7 @@ void ModelBuilder::addMotor(Motor motor) {
     fail(element, "its continuous effort is not positive",
          "give the effort it can sustain indefinitely, or leave it out");
   applyDrive(element, motor);
-  model_.motors_.push_back(std::move(motor));
+  model_.data_->motors.push_back(std::move(motor));
 }
 
 void ModelBuilder::applyDrive(const std::string& element, Motor& motor) const {
@@ -161,11 +161,11 @@ void ModelBuilder::addJointForce(const std::string& joint, JointForce force) {
   const std::string element = "force on joint '" + joint + "'";
   const int index = model_.findJoint(joint);
   if (index < 0) fail(element, "there is no moving joint of this name", "name a joint of the robot that is not fixed");
-  const Joint& j = model_.joints_[index];
+  const Joint& j = model_.joints()[index];
   if (j.nv != 1)
     fail(element, "it is a " + std::string(getName(j.kind)) + " joint of " + std::to_string(j.nv) + " coordinates",
          "springs, dampers and friction act on revolute, continuous or prismatic joints");
-  for (const JointForce& other : model_.joint_forces_)
+  for (const JointForce& other : model_.jointForces())
     if (other.joint == index) fail(element, "it is declared twice", "add its forces up");
   for (double value : {force.stiffness, force.damping, force.friction})
     if (!(value >= 0) || std::isinf(value))
@@ -178,12 +178,12 @@ void ModelBuilder::addJointForce(const std::string& joint, JointForce force) {
   force.joint = index;
   force.idx_q = j.idx_q;
   force.dof = j.idx_v;
-  model_.joint_forces_.push_back(force);
+  model_.data_->joint_forces.push_back(force);
 }
 
 void ModelBuilder::addPointSpring(const std::string& frame1, const std::string& frame2, PointSpring spring) {
   const std::string element = "point spring '" + spring.name + "'";
-  for (const PointSpring& other : model_.point_springs_)
+  for (const PointSpring& other : model_.pointSprings())
     if (other.name == spring.name) fail(element, "two of them have this name", "rename one of them");
   const FramePlace f1 = getFrame(frame1, element), f2 = getFrame(frame2, element);
   if (f1.body == f2.body)
@@ -200,7 +200,7 @@ void ModelBuilder::addPointSpring(const std::string& frame1, const std::string& 
   spring.body2 = f2.body;
   spring.point1 = f1.X_BF.act(spring.point1);
   spring.point2 = f2.X_BF.act(spring.point2);
-  model_.point_springs_.push_back(std::move(spring));
+  model_.data_->point_springs.push_back(std::move(spring));
 }
 
 void ModelBuilder::copyPointSpring(const Model& from, const PointSpring& spring) {
@@ -215,22 +215,22 @@ void ModelBuilder::addContact(const std::string& name, const std::string& frame,
   const FramePlace place = getFrame(frame, element);
   if (!(half_length >= 0) || !(half_width >= 0) || !std::isfinite(half_length + half_width))
     fail(element, "its sole is not given by two sizes of 0 or more", "give length and width in metres");
-  model_.contacts_.push_back({name, place.body, place.X_BF, kind, half_length, half_width});
+  model_.data_->contacts.push_back({name, place.body, place.X_BF, kind, half_length, half_width});
 }
 
 void ModelBuilder::addReference(Reference reference) {
   checkReference(reference);
-  model_.references_.push_back(std::move(reference));
+  model_.data_->references.push_back(std::move(reference));
 }
 
 void ModelBuilder::checkReference(const Reference& reference) const {
   const std::string element = "reference '" + reference.name + "'";
-  for (const Reference& other : model_.references_)
+  for (const Reference& other : model_.references())
     if (other.name == reference.name) fail(element, "two references have this name", "rename one of them");
   for (const auto& [name, q] : reference.joints) {
     const int index = model_.findJoint(name);
     if (index < 0) fail(element, "there is no moving joint '" + name + "'", "correct the name");
-    const Joint& joint = model_.joints_[index];
+    const Joint& joint = model_.joints()[index];
     const Eigen::Map<const VectorXd> values(q.data(), static_cast<Eigen::Index>(q.size()));
     if (values.size() != joint.nq)
       fail(element,
@@ -255,7 +255,7 @@ void ModelBuilder::addVisual(const std::string& link, Visual visual) {
   const FramePlace place = getFrame(link, "visual of link '" + link + "'");
   visual.body = place.body;
   visual.X_BV = place.X_BF * visual.X_BV;
-  model_.visuals_.push_back(std::move(visual));
+  model_.data_->visuals.push_back(std::move(visual));
 }
 
 void ModelBuilder::addShape(const std::string& link, Shape shape) {
@@ -266,7 +266,7 @@ void ModelBuilder::addShape(const std::string& link, Shape shape) {
     fail(element, "a size is negative or not finite", "give lengths of 0 or more, m");
   shape.body = place.body;
   shape.X_BS = place.X_BF * shape.X_BS;
-  model_.shapes_.push_back(shape);
+  model_.data_->shapes.push_back(shape);
 }
 
 void ModelBuilder::addSerialJoint(const std::string& joint) {
@@ -274,15 +274,15 @@ void ModelBuilder::addSerialJoint(const std::string& joint) {
   if (index < 0)
     fail("serial joint '" + joint + "'", "there is no moving joint of this name",
          "name a joint of the robot that is not fixed");
-  const std::vector<int>& listed = model_.serial_joints_;
+  const std::vector<int>& listed = model_.data_->serial_joints;
   if (std::find(listed.begin(), listed.end(), index) != listed.end())
     fail("serial joint '" + joint + "'", "it is listed twice", "list it once");
-  model_.serial_joints_.push_back(index);
+  model_.data_->serial_joints.push_back(index);
 }
 
 void ModelBuilder::setGravity(const Vector3d& gravity) {
   if (!gravity.allFinite()) fail("gravity", "it is not finite", "give three numbers in m/s^2");
-  model_.gravity_ = gravity;
+  model_.data_->gravity = gravity;
 }
 
 void ModelBuilder::setArmature(const std::string& joint, double armature) {
@@ -295,22 +295,24 @@ void ModelBuilder::setArmature(const std::string& joint, double armature) {
 }
 
 Model ModelBuilder::build(std::vector<std::string>* warnings) const {
-  if (model_.nv_ == 0) fail("robot '" + model_.name_ + "'", "it has no moving joints", "declare at least one");
+  if (model_.nv() == 0) fail("robot '" + model_.data_->name + "'", "it has no moving joints", "declare at least one");
   checkInertias(warnings);
-  Model model = model_;
+  Model model;
+  *model.data_ = *model_.data_;
   finishDofs(model);
   finishClosures(model);
   finishPointSprings(model);
   finishShapes(model);
-  for (int i = 1; i < model.numBodies(); ++i) model.mass_ += model.bodies_[i].inertia.mass;
+  for (int i = 1; i < model.numBodies(); ++i) model.data_->mass += model.data_->bodies[i].inertia.mass;
   return model;
 }
 
 void ModelBuilder::finishShapes(Model& model) const {
-  std::vector<bool> has_shape(model.bodies_.size(), false);
-  for (const Shape& shape : model.shapes_) has_shape[shape.body] = true;
-  for (const Visual& visual : model.visuals_)
-    if (const auto shape = has_shape[visual.body] ? std::nullopt : fitShape(visual)) model.shapes_.push_back(*shape);
+  std::vector<bool> has_shape(model.data_->bodies.size(), false);
+  for (const Shape& shape : model.shapes()) has_shape[shape.body] = true;
+  for (const Visual& visual : model.visuals())
+    if (const auto shape = has_shape[visual.body] ? std::nullopt : fitShape(visual))
+      model.data_->shapes.push_back(*shape);
 }
 
 void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
@@ -344,45 +346,45 @@ void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
 }
 
 void ModelBuilder::finishDofs(Model& model) const {
-  model.dofs_.resize(model.nv_);
-  model.support_.resize(model.numBodies());
+  model.data_->dofs.resize(model.nv());
+  model.data_->support.resize(model.numBodies());
   const size_t bodies = model.numBodies();
-  model.ancestry_.assign(bodies * bodies, 0);
+  model.data_->ancestry.assign(bodies * bodies, 0);
   for (size_t b = 0; b < bodies; ++b)
-    for (int a = static_cast<int>(b); a >= 0; a = model.joints_[a].parent) model.ancestry_[a * bodies + b] = 1;
+    for (int a = static_cast<int>(b); a >= 0; a = model.joints()[a].parent) model.data_->ancestry[a * bodies + b] = 1;
   const double inf = std::numeric_limits<double>::infinity();
-  model.lower_ = VectorXd::Constant(model.nv_, -inf);
-  model.upper_ = VectorXd::Constant(model.nv_, inf);
-  model.velocity_limit_ = VectorXd::Constant(model.nv_, inf);
-  model.armature_ = VectorXd::Zero(model.nv_);
+  model.data_->lower = VectorXd::Constant(model.nv(), -inf);
+  model.data_->upper = VectorXd::Constant(model.nv(), inf);
+  model.data_->velocity_limit = VectorXd::Constant(model.nv(), inf);
+  model.data_->armature = VectorXd::Zero(model.nv());
   for (int i = 1; i < model.numBodies(); ++i) {
-    const Joint& joint = model.joints_[i];
-    model.support_[i] = model.support_[joint.parent];
+    const Joint& joint = model.joints()[i];
+    model.data_->support[i] = model.data_->support[joint.parent];
     for (int k = 0; k < joint.nv; ++k) {
-      Dof& dof = model.dofs_[joint.idx_v + k];
+      Dof& dof = model.data_->dofs[joint.idx_v + k];
       dof.joint = i;
-      dof.parent = model.support_[i].empty() ? -1 : model.support_[i].back();
+      dof.parent = model.data_->support[i].empty() ? -1 : model.data_->support[i].back();
       dof.first_of_universal = joint.kind == JointKind::Universal && k == 0;
       dof.second_of_universal = joint.kind == JointKind::Universal && k == 1;
-      model.support_[i].push_back(joint.idx_v + k);
+      model.data_->support[i].push_back(joint.idx_v + k);
     }
     const JointLimits& limits = limits_[i];
-    if (limits.lower.size()) model.lower_.segment(joint.idx_v, joint.nv) = limits.lower;
-    if (limits.upper.size()) model.upper_.segment(joint.idx_v, joint.nv) = limits.upper;
-    if (limits.velocity.size()) model.velocity_limit_.segment(joint.idx_v, joint.nv) = limits.velocity;
+    if (limits.lower.size()) model.data_->lower.segment(joint.idx_v, joint.nv) = limits.lower;
+    if (limits.upper.size()) model.data_->upper.segment(joint.idx_v, joint.nv) = limits.upper;
+    if (limits.velocity.size()) model.data_->velocity_limit.segment(joint.idx_v, joint.nv) = limits.velocity;
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
-      if (!(model.lower_[k] <= model.upper_[k]))
+      if (!(model.data_->lower[k] <= model.data_->upper[k]))
         fail("joint '" + joint.name + "'", "its lower limit is above its upper limit", "swap them");
   }
-  for (const Motor& motor : model.motors_) {
-    model.armature_[motor.dof] = motor.armature;
-    model.velocity_limit_[motor.dof] = std::min(model.velocity_limit_[motor.dof], motor.velocity_limit);
+  for (const Motor& motor : model.motors()) {
+    model.data_->armature[motor.dof] = motor.armature;
+    model.data_->velocity_limit[motor.dof] = std::min(model.data_->velocity_limit[motor.dof], motor.velocity_limit);
   }
   for (const auto& [name, armature] : joint_armature_) {
     if (model.findMotor(name) >= 0)
       fail("armature of '" + name + "'", "the joint has a motor", "give the armature with the motor");
-    const Joint& joint = model.joints_[model.findJoint(name)];
-    model.armature_.segment(joint.idx_v, joint.nv).setConstant(armature);
+    const Joint& joint = model.joints()[model.findJoint(name)];
+    model.data_->armature.segment(joint.idx_v, joint.nv).setConstant(armature);
   }
 }
 

@@ -55,7 +55,7 @@ void ModelBuilder::addCoupler(const std::string& name, const std::map<std::strin
   for (const auto& [joint, coefficient] : coefficients) {
     const int index = model_.findJoint(joint);
     if (index < 0) fail(element, "there is no moving joint '" + joint + "'", "name joints that are not fixed");
-    const Joint& j = model_.joints_[index];
+    const Joint& j = model_.joints()[index];
     if (j.nv != 1)
       fail(element,
            "it couples '" + joint + "', a " + getName(j.kind) + " joint of " + std::to_string(j.nv) + " coordinates",
@@ -77,11 +77,11 @@ void ModelBuilder::addCoupler(const std::string& name, const std::map<std::strin
 
 void ModelBuilder::addChecked(Closure closure) {
   const std::string element = "closure '" + closure.name + "'";
-  for (const Closure& other : model_.closures_)
+  for (const Closure& other : model_.closures())
     if (other.name == closure.name) fail(element, "two closures have this name", "rename one of them");
   if (!(closure.kp >= 0) || !(closure.kd >= 0) || std::isinf(closure.kp) || std::isinf(closure.kd))
     fail(element, "a stabilisation gain is not a finite number of 0 or more", "correct kp and kd");
-  model_.closures_.push_back(std::move(closure));
+  model_.data_->closures.push_back(std::move(closure));
 }
 
 void ModelBuilder::copyClosure(const Model& from, const Closure& closure) {
@@ -102,18 +102,18 @@ void ModelBuilder::copyClosure(const Model& from, const Closure& closure) {
 // Bodies of a coupler, dofs and signs of any closure.
 void ModelBuilder::finishClosure(const Model& model, Closure& closure) const {
   if (closure.kind == ClosureKind::Coupler) {
-    int carrier = model.joints_[closure.terms.front().joint].parent;
+    int carrier = model.joints()[closure.terms.front().joint].parent;
     const auto carriesAll = [&] {
       return std::all_of(closure.terms.begin(), closure.terms.end(), [&](const CouplerTerm& term) {
-        return model.isAncestorOrSelf(carrier, model.joints_[term.joint].parent);
+        return model.isAncestorOrSelf(carrier, model.joints()[term.joint].parent);
       });
     };
-    while (!carriesAll()) carrier = model.joints_[carrier].parent;
+    while (!carriesAll()) carrier = model.joints()[carrier].parent;
     closure.body1 = closure.body2 = carrier;
     std::set<int> dofs;
     for (const CouplerTerm& term : closure.terms)
-      dofs.insert(model.support_[term.joint].begin() + model.support_[carrier].size(),
-                  model.support_[term.joint].end());
+      dofs.insert(model.data_->support[term.joint].begin() + model.data_->support[carrier].size(),
+                  model.data_->support[term.joint].end());
     closure.dofs.assign(dofs.begin(), dofs.end());
     closure.signs.assign(dofs.size(), 1);
     return;
@@ -122,32 +122,32 @@ void ModelBuilder::finishClosure(const Model& model, Closure& closure) const {
 }
 
 void ModelBuilder::finishPointSprings(Model& model) const {
-  for (PointSpring& spring : model.point_springs_) findRelativeDofs(model, spring);
+  for (PointSpring& spring : model.data_->point_springs) findRelativeDofs(model, spring);
 }
 
 void ModelBuilder::finishClosures(Model& model) const {
-  std::vector<int> owner(model.nv_);  // union-find over dofs
+  std::vector<int> owner(model.nv());  // union-find over dofs
   std::iota(owner.begin(), owner.end(), 0);
   const auto find = [&owner](int k) {
     while (owner[k] != k) k = owner[k] = owner[owner[k]];
     return k;
   };
-  for (Closure& closure : model.closures_) {
+  for (Closure& closure : model.data_->closures) {
     finishClosure(model, closure);
     for (int k : closure.dofs) owner[find(k)] = find(closure.dofs.front());
-    model.closure_rows_ += getRows(closure.kind);
+    model.data_->closure_rows += getRows(closure.kind);
   }
   std::map<int, LoopCluster> clusters;  // by representative dof
-  for (int c = 0; c < static_cast<int>(model.closures_.size()); ++c) {
-    LoopCluster& cluster = clusters[find(model.closures_[c].dofs.front())];
+  for (int c = 0; c < static_cast<int>(model.data_->closures.size()); ++c) {
+    LoopCluster& cluster = clusters[find(model.data_->closures[c].dofs.front())];
     cluster.closures.push_back(c);
-    cluster.rows += getRows(model.closures_[c].kind);
-    cluster.dofs.insert(cluster.dofs.end(), model.closures_[c].dofs.begin(), model.closures_[c].dofs.end());
+    cluster.rows += getRows(model.data_->closures[c].kind);
+    cluster.dofs.insert(cluster.dofs.end(), model.data_->closures[c].dofs.begin(), model.data_->closures[c].dofs.end());
   }
   for (auto& [root, cluster] : clusters) {
     std::sort(cluster.dofs.begin(), cluster.dofs.end());
     cluster.dofs.erase(std::unique(cluster.dofs.begin(), cluster.dofs.end()), cluster.dofs.end());
-    model.clusters_.push_back(std::move(cluster));
+    model.data_->clusters.push_back(std::move(cluster));
   }
 }
 

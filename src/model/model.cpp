@@ -104,49 +104,49 @@ int getRows(ClosureKind kind) {
 }
 
 int Model::findJoint(const std::string& name) const {
-  const int index = findByName(joints_, name);
+  const int index = findByName(data_->joints, name);
   return index == 0 ? -1 : index;  // the world is not a joint
 }
-int Model::findFrame(const std::string& name) const { return findByName(frames_, name); }
-int Model::findMotor(const std::string& name) const { return findByName(motors_, name); }
-int Model::findContact(const std::string& name) const { return findByName(contacts_, name); }
-int Model::findClosure(const std::string& name) const { return findByName(closures_, name); }
+int Model::findFrame(const std::string& name) const { return findByName(data_->frames, name); }
+int Model::findMotor(const std::string& name) const { return findByName(data_->motors, name); }
+int Model::findContact(const std::string& name) const { return findByName(data_->contacts, name); }
+int Model::findClosure(const std::string& name) const { return findByName(data_->closures, name); }
 
 VectorXd Model::makeNeutral() const {
-  VectorXd q(nq_);
-  for (const Joint& joint : joints_)
+  VectorXd q(data_->nq);
+  for (const Joint& joint : data_->joints)
     if (joint.nq) setNeutral(joint.kind, q.segment(joint.idx_q, joint.nq));
   return q;
 }
 
 void Model::integrate(ConstVectorRef q, ConstVectorRef dv, VectorRef q_out) const {
-  for (const Joint& joint : joints_)
+  for (const Joint& joint : data_->joints)
     if (joint.nv)
       integrateJoint(joint, q.segment(joint.idx_q, joint.nq), dv.segment(joint.idx_v, joint.nv),
                      q_out.segment(joint.idx_q, joint.nq));
 }
 
 VectorXd Model::integrate(ConstVectorRef q, ConstVectorRef dv) const {
-  VectorXd out(nq_);
+  VectorXd out(data_->nq);
   integrate(q, dv, out);
   return out;
 }
 
 void Model::difference(ConstVectorRef q0, ConstVectorRef q1, VectorRef dv) const {
-  for (const Joint& joint : joints_)
+  for (const Joint& joint : data_->joints)
     if (joint.nv)
       calcJointDifference(joint, q0.segment(joint.idx_q, joint.nq), q1.segment(joint.idx_q, joint.nq),
                           dv.segment(joint.idx_v, joint.nv));
 }
 
 VectorXd Model::difference(ConstVectorRef q0, ConstVectorRef q1) const {
-  VectorXd out(nv_);
+  VectorXd out(data_->nv);
   difference(q0, q1, out);
   return out;
 }
 
 void Model::normalize(VectorRef q) const {
-  for (const Joint& joint : joints_) {
+  for (const Joint& joint : data_->joints) {
     if (joint.kind == JointKind::Spherical) q.segment<4>(joint.idx_q).normalize();
     if (joint.kind == JointKind::FreeFlyer) q.segment<4>(joint.idx_q + 3).normalize();
   }

@@ -65,29 +65,29 @@ Model ModelBuilder::restore(ModelParts parts) {
   ModelBuilder builder(parts.name);
   builder.limits_.resize(parts.bodies.size());
   Model& draft = builder.model_;
-  draft.gravity_ = parts.gravity;
-  draft.nq_ = parts.joints.back().idx_q + parts.joints.back().nq;
-  draft.nv_ = parts.joints.back().idx_v + parts.joints.back().nv;
-  draft.bodies_ = std::move(parts.bodies);
-  draft.joints_ = std::move(parts.joints);
-  draft.frames_ = std::move(parts.frames);
-  draft.closures_ = std::move(parts.closures);
-  for (Closure& closure : draft.closures_) closure.dofs.clear(), closure.signs.clear();  // found again
-  draft.motors_ = std::move(parts.motors);
-  draft.joint_forces_ = std::move(parts.joint_forces);
-  draft.point_springs_ = std::move(parts.point_springs);
-  for (PointSpring& spring : draft.point_springs_) spring.dofs.clear(), spring.signs.clear();  // found again
-  draft.contacts_ = std::move(parts.contacts);
-  draft.references_ = std::move(parts.references);
-  draft.visuals_ = std::move(parts.visuals);
+  draft.data_->gravity = parts.gravity;
+  draft.data_->nq = parts.joints.back().idx_q + parts.joints.back().nq;
+  draft.data_->nv = parts.joints.back().idx_v + parts.joints.back().nv;
+  draft.data_->bodies = std::move(parts.bodies);
+  draft.data_->joints = std::move(parts.joints);
+  draft.data_->frames = std::move(parts.frames);
+  draft.data_->closures = std::move(parts.closures);
+  for (Closure& closure : draft.data_->closures) closure.dofs.clear(), closure.signs.clear();  // found again
+  draft.data_->motors = std::move(parts.motors);
+  draft.data_->joint_forces = std::move(parts.joint_forces);
+  draft.data_->point_springs = std::move(parts.point_springs);
+  for (PointSpring& spring : draft.data_->point_springs) spring.dofs.clear(), spring.signs.clear();  // found again
+  draft.data_->contacts = std::move(parts.contacts);
+  draft.data_->references = std::move(parts.references);
+  draft.data_->visuals = std::move(parts.visuals);
   for (const Shape& shape : parts.shapes)
-    if (!shape.fitted) draft.shapes_.push_back(shape);  // the others are fitted again
-  draft.serial_joints_ = std::move(parts.serial_joints);
+    if (!shape.fitted) draft.data_->shapes.push_back(shape);  // the others are fitted again
+  draft.data_->serial_joints = std::move(parts.serial_joints);
   Model model = builder.build();
-  model.lower_ = std::move(parts.lower_limits);
-  model.upper_ = std::move(parts.upper_limits);
-  model.velocity_limit_ = std::move(parts.velocity_limits);
-  model.armature_ = std::move(parts.armature);
+  model.data_->lower = std::move(parts.lower_limits);
+  model.data_->upper = std::move(parts.upper_limits);
+  model.data_->velocity_limit = std::move(parts.velocity_limits);
+  model.data_->armature = std::move(parts.armature);
   return model;
 }
 

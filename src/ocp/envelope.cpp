@@ -8,7 +8,7 @@
 namespace bielle {
 
 struct Envelope::Data {
-  const Model& model;
+  const Model model;
   const ShootingProblem& problem;
   const ShootingTrajectory& optimum;
   std::vector<VectorXd> y;

@@ -32,7 +32,7 @@ class Transcription {
   virtual void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const = 0;
 };
 
-// The nodes of a problem. They outlive the transcription, like the model.
+// The nodes of a problem. They outlive the transcription.
 struct NodeList {
   const std::vector<StageSpec>& specs;
   const std::vector<TimeScalePlace>& places;

@@ -63,7 +63,7 @@ enum class EstimatorStatus {
 /// Independent of any simulator: the same object can run on a robot. update() neither allocates nor throws.
 class Estimator {
  public:
-  /// \param model  must outlive it   \param q  closed configuration, e.g. a posture
+  /// \param q  closed configuration, e.g. a posture
   /// \throws ModelError when motors do not determine a joint other than the free-flyer of the trunk
   Estimator(const Model& model, ConstVectorRef q, const EstimatorOptions& options = {});
   ~Estimator();

@@ -35,7 +35,7 @@ class Policy : public Controller {
     RowMatrixXd K;                   ///< nu x 2 nv; empty in all stages without feedback
   };
 
-  /// \param model  must outlive it   \param stages  at least one, in the order of time
+  /// \param stages  at least one, in the order of time
   /// \param u_hold  nu
   Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_hold);
 
@@ -61,7 +61,7 @@ class Policy : public Controller {
   void updateError(const Measurement& measurement);
   void addFeedback(size_t stage, double weight, VectorRef u) const;
 
-  const Model& model_;
+  Model model_;
   std::vector<Stage> stages_;
   std::vector<size_t> gains_;  // per stage, that whose K is taken
   VectorXd u_hold_;            // nu

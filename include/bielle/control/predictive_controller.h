@@ -79,11 +79,11 @@ Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOp
 
 class PredictiveController : public Controller {
  public:
-  /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation; its model must outlive this
+  /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation
   /// \param plan  the solved motion, without the copies of its last stage: where windows end, and what the first one
   /// starts from   \throws ModelError when motors brake and the start is a dead point
   PredictiveController(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
-  /// \param walk  of which no stage has been made yet; its model must outlive this   \throws ModelError likewise
+  /// \param walk  of which no stage has been made yet   \throws ModelError likewise
   PredictiveController(CommandedWalk walk, const PredictiveOptions& options);
   ~PredictiveController() override;
 

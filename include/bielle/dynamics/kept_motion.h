@@ -95,7 +95,7 @@ class KeptMotion {
   VectorXd selectMotors(const VectorXd& x) const;
   bool solveBalance(const VectorXd& rhs, VectorXd& solution) const;
 
-  const Model& model_;
+  Model model_;
   std::vector<int> kept_;
   ConstraintSet constraints_, loops_;
   VectorXd calcLift(const ModelVariation& change, const VectorXd& dq, const VectorXd& v, VectorXd& rows);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -225,43 +226,47 @@ struct Dof {
   bool second_of_universal = false;
 };
 
-/// Immutable description of a robot. Made by ModelBuilder::build or loadRobot.
+/// Immutable description of a robot, made by ModelBuilder::build or loadRobot. Copies share it, so that a problem, a
+/// controller or a world keeps one of its own, as cheap as a pointer.
 class Model {
  public:
-  const std::string& name() const { return name_; }
-  int nq() const { return nq_; }
-  int nv() const { return nv_; }
-  int nu() const { return static_cast<int>(motors_.size()); }
-  int numBodies() const { return static_cast<int>(bodies_.size()); }  ///< including the world
-  const std::vector<Body>& bodies() const { return bodies_; }
-  const std::vector<Joint>& joints() const { return joints_; }  ///< joints()[0] is a placeholder for the world
-  const std::vector<Dof>& dofs() const { return dofs_; }
-  const std::vector<Frame>& frames() const { return frames_; }
-  const std::vector<Closure>& closures() const { return closures_; }
-  const std::vector<LoopCluster>& clusters() const { return clusters_; }
-  const std::vector<Motor>& motors() const { return motors_; }
-  const std::vector<JointForce>& jointForces() const { return joint_forces_; }  ///< at most one per joint
-  const std::vector<PointSpring>& pointSprings() const { return point_springs_; }
-  const std::vector<ContactFrame>& contacts() const { return contacts_; }
-  const std::vector<Reference>& references() const { return references_; }
-  const std::vector<Visual>& visuals() const { return visuals_; }
+  /// Whether both are copies of one model.
+  bool isCopyOf(const Model& other) const { return data_ == other.data_; }
+
+  const std::string& name() const { return data_->name; }
+  int nq() const { return data_->nq; }
+  int nv() const { return data_->nv; }
+  int nu() const { return static_cast<int>(data_->motors.size()); }
+  int numBodies() const { return static_cast<int>(data_->bodies.size()); }  ///< including the world
+  const std::vector<Body>& bodies() const { return data_->bodies; }
+  const std::vector<Joint>& joints() const { return data_->joints; }  ///< joints()[0] is a placeholder for the world
+  const std::vector<Dof>& dofs() const { return data_->dofs; }
+  const std::vector<Frame>& frames() const { return data_->frames; }
+  const std::vector<Closure>& closures() const { return data_->closures; }
+  const std::vector<LoopCluster>& clusters() const { return data_->clusters; }
+  const std::vector<Motor>& motors() const { return data_->motors; }
+  const std::vector<JointForce>& jointForces() const { return data_->joint_forces; }  ///< at most one per joint
+  const std::vector<PointSpring>& pointSprings() const { return data_->point_springs; }
+  const std::vector<ContactFrame>& contacts() const { return data_->contacts; }
+  const std::vector<Reference>& references() const { return data_->references; }
+  const std::vector<Visual>& visuals() const { return data_->visuals; }
   /// Shapes from the files, then shapes fitted to the visuals of bodies without any.
-  const std::vector<Shape>& shapes() const { return shapes_; }
+  const std::vector<Shape>& shapes() const { return data_->shapes; }
   /// Indices of the joints of the equivalent serial chain (hips, knee, ankles).
-  const std::vector<int>& serialJoints() const { return serial_joints_; }
-  const VectorXd& lowerLimits() const { return lower_; }  ///< per dof, -inf if there is none
-  const VectorXd& upperLimits() const { return upper_; }
-  const VectorXd& velocityLimits() const { return velocity_limit_; }
-  const VectorXd& armature() const { return armature_; }  ///< per dof, added to the diagonal of M
-  double mass() const { return mass_; }                   ///< kg, without the world
-  const Vector3d& gravity() const { return gravity_; }
-  bool hasFreeFlyer() const { return numBodies() > 1 && joints_[1].kind == JointKind::FreeFlyer; }
-  int numClosureRows() const { return closure_rows_; }
+  const std::vector<int>& serialJoints() const { return data_->serial_joints; }
+  const VectorXd& lowerLimits() const { return data_->lower; }  ///< per dof, -inf if there is none
+  const VectorXd& upperLimits() const { return data_->upper; }
+  const VectorXd& velocityLimits() const { return data_->velocity_limit; }
+  const VectorXd& armature() const { return data_->armature; }  ///< per dof, added to the diagonal of M
+  double mass() const { return data_->mass; }                   ///< kg, without the world
+  const Vector3d& gravity() const { return data_->gravity; }
+  bool hasFreeFlyer() const { return numBodies() > 1 && data_->joints[1].kind == JointKind::FreeFlyer; }
+  int numClosureRows() const { return data_->closure_rows; }
 
   /// Dofs that move a body, from the root to the body, in increasing order.
-  const std::vector<int>& supportDofs(int body) const { return support_[body]; }
+  const std::vector<int>& supportDofs(int body) const { return data_->support[body]; }
   /// Whether body a is body b or one of its ancestors.
-  bool isAncestorOrSelf(int a, int b) const { return ancestry_[a * bodies_.size() + b] != 0; }
+  bool isAncestorOrSelf(int a, int b) const { return data_->ancestry[a * data_->bodies.size() + b] != 0; }
 
   /// Index by name, -1 when absent.
   int findJoint(const std::string& name) const;
@@ -283,27 +288,31 @@ class Model {
 
  private:
   friend class ModelBuilder;
-  std::string name_;
-  int nq_ = 0, nv_ = 0, closure_rows_ = 0;
-  double mass_ = 0;
-  Vector3d gravity_{0, 0, -9.81};
-  std::vector<Body> bodies_;
-  std::vector<Joint> joints_;
-  std::vector<Dof> dofs_;
-  std::vector<Frame> frames_;
-  std::vector<Closure> closures_;
-  std::vector<LoopCluster> clusters_;
-  std::vector<Motor> motors_;
-  std::vector<JointForce> joint_forces_;
-  std::vector<PointSpring> point_springs_;
-  std::vector<ContactFrame> contacts_;
-  std::vector<Reference> references_;
-  std::vector<Visual> visuals_;
-  std::vector<Shape> shapes_;
-  std::vector<int> serial_joints_;
-  std::vector<std::vector<int>> support_;
-  std::vector<char> ancestry_;  // numBodies() x numBodies(), row: the ancestor
-  VectorXd lower_, upper_, velocity_limit_, armature_;
+  struct Data {
+    std::string name;
+    int nq = 0, nv = 0, closure_rows = 0;
+    double mass = 0;
+    Vector3d gravity{0, 0, -9.81};
+    std::vector<Body> bodies;
+    std::vector<Joint> joints;
+    std::vector<Dof> dofs;
+    std::vector<Frame> frames;
+    std::vector<Closure> closures;
+    std::vector<LoopCluster> clusters;
+    std::vector<Motor> motors;
+    std::vector<JointForce> joint_forces;
+    std::vector<PointSpring> point_springs;
+    std::vector<ContactFrame> contacts;
+    std::vector<Reference> references;
+    std::vector<Visual> visuals;
+    std::vector<Shape> shapes;
+    std::vector<int> serial_joints;
+    std::vector<std::vector<int>> support;
+    std::vector<char> ancestry;  // numBodies() x numBodies(), row: the ancestor
+    VectorXd lower, upper, velocity_limit, armature;
+  };
+  // Only the builder writes to it, before it gives the model away.
+  std::shared_ptr<Data> data_ = std::make_shared<Data>();
 };
 
 }  // namespace bielle

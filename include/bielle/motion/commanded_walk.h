@@ -33,7 +33,7 @@ class CommandedWalk {
   };
 
   /// From the standing posture q0, at time 0.
-  /// \param model  must outlive it   \param options  `flight`, `rigid_landing`, `landing_speed` and `published` are
+  /// \param options  `flight`, `rigid_landing`, `landing_speed` and `published` are
   /// ignored; a time step of 0 is 12 ms
   /// \throws ModelError as planLocomotion() and addLimits() do
   CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits, CommandSource command,
@@ -57,7 +57,7 @@ class CommandedWalk {
   void addLimitsTo(std::vector<StageSpec>& stages);
   const VectorXd& findStaticTorques(const std::array<bool, 2>& stands, const std::vector<ContactTarget>& contacts);
 
-  const Model& model_;
+  Model model_;
   const LocomotionOptions options_;
   const LimitOptions limits_;
   const CommandSource command_;

@@ -48,7 +48,7 @@ class Envelope {
   /// Linearizes all nodes once, and sweeps over them, for (3).
   /// \param model  of the problem, whose states begin with (q, v): a RobotProblem, or a PeakProblem around one
   /// \param optimum, multipliers  of a solve that converged; without values if there are no constraints
-  /// The model, problem and optimum must outlive it.
+  /// The problem and the optimum must outlive it.
   /// \throws std::invalid_argument when sizes do not match
   Envelope(const Model& model, const ShootingProblem& problem, const ShootingTrajectory& optimum,
            const Multipliers& multipliers);

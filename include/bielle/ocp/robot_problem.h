@@ -117,7 +117,6 @@ struct RobotEvaluation : NodeEvaluation {
 
 class RobotProblem : public ShootingProblem {
  public:
-  /// \param model  must outlive the problem
   /// \param q0, v0  initial state; for the reduced formulation closed, with a velocity that keeps it closed
   /// \param stages  N running stages, then the terminal one
   /// \throws ModelError on sizes that do not match, a weight that is negative or not finite, or an open
@@ -166,7 +165,7 @@ class RobotProblem : public ShootingProblem {
   std::vector<CostValue> getCosts(int node, const RobotEvaluation& at) const;
 
  private:
-  const Model& model_;
+  Model model_;
   Formulation formulation_;
   std::vector<StageSpec> specs_;
   std::vector<TimeScalePlace> places_;  // per node

@@ -97,7 +97,7 @@ class FullTranscription : public Transcription {
     dx.tail(nv) = x1.segment(nq, nv) - x0.segment(nq, nv);
   }
 
-  const Model& model_;
+  Model model_;
   const NodeList nodes_;
   const std::vector<StageSpec>& specs_;
   std::vector<NodeCosts> costs_;

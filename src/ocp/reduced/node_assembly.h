@@ -67,7 +67,7 @@ class NodeAssembly {
   template <typename GetWN>
   void project(const VectorXd& v, const GetWN& get_WN, VectorRef out) const;
 
-  const Model& model_;
+  Model model_;
   const Reduction& reduction_;
   const ReducedLayout& layout_;
   std::vector<FreeJoint> free_joints_;

@@ -31,7 +31,7 @@ class ReducedImpact {
   void updateGap(Cluster& c, const ClusterNode& node, const ClusterBasis& next);
   void linearizeFreeJoint(const NodeAssembly::FreeJoint& free, StageModel& out) const;
 
-  const Model& model_;
+  Model model_;
   const Reduction& reduction_;
   std::vector<Cluster> clusters_;
   MatrixXd D_y_, D_v_;  // size x nv, transposes of D_q N + D_v Z and D_v N

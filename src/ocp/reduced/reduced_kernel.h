@@ -238,7 +238,7 @@ class ReducedKernel {
   void updateGap(size_t cluster, const LinearizeItem* items, int count);
   void linearizeStateCosts(const LinearizeItem* items, int count, std::vector<LaneView>& views);
 
-  const Model& model_;
+  Model model_;
   const Reduction& reduction_;
   const ReducedLayout& layout_;
   WorkspaceOf<Lanes> ws_;

@@ -79,7 +79,7 @@ class ReducedTranscription : public Transcription {
   void finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const;
   void finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const;
 
-  const Model& model_;
+  Model model_;
   const NodeList nodes_;
   const std::vector<StageSpec>& specs_;
   const Reduction reduction_;

@@ -48,7 +48,7 @@ class ReducedStateCost {
   void differentiateCluster(const ReducedCluster& loop, const ClusterMotionOf<Lanes>& motion, Cluster& cluster,
                             Lanes* hessian);
 
-  const Model& model_;
+  Model model_;
   const Reduction& reduction_;
   VectorX<Lanes> gradient_q_, gradient_v_;  // nv, J_d^T W_q d and W_v e
   std::vector<Cluster> clusters_;
