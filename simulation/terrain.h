@@ -2,7 +2,7 @@
 /// \file The ground of a world: quick heights and normals, and grounds that no motion was planned for.
 #include <vector>
 
-#include "bielle/ocp/contact_schedule.h"
+#include "bielle/dynamics/ground.h"
 
 namespace bielle::simulation {
 

@@ -7,7 +7,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/ocp/cost.h"
-#include "bielle/ocp/ground_distance.h"
+#include "bielle/dynamics/ground.h"
 #include "check_derivative.h"
 #include "math/so3.h"
 #include "ocp/ground_forces.h"

@@ -1,7 +1,7 @@
 // Rows of the shapes of bodies: legs from each other, other bodies from each other, and all but feet from the ground.
 #include <set>
 
-#include "bielle/ocp/ground_distance.h"
+#include "bielle/dynamics/ground.h"
 #include "check_rows.h"
 
 namespace bielle::validation {

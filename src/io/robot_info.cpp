@@ -11,7 +11,7 @@
 #include "bielle/dynamics/transmission.h"
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
-#include "bielle/ocp/ground_distance.h"
+#include "bielle/dynamics/ground.h"
 #include "dynamics/point_spring.h"
 #include "io/json_text.h"
 #include "model/frame_name.h"

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "bielle/dynamics/ground.h"
 #include "bielle/model/model.h"
 #include "bielle/ocp/contact_schedule.h"
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bielle/dynamics/ground.h"
 #include "bielle/model/options.h"
 #include "bielle/motion/goal.h"
 #include "bielle/motion/limits.h"

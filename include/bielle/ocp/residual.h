@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/ground.h"
 #include "bielle/dynamics/transmission.h"
-#include "bielle/ocp/contact_schedule.h"
 
 namespace bielle {
 

@@ -1,4 +1,4 @@
-#include "bielle/ocp/ground_distance.h"
+#include "bielle/dynamics/ground.h"
 
 #include "dynamics/cell.h"
 
