@@ -96,6 +96,32 @@ TEST_CASE("policy: its gains are those of the solver's last sweep") {
   }
 }
 
+TEST_CASE("policy: its gains on states whose loops are open are those on the difference that the solver sees") {
+  SolvedSquat& squat = getSquat();
+  const Model& model = squat.robot.model;
+  const int nq = model.nq(), nv = model.nv();
+  const Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  NodeEvaluator evaluator(*squat.motion.problem);
+  constexpr int kNode = 40;
+  const VectorXd& x = squat.motion.guess.xs[kNode];
+  evaluator.evaluate(kNode, x, squat.motion.guess.us[kNode]);
+  const RowMatrixXd& K = squat.solver->getSweep().getNodes()[kNode].K;
+  RowMatrixXd gains = policy.getStages()[kNode].K, differences(model.nu(), 2 * nv);
+  constexpr double kStep = 0.01;  // along one coordinate the difference is linear
+  for (int i = 0; i < 2 * nv; ++i) {
+    VectorXd moved = x;
+    if (i < nv)
+      model.integrate(x.head(nq), kStep * VectorXd::Unit(nv, i), moved.head(nq));
+    else
+      moved[nq + i - nv] += kStep;
+    differences.col(i) = K * evaluator.difference(moved) / kStep;
+  }
+  const double scale = differences.cwiseAbs().maxCoeff();
+  CHECK((gains - differences).cwiseAbs().maxCoeff() < 1e-11 * scale);
+  gains(3, nv - 2) += 1e-9 * scale;
+  CHECK_FALSE((gains - differences).cwiseAbs().maxCoeff() < 1e-11 * scale);
+}
+
 TEST_CASE("policy: gains that look ahead are those of an earlier stage of their phase") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;

@@ -10,17 +10,13 @@
 namespace bielle {
 namespace {
 
-// A clock that sums up its steps may be this much early; without it, stages would begin one instant of control late.
-constexpr double kPerturbation = 0.01;  // of Eq. (2); differences are linear in it but for rounding
-
 double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.duration; }
 
 std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajectory& trajectory,
                                       const LqSweep* sweep) {
   const RobotProblem& problem = *motion.problem;
   if (problem.hasFreeTimings()) throw std::invalid_argument("makePolicy: the motion has free durations");
-  const Model& model = problem.model();
-  NodeEvaluator evaluator(problem);
+  RobotEvaluator evaluator(problem);
   std::vector<Policy::Stage> stages;
   double time = 0;
   int node = 0, phase_index = 0;
@@ -32,10 +28,8 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
       Policy::Stage stage;
       fillStage(problem, node, time, x, trajectory.us[node], next, stage);
       stage.phase = phase_index;
-      if (sweep) {
-        evaluator.evaluate(node, x, trajectory.us[node]);
-        calcGains(model, evaluator, sweep->getNodes()[node].K, stage.K);
-      }
+      if (sweep)
+        problem.mapGains(evaluator.evaluate(node, x, trajectory.us[node]), sweep->getNodes()[node].K, stage.K);
       stages.push_back(std::move(stage));
       time += spec.dt;
     }
@@ -65,24 +59,6 @@ void fillStage(const RobotProblem& problem, int node, double start, const Vector
   model.difference(stage.q, x_next.head(model.nq()), stage.q_change);
   stage.v_next = x_next.segment(model.nq(), model.nv());
   stage.u = u.head(model.nu());
-}
-
-void calcGains(const Model& model, NodeEvaluator& evaluator, const RowMatrixXd& K, RowMatrixXd& gains) {
-  const int nq = model.nq(), nv = model.nv();
-  const VectorXd x = evaluator.evaluation().x;
-  MatrixXd map(K.cols(), 2 * nv);
-  VectorXd moved = x, step = VectorXd::Zero(nv);
-  for (int i = 0; i < nv; ++i) {
-    step.setZero();
-    step[i] = kPerturbation;
-    moved = x;
-    model.integrate(x.head(nq), step, moved.head(nq));
-    map.col(i) = evaluator.difference(moved) / kPerturbation;
-    moved = x;
-    moved[nq + i] += kPerturbation;
-    map.col(nv + i) = evaluator.difference(moved) / kPerturbation;
-  }
-  gains.noalias() = K * map;
 }
 
 Policy::Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_hold)

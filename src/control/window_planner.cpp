@@ -310,8 +310,8 @@ void WindowPlanner::makePolicy(const Fddp& solver, int stage, Solution& solution
     if (earlier) {
       out.K = *earlier;
     } else {
-      evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]);
-      calcGains(model_, evaluator_, solver.getSweep().getNodes()[node].K, out.K);
+      problem_.mapGains(evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]),
+                        solver.getSweep().getNodes()[node].K, out.K);
       if (out.phase == solution.stages.front().phase) keepGains(out.phase, out.K);
     }
     solution.u_hold = out.u;

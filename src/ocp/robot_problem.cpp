@@ -272,6 +272,10 @@ void RobotProblem::difference(const DifferenceTask* tasks, int count, ProblemScr
     if (places_[task->node].in_state) (*task->dx)[0] = (*task->x1)[last] - task->at->x[last];
 }
 
+void RobotProblem::mapGains(const RobotEvaluation& at, const RowMatrixXd& K, RowMatrixXd& gains) const {
+  transcription_->mapGains(at, K, gains);
+}
+
 void RobotProblem::getControlBounds(int stage, VectorRef lower, VectorRef upper) const {
   const VectorXd& limits = specs_[stage].effort_limits;
   for (int m = 0; m < model_.nu(); ++m) {

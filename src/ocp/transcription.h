@@ -30,6 +30,8 @@ class Transcription {
   virtual void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const = 0;
   virtual void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const = 0;
   virtual void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const = 0;
+  // RobotProblem's Eq. (7).
+  virtual void mapGains(const RobotEvaluation& at, const RowMatrixXd& K, RowMatrixXd& gains) const = 0;
 };
 
 // The nodes of a problem. They outlive the transcription.

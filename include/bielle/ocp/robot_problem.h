@@ -146,6 +146,12 @@ class RobotProblem : public ShootingProblem {
   void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override;
   void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override;
   int getBatchSize() const override;
+  /// Gains on deviations of a robot whose loops need not be closed, from gains K on the tangent space at the state x_k of an
+  /// evaluation,
+  ///     K d(x (-) x_k)/d(dq, dv) at x = x_k,                                                                        (7)
+  /// which projects such a state on the closed ones in the reduced formulation.
+  /// \param K  rows x tangent size   \param gains  rows x 2 nv; nothing is allocated if it has that size
+  void mapGains(const RobotEvaluation& at, const RowMatrixXd& K, RowMatrixXd& gains) const;
 
   const Model& model() const { return model_; }
   Formulation formulation() const { return formulation_; }

@@ -73,6 +73,9 @@ class FullTranscription : public Transcription {
   void difference(const DifferenceTask* tasks, int count, ProblemScratch*) const override {
     for (int i = 0; i < count; ++i) calcDifference(tasks[i].at->x, *tasks[i].x1, tasks[i].dx->tail(2 * model_.nv()));
   }
+  void mapGains(const RobotEvaluation&, const RowMatrixXd& K, RowMatrixXd& gains) const override {
+    gains = K.rightCols(2 * model_.nv());
+  }
 
  private:
   bool isRunning(int node) const { return node + 1 < static_cast<int>(specs_.size()); }

@@ -70,6 +70,7 @@ class ReducedTranscription : public Transcription {
   void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override {
     static_cast<ReducedScratch*>(scratch)->kernel.difference(tasks, count);
   }
+  void mapGains(const RobotEvaluation& at, const RowMatrixXd& K, RowMatrixXd& gains) const override;
 
  private:
   bool isRunning(int node) const { return node + 1 < static_cast<int>(specs_.size()); }
@@ -115,6 +116,29 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
     const ReducedKernel::StepItem& item = states.items[l];
     if (isImpact(item.node) && item.at->status == StepStatus::Ok) scratch.impact.update(item);
     finishEvaluation(item.node, scratch.views[l], *item.at);
+  }
+}
+
+// The differences of ReducedKernel are linear where they vanish: those of free joints are the identity there, dy = (W N)^T dq of
+// a cluster.
+void ReducedTranscription::mapGains(const RobotEvaluation& at, const RowMatrixXd& K, RowMatrixXd& gains) const {
+  const auto& node = static_cast<const ReducedEvaluation&>(at);
+  const int nv = model_.nv(), nr = reduction_.size;
+  gains.resize(K.rows(), 2 * nv);
+  for (int half = 0; half < 2; ++half) {  // of positions, then of velocities
+    const auto reduced = K.middleCols(K.cols() - 2 * nr + half * nr, nr);
+    auto whole = gains.middleCols(half * nv, nv);
+    for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+      const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+      whole.middleCols(joint.idx_v, joint.nv) = reduced.middleCols(reduction_.free_offsets[i], joint.nv);
+    }
+    for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
+      const ReducedCluster& cluster = reduction_.clusters[i];
+      const MatrixXd& WN = node.clusters[i].at.WN;
+      for (size_t k = 0; k < cluster.dofs.size(); ++k)
+        whole.col(cluster.dofs[k]) =
+            reduced.middleCols(cluster.offset, cluster.size).lazyProduct(WN.row(static_cast<int>(k)).transpose());
+    }
   }
 }
 
