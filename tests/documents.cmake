@@ -1,6 +1,6 @@
 # Runs every command of the pages as a reader would and compares its output.
-set(pages tutorial modelling springs signs new_robot formats motions objectives constraints linkages checks execution speed
-  design_reference)
+set(pages tutorial tutorial_walker modelling springs signs new_robot formats motions objectives constraints linkages checks
+  execution speed design_reference)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()
