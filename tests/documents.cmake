@@ -1,11 +1,11 @@
 # Runs every command of the pages as a reader would and compares its output.
 set(pages tutorial tutorial_walker modelling springs signs new_robot formats motions objectives constraints linkages checks
-  execution speed design_reference)
+  execution speed design design_reference)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()
 if(PAGMO_LIBRARY AND PAGMO_INCLUDE_DIR)
-  list(APPEND pages design)
+  list(APPEND pages design_fronts)
 endif()
 if(TARGET bielle-workers)
   list(APPEND pages workers)
