@@ -115,7 +115,7 @@ def main():
         if page == "README.md":
             shutil.rmtree(sys.argv[4], ignore_errors=True)
             os.makedirs(sys.argv[4])
-    run, printed = 0, ""
+    checked, printed = 0, ""
     with tempfile.TemporaryDirectory() as directory:
         for language, text, line in read_blocks(os.path.join(source, page)):
             place = f"{page}:{line}"
@@ -124,15 +124,17 @@ def main():
                 result = subprocess.run(["bash", "-euo", "pipefail", "-c", prelude + text], cwd=directory, env=environment,
                                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
                 assert result.returncode == 0, f"{place}: status {result.returncode}\n{text}\n{result.stdout}"
-                printed, run = result.stdout, run + 1
+                printed, checked = result.stdout, checked + 1
                 print(f"{place}: {time.time() - begin:.1f} s")
             elif language == "text":
                 check_output(text, printed, place)
             elif language == "bash":
                 check_by_hand(text, source, place)
+                checked += 1
             elif language == "cpp" and page != "README.md":
                 check_program(text, source, place)
-    assert run, f"{page} has no command that is run"
+                checked += 1
+    assert checked, f"{page} has no block that is checked"
 
 
 main()
