@@ -53,9 +53,9 @@ int main(int argc, char** argv) {
 
   FddpObserver observer;
   observer.callback = makeFddpPrinter(std::cout);
-  ShootingTrajectory trajectory = motion.guess;
-  const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
+  const FddpResult solved = solve(*motion.problem, motion.guess, {}, observer);
+  const FddpSummary& summary = solved.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
   printMotion(result, options);
 
   std::printf("\n%s after %d iterations and %.2f s, cost %.6f\n", getName(summary.termination), summary.iterations,

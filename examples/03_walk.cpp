@@ -79,11 +79,11 @@ int main(int argc, char** argv) {
 
   FddpObserver observer;
   observer.callback = makeFddpPrinter(std::cout);
-  ShootingTrajectory trajectory = motion.guess;
-  const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
+  const FddpResult solved = solve(*motion.problem, motion.guess, {}, observer);
+  const FddpSummary& summary = solved.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
 
-  const double worst = printFootholds(motion, trajectory);
+  const double worst = printFootholds(motion, solved.trajectory);
   const int steps = static_cast<int>(options.steps);
   if (steps >= 5)  // the first two and the last two are not steady
     std::printf("\n%.4f m/s requested, %.4f m/s walked\n", options.speed,

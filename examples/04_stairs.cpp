@@ -81,9 +81,9 @@ int main(int argc, char** argv) {
   for (double height : heights) {
     options.height = height;
     Motion motion = makeStairs(robot.model, options);
-    ShootingTrajectory trajectory = motion.guess;
-    const FddpSummary summary = Fddp().solve(*motion.problem, trajectory);
-    const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
+    const FddpResult solved = solve(*motion.problem, motion.guess);
+    const FddpSummary& summary = solved.summary;
+    const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
     const double duration = options.stairs * options.depth / options.speed;
     const Power power = calcMeanPower(robot.model, result.record, duration);
     std::printf("%9.3f %-10s %10d %9.2f %14.2f %10.2f %11.2f %11.2f %11.2f\n", height, getName(summary.termination),

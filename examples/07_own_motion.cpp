@@ -109,10 +109,9 @@ int main(int argc, char** argv) {
   const LoadedRobot robot = loadRobot("bipetto");
   const SwayOptions options;
   Motion motion = makeSway(robot.model, options);
-  ShootingTrajectory trajectory = motion.guess;
-  const FddpSummary summary = Fddp().solve(*motion.problem, trajectory);
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
-  std::printf("%s after %d iterations\n", getName(summary.termination), summary.iterations);
+  const FddpResult solved = solve(*motion.problem, motion.guess);
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, solved.summary);
+  std::printf("%s after %d iterations\n", getName(solved.summary.termination), solved.summary.iterations);
   writeResult(argc > 1 ? argv[1] : "sway", result);
 
   const auto path = result.record.com.col(1);

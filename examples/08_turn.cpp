@@ -78,11 +78,11 @@ int main(int argc, char** argv) {
   Motion motion = makeMotion(robot.model, argc, argv);
   FddpObserver observer;
   observer.callback = makeFddpPrinter(std::cout);
-  ShootingTrajectory trajectory = motion.guess;
-  const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
+  const FddpResult solved = solve(*motion.problem, motion.guess, {}, observer);
+  const FddpSummary& summary = solved.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
 
-  printLandings(motion, trajectory);
+  printLandings(motion, solved.trajectory);
   std::printf("\n%s after %d iterations and %.2f s, slip %.2f mm\n", getName(summary.termination), summary.iterations,
               summary.seconds, 1e3 * result.slip_position);
   for (const std::string& path : writeResult(argc > 1 ? argv[1] : "turn", result)) std::printf("%s\n", path.c_str());

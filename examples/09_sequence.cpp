@@ -45,11 +45,12 @@ int main(int argc, char** argv) {
                 summary.iterations, summary.cost);
     alone += summary.cost;
   };
-  ShootingTrajectory trajectory = solveParts(robot.model, parts, makeStandingPosture(robot.model), apart);
+  ShootingTrajectory guess = solveParts(robot.model, parts, makeStandingPosture(robot.model), apart);
   FddpObserver observer;
   observer.callback = makeFddpPrinter(std::cout);
-  const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
+  const FddpResult solved = solve(*motion.problem, std::move(guess), {}, observer);
+  const FddpSummary& summary = solved.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
 
   std::printf("\n%s after %d iterations and %.2f s: cost %.5f, one by one %.5f\n", getName(summary.termination),
               summary.iterations, summary.seconds, summary.cost, alone);

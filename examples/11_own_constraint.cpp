@@ -38,15 +38,16 @@ Squat solve(const Model& model, double x_max) {
   Motion motion = makeMotion(model, std::move(plan), {});
   FddpOptions options;
   options.gradient_tolerance = 1e-12;
-  Fddp solver(options);
+  const FddpResult solved = bielle::solve(*motion.problem, motion.guess, options);
+  const ShootingTrajectory& trajectory = solved.trajectory;
+  const std::vector<VectorXd>& multipliers = solved.multipliers.values;
   Squat out;
-  out.summary = solver.solve(*motion.problem, motion.guess);
-  const std::vector<VectorXd> multipliers = solver.getMultipliers().values;
+  out.summary = solved.summary;
   RobotEvaluator evaluator(*motion.problem);
-  for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
-    const VectorXd u = k < motion.guess.us.size() ? motion.guess.us[k] : VectorXd();
+  for (size_t k = 0; k < trajectory.xs.size(); ++k) {
+    const VectorXd u = k < trajectory.us.size() ? trajectory.us[k] : VectorXd();
     const int node = static_cast<int>(k);
-    const VectorXd& c = evaluator.evaluate(node, motion.guess.xs[k], u).constraints;
+    const VectorXd& c = evaluator.evaluate(node, trajectory.xs[k], u).constraints;
     for (int row = 0; row < c.size(); ++row) {
       const std::string name = motion.problem->getConstraintName(node, row);
       if (name != "knee of shin_left, row 0" && name != "knee of shin_right, row 0") continue;  // x of a knee

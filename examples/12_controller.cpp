@@ -74,24 +74,23 @@ int main() {
   const Model& model = robot.model;
   WalkOptions options;
   options.speed = 0.4;
-  Motion motion = makeWalk(model, options, {});
+  const Motion motion = makeWalk(model, options, {});
   FddpOptions solver_options;
   solver_options.initial_regularization = kGuessRegularization;
-  solver_options.bounds = ControlBounds::Enforce;
-  Fddp solver(solver_options);
-  if (solver.solve(*motion.problem, motion.guess).termination != FddpTermination::Converged) return 1;
-  Policy gains = makePolicy(motion, motion.guess, solver);
-  MotorFeedback stiff(makePolicy(motion, motion.guess));
+  const FddpResult solved = solve(*motion.problem, motion.guess, solver_options);
+  if (solved.summary.termination != FddpTermination::Converged) return 1;
+  Policy gains = makePolicy(motion, solved.trajectory, solved.gains);
+  MotorFeedback stiff(makePolicy(motion, solved.trajectory));
 
   options.gait.foothold_room = 0.4;  // a foot may land elsewhere
   options.gait.cone_margin = 0.2;    // wrenches leave room for feedback
   options.gait.contact_kp = 0;       // and stands where it landed
   const PredictiveOptions predictive;
   PredictiveController controller(
-      makePredictiveMotion(model, planWalk(model, options, makeStandingPosture(model)), {}, predictive), motion.guess,
-      predictive);
+      makePredictiveMotion(model, planWalk(model, options, makeStandingPosture(model)), {}, predictive),
+      solved.trajectory, predictive);
 
-  const double start = motion.guess.xs[0][2];
+  const double start = solved.trajectory.xs[0][2];
   const double with_gains = run(model, gains, gains), with_stiff = run(model, gains, stiff),
                with_prediction = run(model, gains, controller);
   std::printf(

@@ -63,30 +63,33 @@ LoadedRobot loadRobotOf(const MotionSummary& summary) {
   return loadRobot(std::filesystem::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot);
 }
 
-FddpSummary solveUnlessInterrupted(Fddp& solver, Motion& motion) {
+FddpResult solveUnlessInterrupted(const FddpOptions& options, Motion& motion) {
   FddpObserver observer;
   observer.interrupt = &isInterrupted();
-  const FddpSummary summary = solver.solve(*motion.problem, motion.guess, observer);
+  FddpResult out = solve(*motion.problem, motion.guess, options, observer);
+  motion.guess = out.trajectory;
   requireNoInterrupt();
-  return summary;
+  return out;
 }
 
 void solveFromRest(FddpOptions options, Motion& motion) {
   options.initial_regularization = kGuessRegularization;
-  Fddp solver(options);
-  solveUnlessInterrupted(solver, motion);
+  solveUnlessInterrupted(options, motion);
 }
 
-// A motion, and the solver whose last sweep is about its solution. \returns iterations
-int solveForGains(const std::string& source, Fddp& solver, Motion& motion) {
-  const FddpSummary solved = solveUnlessInterrupted(solver, motion);
+// A motion, and the gains of a sweep about its solution.
+std::vector<Gains> solveForGains(const std::string& source, const FddpOptions& options, Motion& motion,
+                                 int& iterations) {
+  FddpResult result = solveUnlessInterrupted(options, motion);
+  const FddpSummary& solved = result.summary;
   if (solved.termination != FddpTermination::Converged)
     throw ModelError(source, "motion '" + motion.name + "'",
                      std::string("the solve for its gains ended as: ") + getName(solved.termination),
                      "give a motion that converges, or --control open");
   // The sweep is about the trajectory unless the last iteration still took a step.
-  if (!solved.log.empty() && solved.log.back().step > 0) solveUnlessInterrupted(solver, motion);
-  return solved.iterations;
+  iterations = solved.iterations;
+  const bool is_about = solved.log.empty() || solved.log.back().step == 0;
+  return is_about ? std::move(result.gains) : solveUnlessInterrupted(options, motion).gains;
 }
 
 void checkControl(const MotionSummary& summary, PlanControl control) {
@@ -102,12 +105,10 @@ void checkControl(const MotionSummary& summary, PlanControl control) {
 Policy solvePolicy(const std::string& source, bool from_rest, PlanControl control, Motion& motion, int& iterations) {
   FddpOptions options;
   options.max_iterations = kMaxIterations;
-  if (motion.bounded) options.bounds = ControlBounds::Enforce;
   // From the solution penalties stay small, and gains with them.
   if (from_rest) solveFromRest(options, motion);
-  Fddp solver(options);
-  iterations = solveForGains(source, solver, motion);
-  return control == PlanControl::Gains ? makePolicy(motion, motion.guess, solver) : makePolicy(motion, motion.guess);
+  const std::vector<Gains> gains = solveForGains(source, options, motion, iterations);
+  return control == PlanControl::Gains ? makePolicy(motion, motion.guess, gains) : makePolicy(motion, motion.guess);
 }
 
 // A plan with robot and summary, from its request. `guess`: directory of a solution, or empty.

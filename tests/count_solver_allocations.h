@@ -2,8 +2,8 @@
 // Allocations up to the end of each iteration of a solve. Include as count_allocations.h, in its place.
 #include <vector>
 
-#include "bielle/solve/fddp.h"
 #include "count_allocations.h"
+#include "solve_in_place.h"
 
 namespace bielle::test {
 
@@ -12,11 +12,11 @@ inline std::vector<long> countAllocations(const FddpOptions& options, const Shoo
   std::vector<long> counts;
   counts.reserve(1000);
   FddpObserver observer;
-  observer.callback = [&](const FddpIteration&) {
+  observer.callback = [&](const FddpIteration&, const ShootingTrajectory&) {
     counts.push_back(num_allocations);
     return FddpAction::Continue;
   };
-  Fddp(options).solve(problem, trajectory, observer);
+  solveInPlace(problem, trajectory, options, observer);
   return counts;
 }
 

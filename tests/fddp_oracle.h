@@ -3,7 +3,7 @@
 // along its own rollouts by central differences.
 #include <catch2/catch.hpp>
 
-#include "bielle/solve/fddp.h"
+#include "solve_in_place.h"
 #include "solve_problems.h"
 
 namespace bielle::test {

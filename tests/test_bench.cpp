@@ -7,6 +7,7 @@
 #include "bielle/model/error.h"
 #include "own_robots.h"
 #include "solve/window.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -96,9 +97,9 @@ TEST_CASE("bench: a window over all of a problem is that problem") {
     options.max_iterations = 3;
     Motion motion = makeBenchmarkWalk(model, makeShortBenchmark(), formulation);
     ShootingTrajectory whole = motion.guess, seen = motion.guess;
-    const FddpSummary expected = Fddp(options).solve(*motion.problem, whole);
+    const FddpSummary expected = test::solveInPlace(*motion.problem, whole, options);
     Window window(*motion.problem, motion.problem->numStages());
-    const FddpSummary summary = Fddp(options).solve(window, seen);
+    const FddpSummary summary = test::solveInPlace(window, seen, options);
     CHECK(summary.cost == expected.cost);
     CHECK((seen.xs == whole.xs && seen.us == whole.us));
   }
@@ -106,7 +107,7 @@ TEST_CASE("bench: a window over all of a problem is that problem") {
 
 TEST_CASE("bench: a horizon that cannot recede is refused") {
   const Model model = loadOwn("bipetto").model;
-  RecedingOptions options;
+  ShiftOptions options;
   options.walk = makeShortBenchmark();
   options.nodes = 24;
   CHECK_THROWS_AS(runRecedingHorizon(model, Formulation::Reduced, options), std::invalid_argument);

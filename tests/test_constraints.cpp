@@ -80,18 +80,18 @@ Conditions calcConditions(const ShootingProblem& problem, const ShootingTrajecto
 
 TEST_CASE("constraints: a cart catches its pole within bounds, and the conditions of an optimum hold") {
   auto problem = makeBoundedCartPole();
-  ShootingTrajectory t = makeGuess(problem);
   FddpOptions options;
   options.gradient_tolerance = 1e-14;
-  Fddp solver(options);
-  const FddpSummary summary = solver.solve(problem, t);
+  const FddpResult result = solve(problem, makeGuess(problem), options);
+  const ShootingTrajectory& t = result.trajectory;
+  const FddpSummary& summary = result.summary;
   CAPTURE(summary.message, summary.iterations, summary.violation, summary.penalty, summary.multiplier_updates);
   REQUIRE(summary.termination == FddpTermination::Converged);
   CHECK(summary.violation <= 1e-8);
   CHECK(summary.complementarity < 1e-5);
   CHECK(summary.multiplier > 0.1);
   CHECK(calcLargestGap(problem, t) < 1e-10);
-  std::vector<VectorXd> multipliers = solver.getMultipliers().values;
+  std::vector<VectorXd> multipliers = result.multipliers.values;
   const Conditions conditions = calcConditions(problem, t, multipliers);
   CHECK(conditions.gradient < 1e-4);
   CHECK(conditions.violation <= 1e-8);
@@ -103,7 +103,7 @@ TEST_CASE("constraints: a cart catches its pole within bounds, and the condition
   auto free = problem;
   free.rows.erase(free.rows.begin(), free.rows.begin() + 2);
   ShootingTrajectory wide = makeGuess(free);
-  REQUIRE(Fddp().solve(free, wide).termination == FddpTermination::Converged);
+  REQUIRE(solveInPlace(free, wide).termination == FddpTermination::Converged);
   double tip = 0, push = 0;
   for (const VectorXd& x : wide.xs) tip = std::max(tip, x[0] + 0.5 * std::sin(x[1]));
   for (size_t k = 0; k < wide.us.size(); ++k) push = std::min(push, wide.us[k][0] - wide.xs[k][2]);
@@ -121,9 +121,9 @@ TEST_CASE("constraints: a quadratic program has the solution of its dense condit
   problem.rows.push_back({"speed", 1, N, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
   problem.rows.push_back({"end", N, N, 0.25, 0.25, [](const Complex* x, const Complex*) { return x[0]; }});
   problem.rows.push_back({"mix", 3, 9, -kFree, 0.8, [](const Complex* x, const Complex* u) { return u[1] - x[2]; }});
-  ShootingTrajectory t = makeGuess(problem);
-  Fddp solver(makeTightOptions());
-  const FddpSummary summary = solver.solve(problem, t);
+  const FddpResult result = solve(problem, makeGuess(problem), makeTightOptions());
+  const ShootingTrajectory& t = result.trajectory;
+  const FddpSummary& summary = result.summary;
   CAPTURE(summary.message, summary.iterations);
   REQUIRE(summary.termination == FddpTermination::Converged);
 
@@ -134,7 +134,7 @@ TEST_CASE("constraints: a quadratic program has the solution of its dense condit
     for (int k = 0; k < N; ++k) us.push_back(all.segment(2 * k, 2));
     return us;
   };
-  const std::vector<VectorXd> multipliers = solver.getMultipliers().values;
+  const std::vector<VectorXd> multipliers = result.multipliers.values;
   std::vector<std::pair<int, int>> binding;
   VectorXd y_solver(0);
   for (int k = 0; k <= N; ++k)
@@ -192,14 +192,12 @@ TEST_CASE("constraints: with bounds on the control they hold together") {
   auto problem = makeBoundedCartPole();
   problem.rows.erase(problem.rows.begin() + 1);  // the push
   ShootingTrajectory unbounded = makeGuess(problem);
-  Fddp().solve(problem, unbounded);
+  solveInPlace(problem, unbounded);
   double most = 0;
   for (const VectorXd& u : unbounded.us) most = std::max(most, std::abs(u[0]));
   problem.bound = 0.8 * most;
-  FddpOptions options;
-  options.bounds = ControlBounds::Enforce;
   ShootingTrajectory t = makeGuess(problem);
-  const FddpSummary summary = Fddp(options).solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t);
   CAPTURE(summary.message, summary.iterations, summary.violation, most);
   REQUIRE(summary.termination == FddpTermination::Converged);
   double largest = 0;
@@ -214,7 +212,7 @@ TEST_CASE("constraints that never bind change no bit of a solve") {
   Constrained<PlantProblem<CartPole>> loose(free);
   loose.rows.push_back({"track", 0, 100, -500, 500, [](const Complex* x, const Complex*) { return x[0]; }});
   ShootingTrajectory a = makeLine(free), b = a;
-  const FddpSummary of_free = Fddp().solve(free, a), of_loose = Fddp().solve(loose, b);
+  const FddpSummary of_free = solveInPlace(free, a), of_loose = solveInPlace(loose, b);
   CHECK(of_free.iterations == of_loose.iterations);
   CHECK(a.xs == b.xs);
   CHECK(a.us == b.us);
@@ -226,7 +224,7 @@ TEST_CASE("constraints that contradict each other are named, with what is left o
   problem.rows.erase(problem.rows.begin() + 1);  // the push
   problem.rows.push_back({"wall", 60, 60, kFarthest + 0.1, kFree, getTip});
   ShootingTrajectory t = makeGuess(problem);
-  const FddpSummary summary = Fddp().solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t);
   CAPTURE(summary.message, summary.iterations);
   const auto namesOne = [](const FddpSummary& of) {
     return of.message.find("tip at node 60") != std::string::npos ||
@@ -237,7 +235,7 @@ TEST_CASE("constraints that contradict each other are named, with what is left o
   FddpOptions few;  // a solve that is cut off before names them too
   few.max_iterations = summary.iterations - 1;
   ShootingTrajectory unfinished = makeGuess(problem);
-  const FddpSummary cut_off = Fddp(few).solve(problem, unfinished);
+  const FddpSummary cut_off = solveInPlace(problem, unfinished, few);
   CHECK(cut_off.termination == FddpTermination::MaxIterations);
   CHECK(namesOne(cut_off));
   // One of the two is violated by half of what lies between them at least. The sum of squares cannot be less, to first order.
@@ -284,7 +282,7 @@ TEST_CASE("where the cost creeps along curved constraints, it is accepted within
     options.max_iterations = 100;
     options.acceptable_decrease = acceptable_decrease;
     options.constraints.initial_penalty = 10;
-    const FddpSummary summary = Fddp(options).solve(problem, t);
+    const FddpSummary summary = solveInPlace(problem, t, options);
     const std::vector<VectorXd> c = calcConstraints(problem, t.us);
     if (summary.termination == FddpTermination::Converged) CHECK(std::abs(c[1][0]) <= options.constraints.tolerance);
     CHECK(summary.cost == Approx(calcCost(problem, t.us)).epsilon(1e-9));
@@ -332,5 +330,5 @@ TEST_CASE("bounds of constraints that exclude each other are refused") {
   auto problem = makeBoundedCartPole();
   problem.rows[0].lower = kFarthest + 1;
   ShootingTrajectory t = makeGuess(problem);
-  CHECK_THROWS_WITH(Fddp().solve(problem, t), Catch::Contains("node 1"));
+  CHECK_THROWS_WITH(solveInPlace(problem, t), Catch::Contains("node 1"));
 }

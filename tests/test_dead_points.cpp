@@ -11,6 +11,7 @@
 #include "bielle/solve/fddp.h"
 #include "math/constants.h"
 #include "problem_probe.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 
@@ -132,7 +133,7 @@ TEST_CASE("dead points of the rocker: the crank drives through a whole turn") {
   task.way_weight = 10;
   RobotProblem problem = makeProblem(chain, task);
   ShootingTrajectory trajectory = makeGuess(problem);
-  const FddpSummary summary = Fddp().solve(problem, trajectory);
+  const FddpSummary summary = test::solveInPlace(problem, trajectory);
   CAPTURE(summary.message, summary.iterations, summary.cost);
   REQUIRE(summary.termination == FddpTermination::Converged);
   double lowest = 1e9, highest = -1e9;
@@ -195,7 +196,7 @@ TEST_CASE("dead points of the motor: an optimal motion goes through them") {
   testing::ProblemProbe probe(problem);
   for (int k = 0; k < task.stages; ++k)
     REQUIRE(probe.step(k, trajectory.xs[k], trajectory.us[k], trajectory.xs[k + 1], cost) == StepStatus::Ok);
-  const FddpSummary summary = Fddp().solve(problem, trajectory);
+  const FddpSummary summary = test::solveInPlace(problem, trajectory);
   CAPTURE(summary.message, summary.iterations, summary.cost);
   REQUIRE(summary.termination == FddpTermination::Converged);
   int turns_of_rocker = 0;
@@ -254,7 +255,7 @@ TEST_CASE("change point: the folded parallelogram is refused by name") {
   SECTION("a guess that contains it") {
     ShootingTrajectory trajectory = makeGuess(problem);
     trajectory.xs[4] = folded;
-    const FddpSummary summary = Fddp().solve(problem, trajectory);
+    const FddpSummary summary = test::solveInPlace(problem, trajectory);
     CHECK(summary.termination == FddpTermination::Failed);
     CHECK_THAT(summary.message, Catch::Contains("'loop1'") && Catch::Contains("rank") && Catch::Contains("node"));
     CHECK(isFinite(trajectory));
@@ -264,7 +265,7 @@ TEST_CASE("change point: the folded parallelogram is refused by name") {
                              Formulation::Reduced);
     ShootingTrajectory trajectory = makeGuess(from_folded);
     trajectory.us.assign(trajectory.us.size(), VectorXd::Constant(1, 5));
-    const FddpSummary summary = Fddp().solve(from_folded, trajectory);
+    const FddpSummary summary = test::solveInPlace(from_folded, trajectory);
     CAPTURE(summary.message);
     CHECK(summary.termination == FddpTermination::Failed);
     CHECK_THAT(summary.message, Catch::Contains("'loop1'"));

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <random>
 
+#include "bielle/solve/receding.h"
 #include "count_solver_allocations.h"
 #include "fddp_oracle.h"
 #include "solve/lq_sweep.h"
@@ -16,7 +17,7 @@ TEST_CASE("a linear-quadratic problem is solved by one full step from any guess"
   REQUIRE(calcLargestGap(problem, t) > 0.01);
   FddpOptions options;
   options.gradient_tolerance = 1e-14;
-  const FddpSummary summary = Fddp(options).solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t, options);
   checkOptimal(problem, summary, t);
   CHECK(summary.iterations == 1);
   REQUIRE(summary.log.size() == 2);
@@ -28,7 +29,7 @@ TEST_CASE("a pendulum swings up from feasible and infeasible guesses") {
   auto problem = makePendulum();
   for (const ShootingTrajectory& guess : {makeGuess(problem), makeLine(problem)}) {
     ShootingTrajectory t = guess;
-    checkOptimal(problem, Fddp(makeTightOptions()).solve(problem, t), t);
+    checkOptimal(problem, solveInPlace(problem, t, makeTightOptions()), t);
     CHECK((t.xs.back() - problem.goal).norm() < 0.05);
   }
 }
@@ -37,7 +38,7 @@ TEST_CASE("a cart-pole swings up from feasible and infeasible guesses") {
   auto problem = makeCartPole();
   for (const ShootingTrajectory& guess : {makeGuess(problem), makeLine(problem)}) {
     ShootingTrajectory t = guess;
-    checkOptimal(problem, Fddp(makeTightOptions()).solve(problem, t), t);
+    checkOptimal(problem, solveInPlace(problem, t, makeTightOptions()), t);
     CHECK((t.xs.back() - problem.goal).norm() < 0.05);
   }
 }
@@ -55,7 +56,7 @@ TEST_CASE("a body turns on SO(3), from a guess that jumps about") {
     problem.calcSum(x, dx, t.xs[k]);
   }
   REQUIRE(calcLargestGap(problem, t) > 0.5);
-  checkOptimal(problem, Fddp(makeTightOptions()).solve(problem, t), t);
+  checkOptimal(problem, solveInPlace(problem, t, makeTightOptions()), t);
 }
 
 TEST_CASE("the gaps contract by 1 - alpha, and the log tells so") {
@@ -64,7 +65,7 @@ TEST_CASE("the gaps contract by 1 - alpha, and the log tells so") {
   FddpOptions options;
   options.max_iterations = 3;
   const double before = calcLargestGap(problem, t);
-  const FddpSummary summary = Fddp(options).solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t, options);
   CHECK(summary.termination == FddpTermination::MaxIterations);
   REQUIRE(summary.log.size() == 3);
   double expected = before;
@@ -77,13 +78,12 @@ TEST_CASE("the gaps contract by 1 - alpha, and the log tells so") {
   CHECK(calcLargestGap(problem, t) == Approx(expected).epsilon(1e-9));
 }
 
-TEST_CASE("enforced bounds hold, and the controls on them press outwards") {
+TEST_CASE("bounds hold, and the controls on them press outwards") {
   const auto check = [](auto problem, const ShootingTrajectory& guess) {
     ShootingTrajectory t = guess;
     FddpOptions options = makeTightOptions();
     options.gradient_tolerance = 1e-14;
-    options.bounds = ControlBounds::Enforce;
-    const FddpSummary summary = Fddp(options).solve(problem, t);
+    const FddpSummary summary = solveInPlace(problem, t, options);
     CAPTURE(summary.message, summary.iterations);
     CHECK(summary.termination == FddpTermination::Converged);
     CHECK(calcLargestGap(problem, t) < 1e-10);
@@ -110,16 +110,23 @@ TEST_CASE("enforced bounds hold, and the controls on them press outwards") {
   check(cart_pole, makeGuess(cart_pole));
 }
 
-TEST_CASE("enforced bounds that are infinite change nothing but rounding") {
+TEST_CASE("bounds that are far away, or infinite beside them, change nothing but rounding") {
+  struct FarBounds : TurningBody {
+    void getControlBounds(int, VectorRef lower, VectorRef upper) const override {
+      lower << -1e6, -std::numeric_limits<double>::infinity(), -1e6;
+      upper << std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), 1e6;
+    }
+  } bounded;
   TurningBody problem;
   problem.goal << 0.6, 0.4, -0.3, 0.2;
   problem.goal.normalize();
   ShootingTrajectory free = makeGuess(problem), boxed = free;
   FddpOptions options;
   options.gradient_tolerance = 1e-16;
-  const FddpSummary first = Fddp(options).solve(problem, free);
-  options.bounds = ControlBounds::Enforce;
-  const FddpSummary second = Fddp(options).solve(problem, boxed);
+  bounded.goal = problem.goal;
+  CHECK(bounded.hasControlBounds());
+  CHECK_FALSE(problem.hasControlBounds());
+  const FddpSummary first = solveInPlace(problem, free, options), second = solveInPlace(bounded, boxed, options);
   CHECK(first.iterations == second.iterations);
   CHECK(first.cost == Approx(second.cost).epsilon(1e-12));
   for (size_t k = 0; k < free.us.size(); ++k) CHECK((free.us[k] - boxed.us[k]).norm() < 1e-6);
@@ -147,7 +154,7 @@ TEST_CASE("a decrease that rounding hides ends a solve as converged, and a large
     CAPTURE(error);
     problem.error = error;
     ShootingTrajectory t = makeGuess(problem);
-    const FddpSummary summary = Fddp(options).solve(problem, t);
+    const FddpSummary summary = solveInPlace(problem, t, options);
     const bool hidden = error < 1e-12;
     CHECK((summary.termination == FddpTermination::Converged) == hidden);
     if (!hidden) continue;
@@ -163,9 +170,9 @@ TEST_CASE("the number of threads does not change one bit of the result") {
   ShootingTrajectory one = GENERATE(0, 1) ? makeLine(problem) : makeGuess(problem), two = one;
   FddpOptions options;
   options.threads = 1;
-  const FddpSummary first = Fddp(options).solve(problem, one);
+  const FddpSummary first = solveInPlace(problem, one, options);
   options.threads = 2;
-  const FddpSummary second = Fddp(options).solve(problem, two);
+  const FddpSummary second = solveInPlace(problem, two, options);
   CHECK(first.iterations == second.iterations);
   CHECK(first.cost == second.cost);
   CHECK(one.xs == two.xs);
@@ -179,12 +186,12 @@ TEST_CASE("a rollout in segments leads to the same optimum in about as many iter
     options.cost_tolerance = 0;
     options.rollout_segments = 1;
     ShootingTrajectory one = guess;
-    const FddpSummary whole = Fddp(options).solve(problem, one);
+    const FddpSummary whole = solveInPlace(problem, one, options);
     checkOptimal(problem, whole, one);
     for (const int segments : {2, 3, 5}) {
       options.rollout_segments = segments;
       ShootingTrajectory t = guess;
-      const FddpSummary summary = Fddp(options).solve(problem, t);
+      const FddpSummary summary = solveInPlace(problem, t, options);
       CAPTURE(segments, whole.iterations);
       checkOptimal(problem, summary, t);
       CHECK(summary.iterations <= whole.iterations + 2 + whole.iterations / 5);
@@ -222,12 +229,12 @@ TEST_CASE("the gaps that segments open are there, known, and closed by the last 
   ShootingTrajectory t = makeGuess(problem);
   std::vector<double> gaps;
   FddpObserver observer;
-  observer.callback = [&](const FddpIteration&) {
-    gaps.push_back(calcLargestGap(problem, t));
+  observer.callback = [&](const FddpIteration&, const ShootingTrajectory& iterate) {
+    gaps.push_back(calcLargestGap(problem, iterate));
     return FddpAction::Continue;
   };
   options.max_iterations = 4;
-  const FddpSummary summary = Fddp(options).solve(problem, t, observer);
+  const FddpSummary summary = solveInPlace(problem, t, options, observer);
   REQUIRE(summary.termination == FddpTermination::MaxIterations);
   double largest = 0;
   for (size_t i = 1; i < summary.log.size(); ++i) {
@@ -242,10 +249,10 @@ TEST_CASE("the gaps that segments open are there, known, and closed by the last 
 
   // Stopped in between, the summary tells the open gap: to first order about the old node states.
   ShootingTrajectory stopped = makeGuess(problem);
-  observer.callback = [&](const FddpIteration& line) {
+  observer.callback = [&](const FddpIteration& line, const ShootingTrajectory&) {
     return line.iteration == 2 ? FddpAction::Stop : FddpAction::Continue;
   };
-  const FddpSummary open = Fddp(options).solve(problem, stopped, observer);
+  const FddpSummary open = solveInPlace(problem, stopped, options, observer);
   const double actual = calcLargestGap(problem, stopped);
   REQUIRE(actual > 1e-6);
   CHECK(open.gap == Approx(actual).epsilon(0.3));
@@ -263,9 +270,9 @@ TEST_CASE("steps in segments that open ever wider gaps are given up for steps in
   problem.goal << -0.90931, 5.14581, -1.49833, -1.39276;
   FddpOptions options;
   ShootingTrajectory t = makeGuess(problem), whole = t;
-  const FddpSummary summary = Fddp(options).solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t, options);
   options.rollout_segments = 1;
-  const FddpSummary in_one_piece = Fddp(options).solve(problem, whole);
+  const FddpSummary in_one_piece = solveInPlace(problem, whole, options);
   CAPTURE(summary.iterations, in_one_piece.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   CHECK(summary.cost == Approx(in_one_piece.cost).epsilon(1e-9));
@@ -282,16 +289,17 @@ TEST_CASE("a short last step closes the gaps by a second rollout in segments, a 
   } problem;
   makeLongTurn(problem);
   FddpOptions options;
-  options.threads = GENERATE(1, 2);
-  options.gradient_tolerance = 1e-30;  // the end of the iterations is theirs
+  RecedingOptions receding;
+  options.threads = receding.threads = GENERATE(1, 2);
+  options.gradient_tolerance = receding.gradient_tolerance = 1e-30;  // the end of the iterations is theirs
   int short_steps = 0, long_steps = 0;
-  for (options.max_iterations = 2; options.max_iterations <= 9; ++options.max_iterations) {
-    CAPTURE(options.max_iterations);
-    const auto solve = [&](LastRollout last, double& gap) {
-      options.last_rollout = last;
+  for (int iterations = 2; iterations <= 9; ++iterations) {
+    CAPTURE(iterations);
+    options.max_iterations = receding.iterations = iterations;
+    const auto countSteps = [&](bool closes, double& gap) {
       ShootingTrajectory t = makeGuess(problem);
       problem.steps = 0;
-      const FddpSummary summary = Fddp(options).solve(problem, t);
+      const FddpSummary summary = closes ? solveInPlace(problem, t, options) : Receding(problem, receding).step(t);
       REQUIRE(summary.log.back().step == 1);
       const int steps = problem.steps;
       gap = calcLargestGap(problem, t);
@@ -299,7 +307,7 @@ TEST_CASE("a short last step closes the gaps by a second rollout in segments, a 
       return steps;
     };
     double open = 0, closed = 0;
-    const int steps = solve(LastRollout::Segments, open), more = solve(LastRollout::Closed, closed) - steps;
+    const int steps = countSteps(false, open), more = countSteps(true, closed) - steps;
     CHECK(closed <= options.gap_tolerance);
     if (open <= options.gap_tolerance) {
       CHECK(more == 0);
@@ -313,30 +321,34 @@ TEST_CASE("a short last step closes the gaps by a second rollout in segments, a 
   CHECK(long_steps > 0);
 }
 
-TEST_CASE("the seconds of linearization, sweeps and rollouts are parts of those of the solve on one thread") {
+TEST_CASE(
+    "the seconds of evaluations, linearization, sweeps and rollouts are parts of those of the solve on one thread") {
   auto problem = makeCartPole();
   FddpOptions options;
   options.threads = 1;
   ShootingTrajectory t = makeGuess(problem);
-  const FddpSummary summary = Fddp(options).solve(problem, t);
-  const double parts = summary.linearize_seconds + summary.sweep_seconds + summary.rollout_seconds;
-  CHECK(std::min({summary.linearize_seconds, summary.sweep_seconds, summary.rollout_seconds}) > 0);
+  const FddpSummary summary = solveInPlace(problem, t, options);
+  const double models = summary.evaluate_seconds + summary.linearize_seconds;
+  const double parts = models + summary.sweep_seconds + summary.rollout_seconds;
+  CHECK(std::min(
+            {summary.evaluate_seconds, summary.linearize_seconds, summary.sweep_seconds, summary.rollout_seconds}) > 0);
   CHECK(parts <= summary.seconds);
 }
 
-TEST_CASE("one solver serves problems of other sizes without remembering them") {
-  auto cart_pole = makeCartPole();
-  auto linear = makeLinear();
-  Fddp fddp;
-  std::vector<ShootingTrajectory> results;
-  for (int i = 0; i < 2; ++i) {
-    ShootingTrajectory t = makeLine(cart_pole), other = makeLine(linear);
-    CHECK(fddp.solve(cart_pole, t).termination == FddpTermination::Converged);
-    CHECK(fddp.solve(linear, other).termination == FddpTermination::Converged);
-    results.push_back(t);
+TEST_CASE("gains lead to the optimum from another start, which for a linear-quadratic problem they do exactly") {
+  auto problem = makeLinear();
+  const FddpResult at = solve(problem, makeGuess(problem));
+  REQUIRE(at.summary.log.back().step == 0);
+  REQUIRE(at.gains.size() == at.trajectory.us.size());
+  problem.start[1] += 1;
+  const FddpResult off = solve(problem, makeGuess(problem));
+  for (size_t k = 0; k < at.gains.size(); ++k) {
+    CHECK(at.gains[k].k.norm() < 1e-3);
+    const VectorXd expected = at.gains[k].K * (off.trajectory.xs[k] - at.trajectory.xs[k]);
+    const VectorXd found = off.trajectory.us[k] - at.trajectory.us[k];
+    CHECK((found - expected).norm() < 1e-4 * (1 + expected.norm()));
+    if (k == 0) CHECK((found - 1.001 * expected).norm() > 1e-4 * (1 + expected.norm()));
   }
-  CHECK(results[0].xs == results[1].xs);
-  CHECK(results[0].us == results[1].us);
 }
 
 TEST_CASE("an iteration after the first allocates nothing") {
@@ -344,13 +356,12 @@ TEST_CASE("an iteration after the first allocates nothing") {
   const VectorXd by_malloc(100);
   const std::vector<double> by_new(100);
   REQUIRE(num_allocations == before + 2);
-  const auto bounds = GENERATE(ControlBounds::Ignore, ControlBounds::Enforce);
+  const double bound = GENERATE(12.0, std::numeric_limits<double>::infinity());
   const int threads = GENERATE(1, 2);
   auto problem = makeCartPole();
-  problem.bound = 12;
+  problem.bound = bound;
   ShootingTrajectory t = makeLine(problem);
   FddpOptions options;
-  options.bounds = bounds;
   options.threads = threads;
   const std::vector<long> counts = countAllocations(options, problem, t);
   REQUIRE(counts.size() > 10);

@@ -3,26 +3,17 @@
 #include <catch2/catch.hpp>
 
 #include "batched_problem.h"
+#include "bielle/solve/receding.h"
 #include "count_solver_allocations.h"
 #include "fddp_oracle.h"
+#include "solve/fddp_solve.h"
 
 using namespace bielle;
 using namespace bielle::test;
 
 namespace {
 
-struct Result {
-  FddpSummary summary;
-  ShootingTrajectory trajectory;
-};
-
-Result solve(const ShootingProblem& problem, const ShootingTrajectory& guess, const FddpOptions& options) {
-  Result out{{}, guess};
-  out.summary = Fddp(options).solve(problem, out.trajectory);
-  return out;
-}
-
-bool isSame(const Result& a, const Result& b) {
+bool isSame(const FddpResult& a, const FddpResult& b) {
   const auto isSameLine = [](const FddpIteration& l, const FddpIteration& m) {
     return l.cost == m.cost && l.gap == m.gap && l.gradient == m.gradient && l.step == m.step &&
            l.regularization == m.regularization;
@@ -35,8 +26,8 @@ bool isSame(const Result& a, const Result& b) {
 
 // Full steps in segments, short steps that leave gaps open, and closing rollouts all occur on the way.
 struct Case {
-  Case() {
-    cart_pole.bound = 12;
+  explicit Case(double bound) {
+    cart_pole.bound = bound;
     body.stages = 100;
     body.goal << 0.6, 0.4, -0.3, -0.2;
     body.goal.normalize();
@@ -59,20 +50,20 @@ struct Case {
 TEST_CASE("neither batches nor threads change one bit of what comes out") {
   FddpOptions options;
   options.rollout_segments = GENERATE(1, 5);
-  options.bounds = GENERATE(ControlBounds::Ignore, ControlBounds::Enforce);
   options.max_iterations = 25;
   int most_alike = 0;
-  Case().visit([&](const PlainProblem& plain, const ShootingTrajectory& guess) {
-    options.threads = 1;
-    const Result one = solve(plain, guess, options);
-    for (const auto& [size, threads] : {std::pair(1, 2), {3, 1}, {3, 2}, {8, 1}, {8, 3}}) {
-      CAPTURE(size, threads, one.summary.iterations);
-      options.threads = threads;
-      const BatchedProblem problem(plain, size);
-      CHECK(isSame(solve(problem, guess, options), one));
-      most_alike = std::max<int>(most_alike, problem.most_alike);
-    }
-  });
+  Case(GENERATE(12.0, std::numeric_limits<double>::infinity()))
+      .visit([&](const PlainProblem& plain, const ShootingTrajectory& guess) {
+        options.threads = 1;
+        const FddpResult one = solve(plain, guess, options);
+        for (const auto& [size, threads] : {std::pair(1, 2), {3, 1}, {3, 2}, {8, 1}, {8, 3}}) {
+          CAPTURE(size, threads, one.summary.iterations);
+          options.threads = threads;
+          const BatchedProblem problem(plain, size);
+          CHECK(isSame(solve(problem, guess, options), one));
+          most_alike = std::max<int>(most_alike, problem.most_alike);
+        }
+      });
   CHECK(most_alike == 8);  // step lengths were tried side by side
 }
 
@@ -80,7 +71,7 @@ TEST_CASE("a problem whose results depend on batches is told apart by its bits")
   const auto cart_pole = makeCartPole();
   FddpOptions options;
   options.max_iterations = 5;
-  std::vector<Result> results;
+  std::vector<FddpResult> results;
   for (const int size : {1, 8}) {
     BatchedProblem problem(cart_pole, size);
     problem.spread = true;
@@ -114,7 +105,7 @@ TEST_CASE("a sweep at a larger regularization linearizes anew and evaluates noth
   const BatchedProblem problem(well, 1);
   FddpOptions options;
   options.max_iterations = 1;
-  const Result result = solve(problem, makeGuess(well), options);
+  const FddpResult result = solve(problem, makeGuess(well), options);
   REQUIRE(result.summary.iterations == 1);
   REQUIRE(result.summary.log[0].regularization > 1e-4);
   const int num_nodes = well.numStages() + 1, num_trials = 1 - static_cast<int>(std::log2(result.summary.log[0].step));
@@ -130,7 +121,7 @@ TEST_CASE("a short step integrates only behind the gaps that are open") {
   FddpOptions options;
   options.rollout_segments = 1;
   options.max_iterations = 1;
-  const Result result = solve(problem, guess, options);
+  const FddpResult result = solve(problem, guess, options);
   REQUIRE(result.summary.iterations == 1);
   REQUIRE(result.summary.log[0].step < 1);
   CHECK(problem.num_integrated == -std::log2(result.summary.log[0].step));
@@ -140,13 +131,10 @@ TEST_CASE("a short step integrates only behind the gaps that are open") {
 TEST_CASE("in a receding horizon steps of all lengths are rolled out in segments, with the gaps they tell") {
   const auto cart_pole = makeCartPole();
   const BatchedProblem problem(cart_pole, 8);
-  FddpOptions options;
-  options.last_rollout = LastRollout::Segments;
   ShootingTrajectory t = makeLine(cart_pole);
   int num_short = 0;
-  for (int i = 0; i < 8; ++i) {  // one iteration per solve, each from where the last one ended
-    options.max_iterations = 1;
-    const FddpSummary summary = Fddp(options).solve(problem, t);
+  for (int i = 0; i < 8; ++i) {  // one iteration per step, each from where the last one ended
+    const FddpSummary summary = Receding(problem).step(t);
     REQUIRE(summary.iterations == 1);
     num_short += summary.log[0].step < 1;
     CHECK(calcLargestGap(problem, t) == Approx(summary.gap).epsilon(1e-6).margin(1e-12));
@@ -154,24 +142,23 @@ TEST_CASE("in a receding horizon steps of all lengths are rolled out in segments
   CHECK(num_short > 2);
   CHECK(problem.most_alike == 1);  // never in one piece, where step lengths go side by side
 
-  options = makeTightOptions();
-  options.last_rollout = LastRollout::Segments;
-  checkOptimal(problem, Fddp(options).solve(problem, t), t);
+  RecedingOptions options;
+  options.gradient_tolerance = makeTightOptions().gradient_tolerance;
+  options.iterations = 300;
+  checkOptimal(problem, Receding(problem, options).step(t), t);
 }
 
 TEST_CASE("a horizon that advances evaluates only what is new, with the same bytes as one that evaluates all") {
   auto cart_pole = makeCartPole();  // all stages are alike
   BatchedProblem problem(cart_pole, GENERATE(1, 8));
   const int N = cart_pole.stages;
-  FddpOptions options;
-  options.last_rollout = GENERATE(LastRollout::Segments, LastRollout::Closed);
-  options.max_iterations = 1;
+  RecedingOptions options;
   options.threads = 2;
-  Fddp advancing(options), plain(options);
+  Receding advancing(problem, options), plain(problem, options);
   ShootingTrajectory t = makeLine(cart_pole), other = t;
-  const auto count = [&](Fddp& fddp, ShootingTrajectory& trajectory) {
+  const auto count = [&](Receding& receding, ShootingTrajectory& trajectory) {
     const int before = problem.num_evaluated;
-    fddp.solve(problem, trajectory);
+    receding.step(trajectory);
     return problem.num_evaluated - before;
   };
   int num_saving = 0;
@@ -189,16 +176,15 @@ TEST_CASE("a horizon that advances evaluates only what is new, with the same byt
     cart_pole.start = other.xs[0] + VectorXd::Constant(4, 1e-3);  // as it was measured
     ++problem.first;
   }
-  // After trials side by side there are no evaluations to move.
-  if (options.last_rollout == LastRollout::Segments || problem.getBatchSize() == 1) CHECK(num_saving == 11);
+  CHECK(num_saving == 11);
 
   t.us[N / 2][0] += 1e-9;
   const bool anew = GENERATE(false, true);
   if (anew) {  // multipliers that are set are those of nodes that may be others
     advancing.setMultipliers(advancing.getMultipliers());
     CHECK(count(advancing, t) > N);
-  } else if (num_saving == 11) {
-    CHECK_THROWS_WITH(advancing.solve(problem, t), Catch::Contains("node 50"));
+  } else {
+    CHECK_THROWS_WITH(advancing.step(t), Catch::Contains("node 50"));
   }
 }
 
@@ -207,10 +193,10 @@ TEST_CASE("evaluations are kept for a problem, and made anew for another one") {
   const int size = GENERATE(1, 3);
   BatchedProblem problem(cart_pole, size);
   const BatchedProblem copy(cart_pole, size);
-  Fddp fddp;
+  FddpMemory memory;
   const auto solveOnce = [&](const BatchedProblem& p) {
     ShootingTrajectory t = makeGuess(p);
-    fddp.solve(p, t);
+    FddpSolve(FddpOptions(), p, t, {}, memory).run();
     return p.num_made.load();
   };
   const int made = solveOnce(problem);
@@ -218,6 +204,23 @@ TEST_CASE("evaluations are kept for a problem, and made anew for another one") {
   CHECK(solveOnce(problem) == made);
   CHECK(solveOnce(copy) == made);
   CHECK(solveOnce(problem) == 2 * made);
+}
+
+TEST_CASE("memory serves problems of other sizes without remembering them") {
+  auto cart_pole = makeCartPole();
+  auto linear = makeLinear();
+  FddpMemory memory;
+  const auto solveOnce = [&](const ShootingProblem& problem, ShootingTrajectory t) {
+    CHECK(FddpSolve(FddpOptions(), problem, t, {}, memory).run().termination == FddpTermination::Converged);
+    return t;
+  };
+  std::vector<ShootingTrajectory> results;
+  for (int i = 0; i < 2; ++i) {
+    results.push_back(solveOnce(cart_pole, makeLine(cart_pole)));
+    solveOnce(linear, makeLine(linear));
+  }
+  CHECK(results[0].xs == results[1].xs);
+  CHECK(results[0].us == results[1].us);
 }
 
 TEST_CASE("every problem has an id of its own, copies and those that were assigned to included") {
@@ -233,11 +236,10 @@ TEST_CASE("every problem has an id of its own, copies and those that were assign
 
 TEST_CASE("an iteration after the first allocates nothing, in batches") {
   auto cart_pole = makeCartPole();
-  cart_pole.bound = 12;
+  cart_pole.bound = GENERATE(12.0, std::numeric_limits<double>::infinity());
   const BatchedProblem problem(cart_pole, GENERATE(3, 8));
   ShootingTrajectory t = makeLine(cart_pole);
   FddpOptions options;
-  options.bounds = GENERATE(ControlBounds::Ignore, ControlBounds::Enforce);
   options.threads = GENERATE(1, 2);
   const std::vector<long> counts = countAllocations(options, problem, t);
   REQUIRE(counts.size() > 10);

@@ -3,6 +3,7 @@
 #include <limits>
 #include <sstream>
 
+#include "bielle/solve/receding.h"
 #include "fddp_oracle.h"
 
 using namespace bielle;
@@ -74,16 +75,16 @@ TEST_CASE("an interrupted solve keeps the iterate it had, by the flag as by the 
   std::atomic<bool> interrupt{false};
   FddpObserver observer;
   observer.interrupt = &interrupt;
-  observer.callback = [&](const FddpIteration& line) {
+  observer.callback = [&](const FddpIteration& line, const ShootingTrajectory& iterate) {
     if (line.iteration == 5) {
-      seen = t;
+      seen = iterate;
       interrupt = by_flag;
       if (!by_flag) return FddpAction::Stop;
     }
     return FddpAction::Continue;
   };
   const double start = calcCost(problem, t.us);
-  const FddpSummary summary = Fddp(options).solve(problem, t, observer);
+  const FddpSummary summary = solveInPlace(problem, t, options, observer);
   CHECK(summary.termination == FddpTermination::Interrupted);
   CHECK(summary.iterations == 5);
   CHECK(t.xs == seen.xs);
@@ -104,7 +105,7 @@ TEST_CASE("a problem that fails or gives NaN at a node ends the solve with the n
   (evaluating ? problem.bad_evaluation : problem.bad_linearization) = 37;
   ShootingTrajectory t = makeGuess(problem);
   const ShootingTrajectory guess = t;
-  const FddpSummary summary = Fddp().solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t);
   CHECK(summary.termination == FddpTermination::Failed);
   CAPTURE(summary.message);
   const bool named =
@@ -122,12 +123,13 @@ TEST_CASE("trials on which the problem fails or gives NaN are only too long") {
   problem.fault = fault;
   problem.largest_state = 14;
   ShootingTrajectory t = makeGuess(problem);
-  const FddpSummary summary = Fddp(makeTightOptions()).solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t, makeTightOptions());
   CHECK(problem.num_spoiled > 0);
   checkOptimal(inner, summary, t);
 }
 
-TEST_CASE("what a problem throws comes out of solve() as it is, from evaluations, rollouts and linearizations") {
+TEST_CASE(
+    "what a problem throws comes out of solve() and step() as it is, from evaluations, rollouts and linearizations") {
   using Fault = SpoiledProblem::Fault;
   const int where = GENERATE(0, 1, 2), threads = GENERATE(1, 2);
   CAPTURE(where, threads);
@@ -139,26 +141,31 @@ TEST_CASE("what a problem throws comes out of solve() as it is, from evaluations
   if (where == 2) problem.bad_linearization = 37;
   FddpOptions options = makeTightOptions();
   options.threads = threads;
-  Fddp fddp(options);
+  CHECK_THROWS_AS(solve(problem, makeGuess(problem), options), std::logic_error);
+  CHECK(problem.num_spoiled > 0);
+
+  RecedingOptions receding;
+  receding.threads = threads;
+  receding.gradient_tolerance = options.gradient_tolerance;
+  receding.iterations = 300;
+  Receding horizon(problem, receding);
   ShootingTrajectory t = makeGuess(problem), seen = t;
   FddpObserver observer;
-  observer.callback = [&](const FddpIteration&) {
-    seen = t;
+  observer.callback = [&](const FddpIteration&, const ShootingTrajectory& iterate) {
+    seen = iterate;
     return FddpAction::Continue;
   };
-  CHECK_THROWS_AS(fddp.solve(problem, t, observer), std::logic_error);
-  CHECK(problem.num_spoiled > 0);
-  CHECK(t.xs == seen.xs);
+  CHECK_THROWS_AS(horizon.step(t, observer), std::logic_error);
+  CHECK(t.xs == seen.xs);  // the current iterate
   CHECK(t.us == seen.us);
-
-  problem.fault = Fault::None;  // the solver can be used again
-  checkOptimal(inner, fddp.solve(problem, t), t);
+  problem.fault = Fault::None;  // its memory can be used again
+  checkOptimal(inner, horizon.step(t), t);
 }
 
 TEST_CASE("an indefinite problem is regularized until it can be solved") {
   DoubleWell problem;
   ShootingTrajectory t = makeGuess(problem);
-  const FddpSummary summary = Fddp(makeTightOptions()).solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t, makeTightOptions());
   checkOptimal(problem, summary, t);
   CHECK(t.xs.back()[0] == Approx(1).margin(0.01));
   CHECK(summary.log.front().regularization > 1e-4);
@@ -172,7 +179,7 @@ TEST_CASE("a problem nothing can improve ends at the largest regularization, wit
   problem.fault = GENERATE(Fault::Status, Fault::Nan);
   problem.only_state = &inner.start;  // no rollout succeeds
   ShootingTrajectory t = makeGuess(problem);
-  const FddpSummary summary = Fddp().solve(problem, t);
+  const FddpSummary summary = solveInPlace(problem, t);
   CHECK(summary.termination == FddpTermination::RegularizationMax);
   CHECK(summary.iterations == 0);
   CHECK(summary.message == std::string("no step is acceptable even at the largest regularization") +
@@ -180,33 +187,41 @@ TEST_CASE("a problem nothing can improve ends at the largest regularization, wit
 }
 
 TEST_CASE("options without sense are refused by name") {
+  const auto problem = makePendulum();
+  const auto check = [&](const FddpOptions& options) { solve(problem, makeGuess(problem), options); };
   FddpOptions options;
   options.min_regularization = 0;
-  CHECK_THROWS_WITH(Fddp(options), Catch::Contains("min_regularization"));
+  CHECK_THROWS_WITH(check(options), Catch::Contains("min_regularization"));
   options = FddpOptions();
   options.regularization_increase = 1;
-  CHECK_THROWS_WITH(Fddp(options), Catch::Contains("regularization_increase"));
+  CHECK_THROWS_WITH(check(options), Catch::Contains("regularization_increase"));
   for (int threads : {-1, 1025, 100000}) {
     options = FddpOptions();
     options.threads = threads;
-    CHECK_THROWS_WITH(Fddp(options), Catch::Contains("threads must lie between 0, which means all, and 1024"));
+    CHECK_THROWS_WITH(check(options), Catch::Contains("threads must lie between 0, which means all, and 1024"));
   }
   options.threads = 1024;
-  CHECK_NOTHROW(Fddp(options));
+  CHECK_NOTHROW(check(options));
   for (int iterations : {0, 1000001, std::numeric_limits<int>::max()}) {
     options.max_iterations = iterations;
-    CHECK_THROWS_WITH(Fddp(options), Catch::Contains("max_iterations"));
+    CHECK_THROWS_WITH(check(options), Catch::Contains("max_iterations"));
+    RecedingOptions receding;
+    receding.iterations = iterations;
+    CHECK_THROWS_WITH(Receding(problem, receding), Catch::Contains("RecedingOptions: iterations"));
   }
+  RecedingOptions receding;
+  receding.rollout_segments = 0;
+  CHECK_THROWS_WITH(Receding(problem, receding), Catch::Contains("RecedingOptions: rollout_segments"));
 }
 
 TEST_CASE("guesses of wrong sizes are refused with the sizes") {
   auto problem = makePendulum();
   ShootingTrajectory t = makeGuess(problem);
   t.us.pop_back();
-  CHECK_THROWS_WITH(Fddp().solve(problem, t), Catch::Contains("101 states and 99 controls"));
+  CHECK_THROWS_WITH(solveInPlace(problem, t), Catch::Contains("101 states and 99 controls"));
   t = makeGuess(problem);
   t.xs[4].resize(3);
-  CHECK_THROWS_WITH(Fddp().solve(problem, t), Catch::Contains("state 4 has size 3"));
+  CHECK_THROWS_WITH(solveInPlace(problem, t), Catch::Contains("state 4 has size 3"));
 }
 
 TEST_CASE("the log prints a header and one line of the same columns per iteration") {

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/solve/fddp.h"
+#include "solve_in_place.h"
 #include "solve_problems.h"
 
 using namespace bielle;
@@ -46,7 +47,7 @@ TEST_CASE("fddp: a direction that models make too flat does not hold up the othe
     ShootingTrajectory t{{4, VectorXd::Zero(2)}, {3, VectorXd::Zero(2)}};
     FddpOptions options;
     options.gradient_tolerance = 1e-16;
-    const FddpSummary summary = Fddp(options).solve(problem, t);
+    const FddpSummary summary = solveInPlace(problem, t, options);
     CAPTURE(summary.message, summary.iterations);
     CHECK(summary.termination == FddpTermination::Converged);
     CHECK(summary.iterations < 25);

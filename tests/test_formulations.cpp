@@ -9,6 +9,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/motion/squat.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 
@@ -28,7 +29,7 @@ SquatSolution solveSquat(const Model& model, double depth, double dt, Formulatio
   options.contact_kd = 40;  // critical damping; the default is for steps of 15 ms and below
   Motion motion = makeSquat(model, options, {formulation, StepRule::Euler});
   SquatSolution out;
-  out.summary = Fddp().solve(*motion.problem, motion.guess);
+  out.summary = test::solveInPlace(*motion.problem, motion.guess);
   out.trajectory = std::move(motion.guess);
   Workspace ws(model);
   for (const VectorXd& x : out.trajectory.xs) {

@@ -12,6 +12,7 @@
 #include "bielle/motion/walk.h"
 #include "math/constants.h"
 #include "own_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -40,14 +41,14 @@ Goal makeGoal(GoalKind kind, double requested, double tolerance, int first = 0, 
 const std::pair<Motion, FddpSummary>& getWalk() {
   static const auto walk = [] {
     Motion motion = makeWalk(getBipetto());
-    const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
+    const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess);
     return std::pair(std::move(motion), summary);
   }();
   return walk;
 }
 
 MotionResult solveForResult(Motion motion) {
-  const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess);
   return makeResult({"bipetto", "", {}}, motion, motion.guess, summary);
 }
 
@@ -264,7 +265,7 @@ TEST_CASE("goals: a squat far out of reach stays finite, and says by how much it
     Motion motion = makeSquat(getBipetto(), options);
     FddpOptions solver;
     solver.max_iterations = 60;
-    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+    const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, solver);
     CAPTURE(summary.message, summary.cost);
     CHECK(std::isfinite(summary.cost));
     for (const VectorXd& x : motion.guess.xs) REQUIRE(x.allFinite());

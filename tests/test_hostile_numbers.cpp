@@ -19,6 +19,7 @@
 #include "change_option.h"
 #include "infinity.h"
 #include "mechanisms.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -185,7 +186,6 @@ FddpOptions makeHostileOptions(Random& rng) {
   options.max_iterations = 1 + choose(rng, 8);
   options.threads = 1 + choose(rng, 2);
   options.rollout_segments = 1 + choose(rng, 6);
-  options.bounds = pick(rng, {ControlBounds::Ignore, ControlBounds::Enforce});
   options.initial_regularization = options.min_regularization = pick(rng, {1e-9, 1e-300, 1e6});
   options.max_regularization = pick(rng, {1e9, 1e300});
   options.cost_tolerance = pick(rng, {0.0, 1e-13, 1.0});
@@ -227,7 +227,7 @@ TEST_CASE("optimal control of random mechanisms with random options") {
     trajectory.xs.assign(stages + 1, motion.problem->initialState());
     trajectory.us.assign(stages, randomVector(rng, model.nu()) *
                                      (range == Range::Usual ? 1.0 : pick(rng, {0.0, 1.0, 1e5, 1e150, 1e300})));
-    const FddpSummary summary = Fddp(makeHostileOptions(rng)).solve(*motion.problem, trajectory);
+    const FddpSummary summary = test::solveInPlace(*motion.problem, trajectory, makeHostileOptions(rng));
     ++count[summary.termination];
     CAPTURE(getName(summary.termination), summary.message);
     CHECK_FALSE(summary.message.empty());
@@ -269,7 +269,7 @@ TEST_CASE("ten thousand nodes") {
   trajectory.us.assign(kStages, VectorXd::Zero(model.nu()));
   FddpOptions options;
   options.max_iterations = 10;
-  const FddpSummary summary = Fddp(options).solve(problem, trajectory);
+  const FddpSummary summary = test::solveInPlace(problem, trajectory, options);
   CHECK(summary.iterations > 0);
   CHECK(std::isfinite(summary.cost));
   CHECK(areFinite(trajectory.xs));
@@ -304,7 +304,7 @@ void tryMotion(Random& rng, const Model& model, Motion (*make)(const Model&, con
     if (motion.problem->numStages() > 500) return;  // allowed, and too long for here
     FddpOptions solver;
     solver.max_iterations = 2;
-    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+    const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, solver);
     CHECK_FALSE(summary.message.empty());
     CHECK(areFinite(motion.guess.xs));
     CHECK(areFinite(motion.guess.us));

@@ -8,6 +8,7 @@
 #include "bielle/motion/jump.h"
 #include "change_option.h"
 #include "own_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -116,7 +117,7 @@ void measureForces(const Motion& motion, const ShootingTrajectory& t, JumpOutcom
 JumpOutcome solveJump(Motion& motion, FddpSummary& summary) {
   FddpOptions solver;
   solver.max_iterations = 100;
-  summary = Fddp(solver).solve(*motion.problem, motion.guess);
+  summary = test::solveInPlace(*motion.problem, motion.guess, solver);
   JumpOutcome out;
   measureFeet(motion, motion.guess, out);
   measureBody(motion, motion.guess, out);
@@ -213,7 +214,7 @@ TEST_CASE("jump: what no leg can do does not pass for done, and stays finite") {
   Motion motion = makeJump(getBipetto(), options);
   FddpOptions solver;
   solver.max_iterations = 30;
-  const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, solver);
   CHECK(summary.termination != FddpTermination::Converged);
   CHECK(std::isfinite(summary.cost));
   for (const VectorXd& x : motion.guess.xs) REQUIRE(x.allFinite());

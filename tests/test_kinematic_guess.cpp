@@ -8,6 +8,7 @@
 #include "bielle/motion/walk.h"
 #include "motion/kinematic_guess.h"
 #include "own_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -132,7 +133,7 @@ TEST_CASE("guess: one that cannot be evaluated gives way to the posture at the s
   solver.initial_regularization = kGuessRegularization;
   solver.max_iterations = 5;
   ShootingTrajectory guess = motion.guess;
-  CHECK(Fddp(solver).solve(*motion.problem, guess).termination == FddpTermination::Failed);
+  CHECK(test::solveInPlace(*motion.problem, guess, solver).termination == FddpTermination::Failed);
   const FddpSummary summary = solveMotion(motion, solver);
   CAPTURE(summary.message);
   CHECK(summary.termination == FddpTermination::MaxIterations);

@@ -13,17 +13,14 @@
 #include "bielle/motion/walk.h"
 #include "own_robots.h"
 #include "robot_directory.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
 
-FddpSummary solveWithinLimits(Motion& motion) {
-  FddpOptions options;
-  if (motion.bounded) options.bounds = ControlBounds::Enforce;
-  return Fddp(options).solve(*motion.problem, motion.guess);
-}
+FddpSummary solveWithinLimits(Motion& motion) { return test::solveInPlace(*motion.problem, motion.guess); }
 
 double calcPeakTorque(const Motion& motion, const std::string& motor) {
   const int m = getBipetto().findMotor(motor);
@@ -68,8 +65,8 @@ void checkKneesAtFourFifths(const Make& make) {
   LimitOptions limits;
   for (const char* knee : knees) limits.efforts[knee] = 0.8 * calcPeakTorque(free, knee);
   Motion bounded = make(ProblemOptions(Formulation::Reduced, limits));
-  CHECK(bounded.bounded);
-  CHECK(!free.bounded);
+  CHECK(bounded.problem->hasControlBounds());
+  CHECK(!free.problem->hasControlBounds());
   const FddpSummary with = solveWithinLimits(bounded);
   CAPTURE(with.message, with.iterations);
   CHECK(with.termination == FddpTermination::Converged);

@@ -15,6 +15,7 @@
 #include "own_robots.h"
 #include "problem_probe.h"
 #include "robot_directory.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -84,7 +85,7 @@ TEST_CASE("squat: Bipetto goes down or up as requested, loops closed, feet in pl
     Motion motion = makeSquat(model, options, row.formulation);
     FddpOptions solver;
     solver.max_iterations = 100;
-    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+    const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, solver);
     CAPTURE(summary.message, summary.iterations);
     CHECK(summary.termination == FddpTermination::Converged);
     CHECK(calcDefect(*motion.problem, motion.guess) < 1e-9);
@@ -105,7 +106,7 @@ TEST_CASE("a leg on a rail squats and jumps, and comes to rest") {
   motions.push_back(makeSquat(model, squat));
   motions.push_back(makeJump(model));
   for (Motion& motion : motions) {
-    const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
+    const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess);
     CAPTURE(motion.name, summary.message, summary.iterations);
     CHECK(summary.termination == FddpTermination::Converged);
     CHECK(motion.guess.xs.back().tail(model.nv()).lpNorm<Eigen::Infinity>() < 1e-5);
@@ -301,7 +302,7 @@ TEST_CASE("benchmark walk: the schedule that speed is measured on") {
 
   FddpOptions solver;
   solver.max_iterations = 60;
-  const FddpSummary summary = Fddp(solver).solve(problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(problem, motion.guess, solver);
   CAPTURE(summary.message);
   CHECK(summary.termination == FddpTermination::Converged);
   CHECK(calcDefect(problem, motion.guess) < 1e-9);

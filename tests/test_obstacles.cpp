@@ -8,6 +8,7 @@
 #include "measure_steps.h"
 #include "own_robots.h"
 #include "robot_directory.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -18,7 +19,7 @@ StepMeasures solveAndMeasure(Motion& motion) {
   FddpOptions solver;
   solver.initial_regularization = kGuessRegularization;
   solver.max_iterations = 150;
-  const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, solver);
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   return StepMeter(motion, motion.guess).measure();

@@ -15,6 +15,7 @@
 #include "change_option.h"
 #include "problem_probe.h"
 #include "published_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -206,7 +207,7 @@ TEST_CASE("the paper's walk: solved from its first guess, it ends below the pape
   walk.guess = reference->guess;
   FddpOptions solver;
   solver.gradient_tolerance = 1e-10;
-  const FddpSummary summary = Fddp(solver).solve(*walk.problem, walk.guess);
+  const FddpSummary summary = test::solveInPlace(*walk.problem, walk.guess, solver);
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   CHECK(summary.cost == Approx(63.64770).margin(1e-4));

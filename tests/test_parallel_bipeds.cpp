@@ -13,6 +13,7 @@
 #include "model/text_file.h"
 #include "robot_directory.h"
 #include "run_bielle.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -251,7 +252,7 @@ TEST_CASE("Cleobot, the RSU biped and the belt biped walk at 0.9 m/s") {
 
 TEST_CASE("Cleobot: feet of a walk land where they should and do not slide") {
   Motion motion = makeWalk(getCleobot());
-  const FddpSummary summary = Fddp(FddpOptions{}).solve(*motion.problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess);
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   const StepMeasures m = StepMeter(motion, motion.guess).measure();

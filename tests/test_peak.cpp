@@ -42,7 +42,6 @@ Constrained<PlantProblem<Plant>> makeReach(int stages, double distance) {
 
 FddpOptions makeOptions() {
   FddpOptions options;
-  options.bounds = ControlBounds::Enforce;
   options.threads = 1;
   options.gradient_tolerance = 1e-12;
   options.max_iterations = 500;
@@ -60,7 +59,7 @@ Solution solvePeak(const ShootingProblem& inner, const PeakProblem& problem) {
   for (VectorXd& u : guess.us) u.setConstant(1);
   ShootingTrajectory t = problem.wrap(guess);
   Solution out;
-  out.summary = Fddp(makeOptions()).solve(problem, t);
+  out.summary = solveInPlace(problem, t, makeOptions());
   out.share = t.us[0].tail(1)[0];
   out.trajectory = problem.unwrap(t);
   return out;
@@ -161,7 +160,7 @@ TEST_CASE("peak: bisection over fixed bounds finds the same") {
     auto bounded = inner;
     bounded.bound = bound;
     ShootingTrajectory t = makeGuess(bounded);
-    const FddpSummary summary = Fddp(makeOptions()).solve(bounded, t);
+    const FddpSummary summary = solveInPlace(bounded, t, makeOptions());
     const bool done = summary.termination == FddpTermination::Converged;
     if (!done) CHECK(summary.termination == FddpTermination::Infeasible);
     return done;

@@ -7,7 +7,6 @@
 #include "bielle/motion/squat.h"
 #include "bielle/solve/node_evaluator.h"
 #include "count_allocations.h"
-#include "solve/lq_sweep.h"
 
 namespace bielle {
 namespace {
@@ -17,14 +16,14 @@ struct SolvedSquat {
     SquatOptions options;
     options.depth = 0.85;
     motion = makeSquat(robot.model, options);
-    FddpOptions solver_options;
-    if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;
-    solver = std::make_unique<Fddp>(solver_options);
-    REQUIRE(solver->solve(*motion.problem, motion.guess).termination == FddpTermination::Converged);
+    FddpResult result = solve(*motion.problem, motion.guess);
+    REQUIRE(result.summary.termination == FddpTermination::Converged);
+    motion.guess = std::move(result.trajectory);
+    gains = std::move(result.gains);
   }
   LoadedRobot robot;
   Motion motion;
-  std::unique_ptr<Fddp> solver;
+  std::vector<Gains> gains;
 };
 
 SolvedSquat& getSquat() {
@@ -41,7 +40,7 @@ Measurement measure(const Model& model, double time, const VectorXd& x) {
 TEST_CASE("policy: on the plan it gives the torques of the plan, each in the middle of its stage") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
   const auto& stages = policy.getStages();
   REQUIRE(static_cast<int>(stages.size()) == squat.motion.problem->numStages());
   CHECK(policy.getDuration() == Approx(squat.motion.schedule.getTime(squat.motion.problem->numStages())));
@@ -57,7 +56,7 @@ TEST_CASE("policy: on the plan it gives the torques of the plan, each in the mid
 TEST_CASE("policy: torques that act later are those of the time when they act") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
   constexpr double kTime = 0.8, kDelay = 0.0137;
   Measurement at{kTime + kDelay, model.makeNeutral(), VectorXd::Zero(model.nv())};
   VectorXd expected(model.nu()), u(model.nu());
@@ -76,12 +75,12 @@ TEST_CASE("policy: torques that act later are those of the time when they act") 
 TEST_CASE("policy: its gains are those of the solver's last sweep") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
   NodeEvaluator evaluator(*squat.motion.problem);
   for (int k : {1, 40, 120}) {
     const VectorXd& x = squat.motion.guess.xs[k];
     evaluator.evaluate(k, x, squat.motion.guess.us[k]);
-    const RowMatrixXd& K = squat.solver->getSweep().getNodes()[k].K;
+    const RowMatrixXd& K = squat.gains[k].K;
     VectorXd dx(K.cols());
     for (int i = 0; i < dx.size(); ++i) dx[i] = 1e-3 * std::sin(1 + 2.1 * i);
     const VectorXd moved = evaluator.integrate(dx);
@@ -100,12 +99,12 @@ TEST_CASE("policy: its gains on states whose loops are open are those on the dif
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
   const int nq = model.nq(), nv = model.nv();
-  const Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  const Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
   NodeEvaluator evaluator(*squat.motion.problem);
   constexpr int kNode = 40;
   const VectorXd& x = squat.motion.guess.xs[kNode];
   evaluator.evaluate(kNode, x, squat.motion.guess.us[kNode]);
-  const RowMatrixXd& K = squat.solver->getSweep().getNodes()[kNode].K;
+  const RowMatrixXd& K = squat.gains[kNode].K;
   RowMatrixXd gains = policy.getStages()[kNode].K, differences(model.nu(), 2 * nv);
   constexpr double kStep = 0.01;  // along one coordinate the difference is linear
   for (int i = 0; i < 2 * nv; ++i) {
@@ -125,7 +124,7 @@ TEST_CASE("policy: its gains on states whose loops are open are those on the dif
 TEST_CASE("policy: gains that look ahead are those of an earlier stage of their phase") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver), far = policy;
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains), far = policy;
   const auto& stages = policy.getStages();
   constexpr int kStages = 5;
   const size_t last = stages.size() - 1;  // a squat has one phase
@@ -162,7 +161,7 @@ TEST_CASE("policy: without gains the state does not matter; the plan ends at res
 TEST_CASE("policy: after its end the torques hold the last posture, and gains call the robot back") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
   Measurement at{policy.getDuration() + 0.5, model.makeNeutral(), VectorXd::Zero(model.nv())};
   policy.getReference(at.time, at.q, at.v);
   VectorXd u(model.nu()), other(model.nu());
@@ -187,7 +186,7 @@ TEST_CASE("policy: after its end the torques hold the last posture, and gains ca
 TEST_CASE("policy: an update does not allocate") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
   const Measurement at = measure(model, 0, squat.motion.guess.xs[0]);
   Measurement now = at;
   VectorXd u(model.nu());

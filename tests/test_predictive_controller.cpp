@@ -6,6 +6,7 @@
 
 #include "bielle/control/predictive_controller.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
 #include "bielle/motion/squat.h"
 #include "count_allocations.h"
 #include "own_robots.h"
@@ -31,10 +32,10 @@ Solved solve(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&), 
   Solved out{makeMotion(model, plan(model, options, makeStandingPosture(model)), ProblemOptions()), nullptr};
   FddpOptions solver_options;
   solver_options.initial_regularization = kGuessRegularization;
-  solver_options.bounds = ControlBounds::Enforce;
-  Fddp solver(solver_options);
-  REQUIRE(solver.solve(*out.motion.problem, out.motion.guess).termination == FddpTermination::Converged);
-  out.gains = std::make_unique<Policy>(makePolicy(out.motion, out.motion.guess, solver));
+  FddpResult result = bielle::solve(*out.motion.problem, out.motion.guess, solver_options);
+  REQUIRE(result.summary.termination == FddpTermination::Converged);
+  out.motion.guess = std::move(result.trajectory);
+  out.gains = std::make_unique<Policy>(makePolicy(out.motion, out.motion.guess, result.gains));
   return out;
 }
 

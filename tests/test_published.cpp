@@ -15,6 +15,7 @@
 #include "published_robots.h"
 #include "robot_directory.h"
 #include "robots/spring_leg.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using bielle::testing::RobotDirectory;
@@ -30,7 +31,7 @@ LoadedRobot loadCompleted(const std::string& name) { return loadRobot(kSource + 
 FddpSummary solvePublished(Motion& motion) {
   FddpOptions solver;
   solver.max_iterations = 60;
-  return Fddp(solver).solve(*motion.problem, motion.guess);
+  return test::solveInPlace(*motion.problem, motion.guess, solver);
 }
 
 void checkSteps(Motion& motion) {

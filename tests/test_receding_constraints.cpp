@@ -1,39 +1,53 @@
 // Constraints from one solve to the next: multipliers that are kept and moved on, and iterations of receding horizons.
 #include <catch2/catch.hpp>
 
+#include "bielle/solve/receding.h"
 #include "constrained_problem.h"
 #include "fddp_oracle.h"
 
 using namespace bielle;
 using namespace bielle::test;
 
+namespace {
+
+RecedingOptions makeOptions(int iterations) {
+  RecedingOptions options;
+  options.iterations = iterations;
+  return options;
+}
+
+}  // namespace
+
 TEST_CASE("multipliers are worth keeping") {
   auto problem = makeBoundedCartPole();
-  ShootingTrajectory t = makeGuess(problem);
-  Fddp solver;
-  const FddpSummary cold = solver.solve(problem, t);
-  REQUIRE(cold.termination == FddpTermination::Converged);
-  const Multipliers multipliers = solver.getMultipliers();
+  const FddpResult cold = solve(problem, makeGuess(problem));
+  REQUIRE(cold.summary.termination == FddpTermination::Converged);
   problem.start[0] += 0.001;
-  ShootingTrajectory warm = t, half = t;
-  Fddp kept, forgotten;
-  kept.setMultipliers(multipliers);
-  const FddpSummary with = kept.solve(problem, warm), without = forgotten.solve(problem, half);
-  CAPTURE(cold.iterations, with.iterations, without.iterations);
+  const FddpSummary with = solve(problem, cold.trajectory, {}, {}, cold.multipliers).summary,
+                    without = solve(problem, cold.trajectory).summary;
+  CAPTURE(cold.summary.iterations, with.iterations, without.iterations);
   CHECK(with.termination == FddpTermination::Converged);
   CHECK(with.iterations < without.iterations);
-  // A solver that is used again starts anew.
-  ShootingTrajectory again = makeGuess(problem), first = again;
-  const FddpSummary second = kept.solve(problem, again), fresh = Fddp().solve(problem, first);
+  CHECK_THROWS_WITH(solve(problem, cold.trajectory, {}, {}, {cold.multipliers.values, 0}), Catch::Contains("penalty"));
+}
+
+TEST_CASE("a horizon that neither advances nor is given multipliers starts anew") {
+  auto problem = makeBoundedCartPole();
+  ShootingTrajectory t = makeGuess(problem), again = t, first = t;
+  Receding kept(problem, makeOptions(20));
+  kept.step(t);
+  const FddpSummary second = kept.step(again), fresh = Receding(problem, makeOptions(20)).step(first);
   CHECK(second.iterations == fresh.iterations);
   CHECK(again.us == first.us);
 }
 
 TEST_CASE("a horizon that advances takes its multipliers along") {
   auto problem = makeBoundedCartPole();
-  ShootingTrajectory t = makeGuess(problem);
-  Fddp solver;
-  solver.solve(problem, t);
+  FddpResult result = solve(problem, makeGuess(problem));
+  ShootingTrajectory& t = result.trajectory;
+  Receding solver(problem);
+  solver.setMultipliers(result.multipliers);
+  solver.step(t);
   const std::vector<VectorXd> before = solver.getMultipliers().values;
   solver.advance(t);
   const Multipliers after = solver.getMultipliers();
@@ -64,13 +78,12 @@ TEST_CASE("solves of one iteration, for receding horizons, linearize once each a
   problem.rows.push_back(
       {"speed", 1, problem.stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
   ShootingTrajectory t = makeGuess(problem), optimum = t;
-  REQUIRE(Fddp().solve(problem, optimum).termination == FddpTermination::Converged);
-  FddpOptions options;
-  options.threads = options.max_iterations = 1;
-  options.last_rollout = LastRollout::Segments;
+  REQUIRE(solveInPlace(problem, optimum).termination == FddpTermination::Converged);
+  RecedingOptions options;
+  options.threads = 1;
   options.constraints.initial_penalty = 1;
   options.constraints.penalty_increase = 1;
-  Fddp solver(options);
+  Receding solver(problem, options);
   problem.linearized = 0;
   constexpr int kSolves = 25;
   const auto calcError = [&] {
@@ -81,7 +94,7 @@ TEST_CASE("solves of one iteration, for receding horizons, linearize once each a
   double first = 0;
   for (int i = 0; i < kSolves; ++i) {
     if (i > 0) solver.setMultipliers(solver.getMultipliers());
-    solver.solve(problem, t);
+    solver.step(t);
     CHECK(problem.linearized == (i + 1) * (problem.stages + 1));
     if (i == 0) first = calcError();
   }
@@ -92,7 +105,7 @@ TEST_CASE("solves of one iteration, for receding horizons, linearize once each a
 TEST_CASE("in receding horizons a row that binds does not come free and is violated in every other iteration") {
   Constrained<PlantProblem<Linear>> problem(makeLinear());
   ShootingTrajectory t = makeGuess(problem);
-  REQUIRE(Fddp().solve(problem, t).termination == FddpTermination::Converged);  // violates what now comes
+  REQUIRE(solveInPlace(problem, t).termination == FddpTermination::Converged);  // violates what now comes
   problem.rows.push_back(
       {"speed", 1, problem.stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
   const auto calcViolation = [&] {
@@ -102,15 +115,14 @@ TEST_CASE("in receding horizons a row that binds does not come free and is viola
   };
   const double first = calcViolation();
   REQUIRE(first > 0.1);
-  FddpOptions options;
-  options.threads = options.max_iterations = 1;
-  options.last_rollout = LastRollout::Segments;
+  RecedingOptions options;
+  options.threads = 1;
   options.constraints.initial_penalty = 1000;  // the cost alone would let rows be violated by little
   options.constraints.penalty_increase = 1;
-  Fddp solver(options);
+  Receding solver(problem, options);
   for (int i = 0; i < 6; ++i) {
     if (i > 0) solver.setMultipliers(solver.getMultipliers());
-    solver.solve(problem, t);
+    solver.step(t);
     CAPTURE(i, first);
     if (i > 0) CHECK(calcViolation() < 0.05 * first);  // after the first, rows that had no multipliers are violated
   }

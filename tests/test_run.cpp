@@ -9,6 +9,7 @@
 #include "motion/gait.h"
 #include "motion/quintic.h"
 #include "own_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -72,7 +73,7 @@ SolvedRun solveRun(Motion& motion) {
   FddpOptions options;
   options.max_iterations = 150;
   SolvedRun solved;
-  solved.summary = Fddp(options).solve(*motion.problem, motion.guess);
+  solved.summary = test::solveInPlace(*motion.problem, motion.guess, options);
   solved.measures = StepMeter(motion, motion.guess).measure();
   solved.clearance = calcClearance(motion);
   Workspace ws(getBipetto());

@@ -13,6 +13,7 @@
 #include "math/so3.h"
 #include "measure_steps.h"
 #include "own_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -154,7 +155,7 @@ TEST_CASE("sequence: unlike motions are solved as one problem") {
   CHECK(solved == std::vector<std::string>{"squat", "turn", "walk", "stairs", "jump"});
   FddpOptions options;
   options.max_iterations = 100;
-  const FddpSummary summary = Fddp(options).solve(*motion.problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, options);
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   const StepMeasures m = StepMeter(motion, motion.guess).measure();

@@ -12,6 +12,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/squat.h"
 #include "bielle/transmission/lift.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 
@@ -188,7 +189,7 @@ TEST_CASE("a squat of the serial model converges and is lifted: the closed dynam
   options.settle = 0.1;
   options.time_step = 0.02;
   Motion motion = makeSquat(model, options, {Formulation::Reduced, StepRule::Euler});
-  const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess);
   REQUIRE(summary.termination == FddpTermination::Converged);
   const SerialTrajectory trajectory = makeTrajectory(motion);
   const LiftResult lifted = lift(closed, robot.serial, trajectory);

@@ -20,11 +20,9 @@ Policy makeWalkPolicy(const Model& model) {
   options.speed = 0.4;
   options.steps = 2;
   Motion motion = makeWalk(model, options);
-  FddpOptions solver_options;
-  if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;
-  Fddp solver(solver_options);
-  REQUIRE(solver.solve(*motion.problem, motion.guess).termination == FddpTermination::Converged);
-  return makePolicy(motion, motion.guess, solver);
+  const FddpResult result = solve(*motion.problem, motion.guess);
+  REQUIRE(result.summary.termination == FddpTermination::Converged);
+  return makePolicy(motion, result.trajectory, result.gains);
 }
 
 // The configuration after following the policy.

@@ -6,6 +6,7 @@
 #include "change_option.h"
 #include "measure_steps.h"
 #include "own_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -23,7 +24,7 @@ TEST_CASE("stairs: Bipetto goes up and down, every foot on its step") {
     FddpOptions solver;
     solver.initial_regularization = kGuessRegularization;
     solver.max_iterations = 100;
-    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+    const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, solver);
     CAPTURE(summary.message, summary.iterations);
     CHECK(summary.termination == FddpTermination::Converged);
     const StepMeasures m = StepMeter(motion, motion.guess).measure();

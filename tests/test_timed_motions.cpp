@@ -7,6 +7,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/walk.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 namespace fs = std::filesystem;
@@ -23,10 +24,9 @@ struct TimedSolution {
 
 TimedSolution solveTimed(Motion motion, int threads = 0) {
   FddpOptions options;
-  options.bounds = ControlBounds::Enforce;
   options.threads = threads;
   TimedSolution out{std::move(motion), {}, {}};
-  out.summary = Fddp(options).solve(*out.motion.problem, out.motion.guess);
+  out.summary = test::solveInPlace(*out.motion.problem, out.motion.guess, options);
   REQUIRE(out.summary.termination == FddpTermination::Converged);
   out.timings = listTimings(*out.motion.problem, out.motion.schedule, out.motion.guess);
   return out;

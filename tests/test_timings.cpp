@@ -13,6 +13,7 @@
 #include "count_allocations.h"
 #include "discretizations.h"
 #include "mechanisms.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -222,11 +223,10 @@ Solution solve(const RobotProblem& problem, int threads = 1) {
     if (problem.controlSize(k) > problem.model().nu()) out.trajectory.us.back()[problem.model().nu()] = 1;
   }
   FddpOptions options;
-  options.bounds = ControlBounds::Enforce;
   options.gradient_tolerance = 1e-16;
   options.cost_tolerance = 0;
   options.threads = threads;
-  out.summary = Fddp(options).solve(problem, out.trajectory);
+  out.summary = test::solveInPlace(problem, out.trajectory, options);
   return out;
 }
 

@@ -10,6 +10,7 @@
 #include "measure_steps.h"
 #include "motion/gait.h"
 #include "own_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -26,7 +27,7 @@ SolvedWalk solveWalk(Motion motion) {
   options.initial_regularization = kGuessRegularization;
   options.max_iterations = 100;
   SolvedWalk solved;
-  solved.summary = Fddp(options).solve(*motion.problem, motion.guess);
+  solved.summary = test::solveInPlace(*motion.problem, motion.guess, options);
   solved.measures = StepMeter(motion, motion.guess).measure();
   return solved;
 }
@@ -302,7 +303,7 @@ TEST_CASE("walk: feet that come down strike within the cone of friction") {
     Motion motion = makeMotion(model, solved, ProblemOptions(formulation));
     FddpOptions options;
     options.initial_regularization = kGuessRegularization;
-    const FddpSummary summary = Fddp(options).solve(*motion.problem, motion.guess);
+    const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, options);
     CAPTURE(summary.message, summary.iterations);
     REQUIRE(summary.termination == FddpTermination::Converged);
     double largest = 0;

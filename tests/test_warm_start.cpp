@@ -6,6 +6,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/walk.h"
 #include "own_robots.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -24,28 +25,26 @@ Motion makeShortWalk(double speed, double end = 0.3) {
 
 TEST_CASE("warm start: a result is its own solution, and near that of a walk a little faster") {
   Motion motion = makeShortWalk(0.4);
-  Fddp first;
-  const FddpSummary cold = first.solve(*motion.problem, motion.guess);
+  const FddpResult first = solve(*motion.problem, motion.guess);
+  const FddpSummary& cold = first.summary;
+  motion.guess = first.trajectory;
   REQUIRE(cold.termination == FddpTermination::Converged);
   const MotionRecord record = makeRecord(motion, motion.guess);
 
   // The trajectory itself, and what a file keeps of it, both with the multipliers of its constraints.
   Motion same = makeShortWalk(0.4);
   same.guess = motion.guess;
-  Fddp second;
-  second.setMultipliers(first.getMultipliers());
-  CHECK(second.solve(*same.problem, same.guess).iterations <= 1);
+  CHECK(solve(*same.problem, same.guess, {}, {}, first.multipliers).summary.iterations <= 1);
   setGuess(record, same);
-  second.setMultipliers(first.getMultipliers());
-  const FddpSummary again = second.solve(*same.problem, same.guess);
+  const FddpSummary again = solve(*same.problem, same.guess, {}, {}, first.multipliers).summary;
   CHECK(again.termination == FddpTermination::Converged);
   CHECK(3 * again.iterations <= cold.iterations);
   CHECK(again.cost == Approx(cold.cost).epsilon(1e-8));
 
   Motion faster = makeShortWalk(0.48), warm = makeShortWalk(0.48);
-  const FddpSummary faster_cold = Fddp().solve(*faster.problem, faster.guess);
+  const FddpSummary faster_cold = test::solveInPlace(*faster.problem, faster.guess);
   setGuess(record, warm);
-  const FddpSummary faster_warm = Fddp().solve(*warm.problem, warm.guess);
+  const FddpSummary faster_warm = test::solveInPlace(*warm.problem, warm.guess);
   CHECK(faster_warm.termination == FddpTermination::Converged);
   CHECK(faster_warm.iterations < faster_cold.iterations);
   CHECK(faster_warm.cost == Approx(faster_cold.cost).epsilon(1e-6));

@@ -11,6 +11,7 @@
 #include "check.h"
 #include "get_error.h"
 #include "robot_directory.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -30,7 +31,7 @@ CheckedMotion solveBriefly(Motion motion) {
   const RobotDirectory directory;
   FddpOptions options;
   options.max_iterations = 4;
-  const FddpSummary summary = Fddp(options).solve(*motion.problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, options);
   writeResult(directory.path(), makeResult({"bipetto", getBipetto().file, {}}, motion, motion.guess, summary));
   return readMotion(directory.path());
 }

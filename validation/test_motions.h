@@ -14,6 +14,7 @@
 #include "bielle/motion/squat.h"
 #include "check.h"
 #include "robot_directory.h"
+#include "solve_in_place.h"
 
 namespace bielle::testing {
 
@@ -50,7 +51,7 @@ struct SolvedSquat {
     ProblemOptions options(formulation);
     options.step = step;
     Motion motion = makeSquat(robot.model, {}, options);
-    summary = Fddp().solve(*motion.problem, motion.guess);
+    summary = test::solveInPlace(*motion.problem, motion.guess);
     writeResult(directory.path(), makeResult({"bipetto", robot.file, {}}, motion, motion.guess, summary));
     checked = readMotion(directory.path());
   }

@@ -1722,28 +1722,6 @@ class Node:
         """Jacobian of that twist (6, nv); only in calc_jacobian."""
         ...
 
-class ControlBounds:
-    IGNORE: ClassVar[ControlBounds]
-    ENFORCE: ClassVar[ControlBounds]
-    __members__: ClassVar[Dict[str, ControlBounds]]
-    def __init__(self, value: int) -> None: ...
-    def __int__(self) -> int: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def value(self) -> int: ...
-
-class LastRollout:
-    CLOSED: ClassVar[LastRollout]
-    SEGMENTS: ClassVar[LastRollout]
-    __members__: ClassVar[Dict[str, LastRollout]]
-    def __init__(self, value: int) -> None: ...
-    def __int__(self) -> int: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def value(self) -> int: ...
-
 class ConstraintOptions:
     """How constraints are enforced.
 
@@ -1774,8 +1752,8 @@ class SolverOptions:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., acceptable_decrease: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., bounds: ControlBounds = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., last_rollout: LastRollout = ..., threads: int = ...) -> None: ...
-    def replace(self, *, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., acceptable_decrease: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., bounds: ControlBounds = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., last_rollout: LastRollout = ..., threads: int = ...) -> SolverOptions: ...
+    def __init__(self, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., acceptable_decrease: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., threads: int = ...) -> None: ...
+    def replace(self, *, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., acceptable_decrease: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., threads: int = ...) -> SolverOptions: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def max_iterations(self) -> int:
@@ -1838,20 +1816,12 @@ class SolverOptions:
         """share of the predicted decrease, in (0, 1)"""
         ...
     @property
-    def bounds(self) -> ControlBounds:
-        """ControlBounds"""
-        ...
-    @property
     def constraints(self) -> ConstraintOptions:
         """ConstraintOptions"""
         ...
     @property
     def rollout_segments(self) -> int:
         """largest number of segments of a rollout"""
-        ...
-    @property
-    def last_rollout(self) -> LastRollout:
-        """LastRollout"""
         ...
     @property
     def threads(self) -> int:
@@ -1919,8 +1889,8 @@ class Summary:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, termination: Termination = ..., message: str = ..., acceptable: bool = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> None: ...
-    def replace(self, *, termination: Termination = ..., message: str = ..., acceptable: bool = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> Summary: ...
+    def __init__(self, termination: Termination = ..., message: str = ..., acceptable: bool = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., evaluate_seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> None: ...
+    def replace(self, *, termination: Termination = ..., message: str = ..., acceptable: bool = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., evaluate_seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> Summary: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def termination(self) -> Termination:
@@ -1971,8 +1941,12 @@ class Summary:
         """s"""
         ...
     @property
-    def linearize_seconds(self) -> float:
+    def evaluate_seconds(self) -> float:
         """summed over the threads, s"""
+        ...
+    @property
+    def linearize_seconds(self) -> float:
+        """likewise"""
         ...
     @property
     def sweep_seconds(self) -> float:
@@ -1989,6 +1963,23 @@ class Summary:
     @property
     def converged(self) -> bool:
         """whether the solver ended at an optimum"""
+        ...
+
+class Gains:
+    """Feedback of a stage about a node state x_k and a control u_k: u = u_k + k + K dx, dx from x_k to x in the tangent space of the problem. K is added: it has the sign of a negative feedback.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, k: ArrayLike = ..., K: ArrayLike = ...) -> None: ...
+    def replace(self, *, k: ArrayLike = ..., K: ArrayLike = ...) -> Gains: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def k(self) -> Array:
+        """(nu,); vanishes at an optimum"""
+        ...
+    @property
+    def K(self) -> Array:
+        """(nu, ndx); rows of controls at their bounds are zero"""
         ...
 
 class Multipliers:
@@ -2443,6 +2434,10 @@ class Motion:
     @property
     def multipliers(self) -> Multipliers:
         """Multipliers of the last solve"""
+        ...
+    @property
+    def gains(self) -> Tuple[Gains, ...]:
+        """Gains of the last sweep, stage by stage"""
         ...
     @property
     def summary(self) -> Optional[Summary]:

@@ -10,11 +10,11 @@ namespace {
 
 std::shared_ptr<HeldController> makeHeldPolicy(const std::shared_ptr<HeldMotion>& motion, bool gains) {
   requireStill(*motion);
-  if (gains && !motion->solver)
+  if (gains && !motion->gains)
     throw std::runtime_error("gains come from the last solve: solve the motion first, or give gains=False");
   auto held = std::make_shared<HeldController>();
   held->model = motion->model;
-  auto policy = std::make_unique<Policy>(gains ? makePolicy(motion->motion, motion->motion.guess, *motion->solver)
+  auto policy = std::make_unique<Policy>(gains ? makePolicy(motion->motion, motion->motion.guess, *motion->gains)
                                                : makePolicy(motion->motion, motion->motion.guess));
   held->policy = policy.get();
   held->controller = std::move(policy);

@@ -45,7 +45,8 @@ FddpObserver makeObserver(const py::object& callback, bool* is_called) {
   };
   FddpObserver observer;
   // Copies of the observer are made without the interpreter's lock.
-  observer.callback = [shared = std::make_shared<SharedObject>(callback), is_called](const FddpIteration& iteration) {
+  observer.callback = [shared = std::make_shared<SharedObject>(callback), is_called](const FddpIteration& iteration,
+                                                                                     const ShootingTrajectory&) {
     const py::gil_scoped_acquire lock;
     const Mark mark(is_called);
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -151,28 +152,33 @@ py::list makeResiduals(const std::shared_ptr<Model>& model, const py::object& ma
                                  recipe));
 }
 
-FddpSummary solve(HeldMotion& held, FddpOptions options, const py::object& callback) {
+FddpSummary solveHeld(HeldMotion& held, const FddpOptions& options, const py::object& callback) {
   const BusyGuard guard(held.is_busy, "motion");
-  const FddpObserver observer = makeObserver(callback, &held.is_observed);
   Motion& motion = held.motion;
+  const bool has_peak = motion.peak_limits.size() > 0;
+  const FddpObserver inner = makeObserver(callback, &held.is_observed);
+  FddpObserver observer = inner;
+  if (!has_peak)
+    observer.callback = [&](const FddpIteration& line, const ShootingTrajectory& iterate) {
+      motion.guess = iterate;
+      return inner.callback(line, iterate);
+    };
   // What properties read changes under the interpreter's lock only.
-  held.multipliers.reset(), held.summary.reset();
-  Multipliers multipliers;
-  FddpSummary summary;
+  held.gains.reset(), held.multipliers.reset(), held.summary.reset();
+  FddpResult result;
   {
     const py::gil_scoped_release release;
-    if (motion.peak_limits.size() > 0) {
-      summary = solveMotion(motion, options, observer, &multipliers);
+    if (has_peak) {
+      result.summary = solveMotion(motion, options, observer, &result.multipliers);
     } else {
-      if (motion.bounded) options.bounds = ControlBounds::Enforce;
-      held.solver = std::make_unique<Fddp>(options);
-      summary = held.solver->solve(*motion.problem, motion.guess, observer);
-      multipliers = held.solver->getMultipliers();
+      result = solve(*motion.problem, motion.guess, options, observer);
+      motion.guess = std::move(result.trajectory);
     }
   }
-  held.multipliers = std::move(multipliers);
-  held.summary = summary;
-  return summary;
+  if (!has_peak) held.gains = std::move(result.gains);
+  held.multipliers = std::move(result.multipliers);
+  held.summary = result.summary;
+  return result.summary;
 }
 
 // The guess; the motion takes only one that fits its problem.
@@ -286,7 +292,7 @@ void bindHeldMotion(py::module_& module) {
            "Sets the guess from the record of another motion of the robot, resampled if its length differs.")
       .def("costs", &getCosts, py::arg("node"),
            "Costs of a node of the guess by name, before scaling by the time step.")
-      .def("solve", &solve, py::arg("options") = FddpOptions(), py::arg("callback") = py::none(),
+      .def("solve", &solveHeld, py::arg("options") = FddpOptions(), py::arg("callback") = py::none(),
            "Solves from the guess and leaves the solution there. Returns a Summary.\n\n"
            "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve with "
            "the current iterate in the guess.")
@@ -297,6 +303,14 @@ void bindHeldMotion(py::module_& module) {
             return *h.multipliers;
           },
           "Multipliers of the last solve")
+      .def_property_readonly(
+          "gains",
+          [](const HeldMotion& h) {
+            requireStill(h);
+            if (!h.gains) throw std::runtime_error("the motion has no gains: solve it first, for other than the least peak torque");
+            return show(*h.gains, {});
+          },
+          "Gains of the last sweep, stage by stage")
       .def_property_readonly(
           "summary", [](const HeldMotion& h) { return h.summary ? py::cast(*h.summary) : py::object(py::none()); },
           "Summary of the last solve, or None");

@@ -28,12 +28,12 @@ struct HeldMotion {
   std::optional<MotionPlan> plan;  // or that
   ProblemOptions options;
   Motion motion;
-  std::unique_ptr<Fddp> solver;            // of the last solve: gains
-  std::optional<Multipliers> multipliers;  // likewise
-  std::optional<FddpSummary> summary;      // likewise
-  std::atomic<bool> is_busy{false};        // one solve at a time
-  bool is_remembered = false;              // rememberResiduals() knows those of its stages
-  bool is_observed = false;                // that solve waits for its callback; under the interpreter's lock
+  std::optional<std::vector<Gains>> gains;  // of the last solve; none for the least peak torque
+  std::optional<Multipliers> multipliers;   // likewise
+  std::optional<FddpSummary> summary;       // likewise
+  std::atomic<bool> is_busy{false};         // one solve at a time
+  bool is_remembered = false;               // rememberResiduals() knows those of its stages
+  bool is_observed = false;                 // that solve waits for its callback; under the interpreter's lock
 };
 
 /// \throws RuntimeError while another thread changes the guess and the gains. A callback of the solve may read them.

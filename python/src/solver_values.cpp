@@ -6,12 +6,6 @@ namespace bielle::python {
 namespace {
 
 void bindOptions(py::module_& module) {
-  py::enum_<ControlBounds>(module, "ControlBounds")
-      .value("IGNORE", ControlBounds::Ignore)
-      .value("ENFORCE", ControlBounds::Enforce);
-  py::enum_<LastRollout>(module, "LastRollout")
-      .value("CLOSED", LastRollout::Closed)
-      .value("SEGMENTS", LastRollout::Segments);
   Value<ConstraintOptions>(module, "ConstraintOptions", "How constraints are enforced.")
       .field("tolerance", &ConstraintOptions::tolerance, "largest violation of a converged solve")
       .field("initial_penalty", &ConstraintOptions::initial_penalty, "cost over squared violation")
@@ -36,10 +30,8 @@ void bindOptions(py::module_& module) {
       .field("short_step", &FddpOptions::short_step, "a step is short up to this")
       .field("num_step_lengths", &FddpOptions::num_step_lengths, "1, 1/2, 1/4, ...")
       .field("acceptance", &FddpOptions::acceptance, "share of the predicted decrease, in (0, 1)")
-      .field("bounds", &FddpOptions::bounds, "ControlBounds")
       .field("constraints", &FddpOptions::constraints, "ConstraintOptions")
       .field("rollout_segments", &FddpOptions::rollout_segments, "largest number of segments of a rollout")
-      .field("last_rollout", &FddpOptions::last_rollout, "LastRollout")
       .field("threads", &FddpOptions::threads, "0: all; at most 1024; results are bitwise independent of it");
 }
 
@@ -73,7 +65,8 @@ void bindSummary(py::module_& module) {
       .field("penalty", &FddpSummary::penalty, "penalty of violated constraints; 0: there are none")
       .field("multiplier_updates", &FddpSummary::multiplier_updates, "number")
       .field("seconds", &FddpSummary::seconds, "s")
-      .field("linearize_seconds", &FddpSummary::linearize_seconds, "summed over the threads, s")
+      .field("evaluate_seconds", &FddpSummary::evaluate_seconds, "summed over the threads, s")
+      .field("linearize_seconds", &FddpSummary::linearize_seconds, "likewise")
       .field("sweep_seconds", &FddpSummary::sweep_seconds, "likewise")
       .field("rollout_seconds", &FddpSummary::rollout_seconds, "likewise")
       .field("log", &FddpSummary::log, "Iterations")
@@ -81,6 +74,12 @@ void bindSummary(py::module_& module) {
       .def_property_readonly(
           "converged", [](const FddpSummary& s) { return s.termination == FddpTermination::Converged; },
           "whether the solver ended at an optimum");
+  Value<Gains>(
+      module, "Gains",
+      "Feedback of a stage about a node state x_k and a control u_k: u = u_k + k + K dx, dx from x_k to x in the "
+      "tangent space of the problem. K is added: it has the sign of a negative feedback.")
+      .field("k", &Gains::k, "(nu,); vanishes at an optimum")
+      .field("K", &Gains::K, "(nu, ndx); rows of controls at their bounds are zero");
   Value<Multipliers>(module, "Multipliers", "Multipliers of the constraints, node by node.")
       .field("values", &Multipliers::values, "N + 1 of (constraint size,)")
       .field("penalty", &Multipliers::penalty, "penalty of violated constraints");

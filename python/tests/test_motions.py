@@ -109,6 +109,18 @@ def test_interrupt_leaves_the_iterate_in_the_guess(model):
     assert motion.solve().converged
 
 
+def test_gains_are_those_of_the_last_sweep(model):
+    motion = bielle.Motion.make(model, bielle.Request(motion="squat"))
+    with pytest.raises(RuntimeError, match="no gains: solve it first"):
+        motion.gains
+    assert motion.solve().converged
+    assert len(motion.gains) == motion.num_stages
+    for gains, x, u in zip(motion.gains, motion.guess.xs, motion.guess.us):
+        assert gains.k.shape == u.shape and gains.K.shape[0] == len(u) and 0 < gains.K.shape[1] < len(x)
+        assert np.abs(gains.k).max() < 1e-3 * np.abs(u).max()
+    assert np.abs(motion.gains[0].K).max() > 1
+
+
 def test_other_threads_run_during_a_solve(robot):
     ticks, done = [], threading.Event()
 

@@ -12,6 +12,7 @@
 #include "bielle/motion/squat.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "motion/benchmark_walk.h"
+#include "solve/fddp_solve.h"
 #include "solve/lq_sweep.h"
 
 namespace bielle {
@@ -138,19 +139,18 @@ double countRollouts(const FddpSummary& summary) {
   return std::max(1.0, rollouts);
 }
 
-Fddp makeSolver(int iterations, int threads) {
+FddpOptions makeOptions(int iterations, int threads) {
   FddpOptions options;
   options.max_iterations = iterations;
   options.threads = threads;
-  return Fddp(options);
+  return options;
 }
 
 // At most `iterations` iterations from the guess. The trajectory is stored in `result`, if given.
 FddpSummary iterate(Motion& motion, int iterations, int threads, ShootingTrajectory* result = nullptr) {
-  ShootingTrajectory trajectory = motion.guess;
-  const FddpSummary summary = makeSolver(iterations, threads).solve(*motion.problem, trajectory);
-  if (result) *result = std::move(trajectory);
-  return summary;
+  FddpResult solved = solve(*motion.problem, motion.guess, makeOptions(iterations, threads));
+  if (result) *result = std::move(solved.trajectory);
+  return solved.summary;
 }
 
 class Bench {
@@ -234,23 +234,24 @@ class Bench {
   void measureIterations(Motion& motion, int threads, NodeTimes& times) {
     const int n = motion.problem->numStages();
     FddpSummary best;
-    Fddp solver = makeSolver(whole_ ? 10 : 2, threads);
+    const FddpOptions options = makeOptions(whole_ ? 10 : 2, threads);
+    FddpMemory memory;
     // The first solve starts the threads and allocates memory, which takes as long as several iterations.
     for (int i = 0; i < (whole_ ? 4 : 2); ++i) {
       ShootingTrajectory trajectory = motion.guess;
-      const FddpSummary summary = solver.solve(*motion.problem, trajectory);
+      const FddpSummary summary = FddpSolve(options, *motion.problem, trajectory, {}, memory).run();
       if (i <= 1 || summary.seconds < best.seconds) best = summary;
     }
     const double rollouts = countRollouts(best);
     if (threads == 1) times.rollout = best.rollout_seconds / rollouts / n;
-    const double work =
-        std::max(best.seconds * (threads == 1), best.linearize_seconds + best.sweep_seconds + best.rollout_seconds);
+    const double linearize = best.evaluate_seconds + best.linearize_seconds;
+    const double work = std::max(best.seconds * (threads == 1), linearize + best.sweep_seconds + best.rollout_seconds);
     IterationTimes iteration;
     iteration.formulation = motion.problem->formulation();
     iteration.threads = threads;
     iteration.seconds = best.seconds / best.iterations / n;
     iteration.rollouts = rollouts / best.iterations;
-    iteration.linearize = best.linearize_seconds / work;
+    iteration.linearize = linearize / work;
     iteration.sweep = best.sweep_seconds / work;
     iteration.rollout = best.rollout_seconds / work;
     report_.iterations.push_back(iteration);
@@ -278,8 +279,8 @@ class Bench {
     measureSolve("benchmark walk", formulation, [&] { return makeBenchmarkWalk(model_, getWalk(), formulation); });
   }
 
-  RecedingOptions getReceding(Formulation formulation, bool cones, int threads) const {
-    RecedingOptions options;
+  ShiftOptions getReceding(Formulation formulation, bool cones, int threads) const {
+    ShiftOptions options;
     options.threads = threads;
     options.walk = getWalk();
     if (cones) options.walk.friction = LocomotionOptions{}.friction;
@@ -331,7 +332,7 @@ class Bench {
       double seconds = std::numeric_limits<double>::infinity();
       for (int i = 0; i < (whole_ ? 3 : 1); ++i) {
         const FddpSummary summary = iterate(motion, 1, 1);
-        seconds = std::min(seconds, summary.linearize_seconds + summary.sweep_seconds +
+        seconds = std::min(seconds, summary.evaluate_seconds + summary.linearize_seconds + summary.sweep_seconds +
                                         summary.rollout_seconds / countRollouts(summary));
       }
       report_.horizons.push_back({formulation, nodes, seconds / nodes});

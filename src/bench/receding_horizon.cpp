@@ -10,6 +10,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/solve/receding.h"
 #include "solve/window.h"
 
 namespace bielle {
@@ -75,9 +76,9 @@ ShiftTimes summarize(std::vector<double> times) {
   return {static_cast<int>(count), times[count / 2], times[(99 * count + 99) / 100 - 1], times.back()};
 }
 
-class Receding {
+class ShiftedWalk {
  public:
-  Receding(const Model& model, Formulation formulation, const RecedingOptions& options)
+  ShiftedWalk(const Model& model, Formulation formulation, const ShiftOptions& options)
       : model_(model),
         options_(options),
         motion_(makeBenchmarkWalk(model, options.walk, formulation)),
@@ -100,14 +101,12 @@ class Receding {
   RecedingHorizon run() {
     Multipliers multipliers;
     const ShootingTrajectory plan = makePlan(multipliers);
-    FddpOptions single;
+    RecedingOptions single;
     single.threads = options_.threads;
-    single.max_iterations = 1;
     single.initial_regularization = single.min_regularization = kRegularization;
-    single.last_rollout = LastRollout::Segments;
-    Fddp solver(single);
+    Receding solver(window_, single);
     ShootingTrajectory trajectory = plan;
-    solver.solve(window_, trajectory);  // sizes the memory
+    solver.step(trajectory);  // sizes the memory
     while (out_.up && static_cast<int>(times_.size()) < options_.shifts) {
       if (out_.cones) solver.setMultipliers(multipliers);
       walk(plan, solver);
@@ -126,14 +125,13 @@ class Receding {
     FddpOptions options;
     options.threads = options_.threads;
     options.max_iterations = options_.first_iterations;
-    Fddp solver(options);
-    solver.solve(window_, plan);
-    multipliers = solver.getMultipliers();
-    return plan;
+    FddpResult solved = bielle::solve(window_, std::move(plan), options);
+    multipliers = std::move(solved.multipliers);
+    return std::move(solved.trajectory);
   }
 
   // One pass from the start of the walk until the horizon reaches its end, or enough shifts are made.
-  void walk(ShootingTrajectory trajectory, Fddp& solver) {
+  void walk(ShootingTrajectory trajectory, Receding& solver) {
     VectorXd x = whole_.initialState(), next = x;
     const Torso start = findTorso(model_, ws_, x);
     const int last = whole_.numStages() - options_.nodes;
@@ -162,21 +160,21 @@ class Receding {
     return worst;
   }
 
-  bool solve(int k, Fddp& solver, ShootingTrajectory& trajectory) {
+  bool solve(int k, Receding& solver, ShootingTrajectory& trajectory) {
     const long preemptions = countPreemptions();
     const auto begin = std::chrono::steady_clock::now();
     if (k > 0) {
       solver.advance(trajectory);
       extend(whole_, evaluator_, k + options_.nodes - 1, trajectory);
     }
-    const FddpSummary summary = solver.solve(window_, trajectory);
+    const FddpSummary summary = solver.step(trajectory);
     times_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     if (countPreemptions() == preemptions) undisturbed_.push_back(times_.back());
     return summary.termination != FddpTermination::Failed;
   }
 
   const Model& model_;
-  const RecedingOptions& options_;
+  const ShiftOptions& options_;
   Motion motion_;
   RobotProblem& whole_;
   Window window_;
@@ -189,8 +187,8 @@ class Receding {
 
 }  // namespace
 
-RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, const RecedingOptions& options) {
-  return Receding(model, formulation, options).run();
+RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, const ShiftOptions& options) {
+  return ShiftedWalk(model, formulation, options).run();
 }
 
 }  // namespace bielle

@@ -5,7 +5,7 @@
 
 namespace bielle {
 
-struct RecedingOptions {
+struct ShiftOptions {
   int threads = 1;
   int shifts = 10000;         ///< in as many walks as necessary
   int nodes = 100;            ///< stages of the horizon
@@ -14,6 +14,6 @@ struct RecedingOptions {
 };
 
 /// \throws std::invalid_argument when no shift is requested, or the walk is not longer than the horizon
-RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, const RecedingOptions& options);
+RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, const ShiftOptions& options);
 
 }  // namespace bielle

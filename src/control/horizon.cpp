@@ -58,7 +58,6 @@ class MotionHorizon : public Horizon {
   }
 
   RobotProblem& getProblem() override { return problem_; }
-  bool isBounded() const override { return motion_.bounded; }
   int getFirst(int stage) const override { return getNode(stage); }  // the window moves no farther than its end
   void prepare(int) override {}
   int getBegin() const override { return 0; }
@@ -109,7 +108,6 @@ class WalkHorizon : public Horizon {
   }
 
   RobotProblem& getProblem() override { return *problem_; }
-  bool isBounded() const override { return walk_.isBounded(); }
   int getFirst(int stage) const override { return stage; }
   void prepare(int first) override {
     while (made_ <= first + nodes_) {

@@ -10,7 +10,6 @@ class Horizon {
  public:
   virtual ~Horizon() = default;
   virtual RobotProblem& getProblem() = 0;
-  virtual bool isBounded() const = 0;
   // Where the window begins whose solution is to be in force from this stage on.
   virtual int getFirst(int stage) const = 0;
   virtual void prepare(int first) = 0;

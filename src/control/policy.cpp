@@ -5,7 +5,6 @@
 
 #include "control/clock.h"
 #include "control/policy_stages.h"
-#include "solve/lq_sweep.h"
 
 namespace bielle {
 namespace {
@@ -13,7 +12,7 @@ namespace {
 double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.duration; }
 
 std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajectory& trajectory,
-                                      const LqSweep* sweep) {
+                                      const std::vector<Gains>* gains) {
   const RobotProblem& problem = *motion.problem;
   if (problem.hasFreeTimings()) throw std::invalid_argument("makePolicy: the motion has free durations");
   RobotEvaluator evaluator(problem);
@@ -28,8 +27,7 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
       Policy::Stage stage;
       fillStage(problem, node, time, x, trajectory.us[node], next, stage);
       stage.phase = phase_index;
-      if (sweep)
-        problem.mapGains(evaluator.evaluate(node, x, trajectory.us[node]), sweep->getNodes()[node].K, stage.K);
+      if (gains) problem.mapGains(evaluator.evaluate(node, x, trajectory.us[node]), (*gains)[node].K, stage.K);
       stages.push_back(std::move(stage));
       time += spec.dt;
     }
@@ -154,9 +152,8 @@ Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory) {
   return {motion.problem->model(), makeStages(motion, trajectory, nullptr), calcHoldTorques(motion, trajectory)};
 }
 
-Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const Fddp& solver) {
-  return {motion.problem->model(), makeStages(motion, trajectory, &solver.getSweep()),
-          calcHoldTorques(motion, trajectory)};
+Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const std::vector<Gains>& gains) {
+  return {motion.problem->model(), makeStages(motion, trajectory, &gains), calcHoldTorques(motion, trajectory)};
 }
 
 }  // namespace bielle

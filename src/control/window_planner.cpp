@@ -7,7 +7,6 @@
 #include "control/clock.h"
 #include "control/policy_stages.h"
 #include "motion/foot_constraints.h"
-#include "solve/lq_sweep.h"
 
 namespace bielle {
 namespace {
@@ -22,16 +21,14 @@ constexpr double kLoweringSpeed = 0.3;  // m/s
 constexpr double kDepth = 0.05;         // to which it is lowered, m
 constexpr int kFirstIterations = 10;    // of the solve before the start
 
-FddpOptions makeSolverOptions(bool bounded, const PredictiveOptions& options, int iterations) {
-  FddpOptions out;
+RecedingOptions makeSolverOptions(const PredictiveOptions& options, int iterations) {
+  RecedingOptions out;
   out.threads = options.threads;
-  out.max_iterations = iterations;
+  out.iterations = iterations;
   out.initial_regularization = out.min_regularization = options.regularization;
-  out.last_rollout = LastRollout::Segments;
   // One penalty for all solves: each takes a few iterations only, and multipliers are moved on from one to the next.
   out.constraints.initial_penalty = options.penalty;
   out.constraints.penalty_increase = 1;
-  if (bounded) out.bounds = ControlBounds::Enforce;
   return out;
 }
 
@@ -64,8 +61,8 @@ WindowPlanner::Solution WindowPlanner::makeEmpty() const {
 WindowPlanner::Solution WindowPlanner::makeFirst() {
   startFromGuess(0);
   if (!horizon_->isSolved()) solveFromRest();
-  Fddp first = makeSolver(kFirstIterations);
-  first.solve(window_, trajectory_);
+  Receding first = makeSolver(kFirstIterations);
+  first.step(trajectory_);
   Solution solution = makeEmpty();
   makePolicy(first, 0, solution);
   predictFootholds(0, solution);
@@ -90,8 +87,8 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
   solution.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-Fddp WindowPlanner::makeSolver(int iterations) const {
-  return Fddp(makeSolverOptions(horizon_->isBounded(), options_, iterations));
+Receding WindowPlanner::makeSolver(int iterations) const {
+  return Receding(window_, makeSolverOptions(options_, iterations));
 }
 
 // From a guess that stands still, step by step to the end.
@@ -99,8 +96,7 @@ void WindowPlanner::solveFromRest() {
   FddpOptions options;
   options.threads = options_.threads;
   options.initial_regularization = kGuessRegularization;
-  if (horizon_->isBounded()) options.bounds = ControlBounds::Enforce;
-  Fddp(options).solve(window_, trajectory_);
+  trajectory_ = bielle::solve(window_, std::move(trajectory_), options).trajectory;
 }
 
 bool WindowPlanner::stands(int stage, int contact) const {
@@ -231,7 +227,7 @@ bool WindowPlanner::solveWindow(Solution& solution) {
     horizon_->extend(first_ + nodes, trajectory_);
   }
   moveWindow();
-  if (solver_.solve(window_, trajectory_).termination == FddpTermination::Failed) return false;
+  if (solver_.step(trajectory_).termination == FddpTermination::Failed) return false;
   makePolicy(solver_, solution.target, solution);
   predictFootholds(solution.target, solution);
   return true;
@@ -297,7 +293,7 @@ void WindowPlanner::keepGains(int phase, const RowMatrixXd& K) {
 }
 
 // The first stages of the window's solution.
-void WindowPlanner::makePolicy(const Fddp& solver, int stage, Solution& solution) {
+void WindowPlanner::makePolicy(const Receding& solver, int stage, Solution& solution) {
   int node = 0;
   const Policy::Stage* before = nullptr;
   for (Policy::Stage& out : solution.stages) {
@@ -310,8 +306,8 @@ void WindowPlanner::makePolicy(const Fddp& solver, int stage, Solution& solution
     if (earlier) {
       out.K = *earlier;
     } else {
-      problem_.mapGains(evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]),
-                        solver.getSweep().getNodes()[node].K, out.K);
+      problem_.mapGains(evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]), solver.getGains(node).K,
+                        out.K);
       if (out.phase == solution.stages.front().phase) keepGains(out.phase, out.K);
     }
     solution.u_hold = out.u;

@@ -3,6 +3,7 @@
 #include <deque>
 
 #include "bielle/dynamics/impact.h"
+#include "bielle/solve/receding.h"
 #include "control/horizon.h"
 #include "solve/window.h"
 
@@ -47,7 +48,7 @@ class WindowPlanner {
  private:
   const StageSpec& getSpec(int stage) const { return problem_.spec(horizon_->getNode(stage)); }
   bool isImpact(int stage) const { return getSpec(stage).kind == StageKind::Impact; }
-  Fddp makeSolver(int iterations) const;
+  Receding makeSolver(int iterations) const;
   void solveFromRest();
   bool stands(int stage, int contact) const;
   int findLanding(int stage, const Measurement& measurement);
@@ -68,7 +69,7 @@ class WindowPlanner {
   bool isNearEnd(int stage) const;
   const RowMatrixXd* findEarlierGains(const Policy::Stage* before, int phase) const;
   void keepGains(int phase, const RowMatrixXd& K);
-  void makePolicy(const Fddp& solver, int stage, Solution& solution);
+  void makePolicy(const Receding& solver, int stage, Solution& solution);
   void predictFootholds(int stage, Solution& solution);
 
   const PredictiveOptions options_;
@@ -79,7 +80,7 @@ class WindowPlanner {
   RobotEvaluator evaluator_;
   ImpactWorkspace impact_;
   Workspace feet_;
-  Fddp solver_;
+  Receding solver_;
   ShootingTrajectory trajectory_;  // of the window
   std::deque<VectorXd> past_us_;   // of the stages before the window, as many as it may go back
   double advance_ = 0;  // how far feet that landed early or late have brought the motion ahead of its plan, s

@@ -185,7 +185,7 @@ void CommandedWalk::addLimitsTo(std::vector<StageSpec>& stages) {
   // Those of the first stage and of the last are those of the ends of a motion.
   stages.insert(stages.begin(), StageSpec());
   stages.emplace_back();
-  bounded_ = addLimits(model_, limits_, standing_.q, stages);
+  addLimits(model_, limits_, standing_.q, stages);
   stages.erase(stages.begin());
   stages.pop_back();
 }

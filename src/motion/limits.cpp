@@ -1,6 +1,7 @@
 #include "bielle/motion/limits.h"
 
 #include <cmath>
+#include <limits>
 
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
@@ -101,7 +102,11 @@ void addConstraint(const Bound& bound, std::unique_ptr<Residual> residual, Stage
 }  // namespace
 
 bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages) {
-  if (!options.enforced) return false;
+  if (!options.enforced) {
+    for (StageSpec& stage : stages)
+      stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
+    return false;
+  }
   const double margin = options.dead_point_margin;
   requireOption(margin >= 0 && margin < 1, "dead_point_margin", "it is outside 0 .. 1", "give a share, e.g. 0.15");
   const VectorXd efforts = getEffortLimits(model, options);

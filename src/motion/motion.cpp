@@ -27,7 +27,7 @@ void requireOption(bool ok, const std::string& option, const std::string& proble
 
 namespace {
 
-// Where bounds of durations are enforced, those of the motors are not to be.
+// The bounds of the motors are not those of the paper's problem.
 void leaveTorquesFree(const Model& model, std::vector<StageSpec>& stages) {
   for (StageSpec& stage : stages) stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
 }
@@ -40,17 +40,15 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
   Motion motion;
   requireOption(plan.limited || !options.limits.areGiven(), "limit", "the paper's problem has no limits",
                 "leave it out");
-  if (plan.limited) motion.bounded = addLimits(model, options.limits, plan.q_start, plan.stages);
+  if (plan.limited) motion.within_limits = addLimits(model, options.limits, plan.q_start, plan.stages);
   freeTimings(options.timings, plan.schedule, plan.stages);
   for (StageSpec& stage : plan.stages)  // at an impact h vanishes, and gains have no effect
     if (stage.dt > 0 && (plan.limited || stage.timing.phase >= 0))
       limitGains(step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
   setObjective(model, options.objective, plan.stages);
   motion.objective = options.objective;
-  motion.within_limits = motion.bounded;
   if (options.objective.objective == Objective::PeakTorque) motion.peak_limits = getPeakLimits(model, options.limits);
-  if (!motion.bounded) leaveTorquesFree(model, plan.stages);
-  motion.bounded |= options.timings.areGiven();
+  if (!plan.limited) leaveTorquesFree(model, plan.stages);
   motion.name = std::move(plan.name);
   motion.schedule = std::move(plan.schedule);
   motion.ground = std::move(plan.ground);

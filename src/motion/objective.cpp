@@ -105,12 +105,6 @@ std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion) {
 
 namespace {
 
-struct Attempt {
-  FddpSummary summary;
-  ShootingTrajectory trajectory;
-  Multipliers multipliers;
-};
-
 // Whether a problem has these rows of constraints at its nodes.
 bool haveRows(const ShootingProblem& problem, const Multipliers& multipliers) {
   if (!(multipliers.penalty > 0) || static_cast<int>(multipliers.values.size()) != problem.numStages() + 1)
@@ -121,30 +115,28 @@ bool haveRows(const ShootingProblem& problem, const Multipliers& multipliers) {
 }
 
 // \param start  multipliers to start from if the problem has their rows, else from zero
-Attempt attempt(const Motion& motion, FddpOptions solver, const FddpObserver& observer, const Multipliers& start = {}) {
+FddpResult attempt(const Motion& motion, const FddpOptions& solver, const FddpObserver& observer,
+                   const Multipliers& start = {}) {
   const std::unique_ptr<PeakProblem> peak = makePeakProblem(motion);
-  if (motion.bounded || peak) solver.bounds = ControlBounds::Enforce;
   const ShootingProblem& problem = peak ? static_cast<const ShootingProblem&>(*peak) : *motion.problem;
-  Fddp fddp(solver);
   // The penalty that a solve ended with is too stiff for another motion.
-  if (haveRows(problem, start)) fddp.setMultipliers({start.values, solver.constraints.initial_penalty});
-  Attempt out;
-  out.trajectory = peak ? peak->wrap(motion.guess) : motion.guess;
-  out.summary = fddp.solve(problem, out.trajectory, observer);
+  Multipliers first;
+  if (haveRows(problem, start)) first = {start.values, solver.constraints.initial_penalty};
+  FddpResult out = solve(problem, peak ? peak->wrap(motion.guess) : motion.guess, solver, observer, first);
   if (peak) out.trajectory = peak->unwrap(out.trajectory);
-  out.multipliers = fddp.getMultipliers();
   return out;
 }
 
 // The better of two attempts, with the iterations and times of both.
-Attempt join(Attempt first, Attempt second) {
+FddpResult join(FddpResult first, FddpResult second) {
   const bool both = second.summary.termination == FddpTermination::Infeasible;
   const FddpSummary &before = first.summary, &after = second.summary;
-  Attempt& better = both && before.violation < after.violation ? first : second;
+  FddpResult& better = both && before.violation < after.violation ? first : second;
   FddpSummary out = better.summary;
   out.iterations = before.iterations + after.iterations;
   out.multiplier_updates = before.multiplier_updates + after.multiplier_updates;
   out.seconds = before.seconds + after.seconds;
+  out.evaluate_seconds = before.evaluate_seconds + after.evaluate_seconds;
   out.linearize_seconds = before.linearize_seconds + after.linearize_seconds;
   out.sweep_seconds = before.sweep_seconds + after.sweep_seconds;
   out.rollout_seconds = before.rollout_seconds + after.rollout_seconds;
@@ -174,7 +166,7 @@ FddpOptions makeMotionSolverOptions() {
 FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                         Multipliers* multipliers) {
   constexpr double kCautious = 1e-2;  // regularization of the second attempt
-  Attempt result = attempt(motion, options, observer, multipliers ? *multipliers : Multipliers());
+  FddpResult result = attempt(motion, options, observer, multipliers ? *multipliers : Multipliers());
   if (result.summary.termination == FddpTermination::Failed && result.summary.iterations == 0) {
     holdPosture(motion);
     result = attempt(motion, options, observer);

@@ -18,7 +18,7 @@ void requireSameSizes(const ShootingProblem& a, const ShootingProblem& b);
 std::optional<ShootingTrajectory> calcPath(const ShootingProblem& problem, const ShootingTrajectory& optimum,
                                            const ShootingProblem& changed);
 
-// Weights of Eq. (11) of fddp.h about constraints c, of the rows that are active by their multipliers y.
+// Weights of Eq. (11) of docs/solver.md about constraints c, of the rows that are active by their multipliers y.
 ConstraintWeights makeActiveWeights(const ShootingProblem& problem, int node, const VectorXd& y, const VectorXd& c,
                                     double penalty);
 

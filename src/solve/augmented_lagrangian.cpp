@@ -41,7 +41,7 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
     for (VectorXd* v : {&node.lower, &node.upper, &node.weights.gradient, &node.weights.hessian}) v->setZero(rows);
     problem.getConstraintBounds(k, node.lower, node.upper);
     if (!(node.lower.array() <= node.upper.array()).all())
-      throw std::invalid_argument("Fddp: a lower bound of the constraints of node " + std::to_string(k) +
+      throw std::invalid_argument("FDDP: a lower bound of the constraints of node " + std::to_string(k) +
                                   " exceeds the upper");
     rows_ += rows;
   }
@@ -195,7 +195,7 @@ Multipliers AugmentedLagrangian::getMultipliers() const {
 }
 
 void AugmentedLagrangian::setMultipliers(const Multipliers& multipliers) {
-  if (!(multipliers.penalty > 0)) throw std::invalid_argument("Fddp: the penalty of multipliers must be positive");
+  if (!(multipliers.penalty > 0)) throw std::invalid_argument("FDDP: the penalty of multipliers must be positive");
   nodes_.resize(multipliers.values.size());
   for (size_t k = 0; k < nodes_.size(); ++k) nodes_[k].multipliers = multipliers.values[k];
   far_penalty_ = multipliers.penalty;

@@ -1,5 +1,5 @@
 #pragma once
-// The constraints of a shooting problem, by an augmented Lagrangian (fddp.h, Eqs. 10 to 14).
+// The constraints of a shooting problem, by an augmented Lagrangian (docs/solver.md, Eqs. 10 to 14).
 #include "bielle/solve/fddp.h"
 #include "solve/node_evaluations.h"
 
@@ -35,7 +35,7 @@ class AugmentedLagrangian {
   /// and evaluates again. Once the penalty has reached its maximum, the violations alone are minimized: without multipliers,
   /// under a penalty that dominates `cost`. Returns false if that has been done and has not reduced them: infeasible.
   bool updateMultipliers(const EvaluationList& iterate, double cost);
-  /// Holds the rows that have a multiplier at their bounds (fddp.h, Eq. 14) until the next evaluate().
+  /// Holds the rows that have a multiplier at their bounds (receding.h, Eq. 14) until the next evaluate().
   void hold(const EvaluationList& iterate);
   /// Minimizes the violations alone from now on, as updateMultipliers() does in the end. False if that was so already.
   bool restore(const EvaluationList& iterate, double cost);

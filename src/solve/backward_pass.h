@@ -1,5 +1,5 @@
 #pragma once
-// The linearization of all nodes and the sweep over them (fddp.h, 1 and 2).
+// The linearization of all nodes and the sweep over them (docs/solver.md, 1 and 2).
 #include <atomic>
 #include <string>
 

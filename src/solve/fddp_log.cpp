@@ -37,8 +37,8 @@ void printFddpIteration(std::ostream& out, const FddpIteration& line) {
   out << text;
 }
 
-std::function<FddpAction(const FddpIteration&)> makeFddpPrinter(std::ostream& out) {
-  return [&out](const FddpIteration& line) {
+std::function<FddpAction(const FddpIteration&, const ShootingTrajectory&)> makeFddpPrinter(std::ostream& out) {
+  return [&out](const FddpIteration& line, const ShootingTrajectory&) {
     if (line.iteration == 1) printFddpHeader(out);
     printFddpIteration(out, line);
     out.flush();

@@ -24,6 +24,7 @@
 /// Without gaps and boxes curvature = -slope.
 #include <vector>
 
+#include "bielle/solve/gains.h"
 #include "bielle/solve/stage_model.h"
 #include "solve/box_qp.h"
 
@@ -54,13 +55,11 @@ struct LqResult {
 /// Owns all data that a sweep writes. Sized by the first update(); later ones of the same sizes allocate nothing.
 class LqSweep {
  public:
-  /// Results of the sweep at node k; at the terminal node Vx and Vxx only.
-  struct Node {
-    VectorXd Vx;    ///< ndx_k
-    MatrixXd Vxx;   ///< ndx_k x ndx_k, symmetric, both triangles
-    VectorXd Qu;    ///< nu_k
-    VectorXd k;     ///< nu_k
-    RowMatrixXd K;  ///< nu_k x ndx_k
+  /// Results of the sweep at node k: k and K of Eq. (5), and the value function; at the terminal node Vx and Vxx only.
+  struct Node : Gains {
+    VectorXd Vx;   ///< ndx_k
+    MatrixXd Vxx;  ///< ndx_k x ndx_k, symmetric, both triangles
+    VectorXd Qu;   ///< nu_k
   };
 
   /// Solves (1) for N + 1 models, the last one terminal. boxes: N of them, or none.

@@ -58,7 +58,7 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
     if (!fresh_[k]) {
       tasks_.push_back({k, x, u, nullptr, iterate_[k].get()});
     } else if (iterate_[k]->x != *x || (u && iterate_[k]->u != *u)) {
-      throw std::invalid_argument("Fddp: node " + std::to_string(k) + " changed after the horizon advanced");
+      throw std::invalid_argument("FDDP: node " + std::to_string(k) + " changed after the horizon advanced");
     }
   }
   std::fill(fresh_.begin(), fresh_.end(), true);

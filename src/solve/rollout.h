@@ -1,5 +1,5 @@
 #pragma once
-// The nonlinear rollout of trial steps (fddp.h, Eqs. 2, 3, 7 and 8).
+// The nonlinear rollout of trial steps (docs/solver.md, Eqs. 2, 3, 7 and 8).
 #include "solve/augmented_lagrangian.h"
 #include "solve/lq_sweep.h"
 
@@ -43,7 +43,7 @@ class Rollout {
 
   /// Rolls out a step of length alpha in several segments: getTrial(0).
   void cut(const RolloutInput& input, double alpha, int segments);
-  /// Repeats a full step from starts that close the gaps of the last cut() to first order (fddp.h, Eq. 9).
+  /// Repeats a full step from starts that close the gaps of the last cut() to first order (docs/solver.md, Eq. 9).
   void close(const RolloutInput& input);
   /// Rolls out steps of length alpha, alpha / 2, alpha / 4, ..., each in one piece, one per trial.
   void search(const RolloutInput& input, double alpha, int num);

@@ -25,6 +25,17 @@ void ShootingProblem::getControlBounds(int, VectorRef lower, VectorRef upper) co
   upper.setConstant(std::numeric_limits<double>::infinity());
 }
 
+bool ShootingProblem::hasControlBounds() const {
+  VectorXd lower, upper;
+  for (int k = 0; k < numStages(); ++k) {
+    lower.resize(controlSize(k));
+    upper.resize(controlSize(k));
+    getControlBounds(k, lower, upper);
+    if (lower.array().isFinite().any() || upper.array().isFinite().any()) return true;
+  }
+  return false;
+}
+
 void ShootingProblem::getConstraintBounds(int, VectorRef lower, VectorRef upper) const {
   lower.setConstant(-std::numeric_limits<double>::infinity());
   upper.setConstant(std::numeric_limits<double>::infinity());

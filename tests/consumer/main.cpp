@@ -20,8 +20,9 @@ int main(int argc, char** argv) {
   options.settle = 0;
   options.time_step = 0.02;
   bielle::Motion motion = bielle::makeSquat(robot.model, options);
-  const bielle::FddpSummary summary = bielle::Fddp().solve(*motion.problem, motion.guess);
-  const bielle::MotionResult result = bielle::makeResult({"bipetto", {}}, motion, motion.guess, summary);
+  const bielle::FddpResult solved = bielle::solve(*motion.problem, motion.guess);
+  const bielle::FddpSummary& summary = solved.summary;
+  const bielle::MotionResult result = bielle::makeResult({"bipetto", {}}, motion, solved.trajectory, summary);
   bielle::writeResult(argc > 1 ? argv[1] : "squat", result);
   std::printf("%s after %d iterations, lowest at %.4f m\n", getName(summary.termination), summary.iterations,
               result.com_lowest);

@@ -19,7 +19,7 @@
 
 #include "bielle/control/controller.h"
 #include "bielle/motion/motion.h"
-#include "bielle/solve/fddp.h"
+#include "bielle/solve/gains.h"
 
 namespace bielle {
 
@@ -72,7 +72,7 @@ class Policy : public Controller {
 
 /// The torques and states of a motion's trajectory, without feedback. The motion must not have free durations.
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory);
-/// The same with gains. \param solver  whose last solve returned the trajectory
-Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const Fddp& solver);
+/// The same with gains, about the trajectory's nodes.
+Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const std::vector<Gains>& gains);
 
 }  // namespace bielle

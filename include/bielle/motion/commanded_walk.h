@@ -45,8 +45,6 @@ class CommandedWalk {
   double getTimeStep() const { return options_.timing.time_step; }  ///< s
   /// The stages of a step on the spot, which are as large as any stage of the walk; for allocating memory.
   std::vector<StageSpec> makeExamples() const;
-  /// Whether torques are limited, so that a solver must enforce bounds.
-  bool isBounded() const { return bounded_; }
 
  private:
   struct Segment;
@@ -73,7 +71,6 @@ class CommandedWalk {
   Side swing_ = Side::Right;  // foot of the next step
   std::array<bool, 2> standing_feet_{};
   int made_ = 0, phase_ = 0;
-  bool bounded_ = false;
   std::deque<Stage> stages_;  // made, but not requested yet
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file Limits of motors and joints, for every motion.
 ///
-/// - Torques |u| <= effort limit: bounds of the controls, enforced by a solver with ControlBounds::Enforce.
+/// - Torques |u| <= effort limit: bounds of the controls.
 /// - Ranges of joints with one degree of freedom, velocities, and powers |u v| of motors: path constraints at every
 ///   node but the first, whose state is given. A violation of 1 is half the width of a range (1 rad or 1 m where one
 ///   side is open), or the limit of a velocity or power.

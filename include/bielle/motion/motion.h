@@ -45,7 +45,6 @@ struct Motion {
   ShootingTrajectory guess;  ///< quasi-static
   OptionValues options;      ///< every option of the motion by name
   std::vector<Goal> goals;   ///< requested quantities, to be measured on the trajectory
-  bool bounded = false;      ///< a torque or a duration is limited: to be solved with ControlBounds::Enforce
   ObjectiveOptions objective{};
   VectorXd peak_limits{};      ///< of the peak torque, nu (getPeakLimits); empty for other objectives
   bool within_limits = false;  ///< whether torques are limited, at s = 1 of the peak torque
@@ -59,9 +58,9 @@ ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& op
 /// of least effort near the limits of friction or of a linkage need that.
 FddpOptions makeMotionSolverOptions();
 
-/// Solves a motion from its guess, and leaves the solution there: by Fddp, with bounds enforced where there are any. For the
-/// least peak torque it solves the PeakProblem of motion.problem. The guess should then be the motion of least effort:
-/// from a quasi-static guess, motors that share a load gain nothing by sharing it better. An infeasible end is only a
+/// Solves a motion from its guess, and leaves the solution there. For the least peak torque it solves the PeakProblem of
+/// motion.problem. The guess should then be the motion of least effort: from a quasi-static guess, motors that share a
+/// load gain nothing by sharing it better. An infeasible end is only a
 /// local statement. The solve is then repeated from the guess, with shorter first steps (regularization 1e-2);
 /// iterations, times and log are those of both attempts. Where the guess cannot be evaluated, such as with a leg that
 /// is nearly straight, the posture at the start takes its place.

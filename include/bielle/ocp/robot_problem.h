@@ -79,7 +79,7 @@ struct StageSpec {
   ControlCost control;
   std::vector<Cost> costs;
   std::vector<PathConstraint> path_constraints;
-  VectorXd effort_limits;  ///< bounds of |u|, nu, for solvers that enforce bounds; empty: those of the motors
+  VectorXd effort_limits;  ///< bounds of |u|, nu; empty: those of the motors
 };
 
 /// Value of one cost at one node, for reports.

@@ -10,7 +10,7 @@
 ///
 ///     u_i = s L_i w_i,   -1 <= w_i <= 1    (u_i = w_i, within its own bounds, where L_i is infinite).               (2)
 ///
-/// Bounds of w do not depend on s, so that a solver with ControlBounds::Enforce satisfies them exactly. (2) is modelled
+/// Bounds of w do not depend on s, so that the solver satisfies them exactly. (2) is modelled
 /// to first order: its second derivative, by s and w_i, belongs to the derivative of the Lagrangian by u_i, which at a
 /// solution vanishes, unless w_i is at a bound and does not move. The cost is quadratic in s to give the model of s its
 /// curvature.

@@ -100,8 +100,10 @@ class ShootingProblem {
   virtual int tangentSize(int node) const = 0;   ///< node in [0, N]
   virtual int controlSize(int stage) const = 0;  ///< stage in [0, N)
   virtual const VectorXd& initialState() const = 0;
-  /// Bounds of the controls of a stage (nu each), infinite if there are none.
+  /// Bounds of the controls of a stage (nu each), which solvers keep; infinite if there are none.
   virtual void getControlBounds(int stage, VectorRef lower, VectorRef upper) const;
+  /// Whether any of them is finite.
+  bool hasControlBounds() const;
 
   /// Rows of c_k, node in [0, N].
   virtual int constraintSize(int) const { return 0; }

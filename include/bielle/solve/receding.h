@@ -1,0 +1,59 @@
+#pragma once
+/// \file FDDP for a receding horizon: a few iterations per step, each about as long as the last, on a window that moves.
+///
+/// Iterations are those of fddp.h, with three differences. None closes the gaps for its own sake: steps of all lengths are
+/// rolled out in segments, which run at the same time, and what they leave open is left to the next step. Multipliers are new,
+/// fddp.h Eq. (12), before every linearization, which is made once. And since Eq. (10) is not at its minimum there, rows with
+/// y_k != 0 are then held at their bounds, like equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal
+/// on Optimization 13, 2002): in Eq. (10) they have
+///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (14)
+/// With Eq. (10) alone a violated row moves inside by as much as it was violated. There it is free, since it is farther from
+/// its bound than y_k / rho, and is then violated again: in a walk's window, wrench cones by 0.5 in every other iteration.
+#include <memory>
+
+#include "bielle/solve/fddp.h"
+
+namespace bielle {
+
+struct FddpMemory;
+
+/// For a constant penalty set constraints.penalty_increase to 1, for a constant regularization the least one to the initial.
+struct RecedingOptions : IterationOptions {
+  int iterations = 1;  ///< per step, at most 1000000; fewer if it converges
+};
+
+/// Keeps its memory and multipliers from step to step: an iteration after the first allocates nothing.
+class Receding {
+ public:
+  /// \param problem  of the window; must outlive it and may change between steps, sizes included
+  /// \throws std::invalid_argument naming invalid options
+  explicit Receding(const ShootingProblem& problem, const RecedingOptions& options = {});
+  ~Receding();
+  Receding(Receding&&) noexcept;
+  Receding& operator=(Receding&&) noexcept;
+
+  /// Improves the trajectory of the window: on entry, like the guess of solve(), then the last iterate. Multipliers start
+  /// from zero unless advance() or setMultipliers() came after the last step. Exceptions of the problem leave it, with the
+  /// current iterate in the trajectory. \throws std::invalid_argument like solve()
+  FddpSummary step(ShootingTrajectory& trajectory, const FddpObserver& observer = {});
+
+  /// Moves on by one stage: the trajectory of the last step(), its multipliers and the evaluations of its nodes. Node k of
+  /// the problem must now be the previous node k + 1; the next step() evaluates only nodes 0, N - 1 and N. Until then no
+  /// other node of the trajectory may change, or it throws std::invalid_argument. The last state and control are repeated.
+  void advance(ShootingTrajectory& trajectory);
+
+  /// Those at the end of the last step(), moved on by advance(); and those from which the next one starts, with all its nodes
+  /// evaluated again. \throws std::invalid_argument when the penalty is not positive
+  Multipliers getMultipliers() const;
+  void setMultipliers(const Multipliers& multipliers);
+
+  /// Of a stage of the last sweep, about the iterate linearized last; valid until the next step().
+  const Gains& getGains(int stage) const;
+
+ private:
+  const ShootingProblem* problem_;
+  RecedingOptions options_;
+  std::unique_ptr<FddpMemory> memory_;
+};
+
+}  // namespace bielle

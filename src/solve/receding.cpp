@@ -1,0 +1,111 @@
+#include "bielle/solve/receding.h"
+
+#include <stdexcept>
+
+#include "solve/fddp_checks.h"
+#include "solve/fddp_iterations.h"
+
+namespace bielle {
+
+namespace {
+
+/// One call of step().
+class RecedingStep : private FddpIterations {
+ public:
+  RecedingStep(const RecedingOptions& options, const ShootingProblem& problem, ShootingTrajectory& trajectory,
+               const FddpObserver& observer, FddpMemory& memory)
+      : FddpIterations(options, options.iterations, problem, trajectory, observer, memory) {}
+
+  FddpSummary run() {
+    start();
+    while (true) {
+      if (const End end = linearize()) return finish(*end);
+      if (const End end = findStep()) return finish(*end);
+      acceptStep();
+      if (const End end = checkProgress()) return finish(*end);
+      adaptRegularization();
+    }
+  }
+
+ private:
+  // New multipliers come before, so that no iteration linearizes twice.
+  End linearize() {
+    if (const End end = evaluate()) return end;
+    AugmentedLagrangian& lagrangian = memory_.lagrangian;
+    if (!lagrangian.isEmpty()) {
+      lagrangian.updateMultipliers(getIterate(), line_.cost);
+      lagrangian.hold(getIterate());
+    }
+    return updateModels();
+  }
+
+  // Finds an acceptable trial, unless the iterations end at the current iterate.
+  End findStep() {
+    while (true) {
+      if (const End end = updateStep()) return end;
+      if (isOptimal()) return FddpTermination::Converged;
+      if (stalled_ && isClosed() && !memory_.lagrangian.isEmpty()) {
+        if (!memory_.lagrangian.updateMultipliers(getIterate(), line_.cost)) return endViolated();
+        stalled_ = swept_ = false;
+        continue;
+      }
+      if (searchLine() && (accepted_->alpha == 1 || !isRounding())) return {};
+      if (const End end = raiseRegularizationOrStall()) return end;
+    }
+  }
+
+  // There is no time for rollouts in one piece, except at the end.
+  bool searchLine() {
+    const RolloutInput input = startSearch();
+    const int segments = getNumSegments();
+    if (segments == 1) return searchInOnePiece(input);
+    if (!vanishesNext()) return searchInSegments(input, segments);
+    return (last_step_ == 1 && first_step_ == 1 && tryClosed(input, segments)) || searchInOnePiece(input);
+  }
+
+  // Steps of all lengths.
+  bool searchInSegments(const RolloutInput& input, int segments) {
+    double alpha = 1;
+    for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
+      if (isInterrupted()) return false;
+      memory_.rollout.cut(input, alpha, segments);
+      if (accept(memory_.rollout.getTrial(0))) return true;
+    }
+    return false;
+  }
+};
+
+}  // namespace
+
+Receding::Receding(const ShootingProblem& problem, const RecedingOptions& options)
+    : problem_(&problem), options_(options), memory_(std::make_unique<FddpMemory>()) {
+  checkOptions(options_);
+}
+Receding::~Receding() = default;
+Receding::Receding(Receding&&) noexcept = default;
+Receding& Receding::operator=(Receding&&) noexcept = default;
+
+FddpSummary Receding::step(ShootingTrajectory& trajectory, const FddpObserver& observer) {
+  return RecedingStep(options_, *problem_, trajectory, observer, *memory_).run();
+}
+
+void Receding::advance(ShootingTrajectory& trajectory) {
+  const size_t N = trajectory.us.size();
+  if (N < 1 || trajectory.xs.size() != N + 1) throw std::invalid_argument("Receding: no trajectory to advance");
+  for (size_t k = 0; k < N; ++k) trajectory.xs[k].swap(trajectory.xs[k + 1]);
+  for (size_t k = 0; k + 1 < N; ++k) trajectory.us[k].swap(trajectory.us[k + 1]);
+  trajectory.xs[N] = trajectory.xs[N - 1];
+  if (N > 1) trajectory.us[N - 1] = trajectory.us[N - 2];
+  memory_->evaluations.advance();
+  memory_->lagrangian.advance();
+}
+
+Multipliers Receding::getMultipliers() const { return memory_->lagrangian.getMultipliers(); }
+void Receding::setMultipliers(const Multipliers& multipliers) {
+  memory_->lagrangian.setMultipliers(multipliers);
+  memory_->evaluations.outdate();
+}
+
+const Gains& Receding::getGains(int stage) const { return memory_->backward.getSweep().getNodes()[stage]; }
+
+}  // namespace bielle
