@@ -13,9 +13,9 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/io/robot_loader.h"
+#include "bielle/model/names.h"
 #include "bielle/motion/squat.h"
 
 using namespace bielle;
@@ -48,14 +48,14 @@ int main(int argc, char** argv) {
   if (argc > 2) options.duration = std::atof(argv[2]);
 
   const LoadedRobot robot = loadRobot("bipetto");
-  Motion motion = makeSquat(robot.model, options);
+  const Motion motion = makeSquat(robot.model, options);
   std::printf("%d stages, %d velocities, %d motors\n", motion.problem->numStages(), robot.model.nv(), robot.model.nu());
 
-  FddpObserver observer;
-  observer.callback = makeFddpPrinter(std::cout);
-  const FddpResult solved = solve(*motion.problem, motion.guess, {}, observer);
-  const FddpSummary& summary = solved.summary;
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
+  SolveObserver observer;
+  observer.motion.callback = makeFddpPrinter(std::cout);
+  const Solution solution = solve(motion, {}, observer);
+  const FddpSummary& summary = solution.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, solution);
   printMotion(result, options);
 
   std::printf("\n%s after %d iterations and %.2f s, cost %.6f\n", getName(summary.termination), summary.iterations,

@@ -72,18 +72,18 @@ int main(int argc, char** argv) {
   if (argc > 3) options.steps = std::atoi(argv[3]);
 
   const LoadedRobot robot = loadRobot("bipetto");
-  Motion motion = makeWalk(robot.model, options);
+  const Motion motion = makeWalk(robot.model, options);
   std::printf("%d stages, %zu phases, steps of %.3f m every %.3f s\n", motion.problem->numStages(),
               motion.schedule.phases.size(), options.speed * options.gait.timing.stepDuration(),
               options.gait.timing.stepDuration());
 
-  FddpObserver observer;
-  observer.callback = makeFddpPrinter(std::cout);
-  const FddpResult solved = solve(*motion.problem, motion.guess, {}, observer);
-  const FddpSummary& summary = solved.summary;
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
+  SolveObserver observer;
+  observer.motion.callback = makeFddpPrinter(std::cout);
+  const Solution solution = solve(motion, {}, observer);
+  const FddpSummary& summary = solution.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, solution);
 
-  const double worst = printFootholds(motion, solved.trajectory);
+  const double worst = printFootholds(motion, solution.trajectory);
   const int steps = static_cast<int>(options.steps);
   if (steps >= 5)  // the first two and the last two are not steady
     std::printf("\n%.4f m/s requested, %.4f m/s walked\n", options.speed,

@@ -80,10 +80,10 @@ int main(int argc, char** argv) {
   bool converged = true;
   for (double height : heights) {
     options.height = height;
-    Motion motion = makeStairs(robot.model, options);
-    const FddpResult solved = solve(*motion.problem, motion.guess);
-    const FddpSummary& summary = solved.summary;
-    const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
+    const Motion motion = makeStairs(robot.model, options);
+    const Solution solution = solve(motion);
+    const FddpSummary& summary = solution.summary;
+    const MotionResult result = makeResult({"bipetto", robot.file, {}}, solution);
     const double duration = options.stairs * options.depth / options.speed;
     const Power power = calcMeanPower(robot.model, result.record, duration);
     std::printf("%9.3f %-10s %10d %9.2f %14.2f %10.2f %11.2f %11.2f %11.2f\n", height, getName(summary.termination),

@@ -15,9 +15,9 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/io/robot_loader.h"
+#include "bielle/model/names.h"
 #include "bielle/motion/jump.h"
 
 using namespace bielle;
@@ -73,13 +73,13 @@ int main(int argc, char** argv) {
   std::printf("%.3f s in the air: take-off at %.3f m/s, rise of %.4f m, %.2f times the weight on average to push off\n",
               figures.flight, figures.take_off, figures.rise,
               1 + figures.take_off / (robot.model.gravity().norm() * figures.push));
-  Motion motion = makeJump(robot.model, options);
+  const Motion motion = makeJump(robot.model, options);
 
-  FddpObserver observer;
-  observer.callback = makeFddpPrinter(std::cout);
-  const FddpResult solved = solve(*motion.problem, motion.guess, {}, observer);
-  const FddpSummary& summary = solved.summary;
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
+  SolveObserver observer;
+  observer.motion.callback = makeFddpPrinter(std::cout);
+  const Solution solution = solve(motion, {}, observer);
+  const FddpSummary& summary = solution.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, solution);
   printMotion(result, options);
 
   std::printf("\n%s after %d iterations and %.2f s; falls with %.3f m/s^2, feet slip by at most %.1e m\n",

@@ -41,14 +41,14 @@ bool planAndLift(const Model& closed, const SerialModel& serial, double depth) {
   SquatOptions options;
   options.depth = depth;
   // Lifting takes accelerations at the nodes, where Euler steps have them.
-  Motion motion = makeSquat(serial.model, options, {Formulation::Reduced, StepRule::Euler});
-  const FddpResult solved = solve(*motion.problem, motion.guess);
-  const MotionRecord record = makeRecord(motion, solved.trajectory);
+  const Motion motion = makeSquat(serial.model, options, {Formulation::Reduced, StepRule::Euler});
+  const Solution solution = solve(motion);
+  const MotionRecord record = makeRecord(motion, solution.trajectory);
   double knee = 0;
-  for (const VectorXd& x : solved.trajectory.xs)
+  for (const VectorXd& x : solution.trajectory.xs)
     knee = std::max(knee, x[serial.model.joints()[serial.model.findJoint("knee_right")].idx_q]);
   std::printf("\nsquat to %.2f on the serial model: %s after %d iterations, knee to %.4f rad\n", depth,
-              getName(solved.summary.termination), solved.summary.iterations, knee);
+              getName(solution.summary.termination), solution.summary.iterations, knee);
 
   const LiftResult lifted = lift(closed, serial, makeSerialTrajectory(motion, record));
   if (!lifted.lifted()) {

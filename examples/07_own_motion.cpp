@@ -108,10 +108,11 @@ double calcPressureError(const MotionRecord& record, double dt) {
 int main(int argc, char** argv) {
   const LoadedRobot robot = loadRobot("bipetto");
   const SwayOptions options;
-  Motion motion = makeSway(robot.model, options);
-  const FddpResult solved = solve(*motion.problem, motion.guess);
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, solved.summary);
-  std::printf("%s after %d iterations\n", getName(solved.summary.termination), solved.summary.iterations);
+  const Motion motion = makeSway(robot.model, options);
+  const Solution solution = solve(motion);
+  const FddpSummary& summary = solution.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, solution);
+  std::printf("%s after %d iterations\n", getName(summary.termination), summary.iterations);
   writeResult(argc > 1 ? argv[1] : "sway", result);
 
   const auto path = result.record.com.col(1);

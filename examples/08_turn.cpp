@@ -75,14 +75,14 @@ void printLandings(const Motion& motion, const ShootingTrajectory& trajectory) {
 
 int main(int argc, char** argv) {
   const LoadedRobot robot = loadRobot("bipetto");
-  Motion motion = makeMotion(robot.model, argc, argv);
-  FddpObserver observer;
-  observer.callback = makeFddpPrinter(std::cout);
-  const FddpResult solved = solve(*motion.problem, motion.guess, {}, observer);
-  const FddpSummary& summary = solved.summary;
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
+  const Motion motion = makeMotion(robot.model, argc, argv);
+  SolveObserver observer;
+  observer.motion.callback = makeFddpPrinter(std::cout);
+  const Solution solution = solve(motion, {}, observer);
+  const FddpSummary& summary = solution.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, solution);
 
-  printLandings(motion, solved.trajectory);
+  printLandings(motion, solution.trajectory);
   std::printf("\n%s after %d iterations and %.2f s, slip %.2f mm\n", getName(summary.termination), summary.iterations,
               summary.seconds, 1e3 * result.slip_position);
   for (const std::string& path : writeResult(argc > 1 ? argv[1] : "turn", result)) std::printf("%s\n", path.c_str());

@@ -37,20 +37,20 @@ int main(int argc, char** argv) {
       {"jump", [&](const Model& model, const VectorXd& q0) { return planJump(model, jump, q0); }}};
 
   const LoadedRobot robot = loadRobot("bipetto");
-  Motion motion = makeSequence(robot.model, parts);
+  const Motion motion = makeSequence(robot.model, parts);
   double alone = 0;
-  PartsOptions apart;
-  apart.report = [&](const std::string& part, const FddpSummary& summary) {
+  const auto report = [&](const std::string& part, const FddpSummary& summary) {
     std::printf("%-8s %-10s after %2d iterations, cost %9.5f\n", part.c_str(), getName(summary.termination),
                 summary.iterations, summary.cost);
     alone += summary.cost;
   };
-  ShootingTrajectory guess = solveParts(robot.model, parts, makeStandingPosture(robot.model), apart);
-  FddpObserver observer;
-  observer.callback = makeFddpPrinter(std::cout);
-  const FddpResult solved = solve(*motion.problem, std::move(guess), {}, observer);
-  const FddpSummary& summary = solved.summary;
-  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, solved.trajectory, summary);
+  SolveOptions options;
+  options.start = StartingPoint{solveParts(robot.model, parts, makeStandingPosture(robot.model), {}, {}, {}, report)};
+  SolveObserver observer;
+  observer.motion.callback = makeFddpPrinter(std::cout);
+  const Solution solution = solve(motion, options, observer);
+  const FddpSummary& summary = solution.summary;
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, solution);
 
   std::printf("\n%s after %d iterations and %.2f s: cost %.5f, one by one %.5f\n", getName(summary.termination),
               summary.iterations, summary.seconds, summary.cost, alone);

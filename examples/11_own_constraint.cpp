@@ -35,19 +35,19 @@ Squat solve(const Model& model, double x_max) {
       stage.path_constraints.push_back(
           {std::string("knee of ") + shin, makeFrameTranslation(getBodyFrame(model, shin), Vector3d::Zero()),
            Vector3d::Constant(-kFree), Vector3d(x_max, kFree, kFree), Vector3d::Constant(scale)});
-  Motion motion = makeMotion(model, std::move(plan), {});
-  FddpOptions options;
-  options.gradient_tolerance = 1e-12;
-  const FddpResult solved = bielle::solve(*motion.problem, motion.guess, options);
-  const ShootingTrajectory& trajectory = solved.trajectory;
-  const std::vector<VectorXd>& multipliers = solved.multipliers.values;
+  const Motion motion = makeMotion(model, std::move(plan), {});
+  SolveOptions options;
+  options.solver.gradient_tolerance = 1e-12;
+  const Solution solution = bielle::solve(motion, options);
   Squat out;
-  out.summary = solved.summary;
+  out.summary = solution.summary;
+  const std::vector<VectorXd>& multipliers = solution.multipliers.values;
+  const auto& [xs, us] = solution.trajectory;
   RobotEvaluator evaluator(*motion.problem);
-  for (size_t k = 0; k < trajectory.xs.size(); ++k) {
-    const VectorXd u = k < trajectory.us.size() ? trajectory.us[k] : VectorXd();
+  for (size_t k = 0; k < xs.size(); ++k) {
+    const VectorXd u = k < us.size() ? us[k] : VectorXd();
     const int node = static_cast<int>(k);
-    const VectorXd& c = evaluator.evaluate(node, trajectory.xs[k], u).constraints;
+    const VectorXd& c = evaluator.evaluate(node, xs[k], u).constraints;
     for (int row = 0; row < c.size(); ++row) {
       const std::string name = motion.problem->getConstraintName(node, row);
       if (name != "knee of shin_left, row 0" && name != "knee of shin_right, row 0") continue;  // x of a knee

@@ -74,13 +74,10 @@ int main() {
   const Model& model = robot.model;
   WalkOptions options;
   options.speed = 0.4;
-  const Motion motion = makeWalk(model, options, {});
-  FddpOptions solver_options;
-  solver_options.initial_regularization = kGuessRegularization;
-  const FddpResult solved = solve(*motion.problem, motion.guess, solver_options);
-  if (solved.summary.termination != FddpTermination::Converged) return 1;
-  Policy gains = makePolicy(motion, solved.trajectory, solved.gains);
-  MotorFeedback stiff(makePolicy(motion, solved.trajectory));
+  const Solution solution = solve(makeWalk(model, options, {}));
+  if (!solution.converged()) return 1;
+  Policy gains = makePolicy(solution);
+  MotorFeedback stiff(makePolicy(solution.motion, solution.trajectory));
 
   options.gait.foothold_room = 0.4;  // a foot may land elsewhere
   options.gait.cone_margin = 0.2;    // wrenches leave room for feedback
@@ -88,9 +85,9 @@ int main() {
   const PredictiveOptions predictive;
   PredictiveController controller(
       makePredictiveMotion(model, planWalk(model, options, makeStandingPosture(model)), {}, predictive),
-      solved.trajectory, predictive);
+      solution.trajectory, predictive);
 
-  const double start = solved.trajectory.xs[0][2];
+  const double start = solution.trajectory.xs[0][2];
   const double with_gains = run(model, gains, gains), with_stiff = run(model, gains, stiff),
                with_prediction = run(model, gains, controller);
   std::printf(

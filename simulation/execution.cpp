@@ -8,10 +8,10 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/names.h"
+#include "bielle/model/names.h"
 #include "control/clock.h"
-#include "io/record_tables.h"
 #include "math/constants.h"
+#include "motion/record_tables.h"
 #include "simulation/robot_errors.h"
 
 namespace bielle::simulation {

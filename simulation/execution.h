@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bielle/control/policy.h"
-#include "bielle/io/record.h"
+#include "bielle/motion/record.h"
 #include "simulation/fall_detector.h"
 #include "simulation/perception.h"
 #include "simulation/torque_delay.h"

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "bielle/io/motion_registry.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/motion/solve.h"
 #include "io/interrupt.h"
 
 namespace bielle::simulation {
@@ -63,33 +63,34 @@ LoadedRobot loadRobotOf(const MotionSummary& summary) {
   return loadRobot(std::filesystem::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot);
 }
 
-FddpResult solveUnlessInterrupted(const FddpOptions& options, Motion& motion) {
-  FddpObserver observer;
-  observer.interrupt = &isInterrupted();
-  FddpResult out = solve(*motion.problem, motion.guess, options, observer);
-  motion.guess = out.trajectory;
+Solution solveUnlessInterrupted(const Motion& motion, const SolveOptions& options) {
+  SolveObserver observer;
+  observer.motion.interrupt = observer.part.interrupt = &isInterrupted();
+  Solution solution = solve(motion, options, observer);
   requireNoInterrupt();
-  return out;
+  return solution;
 }
 
-void solveFromRest(FddpOptions options, Motion& motion) {
-  options.initial_regularization = kGuessRegularization;
-  solveUnlessInterrupted(options, motion);
-}
-
-// A motion, and the gains of a sweep about its solution.
-std::vector<Gains> solveForGains(const std::string& source, const FddpOptions& options, Motion& motion,
-                                 int& iterations) {
-  FddpResult result = solveUnlessInterrupted(options, motion);
-  const FddpSummary& solved = result.summary;
-  if (solved.termination != FddpTermination::Converged)
+// The same motion from a solution, with gains about it: penalties stay small from there, and gains with them.
+Solution solveForGains(const std::string& source, const Motion& motion, const ShootingTrajectory& start,
+                       int& iterations) {
+  SolveOptions options;
+  options.solver = FddpOptions();
+  options.solver.max_iterations = kMaxIterations;
+  options.start = StartingPoint{start};
+  options.refine = false;
+  Solution solution = solveUnlessInterrupted(motion, options);
+  if (!solution.converged())
     throw ModelError(source, "motion '" + motion.name + "'",
-                     std::string("the solve for its gains ended as: ") + getName(solved.termination),
+                     std::string("the solve for its gains ended as: ") + getName(solution.summary.termination),
                      "give a motion that converges, or --control open");
+  iterations = solution.summary.iterations;
   // The sweep is about the trajectory unless the last iteration still took a step.
-  iterations = solved.iterations;
-  const bool is_about = solved.log.empty() || solved.log.back().step == 0;
-  return is_about ? std::move(result.gains) : solveUnlessInterrupted(options, motion).gains;
+  if (!solution.summary.log.empty() && solution.summary.log.back().step > 0) {
+    options.start = StartingPoint{solution.trajectory};
+    solution = solveUnlessInterrupted(motion, options);
+  }
+  return solution;
 }
 
 void checkControl(const MotionSummary& summary, PlanControl control) {
@@ -101,14 +102,15 @@ void checkControl(const MotionSummary& summary, PlanControl control) {
                      "solve the motion without --formulation full, or give --control gains");
 }
 
-// Solves the motion from its guess, for the gains of the solver's last sweep, or from rest.
-Policy solvePolicy(const std::string& source, bool from_rest, PlanControl control, Motion& motion, int& iterations) {
-  FddpOptions options;
-  options.max_iterations = kMaxIterations;
-  // From the solution penalties stay small, and gains with them.
-  if (from_rest) solveFromRest(options, motion);
-  const std::vector<Gains> gains = solveForGains(source, options, motion, iterations);
-  return control == PlanControl::Gains ? makePolicy(motion, motion.guess, gains) : makePolicy(motion, motion.guess);
+// The request with the durations that a solve has chosen.
+MotionRequest fixDurations(const MotionSummary& summary, MotionRequest request) {
+  request.planner = [planner = request.planner, timings = summary.timings, step = summary.step](
+                        const Model& model, const VectorXd& q0, const OptionSet& options) {
+    MotionPlan plan = planner(model, q0, options);
+    fixTimings(timings, step, plan.schedule, plan.stages);
+    return plan;
+  };
+  return request;
 }
 
 // A plan with robot and summary, from its request. `guess`: directory of a solution, or empty.
@@ -116,33 +118,32 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
                 const PredictiveOptions& predictive, Plan& plan) {
   const MotionSummary& summary = plan.summary;
   const Model& model = plan.getModel();
-  const auto makeStages = [&](const MotionRequest& made) {
-    MotionPlan stages = made.plan(model, makeStandingPosture(model));
-    fixTimings(summary.timings, summary.step, stages.schedule, stages.stages);
-    return stages;
-  };
-  ProblemOptions options(summary.formulation, summary.step);
-  options.limits = readLimits(summary);
-  options.objective = summary.objective;
-  Motion motion = makeMotion(model, makeStages(request), options);
-  plan.ground = motion.ground;
-  plan.schedule = motion.schedule;
-  plan.goals = motion.goals;
-  if (!guess.empty()) setGuess(readResultRecord(guess), motion);
+  ProblemOptions problem(summary.formulation, summary.step);
+  problem.limits = readLimits(summary);
+  problem.objective = summary.objective;
+  const Motion motion = makeMotion(model, fixDurations(summary, request), problem);
+  Solution solution{motion, {}, {}};
+  if (!guess.empty()) solution.trajectory = makeStart(readResultRecord(guess), motion).trajectory;
   // A solution in the files is only solved again for its gains; predictive control has its own.
   const bool is_open = control == PlanControl::Open;
   const bool is_known = !guess.empty() && (is_open || (control == PlanControl::Predictive && summary.converged));
   if (!is_open || !is_known) checkControl(summary, control);
-  plan.policy =
-      std::make_unique<Policy>(is_known ? makePolicy(motion, motion.guess)
-                                        : solvePolicy(summary.file, guess.empty(), control, motion, plan.iterations));
+  if (guess.empty()) solution = solveUnlessInterrupted(motion, {});
+  if (!is_known) solution = solveForGains(summary.file, solution.motion, solution.trajectory, plan.iterations);
+  plan.ground = solution.motion.ground;
+  plan.schedule = solution.motion.schedule;
+  plan.goals = solution.motion.goals;
+  plan.policy = std::make_unique<Policy>(
+      control == PlanControl::Gains ? makePolicy(solution) : makePolicy(solution.motion, solution.trajectory));
   if (control != PlanControl::Predictive) return;
-  const MotionRequest freed = freeFeet(plan.ground, request);
+  problem = solution.motion.problem_options;
+  const MotionRequest freed = freeFeet(plan.ground, *solution.motion.request);
   // A plan may be closer to a dead point than motors would let it come, or start from one: without a margin there is no stop.
   PredictiveOptions stopping = predictive;
-  stopping.dead_point_stop = std::min(stopping.dead_point_stop, kStopShare * options.limits.dead_point_margin);
+  stopping.dead_point_stop = std::min(stopping.dead_point_stop, kStopShare * problem.limits.dead_point_margin);
   plan.predictive = std::make_unique<PredictiveController>(
-      makePredictiveMotion(model, makeStages(freed), options, stopping), motion.guess, stopping);
+      makePredictiveMotion(model, freed.plan(model, makeStandingPosture(model)), problem, stopping),
+      solution.trajectory, stopping);
 }
 
 void setModel(Belief belief, MotionSummary& summary) {

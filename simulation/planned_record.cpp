@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "bielle/dynamics/kinematics.h"
-#include "io/record_tables.h"
+#include "motion/record_tables.h"
 
 namespace bielle::simulation {
 

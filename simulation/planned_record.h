@@ -1,7 +1,7 @@
 #pragma once
 /// \file The plan at the nodes of a motion that happened, to be compared with it row by row.
 #include "bielle/control/policy.h"
-#include "bielle/io/record.h"
+#include "bielle/motion/record.h"
 
 namespace bielle::simulation {
 

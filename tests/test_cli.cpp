@@ -8,8 +8,8 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/names.h"
 #include "bielle/io/robot_loader.h"
+#include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/motion/squat.h"
 #include "cli_command.h"

@@ -7,9 +7,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "bielle/io/record.h"
-#include "bielle/io/refinement.h"
 #include "bielle/io/robot_loader.h"
+#include "bielle/motion/record.h"
+#include "bielle/motion/refinement.h"
 #include "bielle/motion/squat.h"
 #include "cli_command.h"
 #include "robot_directory.h"
@@ -194,7 +194,7 @@ TEST_CASE("motions that miss their differences where a linkage is near its dead 
   const OutputDirectory directory;
   REQUIRE(run({"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--quiet", "--no-check"}).status == 0);
   const Model model = loadRobot("bipetto").model;
-  const MotionRequest& request = findMotion("", "squat").request;
+  const Motion squat = makeMotion(model, findMotion("", "squat").request);
   const MotionRecord record = directory.readTrajectory();
   const auto disturb = [&record](int node) {
     MotionRecord disturbed = record;
@@ -202,9 +202,9 @@ TEST_CASE("motions that miss their differences where a linkage is near its dead 
     return disturbed;
   };
   const int deepest = 96, high = 10;  // the knees are near their dead point in the lowest posture alone
-  CHECK_FALSE(avoidDeadPoints(request, model, {}, record));
-  CHECK_FALSE(avoidDeadPoints(request, model, {}, disturb(high)));
-  const std::optional<Motion> planned = avoidDeadPoints(request, model, {}, disturb(deepest));
+  CHECK_FALSE(avoidDeadPoints(squat, record));
+  CHECK_FALSE(avoidDeadPoints(squat, disturb(high)));
+  const std::optional<Motion> planned = avoidDeadPoints(squat, disturb(deepest));
   REQUIRE(planned);
   int bounded = 0;
   for (const PathConstraint& constraint : planned->problem->spec(deepest).path_constraints)
@@ -215,7 +215,7 @@ TEST_CASE("motions that miss their differences where a linkage is near its dead 
   CHECK(bounded >= 2);
   ProblemOptions wide;
   wide.limits.dead_point_margin = kWideDeadPointMargin;
-  CHECK_FALSE(avoidDeadPoints(request, model, wide, disturb(deepest)));
+  CHECK_FALSE(avoidDeadPoints(makeMotion(model, *squat.request, wide), disturb(deepest)));
 }
 
 // The crank and the coupler of robots/fourbar are one rod where cos crank = (0.5^2 + 0.4^2 - 0.3^2) / (2 * 0.5 * 0.4).

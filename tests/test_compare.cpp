@@ -7,7 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "bielle/io/record.h"
+#include "bielle/io/record_files.h"
 #include "bielle/io/robot_loader.h"
 #include "read_table.h"
 #include "robot_directory.h"

@@ -35,20 +35,21 @@ FddpOptions makeTightOptions() {
 struct Optimum {
   Optimum(Model robot, const MakeMotion& make, const ShootingTrajectory* guess = nullptr,
           const FddpOptions& options = makeTightOptions())
-      : model(std::move(robot)), motion(make(model)) {
-    if (guess) motion.guess = *guess;
-    summary = solveMotion(motion, options, {}, &multipliers);
-    CAPTURE(summary.message, summary.iterations);
-    REQUIRE(summary.termination == FddpTermination::Converged);
+      : model(std::move(robot)) {
+    SolveOptions how;
+    how.solver = options;
+    if (guess) how.start = StartingPoint{*guess};
+    solution = solve(make(model), how);
+    CAPTURE(solution.summary.message, solution.summary.iterations);
+    REQUIRE(solution.converged());
   }
+  double cost() const { return solution.summary.cost; }
   Model model;
-  Motion motion;
-  Multipliers multipliers;
-  FddpSummary summary;
+  Solution solution;
 };
 
 VectorXd calcGradient(const Parametrization& robot, const Optimum& optimum, const MakeMotion& make) {
-  return calcCostGradient(robot, robot.start(), MotionEnvelope(optimum.motion, optimum.multipliers), make);
+  return calcCostGradient(robot, robot.start(), MotionEnvelope(optimum.solution), make);
 }
 
 double differentiateOptima(const Parametrization& robot, const MakeMotion& make, const ShootingTrajectory* guess, int i,
@@ -56,7 +57,7 @@ double differentiateOptima(const Parametrization& robot, const MakeMotion& make,
   double out = 0;
   for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
     const VectorXd dx = steps * step * VectorXd::Unit(robot.start().size(), i);
-    out += weight * Optimum(robot.make(robot.start() + dx), make, guess).summary.cost / (12 * step);
+    out += weight * Optimum(robot.make(robot.start() + dx), make, guess).cost() / (12 * step);
   }
   return out;
 }
@@ -66,14 +67,14 @@ void check(const std::string& name, const Parametrization& robot, const MakeMoti
            const ShootingTrajectory* guess = nullptr, double between = kBetweenOptima) {
   CAPTURE(name);
   const Optimum optimum(robot.startModel(), make, guess);
-  CHECK(MotionEnvelope(optimum.motion, optimum.multipliers).cost() == Approx(optimum.summary.cost).epsilon(1e-12));
+  CHECK(MotionEnvelope(optimum.solution).cost() == Approx(optimum.cost()).epsilon(1e-12));
   const VectorXd gradient = calcGradient(robot, optimum, make);
   for (Eigen::Index i = 0; i < gradient.size(); ++i) {
     const double step = between * (robot.upper()[i] - robot.lower()[i]);
     const double expected = differentiateOptima(robot, make, guess, static_cast<int>(i), step);
     // Optimal costs are known to twelve digits, which shows in the derivative by an inertia that hardly counts: the four of a
     // difference are off by (1 + 8 + 8 + 1) / 12 as much at worst.
-    const double rounding = 1.5e-12 * optimum.summary.cost / step;
+    const double rounding = 1.5e-12 * optimum.cost() / step;
     CAPTURE(robot.variables()[i].name, gradient[i], expected, rounding);
     std::printf("%-28s %-16s %14.8g %10.1e\n", name.c_str(), robot.variables()[i].name.c_str(), gradient[i],
                 gradient[i] / expected - 1);
@@ -149,13 +150,13 @@ TEST_CASE("envelope: controls at bounds, free durations, the least peak torque")
   const Parametrization robot = makeFivebar();
   const Optimum free(robot.startModel(), makeSquatMaker(Formulation::Reduced));
   double most = 0;
-  for (const VectorXd& u : free.motion.guess.us) most = std::max(most, u.lpNorm<Eigen::Infinity>());
+  for (const VectorXd& u : free.solution.trajectory.us) most = std::max(most, u.lpNorm<Eigen::Infinity>());
 
   ProblemOptions bounded(Formulation::Reduced);
   for (const Motor& motor : robot.startModel().motors()) bounded.limits.efforts[motor.name] = 0.95 * most;
   const Optimum at_bounds(robot.startModel(), makeSquatMaker(bounded));
   int touching = 0;
-  for (const VectorXd& u : at_bounds.motion.guess.us) touching += u.lpNorm<Eigen::Infinity>() == 0.95 * most;
+  for (const VectorXd& u : at_bounds.solution.trajectory.us) touching += u.lpNorm<Eigen::Infinity>() == 0.95 * most;
   CHECK(touching > 0);
   // Where a torque reaches its bound the second derivative jumps, so that differences have to stay on one side.
   check("bounded torques", robot, makeSquatMaker(bounded), nullptr, 1e-4);
@@ -166,8 +167,8 @@ TEST_CASE("envelope: controls at bounds, free durations, the least peak torque")
 
   ProblemOptions peak(Formulation::Reduced);
   peak.objective.objective = Objective::PeakTorque;
-  peak.objective = scaleObjective(free.motion, peak.objective);
-  check("least peak torque", robot, makeSquatMaker(peak), &free.motion.guess);
+  peak.objective = scaleObjective(free.solution.motion, free.solution.trajectory, peak.objective);
+  check("least peak torque", robot, makeSquatMaker(peak), &free.solution.trajectory);
 }
 
 namespace {
@@ -188,21 +189,22 @@ class FollowedMotors {
       : step_(1e-3 * (robot.upper()[variable] - robot.lower()[variable])),
         dx_(step_ * VectorXd::Unit(robot.start().size(), variable)),
         here_(robot.startModel(), make),
-        ahead_(robot.make(robot.start() + dx_), make, &here_.motion.guess),
-        behind_(robot.make(robot.start() - dx_), make, &here_.motion.guess) {
-    for (int k = 0; k < here_.motion.problem->numStages(); ++k) dt_.push_back(here_.motion.problem->spec(k).dt);
-    solved_ = differ(ahead_.motion.guess, behind_.motion.guess);
+        ahead_(robot.make(robot.start() + dx_), make, &here_.solution.trajectory),
+        behind_(robot.make(robot.start() - dx_), make, &here_.solution.trajectory) {
+    const RobotProblem& problem = *here_.solution.motion.problem;
+    for (int k = 0; k < problem.numStages(); ++k) dt_.push_back(problem.spec(k).dt);
+    solved_ = differ(ahead_.solution.trajectory, behind_.solution.trajectory);
   }
 
   VectorXd sweep(int sweeps) const {
-    const auto to = followOptimum(here_.motion, here_.multipliers, ahead_.motion, sweeps),
-               from = followOptimum(here_.motion, here_.multipliers, behind_.motion, sweeps);
+    const auto to = followOptimum(here_.solution, ahead_.solution.motion, sweeps),
+               from = followOptimum(here_.solution, behind_.solution.motion, sweeps);
     REQUIRE((to && from));
     return differ(*to, *from);
   }
   OptimumDerivative differentiate() const {
     const auto out = differentiateOptimum(
-        here_.motion, here_.multipliers, ahead_.motion, behind_.motion, step_,
+        here_.solution, ahead_.solution.motion, behind_.solution.motion, step_,
         [&](const Motion& motion, const ShootingTrajectory& t) { return readMotors(dt_, motion, t); });
     REQUIRE(out);
     return *out;
@@ -217,7 +219,7 @@ class FollowedMotors {
 
   // That of a measure of one motor, over the measure, for a change of the variable by the width of its bounds.
   double calcSlope(Measure measure, int motor, const VectorXd& derivative) const {
-    const MotorTrace trace = makeMotorTrace(here_.model, dt_, here_.motion.guess);
+    const MotorTrace trace = makeMotorTrace(here_.model, dt_, here_.solution.trajectory);
     const Eigen::Index nu = trace.torque.rows(), N = trace.torque.cols();
     MotorSlopes slopes;
     slopes.dt = dt_, slopes.u = trace.torque, slopes.v = trace.speed;
@@ -230,7 +232,7 @@ class FollowedMotors {
   // The same by the measures of the optima themselves.
   double calcSolvedSlope(Measure measure, int motor) const {
     const auto get = [&](const Optimum& optimum) {
-      const MotionMeasures measures = calcMotionMeasures(optimum.model, dt_, optimum.motion.guess);
+      const MotionMeasures measures = calcMotionMeasures(optimum.model, dt_, optimum.solution.trajectory);
       return getMeasure(measure, {motor}, {measures});
     };
     return (get(ahead_) - get(behind_)) / (2e-3 * get(here_));
@@ -239,7 +241,7 @@ class FollowedMotors {
 
  private:
   VectorXd differ(const ShootingTrajectory& to, const ShootingTrajectory& from) const {
-    return (readMotors(dt_, ahead_.motion, to) - readMotors(dt_, behind_.motion, from)) / (2 * step_);
+    return (readMotors(dt_, ahead_.solution.motion, to) - readMotors(dt_, behind_.solution.motion, from)) / (2 * step_);
   }
 
   double step_;
@@ -326,10 +328,12 @@ TEST_CASE("envelope: where Gauss-Newton Hessians point the wrong way, second-ord
 TEST_CASE("envelope: problems that do not fit the optimum are refused") {
   const Parametrization robot = makeFivebar();
   const Optimum optimum(robot.startModel(), makeSquatMaker(Formulation::Reduced));
-  const MotionEnvelope envelope(optimum.motion, optimum.multipliers);
-  CHECK(envelope.calcLagrangian(optimum.motion) == Approx(optimum.summary.cost).epsilon(1e-9));
+  const MotionEnvelope envelope(optimum.solution);
+  CHECK(envelope.calcLagrangian(optimum.solution.motion) == Approx(optimum.cost()).epsilon(1e-9));
   CHECK_THROWS_AS(envelope.calcLagrangian(makeSquat(optimum.model)), std::invalid_argument);
-  CHECK_THROWS_AS(MotionEnvelope(optimum.motion, Multipliers{{VectorXd()}, 1}), std::invalid_argument);
+  Solution other = optimum.solution;
+  other.multipliers = {{VectorXd()}, 1};
+  CHECK_THROWS_AS(MotionEnvelope(other), std::invalid_argument);
 }
 
 TEST_CASE("envelope: time of twenty parameters", "[.table]") {

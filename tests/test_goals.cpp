@@ -49,7 +49,7 @@ const std::pair<Motion, FddpSummary>& getWalk() {
 
 MotionResult solveForResult(Motion motion) {
   const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess);
-  return makeResult({"bipetto", "", {}}, motion, motion.guess, summary);
+  return makeResult({"bipetto", "", {}}, {motion, motion.guess, summary});
 }
 
 const GoalOutcome& find(const MotionResult& result, const std::string& name) {
@@ -188,7 +188,7 @@ TEST_CASE("goals: a walk, one backwards and a squat that goes up achieve what wa
     }
   };
   const auto& [walk, walked] = getWalk();
-  expect(makeResult({"bipetto", "", {}}, walk, walk.guess, walked), 0.5);
+  expect(makeResult({"bipetto", "", {}}, {walk, walk.guess, walked}), 0.5);
   WalkOptions backward;
   backward.speed = -0.3;
   expect(solveForResult(makeWalk(getBipetto(), backward)), -0.3);
@@ -231,7 +231,7 @@ TEST_CASE("goals: a sequence has those of its motions, at their nodes") {
 TEST_CASE("goals: trajectories that miss are reported") {
   const Motion& walk = getWalk().first;
   const auto measure = [&](const ShootingTrajectory& trajectory) {
-    return makeResult({"bipetto", "", {}}, walk, trajectory, getWalk().second);
+    return makeResult({"bipetto", "", {}}, {walk, trajectory, getWalk().second});
   };
   const MotionResult good = measure(walk.guess);
   ShootingTrajectory slow = walk.guess;
@@ -270,7 +270,7 @@ TEST_CASE("goals: a squat far out of reach stays finite, and says by how much it
     CHECK(std::isfinite(summary.cost));
     for (const VectorXd& x : motion.guess.xs) REQUIRE(x.allFinite());
     for (const VectorXd& u : motion.guess.us) REQUIRE(u.allFinite());
-    const MotionResult result = makeResult({"bipetto", "", {}}, motion, motion.guess, summary);
+    const MotionResult result = makeResult({"bipetto", "", {}}, {motion, motion.guess, summary});
     const GoalOutcome& outcome = find(result, "depth");
     CHECK_FALSE(outcome.met());
     CHECK(outcome.achieved > least);

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bielle/io/record.h"
+#include "bielle/io/record_files.h"
 #include "bielle/model/error.h"
 #include "get_error_of_reading.h"
 #include "io/text_file.h"

@@ -14,10 +14,10 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "bielle/motion/squat.h"
 #include "get_error.h"
 #include "get_error_of_reading.h"
@@ -259,7 +259,7 @@ TEST_CASE("midpoint steps are recorded with the points to which their accelerati
   writeNpz(directory / "t.npz", record);
   checkEqual(readRecord(directory / "t.npz"), record);
 
-  const MotionResult result = makeResult({"bipetto", "/r.urdf", {}}, squat.motion, squat.motion.guess, {});
+  const MotionResult result = makeResult({"bipetto", "/r.urdf", {}}, {squat.motion, squat.motion.guess, {}});
   writeResult(directory / "", result);
   CHECK(readSummary(directory / "").step == StepRule::Midpoint);
 }
@@ -357,7 +357,7 @@ TEST_CASE("a result is three whole files, written again over the old ones") {
   summary.cost = 2.5;
   summary.log.resize(3);
   const MotionResult result =
-      makeResult({"bipetto", "/r.urdf", {"bielle", "solve"}}, squat.motion, squat.motion.guess, summary);
+      makeResult({"bipetto", "/r.urdf", {"bielle", "solve"}}, {squat.motion, squat.motion.guess, summary});
   CHECK(result.interrupted());
   CHECK_FALSE(result.converged());
   for (size_t m = 1; m < result.peak_torques.size(); ++m)
@@ -380,7 +380,7 @@ TEST_CASE("a summary reads back: phases, stances, ground; what is none is refuse
   ShortSquat squat;
   squat.motion.ground.height = -0.25;
   squat.motion.ground.steps.push_back({Vector3d(0.5, 0.1, 0.15), 0.3, 0.6, 0.2});
-  const MotionResult result = makeResult({"bipetto", "/r.urdf", {}}, squat.motion, squat.motion.guess, {});
+  const MotionResult result = makeResult({"bipetto", "/r.urdf", {}}, {squat.motion, squat.motion.guess, {}});
   writeResult(directory / "", result);
   const MotionSummary summary = readSummary(directory / "");
   CHECK(summary.motion == "squat");
@@ -437,7 +437,7 @@ TEST_CASE("the slip is zero for feet that stand still") {
   SquatOptions options;
   options.duration = 0.12;
   Motion motion = makeSquat(robot.model, options);
-  const MotionResult result = makeResult({}, motion, motion.guess, {});
+  const MotionResult result = makeResult({}, {motion, motion.guess, {}});
   CHECK(result.slip_position == 0);
   CHECK(result.slip_angle < 1e-15);
   CHECK(result.gap_position < 1e-12);

@@ -134,7 +134,9 @@ TEST_CASE("guess: one that cannot be evaluated gives way to the posture at the s
   solver.max_iterations = 5;
   ShootingTrajectory guess = motion.guess;
   CHECK(test::solveInPlace(*motion.problem, guess, solver).termination == FddpTermination::Failed);
-  const FddpSummary summary = solveMotion(motion, solver);
+  SolveOptions how;
+  how.solver = solver;
+  const FddpSummary summary = solve(motion, how).summary;
   CAPTURE(summary.message);
   CHECK(summary.termination == FddpTermination::MaxIterations);
   CHECK(summary.iterations == 5);

@@ -11,18 +11,18 @@ using namespace bielle;
 namespace {
 
 struct SolvedSquat {
-  Motion motion;
-  FddpSummary summary;
+  Solution solution;
   MotionResult result;
 };
 
-SolvedSquat finish(Motion motion, const ShootingTrajectory* guess) {
-  if (guess) motion.guess = *guess;
-  SolvedSquat out{std::move(motion), {}, {}};
-  out.summary = solveMotion(out.motion, {});
-  CAPTURE(out.summary.message);
-  REQUIRE(out.summary.termination == FddpTermination::Converged);
-  out.result = makeResult({"robot", {}, {}}, out.motion, out.motion.guess, out.summary);
+SolvedSquat finish(const Motion& motion, const ShootingTrajectory* start) {
+  SolveOptions options;
+  options.solver = FddpOptions();
+  if (start) options.start = StartingPoint{*start};
+  SolvedSquat out{solve(motion, options), {}};
+  CAPTURE(out.solution.summary.message);
+  REQUIRE(out.solution.converged());
+  out.result = makeResult({"robot", {}, {}}, out.solution);
   for (const GoalOutcome& outcome : out.result.goals) CHECK(outcome.met());
   return out;
 }
@@ -33,8 +33,8 @@ SolvedSquat solveFromEffort(const SolvedSquat& effort, const Model& model, const
   ProblemOptions options;
   options.objective.objective = objective;
   options.objective.regeneration = regeneration;
-  options.objective = scaleObjective(effort.motion, options.objective);
-  return finish(makeSquat(model, squat, options), &effort.motion.guess);
+  options.objective = scaleObjective(effort.solution.motion, effort.solution.trajectory, options.objective);
+  return finish(makeSquat(model, squat, options), &effort.solution.trajectory);
 }
 
 double getPeak(const SolvedSquat& solved) { return solved.result.peak_torques.front().second; }
@@ -55,16 +55,18 @@ TEST_CASE("objectives: a squat of least energy, with and without what flows back
   // The energies of the result, and what the cost adds to them by smoothing.
   double total = 0, in_cost = 0;
   const MotionRecord& record = least.result.record;
-  RobotEvaluator evaluator(*least.motion.problem);
+  RobotEvaluator evaluator(*least.solution.motion.problem);
   for (Eigen::Index k = 0; k < record.u.rows(); ++k) {
     for (int m = 0; m < model.nu(); ++m) {
       const double u = record.u(k, m);
       total += squat.time_step * std::max(0.0, u * record.v_mid(k, model.motors()[m].dof) + kDefaultTorqueLoss * u * u);
     }
     const int node = static_cast<int>(k);
-    const RobotEvaluation& at = evaluator.evaluate(node, least.motion.guess.xs[node], least.motion.guess.us[node]);
-    for (const CostValue& cost : least.motion.problem->getCosts(node, at))
-      if (cost.name == "electrical energy") in_cost += at.dt * cost.value / least.motion.objective.scale;
+    const RobotEvaluation& at =
+        evaluator.evaluate(node, least.solution.trajectory.xs[node], least.solution.trajectory.us[node]);
+    for (const CostValue& cost : least.solution.motion.problem->getCosts(node, at))
+      if (cost.name == "electrical energy")
+        in_cost += at.dt * cost.value / least.solution.motion.problem_options.objective.scale.value();
   }
   CHECK(least.result.energy.total == Approx(total).epsilon(1e-12));
   CHECK(least.result.energy.by_motor.sum() == Approx(total).epsilon(1e-12));
@@ -94,14 +96,14 @@ TEST_CASE("objectives: a squat of least peak torque, in both formulations") {
   // The effort within limits of that peak exists; it is the regularization that keeps the peak above the least one.
   ProblemOptions limited;
   for (const Motor& motor : model.motors()) limited.limits.efforts[motor.name] = getPeak(least);
-  const SolvedSquat bounded = finish(makeSquat(model, squat, limited), &effort.motion.guess);
+  const SolvedSquat bounded = finish(makeSquat(model, squat, limited), &effort.solution.trajectory);
   CHECK(getPeak(bounded) <= getPeak(least) * (1 + 1e-12));
-  CHECK(bounded.summary.cost > effort.summary.cost);
+  CHECK(bounded.solution.summary.cost > effort.solution.summary.cost);
 
   ProblemOptions full(Formulation::Full);
   const SolvedSquat effort_full = finish(makeSquat(model, squat, full), nullptr);
   full.objective.objective = Objective::PeakTorque;
-  full.objective = scaleObjective(effort_full.motion, full.objective);
-  const SolvedSquat least_full = finish(makeSquat(model, squat, full), &effort_full.motion.guess);
+  full.objective = scaleObjective(effort_full.solution.motion, effort_full.solution.trajectory, full.objective);
+  const SolvedSquat least_full = finish(makeSquat(model, squat, full), &effort_full.solution.trajectory);
   CHECK(getPeak(least_full) == Approx(getPeak(least)).epsilon(0.01));
 }

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/record.h"
+#include "bielle/io/record_files.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/motion/walk.h"
 #include "design/conditioning.h"

@@ -15,15 +15,13 @@ struct SolvedSquat {
   SolvedSquat() : robot(loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto")) {
     SquatOptions options;
     options.depth = 0.85;
-    motion = makeSquat(robot.model, options);
-    FddpResult result = solve(*motion.problem, motion.guess);
-    REQUIRE(result.summary.termination == FddpTermination::Converged);
-    motion.guess = std::move(result.trajectory);
-    gains = std::move(result.gains);
+    SolveOptions how;
+    how.solver = FddpOptions();
+    solution = solve(makeSquat(robot.model, options), how);
+    REQUIRE(solution.converged());
   }
   LoadedRobot robot;
-  Motion motion;
-  std::vector<Gains> gains;
+  Solution solution;
 };
 
 SolvedSquat& getSquat() {
@@ -40,23 +38,24 @@ Measurement measure(const Model& model, double time, const VectorXd& x) {
 TEST_CASE("policy: on the plan it gives the torques of the plan, each in the middle of its stage") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
+  Policy policy = makePolicy(squat.solution);
   const auto& stages = policy.getStages();
-  REQUIRE(static_cast<int>(stages.size()) == squat.motion.problem->numStages());
-  CHECK(policy.getDuration() == Approx(squat.motion.schedule.getTime(squat.motion.problem->numStages())));
+  REQUIRE(static_cast<int>(stages.size()) == squat.solution.motion.problem->numStages());
+  CHECK(policy.getDuration() ==
+        Approx(squat.solution.motion.schedule.getTime(squat.solution.motion.problem->numStages())));
   VectorXd u(model.nu());
   for (size_t k : {size_t(0), stages.size() / 3, stages.size() - 1}) {
     Measurement at{stages[k].start + 0.5 * stages[k].duration, model.makeNeutral(), VectorXd::Zero(model.nv())};
     policy.getReference(at.time, at.q, at.v);
     policy.update(at, u);
-    CHECK((u - squat.motion.guess.us[k].head(model.nu())).norm() < 1e-9 * (1 + u.norm()));
+    CHECK((u - squat.solution.trajectory.us[k].head(model.nu())).norm() < 1e-9 * (1 + u.norm()));
   }
 }
 
 TEST_CASE("policy: torques that act later are those of the time when they act") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
+  Policy policy = makePolicy(squat.solution);
   constexpr double kTime = 0.8, kDelay = 0.0137;
   Measurement at{kTime + kDelay, model.makeNeutral(), VectorXd::Zero(model.nv())};
   VectorXd expected(model.nu()), u(model.nu());
@@ -75,12 +74,12 @@ TEST_CASE("policy: torques that act later are those of the time when they act") 
 TEST_CASE("policy: its gains are those of the solver's last sweep") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
-  NodeEvaluator evaluator(*squat.motion.problem);
+  Policy policy = makePolicy(squat.solution);
+  NodeEvaluator evaluator(*squat.solution.motion.problem);
   for (int k : {1, 40, 120}) {
-    const VectorXd& x = squat.motion.guess.xs[k];
-    evaluator.evaluate(k, x, squat.motion.guess.us[k]);
-    const RowMatrixXd& K = squat.gains[k].K;
+    const VectorXd& x = squat.solution.trajectory.xs[k];
+    evaluator.evaluate(k, x, squat.solution.trajectory.us[k]);
+    const RowMatrixXd& K = squat.solution.gains[k].K;
     VectorXd dx(K.cols());
     for (int i = 0; i < dx.size(); ++i) dx[i] = 1e-3 * std::sin(1 + 2.1 * i);
     const VectorXd moved = evaluator.integrate(dx);
@@ -99,12 +98,12 @@ TEST_CASE("policy: its gains on states whose loops are open are those on the dif
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
   const int nq = model.nq(), nv = model.nv();
-  const Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
-  NodeEvaluator evaluator(*squat.motion.problem);
+  const Policy policy = makePolicy(squat.solution);
+  NodeEvaluator evaluator(*squat.solution.motion.problem);
   constexpr int kNode = 40;
-  const VectorXd& x = squat.motion.guess.xs[kNode];
-  evaluator.evaluate(kNode, x, squat.motion.guess.us[kNode]);
-  const RowMatrixXd& K = squat.gains[kNode].K;
+  const VectorXd& x = squat.solution.trajectory.xs[kNode];
+  evaluator.evaluate(kNode, x, squat.solution.trajectory.us[kNode]);
+  const RowMatrixXd& K = squat.solution.gains[kNode].K;
   RowMatrixXd gains = policy.getStages()[kNode].K, differences(model.nu(), 2 * nv);
   constexpr double kStep = 0.01;  // along one coordinate the difference is linear
   for (int i = 0; i < 2 * nv; ++i) {
@@ -124,7 +123,7 @@ TEST_CASE("policy: its gains on states whose loops are open are those on the dif
 TEST_CASE("policy: gains that look ahead are those of an earlier stage of their phase") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains), far = policy;
+  Policy policy = makePolicy(squat.solution), far = policy;
   const auto& stages = policy.getStages();
   constexpr int kStages = 5;
   const size_t last = stages.size() - 1;  // a squat has one phase
@@ -147,28 +146,28 @@ TEST_CASE("policy: gains that look ahead are those of an earlier stage of their 
 TEST_CASE("policy: without gains the state does not matter; the plan ends at rest") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy open = makePolicy(squat.motion, squat.motion.guess);
+  Policy open = makePolicy(squat.solution.motion, squat.solution.trajectory);
   VectorXd u(model.nu()), other(model.nu());
-  open.update(measure(model, 0.4, squat.motion.guess.xs[0]), u);
-  open.update(measure(model, 0.4, squat.motion.guess.xs[90]), other);
+  open.update(measure(model, 0.4, squat.solution.trajectory.xs[0]), u);
+  open.update(measure(model, 0.4, squat.solution.trajectory.xs[90]), other);
   CHECK(u == other);
   VectorXd q = model.makeNeutral(), v(model.nv());
   open.getReference(100, q, v);
   CHECK(v.isZero(0));
-  CHECK(model.difference(squat.motion.guess.xs.back().head(model.nq()), q).norm() < 1e-12);
+  CHECK(model.difference(squat.solution.trajectory.xs.back().head(model.nq()), q).norm() < 1e-12);
 }
 
 TEST_CASE("policy: after its end the torques hold the last posture, and gains call the robot back") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
+  Policy policy = makePolicy(squat.solution);
   Measurement at{policy.getDuration() + 0.5, model.makeNeutral(), VectorXd::Zero(model.nv())};
   policy.getReference(at.time, at.q, at.v);
   VectorXd u(model.nu()), other(model.nu());
   policy.update(at, u);
   Workspace ws(model);
   ConstrainedWorkspace cws;
-  ConstraintSet set = makeConstraintSet(model, squat.motion.schedule.phases.back().contacts);
+  ConstraintSet set = makeConstraintSet(model, squat.solution.motion.schedule.phases.back().contacts);
   for (Closure& closure : set.closures) closure.kp = closure.kd = 0;  // the feet may stand where they are
   const auto calcAcceleration = [&](const VectorXd& torques) {
     updateConstrainedDynamics(model, ws, cws, set, at.q, at.v, calcMotorForces(model, torques));
@@ -186,8 +185,8 @@ TEST_CASE("policy: after its end the torques hold the last posture, and gains ca
 TEST_CASE("policy: an update does not allocate") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
-  Policy policy = makePolicy(squat.motion, squat.motion.guess, squat.gains);
-  const Measurement at = measure(model, 0, squat.motion.guess.xs[0]);
+  Policy policy = makePolicy(squat.solution);
+  const Measurement at = measure(model, 0, squat.solution.trajectory.xs[0]);
   Measurement now = at;
   VectorXd u(model.nu());
   const long before = num_allocations;

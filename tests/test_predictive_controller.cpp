@@ -23,19 +23,18 @@ using bielle::testing::kStageTicks;
 
 // A squat, its solution, and the policy of its gains.
 struct Solved {
-  Motion motion;
+  Solution solution;
   std::unique_ptr<Policy> gains;
 };
 template <typename Options>
 Solved solve(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&), const Options& options) {
   const Model& model = getBipetto();
-  Solved out{makeMotion(model, plan(model, options, makeStandingPosture(model)), ProblemOptions()), nullptr};
-  FddpOptions solver_options;
-  solver_options.initial_regularization = kGuessRegularization;
-  FddpResult result = bielle::solve(*out.motion.problem, out.motion.guess, solver_options);
-  REQUIRE(result.summary.termination == FddpTermination::Converged);
-  out.motion.guess = std::move(result.trajectory);
-  out.gains = std::make_unique<Policy>(makePolicy(out.motion, out.motion.guess, result.gains));
+  SolveOptions how;
+  how.solver = FddpOptions();
+  Solved out{solve(makeMotion(model, plan(model, options, makeStandingPosture(model)), ProblemOptions()), how),
+             nullptr};
+  REQUIRE(out.solution.converged());
+  out.gains = std::make_unique<Policy>(makePolicy(out.solution));
   return out;
 }
 
@@ -46,7 +45,7 @@ std::unique_ptr<PredictiveController> makeController(MotionPlan (*plan)(const Mo
   const Model& model = getBipetto();
   return std::make_unique<PredictiveController>(
       makePredictiveMotion(model, plan(model, options, makeStandingPosture(model)), ProblemOptions(), predictive),
-      solved.motion.guess, predictive);
+      solved.solution.trajectory, predictive);
 }
 
 constexpr double kStage = 0.015;  // s
@@ -318,7 +317,7 @@ TEST_CASE("estimator: contacts are expected where the controller is in its plan,
 TEST_CASE("predictive control: it refuses a plan that is not one of its motion") {
   const Model& model = getBipetto();
   const PredictiveOptions options = makeShortWindow(1);
-  ShootingTrajectory shorter = getShortSquat().motion.guess;
+  ShootingTrajectory shorter = getShortSquat().solution.trajectory;
   shorter.xs.pop_back();
   shorter.us.pop_back();
   CHECK_THROWS_AS(
@@ -332,8 +331,8 @@ TEST_CASE("predictive control: windows, threads and iterations without sense are
   const Model& model = getBipetto();
   const MotionPlan plan = planSquat(model, makeShortSquat(), makeStandingPosture(model));
   const auto make = [&](const PredictiveOptions& options) {
-    PredictiveController(makePredictiveMotion(model, plan, ProblemOptions(), options), getShortSquat().motion.guess,
-                         options);
+    PredictiveController(makePredictiveMotion(model, plan, ProblemOptions(), options),
+                         getShortSquat().solution.trajectory, options);
   };
   for (int nodes : {-1, 0, 9, 1001, 2000000000}) {
     PredictiveOptions options = makeShortWindow(1);

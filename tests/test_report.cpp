@@ -59,7 +59,7 @@ void writeShortSquat(const std::string& directory) {
   const Motion motion = makeSquat(robot.model, options);
   FddpSummary summary;
   summary.log.resize(2);
-  writeResult(directory, makeResult({"bipetto", "", {"bielle"}}, motion, motion.guess, summary));
+  writeResult(directory, makeResult({"bipetto", "", {"bielle"}}, {motion, motion.guess, summary}));
 }
 
 // A record of two nodes that fits any robot with names of its own.

@@ -5,7 +5,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/footsteps.h"
 #include "bielle/motion/jump.h"
-#include "bielle/motion/sequence.h"
+#include "bielle/motion/solve.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
@@ -146,12 +146,11 @@ TEST_CASE("sequence: unlike motions are solved as one problem") {
   const Model& model = getBipetto();
   Motion motion = makeSequence(model, parts);
   std::vector<std::string> solved;
-  PartsOptions apart;
-  apart.report = [&](const std::string& part, const FddpSummary& summary) {
+  const auto report = [&](const std::string& part, const FddpSummary& summary) {
     solved.push_back(part);
     CHECK(summary.termination == FddpTermination::Converged);
   };
-  motion.guess = solveParts(model, parts, makeStandingPosture(model), apart);
+  motion.guess = solveParts(model, parts, makeStandingPosture(model), {}, {}, {}, report);
   CHECK(solved == std::vector<std::string>{"squat", "turn", "walk", "stairs", "jump"});
   FddpOptions options;
   options.max_iterations = 100;

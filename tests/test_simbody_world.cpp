@@ -19,10 +19,9 @@ Policy makeWalkPolicy(const Model& model) {
   WalkOptions options;
   options.speed = 0.4;
   options.steps = 2;
-  Motion motion = makeWalk(model, options);
-  const FddpResult result = solve(*motion.problem, motion.guess);
-  REQUIRE(result.summary.termination == FddpTermination::Converged);
-  return makePolicy(motion, result.trajectory, result.gains);
+  const Solution solution = solve(makeWalk(model, options));
+  REQUIRE(solution.converged());
+  return makePolicy(solution);
 }
 
 // The configuration after following the policy.

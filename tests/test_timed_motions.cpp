@@ -93,7 +93,7 @@ TEST_CASE("a walk chooses the best duration of each phase") {
 TEST_CASE("a result has the final durations, and a warm start goes on from them") {
   const Model model = loadRobot("bipetto").model;
   const TimedSolution walk = solveTimed(makeTimedWalk(model));
-  const MotionResult result = makeResult({"bipetto", "", {}}, walk.motion, walk.motion.guess, walk.summary);
+  const MotionResult result = makeResult({"bipetto", "", {}}, {walk.motion, walk.motion.guess, walk.summary});
   REQUIRE(result.timings.size() == 5);
   int node = 0;
   for (size_t i = 0; i < result.timings.size(); ++i) {
@@ -117,7 +117,7 @@ TEST_CASE("a result has the final durations, and a warm start goes on from them"
   CHECK(summary.timings[1].phase == result.timings[1].phase);
   CHECK(summary.timings[1].chosen == result.timings[1].chosen);
   Motion again = makeTimedWalk(model);
-  setGuess(readResultRecord(directory.string()), again);
+  again.guess = makeStart(readResultRecord(directory.string()), again).trajectory;
   fs::remove_all(directory);
   for (size_t i = 0; i < result.timings.size(); ++i) {
     const std::vector<PhaseTiming> guessed = listTimings(*again.problem, again.schedule, again.guess);

@@ -162,10 +162,9 @@ TEST_CASE("walk: a fast one with short stages, whose contacts are stiff, is foun
   WalkOptions options;
   options.speed = 0.9;
   options.gait.timing.time_step = 0.01;
-  Motion motion = makeWalk(getBipetto(), options);
-  FddpOptions solver;
-  solver.initial_regularization = kGuessRegularization;
-  const FddpSummary summary = solveMotion(motion, solver);
+  SolveOptions how;
+  how.solver = FddpOptions();
+  const FddpSummary summary = solve(makeWalk(getBipetto(), options), how).summary;
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
 }
@@ -380,10 +379,9 @@ TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with i
 
 TEST_CASE("walk: it is called infeasible after two attempts") {
   int landing = -1;
-  Motion motion = makeFarLanding(landing);
-  FddpOptions solver;
-  solver.initial_regularization = kGuessRegularization;
-  const FddpSummary summary = solveMotion(motion, solver);
+  SolveOptions how;
+  how.solver = FddpOptions();
+  const FddpSummary summary = solve(makeFarLanding(landing), how).summary;
   CAPTURE(summary.message);
   CHECK(summary.termination == FddpTermination::Infeasible);
   CHECK_THAT(summary.message, Catch::Contains("landing of foot_") && Catch::Contains("two attempts"));

@@ -35,7 +35,7 @@ TEST_CASE("warm start: a result is its own solution, and near that of a walk a l
   Motion same = makeShortWalk(0.4);
   same.guess = motion.guess;
   CHECK(solve(*same.problem, same.guess, {}, {}, first.multipliers).summary.iterations <= 1);
-  setGuess(record, same);
+  same.guess = makeStart(record, same).trajectory;
   const FddpSummary again = solve(*same.problem, same.guess, {}, {}, first.multipliers).summary;
   CHECK(again.termination == FddpTermination::Converged);
   CHECK(3 * again.iterations <= cold.iterations);
@@ -43,7 +43,7 @@ TEST_CASE("warm start: a result is its own solution, and near that of a walk a l
 
   Motion faster = makeShortWalk(0.48), warm = makeShortWalk(0.48);
   const FddpSummary faster_cold = test::solveInPlace(*faster.problem, faster.guess);
-  setGuess(record, warm);
+  warm.guess = makeStart(record, warm).trajectory;
   const FddpSummary faster_warm = test::solveInPlace(*warm.problem, warm.guess);
   CHECK(faster_warm.termination == FddpTermination::Converged);
   CHECK(faster_warm.iterations < faster_cold.iterations);
@@ -51,34 +51,32 @@ TEST_CASE("warm start: a result is its own solution, and near that of a walk a l
 }
 
 TEST_CASE("warm start: what a solve was cut off with goes on where it was, multipliers included") {
-  Motion motion = makeShortWalk(0.4), whole = makeShortWalk(0.4), again = makeShortWalk(0.4),
-         other = makeShortWalk(0.4, 0.6);
-  const FddpSummary cold = solveMotion(whole, {});
-  FddpOptions few;
-  few.max_iterations = cold.iterations - 3;
-  MotionRecord record;
-  REQUIRE(solveMotion(motion, few, {}, &record.multipliers).termination == FddpTermination::MaxIterations);
-  const Multipliers kept = record.multipliers;
-  record = makeRecord(motion, motion.guess);
+  const Motion motion = makeShortWalk(0.4), other = makeShortWalk(0.4, 0.6);
+  SolveOptions options, few;
+  options.solver = few.solver = FddpOptions();
+  const FddpSummary cold = solve(motion, options).summary;
+  few.solver.max_iterations = cold.iterations - 3;
+  const Solution cut = solve(motion, few);
+  REQUIRE(cut.summary.termination == FddpTermination::MaxIterations);
+  CHECK(motion.guess.xs.back() == makeShortWalk(0.4).guess.xs.back());  // a solve leaves its motion as it is
+  MotionRecord record = makeRecord(motion, cut.trajectory);
 
-  setGuess(record, again);
-  Multipliers multipliers;
-  const FddpSummary without = solveMotion(again, {}, {}, &multipliers);
-  setGuess(record, again);
-  multipliers = kept;
-  const FddpSummary with = solveMotion(again, {}, {}, &multipliers);
-  CHECK(with.termination == FddpTermination::Converged);
-  CHECK(with.iterations < without.iterations);
-  CHECK(with.cost == Approx(cold.cost).epsilon(1e-8));
-  CHECK(multipliers.penalty > 0);
+  options.start = makeStart(record, motion);
+  const FddpSummary without = solve(motion, options).summary;
+  record.multipliers = cut.multipliers;
+  options.start = makeStart(record, motion);
+  const Solution with = solve(motion, options);
+  CHECK(with.converged());
+  CHECK(with.summary.iterations < without.iterations);
+  CHECK(with.summary.cost == Approx(cold.cost).epsilon(1e-8));
+  CHECK(with.multipliers.penalty > 0);
 
   // Those of a motion with other nodes are not taken.
-  FddpOptions one;
-  one.max_iterations = 1;
-  const FddpSummary alone = solveMotion(other, one);
-  other = makeShortWalk(0.4, 0.6);
-  multipliers = kept;
-  CHECK(solveMotion(other, one, {}, &multipliers).cost == alone.cost);
+  options.solver.max_iterations = 1;
+  options.start = StartingPoint{other.guess};
+  const FddpSummary alone = solve(other, options).summary;
+  options.start->multipliers = cut.multipliers;
+  CHECK(solve(other, options).summary.cost == alone.cost);
 }
 
 TEST_CASE("warm start: other lengths are resampled, feet carried to their places, other robots refused") {
@@ -86,7 +84,7 @@ TEST_CASE("warm start: other lengths are resampled, feet carried to their places
   MotionRecord record = makeRecord(motion, motion.guess);
   Motion longer = makeShortWalk(0.6, 0.6);
   REQUIRE(longer.problem->numStages() == motion.problem->numStages() + 25);
-  setGuess(record, longer);
+  longer.guess = makeStart(record, longer).trajectory;
   const Model& model = getBipetto();
   Workspace ws(model);
   for (size_t k = 0; k < longer.guess.xs.size(); ++k) {
@@ -101,8 +99,8 @@ TEST_CASE("warm start: other lengths are resampled, feet carried to their places
   CHECK((longer.guess.us.back() - motion.guess.us.back()).norm() == 0);
 
   record.u(3, 0) = std::numeric_limits<double>::quiet_NaN();
-  CHECK_THROWS_WITH(setGuess(record, motion), Catch::Contains("finite"));
+  CHECK_THROWS_WITH(makeStart(record, motion), Catch::Contains("finite"));
   record.u_names.front() = "other";
-  CHECK_THROWS_WITH(setGuess(record, motion), Catch::Contains("motors"));
+  CHECK_THROWS_WITH(makeStart(record, motion), Catch::Contains("motors"));
   CHECK_THROWS_AS(readResultRecord("/nowhere/at/all"), ModelError);
 }

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <set>
 
-#include "bielle/io/names.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "bielle/transmission/serial_model.h"
 
 namespace bielle::validation {

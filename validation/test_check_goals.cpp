@@ -32,7 +32,7 @@ CheckedMotion solveBriefly(Motion motion) {
   FddpOptions options;
   options.max_iterations = 4;
   const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, options);
-  writeResult(directory.path(), makeResult({"bipetto", getBipetto().file, {}}, motion, motion.guess, summary));
+  writeResult(directory.path(), makeResult({"bipetto", getBipetto().file, {}}, {motion, motion.guess, summary}));
   return readMotion(directory.path());
 }
 

@@ -8,9 +8,9 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/names.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/model/builder.h"
+#include "bielle/model/names.h"
 #include "bielle/motion/squat.h"
 #include "check.h"
 #include "robot_directory.h"
@@ -52,7 +52,7 @@ struct SolvedSquat {
     options.step = step;
     Motion motion = makeSquat(robot.model, {}, options);
     summary = test::solveInPlace(*motion.problem, motion.guess);
-    writeResult(directory.path(), makeResult({"bipetto", robot.file, {}}, motion, motion.guess, summary));
+    writeResult(directory.path(), makeResult({"bipetto", robot.file, {}}, {motion, motion.guess, summary}));
     checked = readMotion(directory.path());
   }
   RobotDirectory directory;

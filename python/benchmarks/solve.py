@@ -52,7 +52,7 @@ def run_own_cost(own: bool) -> float:
     stages = [stage.replace(costs=[*stage.costs, cost]) for stage in plan.stages]
     motion = bielle.Motion(model, plan.replace(stages=stages))
     start = time.process_time()
-    summary = motion.solve(bielle.SolverOptions(threads=1, initial_regularization=1e-5))
+    summary = motion.solve(bielle.SolverOptions(threads=1)).summary
     return (time.process_time() - start) / summary.iterations
 
 

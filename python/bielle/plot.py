@@ -10,7 +10,7 @@ from typing import Any, Optional, Sequence, Tuple, Union
 import numpy as np
 import numpy.typing as npt
 
-from ._bielle import Model, Motion, Record, Result, Summary, sweep_ratio
+from ._bielle import Model, Record, Result, Solution, Summary, sweep_ratio
 
 Array = npt.NDArray[np.float64]
 Recorded = Union[Result, Record]
@@ -53,11 +53,9 @@ def loads(result: Recorded, axes: Any = None) -> Any:
     return _draw(_get_steps(record), normal, names, names, "normal force [N]", axes)
 
 
-def convergence(solved: Union[Result, Motion, Summary], axes: Any = None) -> Any:
+def convergence(solved: Union[Result, Solution, Summary], axes: Any = None) -> Any:
     """What the solver drives to zero, over its iterations: gaps, violation of constraints, gradient."""
-    summary = solved.solver if isinstance(solved, Result) else solved.summary if isinstance(solved, Motion) else solved
-    if summary is None:
-        raise ValueError("the motion has not been solved")
+    summary = solved.solver if isinstance(solved, Result) else solved.summary if isinstance(solved, Solution) else solved
     axes = _make_axes(axes)
     iterations = [line.iteration for line in summary.log]
     for name in ("gap", "violation", "gradient"):

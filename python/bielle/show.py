@@ -4,7 +4,7 @@ import html
 import tempfile
 from pathlib import Path
 
-from ._bielle import Motion, Result, Robot, Summary, load_robot, make_report, make_result, make_view
+from ._bielle import Result, Robot, Solution, load_robot, make_report, make_result, make_view
 
 
 def make_frame(page: str, height: int) -> str:
@@ -24,12 +24,13 @@ def show_robot(robot: Robot) -> str:
     return make_frame(make_view(robot), 560)
 
 
-def show_motion(motion: Motion) -> str:
-    """The 3D replay and the plots of the guess of a motion, which after a solve is the solution."""
+def show_solution(solution: Solution) -> str:
+    """The 3D replay and the plots of a solution."""
     with tempfile.TemporaryDirectory() as directory:
         files = str(Path(directory) / "robot")
-        Robot(name=motion.model.name, model=motion.model).write(files)
-        return show_result(make_result(motion, motion.summary or Summary(), load_robot(files)))
+        model = solution.motion.model
+        Robot(name=model.name, model=model).write(files)
+        return show_result(make_result(solution, load_robot(files)))
 
 
 def format_result(result: Result) -> str:
@@ -42,4 +43,4 @@ def format_result(result: Result) -> str:
 setattr(Result, "__repr__", format_result)
 setattr(Result, "_repr_html_", show_result)
 setattr(Robot, "_repr_html_", show_robot)
-setattr(Motion, "_repr_html_", show_motion)
+setattr(Solution, "_repr_html_", show_solution)

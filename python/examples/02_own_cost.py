@@ -29,17 +29,17 @@ class KneePosition(bielle.Residual):
         return {"q": (node.placement(self.shin).R @ node.frame_jacobian(self.shin)[:3])[:1]}
 
 
-def find_farthest(motion: bielle.Motion, shin: str) -> float:
-    model = motion.model
-    q = np.array([x[: model.nq] for x in motion.guess.xs])
+def find_farthest(solution: bielle.Solution, shin: str) -> float:
+    model = solution.motion.model
+    q = np.array([x[: model.nq] for x in solution.trajectory.xs])
     return float(model.placement(q, shin)[:, 0, 3].max())
 
 
 def main() -> None:
     model = bielle.load_robot("bipetto").model
     plan = bielle.Motion.plan(model, bielle.Request(motion="squat", options={"depth": 0.7}))
-    free = bielle.Motion(model, plan)
-    print("free:   ", free.solve().message)
+    free = bielle.Motion(model, plan).solve()
+    print("free:   ", free.summary.message)
     x_max = find_farthest(free, "shin_left") - 0.01
 
     limits = [
@@ -47,8 +47,8 @@ def main() -> None:
         for shin in ("shin_left", "shin_right")
     ]
     stages = [stage.replace(path_constraints=[*stage.path_constraints, *limits]) for stage in plan.stages]
-    bounded = bielle.Motion(model, plan.replace(stages=stages))
-    print("bounded:", bounded.solve().message)
+    bounded = bielle.Motion(model, plan.replace(stages=stages)).solve()
+    print("bounded:", bounded.summary.message)
     print(f"the knee may go to {x_max:.4f} m and goes to {find_farthest(bounded, 'shin_left'):.4f} m")
 
 

@@ -8,8 +8,9 @@ import bielle
 def main() -> None:
     robot = bielle.load_robot("bipetto")
     motion = bielle.Motion.make(robot.model, bielle.Request(motion="walk", options={"speed": 0.3, "steps": 4}))
-    print(motion.solve(bielle.SolverOptions(initial_regularization=1e-5)).message)
-    controller = bielle.Controller.policy(motion)
+    solution = motion.solve()
+    print(solution.summary.message)
+    controller = bielle.Controller.policy(solution)
 
     world = bielle.World(robot.model, ground=motion.ground)
     state = world.reset(*controller.reference(0))

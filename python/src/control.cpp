@@ -8,14 +8,13 @@
 namespace bielle::python {
 namespace {
 
-std::shared_ptr<HeldController> makeHeldPolicy(const std::shared_ptr<HeldMotion>& motion, bool gains) {
-  requireStill(*motion);
-  if (gains && !motion->gains)
-    throw std::runtime_error("gains come from the last solve: solve the motion first, or give gains=False");
+std::shared_ptr<HeldController> makeHeldPolicy(const HeldSolution& solved, bool gains) {
+  const Solution& solution = solved.solution;
+  if (gains && solution.gains.empty()) throw std::runtime_error("the least peak torque has no gains: give gains=False");
   auto held = std::make_shared<HeldController>();
-  held->model = motion->model;
-  auto policy = std::make_unique<Policy>(gains ? makePolicy(motion->motion, motion->motion.guess, *motion->gains)
-                                               : makePolicy(motion->motion, motion->motion.guess));
+  held->model = solved.motion->model;
+  auto policy =
+      std::make_unique<Policy>(gains ? makePolicy(solution) : makePolicy(solution.motion, solution.trajectory));
   held->policy = policy.get();
   held->controller = std::move(policy);
   return held;
@@ -90,8 +89,8 @@ void bindControllers(py::module_& module) {
   py::class_<HeldController, std::shared_ptr<HeldController>>(
       module, "Controller",
       "A feedback law: from measured states to torques. Controller.policy and .predictive make them.")
-      .def_static("policy", &makeHeldPolicy, py::arg("motion"), py::arg("gains").none(false) = true,
-                  "Torques of a solved Motion, and feedback with the gains of its last sweep.")
+      .def_static("policy", &makeHeldPolicy, py::arg("solution"), py::arg("gains").none(false) = true,
+                  "Torques of a Solution, and feedback with its gains.")
       .def_static("predictive", &makePredictive, py::arg("model"), py::arg("plan"), py::arg("solved"),
                   py::arg("problem") = ProblemOptions(), py::arg("options") = PredictiveOptions(),
                   "Solves the next second again at every stage. plan: a MotionPlan; solved: Trajectory of its Motion.")

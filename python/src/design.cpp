@@ -31,19 +31,18 @@ std::shared_ptr<HeldParametrization> parametrizeGenerated(const std::string& gen
       HeldParametrization{nullptr, generator, settings, Parametrization(generator, settings, variables)});
 }
 
-py::array costGradient(HeldMotion& held, const HeldParametrization& robot, const py::object& x) {
+py::array costGradient(const HeldSolution& solved, const HeldParametrization& robot, const py::object& x) {
+  const HeldMotion& held = *solved.motion;
   const VectorXd point = readVector(x, robot.robot.start().size(), "x");
   if (!held.request)
     throw std::runtime_error(
-        "motion: a motion made from a plan cannot be made for other robots; make it from a Request");
-  if (!held.multipliers) throw std::runtime_error("motion: solve it first; gradients need an optimum");
-  const BusyGuard guard(held.is_busy, "motion");
+        "solution: a motion made from a plan cannot be made for other robots; make it from a Request");
   VectorXd gradient;
   {
     const py::gil_scoped_release release;
-    const MotionEnvelope envelope(held.motion, *held.multipliers);
+    const MotionEnvelope envelope(solved.solution);
     gradient = calcCostGradient(robot.robot, point, envelope, [&held](const Model& model) {
-      return makeRequested(held.request->make(), model, held.options);
+      return makeMotion(model, held.request->make(), held.options);
     });
   }
   return makeArray(gradient);
@@ -187,11 +186,11 @@ void bindDesign(py::module_& module) {
   bindVariables(module);
   bindParametrization(module);
   bindSearch(module);
-  module.def(
-      "cost_gradient", &costGradient, py::arg("motion"), py::arg("robot"), py::arg("x"),
-      "Derivatives (n,) of the optimal cost of a motion by every number of its robot, at x (n,).\n\n"
-      "motion: made from a Request and solved for `robot.make(x)`. The derivatives are those of motions solved again "
-      "for every change, but nothing is solved: the multipliers of the optimum suffice (envelope theorem).");
+  module.def("cost_gradient", &costGradient, py::arg("solution"), py::arg("robot"), py::arg("x"),
+             "Derivatives (n,) of the optimal cost of a motion by every number of its robot, at x (n,).\n\n"
+             "solution: of a motion made from a Request for `robot.make(x)`. The derivatives are those of motions "
+             "solved again "
+             "for every change, but nothing is solved: the multipliers of the optimum suffice (envelope theorem).");
 }
 
 }  // namespace bielle::python

@@ -36,18 +36,18 @@ struct Lift {
   std::optional<MotionResult> result;
 };
 
-Lift liftMotion(const Robot& robot, const NamedSerial& named, HeldMotion& motion, const LiftOptions& options) {
-  if (!motion.multipliers) throw std::runtime_error("motion: solve it first");
-  if (!same(motion.model, named.model)) throw py::value_error("motion: expected a motion of the serial model");
+Lift liftMotion(const Robot& robot, const NamedSerial& named, const HeldSolution& solution,
+                const LiftOptions& options) {
+  const HeldMotion& motion = *solution.motion;
+  if (!same(motion.model, named.model)) throw py::value_error("solution: expected a motion of the serial model");
   if (motion.options.step != StepRule::Euler)
     throw py::value_error(
-        "motion: only motions with Euler steps, which have accelerations at their nodes, can be lifted");
-  const BusyGuard guard(motion.is_busy, "motion");
+        "solution: only motions with Euler steps, which have accelerations at their nodes, can be lifted");
   const py::gil_scoped_release release;
   const SerialModel serial = {*named.model,           named.q_reference,  named.frozen_joints,
                               named.dropped_closures, named.replacements, named.dropped_targets};
-  const MotionResult solved = makeResult({robot.name, robot.file, {}}, motion.motion, motion.motion.guess, {});
-  const LiftResult lifted = lift(robot.get(), serial, makeSerialTrajectory(motion.motion, solved.record), options);
+  const MotionRecord record = makeRecord(motion.motion, solution.solution.trajectory);
+  const LiftResult lifted = lift(robot.get(), serial, makeSerialTrajectory(motion.motion, record), options);
   Lift out = {lifted.lifted(), lifted.nodes, {}};
   if (!lifted.trajectory.us.empty())
     out.result = makeLiftedResult({robot.name, robot.file, {}, "closed", ""}, robot.get(), motion.motion, lifted, 0);
@@ -102,9 +102,10 @@ void bindOutcome(py::module_& module) {
       .field("lifted", &Lift::lifted, "all of it")
       .field("nodes", &Lift::nodes, "LiftNodes up to the first failure")
       .field("result", &Lift::result, "Result, as far as it was lifted, or None");
-  module.def("lift", &liftMotion, py::arg("robot"), py::arg("serial"), py::arg("motion"),
+  module.def("lift", &liftMotion, py::arg("robot"), py::arg("serial"), py::arg("solution"),
              py::arg("options") = LiftOptions(),
-             "Lifts a solved Motion of serial.model to the closed robot: the same serial joints, and the motor torques "
+             "Lifts the Solution of a motion of serial.model to the closed robot: the same serial joints, and the "
+             "motor torques "
              "that follow from them.\n\nThe motion must have Euler steps.");
 }
 

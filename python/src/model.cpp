@@ -1,8 +1,8 @@
 #include <pybind11/stl.h>
 
 #include "bielle/dynamics/loop_conflict.h"
-#include "bielle/io/names.h"
 #include "bielle/model/builder.h"
+#include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/residual.h"
 #include "bind.h"

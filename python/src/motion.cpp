@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "bind.h"
 
 namespace bielle::python {
@@ -30,25 +30,12 @@ MotionRequest Request::make() const {
   return request;
 }
 
-void requireStill(const HeldMotion& held) {
-  if (held.is_busy && !held.is_observed) throw std::runtime_error("another thread is using this motion");
-}
-
-FddpObserver makeObserver(const py::object& callback, bool* is_called) {
-  struct Mark {
-    explicit Mark(bool* flag) : flag(flag) { set(true); }
-    ~Mark() { set(false); }
-    void set(bool value) const {
-      if (flag) *flag = value;
-    }
-    bool* flag;
-  };
+FddpObserver makeObserver(const py::object& callback) {
   FddpObserver observer;
   // Copies of the observer are made without the interpreter's lock.
-  observer.callback = [shared = std::make_shared<SharedObject>(callback), is_called](const FddpIteration& iteration,
-                                                                                     const ShootingTrajectory&) {
+  observer.callback = [shared = std::make_shared<SharedObject>(callback)](const FddpIteration& iteration,
+                                                                          const ShootingTrajectory&) {
     const py::gil_scoped_acquire lock;
-    const Mark mark(is_called);
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     const bool stop = !shared->get().is_none() && shared->get()(iteration).is(py::bool_(false));
     return stop ? FddpAction::Stop : FddpAction::Continue;
@@ -62,7 +49,7 @@ std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const R
   held->model = std::move(model);
   held->request = request;
   held->options = options;
-  held->motion = makeRequested(request.make(), *held->model, options);
+  held->motion = makeMotion(*held->model, request.make(), options);
   return held;
 }
 
@@ -152,75 +139,72 @@ py::list makeResiduals(const std::shared_ptr<Model>& model, const py::object& ma
                                  recipe));
 }
 
-FddpSummary solveHeld(HeldMotion& held, const FddpOptions& options, const py::object& callback) {
-  const BusyGuard guard(held.is_busy, "motion");
-  Motion& motion = held.motion;
-  const bool has_peak = motion.peak_limits.size() > 0;
-  const FddpObserver inner = makeObserver(callback, &held.is_observed);
-  FddpObserver observer = inner;
-  if (!has_peak)
-    observer.callback = [&](const FddpIteration& line, const ShootingTrajectory& iterate) {
-      motion.guess = iterate;
-      return inner.callback(line, iterate);
-    };
-  // What properties read changes under the interpreter's lock only.
-  held.gains.reset(), held.multipliers.reset(), held.summary.reset();
-  FddpResult result;
-  {
-    const py::gil_scoped_release release;
-    if (has_peak) {
-      result.summary = solveMotion(motion, options, observer, &result.multipliers);
-    } else {
-      result = solve(*motion.problem, motion.guess, options, observer);
-      motion.guess = std::move(result.trajectory);
-    }
-  }
-  if (!has_peak) held.gains = std::move(result.gains);
-  held.multipliers = std::move(result.multipliers);
-  held.summary = result.summary;
-  return result.summary;
-}
-
-// The guess; the motion takes only one that fits its problem.
-void setTrajectory(HeldMotion& held, const ShootingTrajectory& trajectory) {
-  const BusyGuard guard(held.is_busy, "motion");
-  const RobotProblem& problem = *held.motion.problem;
+// \param name  of the argument in errors
+void requireFit(const RobotProblem& problem, const ShootingTrajectory& trajectory, const std::string& name) {
   const size_t stages = problem.numStages();
   if (trajectory.xs.size() != stages + 1 || trajectory.us.size() != stages)
-    throw py::value_error("guess: expected " + std::to_string(stages + 1) + " states and " + std::to_string(stages) +
+    throw py::value_error(name + ": expected " + std::to_string(stages + 1) + " states and " + std::to_string(stages) +
                           " controls, got " + std::to_string(trajectory.xs.size()) + " and " +
                           std::to_string(trajectory.us.size()));
   for (size_t k = 0; k <= stages; ++k)
     if (trajectory.xs[k].size() != problem.stateSize())
-      throw py::value_error("guess.xs: expected shape (" + std::to_string(problem.stateSize()) + ",), got (" +
+      throw py::value_error(name + ".xs: expected shape (" + std::to_string(problem.stateSize()) + ",), got (" +
                             std::to_string(trajectory.xs[k].size()) + ",)");
   for (size_t k = 0; k < stages; ++k)
     if (trajectory.us[k].size() != problem.controlSize(static_cast<int>(k)))
-      throw py::value_error("guess.us: expected shape (" + std::to_string(problem.controlSize(static_cast<int>(k))) +
+      throw py::value_error(name + ".us: expected shape (" + std::to_string(problem.controlSize(static_cast<int>(k))) +
                             ",), got (" + std::to_string(trajectory.us[k].size()) + ",)");
-  held.motion.guess = trajectory;
-}
-
-ShootingTrajectory getTrajectory(const HeldMotion& held) {
-  requireStill(held);
-  return held.motion.guess;
 }
 
 // Records are bound after motions.
-void setWarmStart(HeldMotion& held, const py::object& record) {
-  const BusyGuard guard(held.is_busy, "motion");
-  setGuess(read<MotionRecord>(record, "record"), held.motion);
+StartingPoint readStart(const HeldMotion& held, const py::object& start) {
+  if (py::isinstance<HeldSolution>(start)) {
+    const Solution& solution = start.cast<const HeldSolution&>().solution;
+    requireFit(*held.motion.problem, solution.trajectory, "warm_start");
+    return {solution.trajectory, solution.multipliers};
+  }
+  if (!py::isinstance<ShootingTrajectory>(start)) return makeStart(read<MotionRecord>(start, "warm_start"), held.motion);
+  StartingPoint out{start.cast<const ShootingTrajectory&>()};
+  requireFit(*held.motion.problem, out.trajectory, "warm_start");
+  return out;
 }
 
-py::dict getCosts(const HeldMotion& held, int node) {
+// The motion that a solution is of: made again, it has the options that it was made with.
+std::shared_ptr<HeldMotion> findSolved(const std::shared_ptr<HeldMotion>& given, const Motion& solved) {
+  if (solved.problem == given->motion.problem) return given;
+  auto held = std::make_shared<HeldMotion>();
+  held->model = given->model;
+  held->request = given->request;
+  for (const auto& [name, value] : solved.request->options.listValues()) held->request->options[name] = value;
+  held->options = solved.problem_options;
+  held->motion = solved;
+  return held;
+}
+
+std::shared_ptr<HeldSolution> solve(const std::shared_ptr<HeldMotion>& held, const FddpOptions& solver,
+                                    const py::object& callback, const py::object& start, bool refine) {
+  SolveOptions options{solver, {}, refine};
+  if (!start.is_none()) options.start = readStart(*held, start);
+  const FddpObserver observer = makeObserver(callback);
+  auto out = std::make_shared<HeldSolution>();
+  {
+    const py::gil_scoped_release release;
+    out->solution = bielle::solve(held->motion, options, {observer, observer, {}, {}});
+  }
+  out->motion = findSolved(held, out->solution.motion);
+  return out;
+}
+
+py::dict getCosts(const HeldMotion& held, int node, const std::optional<ShootingTrajectory>& trajectory) {
   const RobotProblem& problem = *held.motion.problem;
   if (node < 0 || node > problem.numStages())
     throw py::index_error("node: from 0 to " + std::to_string(problem.numStages()));
-  requireStill(held);
+  if (trajectory) requireFit(problem, *trajectory, "trajectory");
+  const ShootingTrajectory& at = trajectory ? *trajectory : held.motion.guess;
   RobotEvaluator evaluator(problem);
-  const VectorXd u = node == problem.numStages() ? VectorXd() : held.motion.guess.us[node];
+  const VectorXd u = node == problem.numStages() ? VectorXd() : at.us[node];
   py::dict out;
-  for (const CostValue& value : problem.getCosts(node, evaluator.evaluate(node, held.motion.guess.xs[node], u)))
+  for (const CostValue& value : problem.getCosts(node, evaluator.evaluate(node, at.xs[node], u)))
     out[py::str(value.name)] = value.value;
   return out;
 }
@@ -285,48 +269,29 @@ void bindHeldMotion(py::module_& module) {
       .def_property_readonly(
           "options", [](const HeldMotion& h) { return show(h.motion.options, {}); },
           "every option of the motion by name")
-      .def_property("guess", &getTrajectory, &setTrajectory, "Trajectory to start from; after a solve the solution")
+      .def_property_readonly(
+          "guess", [](const HeldMotion& h) { return h.motion.guess; }, "Trajectory that a solve starts from")
       .def("stage", &getStage, py::arg("node"),
            "Stage of a node, 0 to N, including the constraints from the robot's limits.")
-      .def("start_from", &setWarmStart, py::arg("record"),
-           "Sets the guess from the record of another motion of the robot, resampled if its length differs.")
-      .def("costs", &getCosts, py::arg("node"),
-           "Costs of a node of the guess by name, before scaling by the time step.")
-      .def("solve", &solveHeld, py::arg("options") = FddpOptions(), py::arg("callback") = py::none(),
-           "Solves from the guess and leaves the solution there. Returns a Summary.\n\n"
-           "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve with "
-           "the current iterate in the guess.")
-      .def_property_readonly(
-          "multipliers",
-          [](const HeldMotion& h) {
-            if (!h.multipliers) throw std::runtime_error("the motion has not been solved");
-            return *h.multipliers;
-          },
-          "Multipliers of the last solve")
-      .def_property_readonly(
-          "gains",
-          [](const HeldMotion& h) {
-            requireStill(h);
-            if (!h.gains) throw std::runtime_error("the motion has no gains: solve it first, for other than the least peak torque");
-            return show(*h.gains, {});
-          },
-          "Gains of the last sweep, stage by stage")
-      .def_property_readonly(
-          "summary", [](const HeldMotion& h) { return h.summary ? py::cast(*h.summary) : py::object(py::none()); },
-          "Summary of the last solve, or None");
+      .def("costs", &getCosts, py::arg("node"), py::arg("trajectory") = py::none(),
+           "Costs of a node of a Trajectory, or of the guess, by name, before scaling by the time step.")
+      .def("solve", &solve, py::arg("options") = makeMotionSolverOptions(), py::arg("callback") = py::none(),
+           py::arg("warm_start") = py::none(), py::arg("refine") = true,
+           "Solves it as `bielle solve` does. Returns a Solution; the motion stays as it is.\n\n"
+           "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve.\n"
+           "warm_start: a Trajectory or a Solution of as many stages, or a Record of any motion of the robot; None: the "
+           "guess\n"
+           "refine: whether the motion of a Request may be made again, e.g. with shorter stages");
   type.def(py::pickle(
       [](const HeldMotion& h) {
-        requireStill(h);
         return py::make_tuple(h.model, h.request ? py::cast(*h.request) : py::none(),
-                              h.plan ? py::cast(*h.plan) : py::none(), h.options, h.motion.guess);
+                              h.plan ? py::cast(*h.plan) : py::none(), h.options);
       },
       [](const py::tuple& state) {
         const auto model = state[0].cast<std::shared_ptr<Model>>();
         const auto options = state[3].cast<ProblemOptions>();
-        auto held = state[1].is_none() ? makeFromPlan(model, state[2].cast<const MotionPlan&>(), options)
-                                       : makeHeldMotion(model, state[1].cast<const Request&>(), options);
-        setTrajectory(*held, state[4].cast<ShootingTrajectory>());
-        return held;
+        return state[1].is_none() ? makeFromPlan(model, state[2].cast<const MotionPlan&>(), options)
+                                  : makeHeldMotion(model, state[1].cast<const Request&>(), options);
       }));
   type.def("__repr__", [](const HeldMotion& h) {
     return "<Motion '" + h.motion.name + "' of " + h.model->name() + ": " +
@@ -334,11 +299,51 @@ void bindHeldMotion(py::module_& module) {
   });
 }
 
+void bindSolution(py::module_& module) {
+  Value<StageGains>(module, "Gains",
+                    "Of a stage, about a solution: u = us + k + K (x - xs), x - xs in the tangent space.")
+      .field("k", &StageGains::k, "(nu,), vanishes at an optimum")
+      .field("K", &StageGains::K, "(nu, ndx)");
+  py::class_<HeldSolution, std::shared_ptr<HeldSolution>>(module, "Solution", "A solved Motion.")
+      .def_readonly("motion", &HeldSolution::motion,
+                    "Motion that was solved: the given one, or that made again of its request")
+      .def_property_readonly(
+          "trajectory", [](const HeldSolution& h) { return h.solution.trajectory; }, "Trajectory")
+      .def_property_readonly(
+          "summary", [](const HeldSolution& h) { return h.solution.summary; }, "Summary")
+      .def_property_readonly(
+          "multipliers", [](const HeldSolution& h) { return h.solution.multipliers; }, "Multipliers of the constraints")
+      .def_property_readonly(
+          "gains", [](const HeldSolution& h) { return show(h.solution.gains, {}); },
+          "Gains of every stage, of the solver's last sweep; () for the least peak torque")
+      .def_property_readonly(
+          "converged", [](const HeldSolution& h) { return h.solution.converged(); },
+          "whether the solver ended at an optimum")
+      .def("__repr__",
+           [](const HeldSolution& h) {
+             return "<Solution of '" + h.solution.motion.name + "' of " + h.motion->model->name() + ": " +
+                    getName(h.solution.summary.termination) + ">";
+           })
+      .def(py::pickle(
+          [](const HeldSolution& h) {
+            const Solution& s = h.solution;
+            return py::make_tuple(h.motion, s.trajectory, s.summary, s.multipliers, show(s.gains, {}));
+          },
+          [](const py::tuple& state) {
+            auto held = std::make_shared<HeldSolution>();
+            held->motion = state[0].cast<std::shared_ptr<HeldMotion>>();
+            held->solution = {held->motion->motion, state[1].cast<ShootingTrajectory>(), state[2].cast<FddpSummary>(),
+                              state[3].cast<Multipliers>(), read<std::vector<StageGains>>(state[4], "gains")};
+            return held;
+          }));
+}
+
 }  // namespace
 
 void bindMotions(py::module_& module) {
   bindRequests(module);
   bindHeldMotion(module);
+  bindSolution(module);
   module.def("_make_residuals", &makeResiduals, py::arg("model"), py::arg("made_of"), py::arg("options") = py::none());
 }
 

@@ -3,8 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "bielle/io/motion_registry.h"
-#include "busy.h"
+#include "bielle/motion/solve.h"
 #include "residual.h"
 #include "robot.h"
 
@@ -28,16 +27,14 @@ struct HeldMotion {
   std::optional<MotionPlan> plan;  // or that
   ProblemOptions options;
   Motion motion;
-  std::optional<std::vector<Gains>> gains;  // of the last solve; none for the least peak torque
-  std::optional<Multipliers> multipliers;   // likewise
-  std::optional<FddpSummary> summary;       // likewise
-  std::atomic<bool> is_busy{false};         // one solve at a time
-  bool is_remembered = false;               // rememberResiduals() knows those of its stages
-  bool is_observed = false;                 // that solve waits for its callback; under the interpreter's lock
+  bool is_remembered = false;  // rememberResiduals() knows those of its stages
 };
 
-/// \throws RuntimeError while another thread changes the guess and the gains. A callback of the solve may read them.
-void requireStill(const HeldMotion& held);
+/// A solution, whose motion is the one that was given unless it was made again.
+struct HeldSolution {
+  std::shared_ptr<HeldMotion> motion;
+  Solution solution;
+};
 
 std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,
                                            const ProblemOptions& options);
@@ -48,7 +45,6 @@ MotionPlan completePlan(const Model& model, MotionPlan plan);
 
 /// Lets `callback(iteration)` observe a solve that runs without the interpreter's lock, and signals end it: their
 /// exceptions leave it. False from the callback stops it.
-/// \param is_called  true while it is; or null
-FddpObserver makeObserver(const py::object& callback, bool* is_called = nullptr);
+FddpObserver makeObserver(const py::object& callback);
 
 }  // namespace bielle::python

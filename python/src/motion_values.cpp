@@ -28,7 +28,7 @@ void bindProblemOptions(py::module_& module) {
       .field("objective", &ObjectiveOptions::objective, "Objective")
       .field("regeneration", &ObjectiveOptions::regeneration, "share of the regenerated energy that is reused, 0 to 1")
       .field("regularization", &ObjectiveOptions::regularization, "weight of the other costs; None: the default")
-      .field("scale", &ObjectiveOptions::scale, "cost of a joule, or of the peak");
+      .field("scale", &ObjectiveOptions::scale, "cost of a joule, or of the peak; None: of the motion of least effort");
   Value<ProblemOptions>(module, "ProblemOptions", "Options of a problem besides those of the motion.")
       .field("formulation", &ProblemOptions::formulation, "Formulation")
       .field("step", &ProblemOptions::step, "StepRule; None: midpoint, or Euler for the paper's problems")

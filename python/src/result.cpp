@@ -2,7 +2,6 @@
 
 #include <pybind11/stl.h>
 
-#include "bielle/io/request_solver.h"
 #include "bielle/report/report.h"
 #include "bind.h"
 #include "motion.h"
@@ -102,9 +101,11 @@ MotionResult solveRequest(const Robot& robot, const Request& request, const Prob
                           const py::object& callback) {
   const FddpObserver observer = makeObserver(callback);
   const py::gil_scoped_release release;
-  const MotionRequest motion_request = request.make();
-  RequestSolver solver(motion_request, robot.get(), {problem, options, warm_start}, {observer, observer, {}, {}});
-  return solver.solve({robot.name, robot.file, {}});
+  const Motion motion = makeMotion(robot.get(), request.make(), problem);
+  SolveOptions how;
+  how.solver = options;
+  if (warm_start) how.start = makeStart(*warm_start, motion);
+  return makeResult({robot.name, robot.file, {}}, solve(motion, how, {observer, observer, {}, {}}));
 }
 
 }  // namespace
@@ -119,11 +120,11 @@ void bindResults(py::module_& module) {
              "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve.");
   module.def(
       "make_result",
-      [](const HeldMotion& held, const FddpSummary& summary, const Robot& robot) {
+      [](const HeldSolution& held, const Robot& robot) {
         const py::gil_scoped_release release;
-        return makeResult({robot.name, robot.file, {}}, held.motion, held.motion.guess, summary);
+        return makeResult({robot.name, robot.file, {}}, held.solution);
       },
-      py::arg("motion"), py::arg("summary"), py::arg("robot"), "The Result of a Motion that was solved.");
+      py::arg("solution"), py::arg("robot"), "The Result of a Solution.");
 }
 
 }  // namespace bielle::python

@@ -14,7 +14,7 @@ from bielle import _bielle
 # Arguments and results that are any object to C++, by name; "" is the result.
 ARGUMENTS = {
     "contacts": "Contacts", "callback": "Optional[Callable[[Iteration], Optional[bool]]]", "gravity": "ArrayLike",
-    "torque_loss": "Optional[float]", "count": "Optional[int]", "other": "object", "record": "Record",
+    "torque_loss": "Optional[float]", "count": "Optional[int]", "other": "object", "warm_start": "Union[None, Trajectory, Solution, Record]",
     "objective": "Callable[[Array], Union[float, Tuple[float, ArrayLike]]]",
 }  # fmt: skip
 RESULTS = {
@@ -25,8 +25,8 @@ RESULTS = {
     "World.count": "Optional[int]", "generators": "Dict[str, Dict[str, Dict[str, Any]]]", "motions": "Dict[str, Dict[str, Any]]",
     "Motion.goals": "Tuple[Goal, ...]", "Motion.gains": "Tuple[Gains, ...]", "Motion.options": "Dict[str, Union[bool, int, float, str]]",
     "Model.shape_pairs": "List[Tuple[int, int, bool]]", "Model.joint_forces": "Tuple[JointForce, ...]", "Model.point_springs": "Tuple[PointSpring, ...]",
-    "Motion.request": "Optional[Request]", "Motion.summary": "Optional[Summary]", "Robot.info": "Dict[str, Any]",
-    "Parametrization.variables": "Tuple[DesignVariable, ...]", "Estimator.contacts": "Dict[str, bool]", "Motion.costs": "Dict[str, float]", "LibraryResidual.origin": "Optional[Tuple[str, Tuple[Any, ...]]]",
+    "Motion.request": "Optional[Request]", "Robot.info": "Dict[str, Any]",
+    "Parametrization.variables": "Tuple[DesignVariable, ...]", "Estimator.contacts": "Dict[str, bool]", "Motion.costs": "Dict[str, float]", "Solution.gains": "Tuple[Gains, ...]", "LibraryResidual.origin": "Optional[Tuple[str, Tuple[Any, ...]]]",
 }  # fmt: skip
 SAMPLES = {"Model": lambda: bielle.load_robot("bipetto").model}
 

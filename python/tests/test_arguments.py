@@ -33,6 +33,7 @@ def make_samples():
     cost = bielle.Cost("seen", 1, bielle.Activation.quadratic([1]), Seen())
     motion = bielle.Motion(model, plan.replace(stages=[plan.stages[0].replace(costs=[cost]), *plan.stages[1:]]))
     motion.costs(0)
+    solution = motion.solve(bielle.SolverOptions(max_iterations=1))
     world = bielle.World(model)
     variable = bielle.DesignVariable(name="upper", lower=0.1, upper=0.3, parameter="upper_length")
     by_type = {name: list(kind.__members__.values())[0] if hasattr(kind, "__members__") else kind()
@@ -40,7 +41,7 @@ def make_samples():
     by_type.update(
         Robot=robot, Model=model, Motion=motion, World=world, Sensors=bielle.Sensors(world), MotionPlan=plan,
         ModelBuilder=bielle.ModelBuilder("m"), Estimator=bielle.Estimator(model, model.standing()), Node=Seen.nodes[0],
-        Request=bielle.Request(motion="squat"), Controller=bielle.Controller.policy(motion, gains=False),
+        Request=bielle.Request(motion="squat"), Controller=bielle.Controller.policy(solution, gains=False), Solution=solution,
         Parametrization=bielle.Parametrization.generated("fivebar_leg", [variable]), Trajectory=motion.guess,
         LibraryResidual=bielle.residuals.com_position(np.zeros(3)), ConstraintSet=model.constraints(["foot_left"]),
         SerialModel=bielle.SerialModel(model=model, q_reference=model.standing()),
@@ -48,12 +49,12 @@ def make_samples():
     q, v = model.standing(), np.zeros(model.nv)
     by_name = {"q": q, "q0": q, "q1": q, "v": v, "dq": v, "a": v, "u": np.zeros(model.nu), "losses": np.zeros(model.nu),
                "x": [0.2], "contacts": (), "R_WT": np.eye(3), "twist": np.zeros(6), "weights": [1.0], "lower": [0.0],
-               "upper": [0.0], "start": [0.0], "made_of": plan, "options": bielle.ProblemOptions()}  # fmt: skip
+               "upper": [0.0], "start": [0.0], "made_of": plan, "options": bielle.ProblemOptions(), "warm_start": solution}  # fmt: skip
     return by_type, by_name
 
 
 # What functions also take as an object of any type.
-BEHIND_OBJECTS = {"contacts": "ConstraintSet", "record": "Record"}
+BEHIND_OBJECTS = {"contacts": "ConstraintSet", "warm_start": "Record"}
 
 
 def is_property(key, attribute):
@@ -323,7 +324,7 @@ def test_numbers_of_threads_and_stages_are_bounded(robot, model):
     for nodes in (-1, 0, 1001):
         with pytest.raises(ValueError, match="nodes must lie between 10 and 1000"):
             bielle.Controller.predictive(model, plan, motion.guess, options=bielle.PredictiveOptions(nodes=nodes))
-    assert motion.solve(bielle.SolverOptions(threads=1024, max_iterations=1)).iterations == 1
+    assert motion.solve(bielle.SolverOptions(threads=1024, max_iterations=1)).summary.iterations == 1
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])

@@ -52,9 +52,9 @@ def test_gradient_of_an_optimum(knee):
     request = bielle.Request(motion="squat", options={"depth": 0.8})
 
     def solve(x):
-        motion = bielle.Motion.make(knee.make(x), request, EULER)
-        assert motion.solve(TIGHT).converged
-        return motion
+        solution = bielle.Motion.make(knee.make(x), request, EULER).solve(TIGHT)
+        assert solution.converged
+        return solution
 
     gradient = bielle.cost_gradient(solve(knee.start), knee, knee.start)
     step = 1e-4
@@ -62,8 +62,9 @@ def test_gradient_of_an_optimum(knee):
     assert gradient == pytest.approx(np.array(differences), rel=1e-4)
     poisoned = gradient + [0, 1e-3 * np.abs(gradient).max()]
     assert poisoned != pytest.approx(np.array(differences), rel=1e-4)
-    with pytest.raises(RuntimeError, match="solve it first"):
-        bielle.cost_gradient(bielle.Motion.make(knee.make(knee.start), request), knee, knee.start)
+    plan = bielle.Motion.plan(knee.make(knee.start), request)
+    with pytest.raises(RuntimeError, match="make it from a Request"):
+        bielle.cost_gradient(bielle.Motion(knee.make(knee.start), plan).solve(TIGHT), knee, knee.start)
 
 
 def rosenbrock(x):
@@ -96,14 +97,14 @@ def test_lift(robot, model):
     assert serial.model.num_closure_rows == 0 and serial.model.nu == model.nu
     assert serial == pickle.loads(pickle.dumps(serial))
     motion = bielle.Motion.make(serial.model, bielle.Request(motion="squat", options={"depth": 0.9}), EULER)
-    assert motion.solve(bielle.SolverOptions(initial_regularization=1e-5)).converged
-    lifted = bielle.lift(robot, serial, motion)
+    solution = motion.solve()
+    assert solution.converged
+    lifted = bielle.lift(robot, serial, solution)
     assert lifted.lifted and max(node.acceleration_error for node in lifted.nodes) < 1e-4
     assert lifted.result.gap_position < 1e-8
     with pytest.raises(ValueError, match="Euler"):
         midpoint = bielle.Motion.make(serial.model, bielle.Request(motion="squat", options={"depth": 0.9}))
-        midpoint.solve(bielle.SolverOptions(max_iterations=1))
-        bielle.lift(robot, serial, midpoint)
+        bielle.lift(robot, serial, midpoint.solve(bielle.SolverOptions(max_iterations=1)))
 
 
 def test_info(robot, model):

@@ -95,9 +95,9 @@ def test_exceptions_of_a_callback_come_out_as_themselves(robot):
     assert caught.value is error
 
 
-def test_interrupt_leaves_the_iterate_in_the_guess(model):
+def test_interrupt_leaves_the_motion_as_it_is(model):
     motion = bielle.Motion.make(model, bielle.Request(motion="squat"))
-    start = motion.guess
+    guess = motion.guess
 
     def press(iteration):
         if iteration.iteration == 2:
@@ -105,8 +105,12 @@ def test_interrupt_leaves_the_iterate_in_the_guess(model):
 
     with pytest.raises(KeyboardInterrupt):
         motion.solve(callback=press)
-    assert motion.guess != start
-    assert motion.solve().converged
+    assert motion.guess == guess
+    stopped = motion.solve(callback=lambda iteration: iteration.iteration < 2)
+    assert not stopped.converged and stopped.trajectory != guess
+    again = motion.solve(warm_start=stopped)
+    assert again.converged and len(again.gains) == motion.num_stages and again.gains[0].K.shape[0] == model.nu
+    assert motion.solve(warm_start=bielle.solve_squat(bielle.load_robot("bipetto")).record).summary.iterations < 5
 
 
 def test_gains_are_those_of_the_last_sweep(model):
@@ -158,23 +162,21 @@ def test_objective_and_limits(robot, squat):
 def test_motions_pickle(model):
     motion = bielle.Motion.make(model, bielle.Request(motion="squat", options={"depth": 0.9}))
     twin = pickle.loads(pickle.dumps(motion))
-    assert twin.guess == motion.guess and twin.solve() is not None
-    assert motion.solve().converged and motion.guess == twin.guess
+    assert twin.guess == motion.guess
+    solution = motion.solve()
+    assert solution.converged and solution.trajectory == twin.solve().trajectory
+    again = pickle.loads(pickle.dumps(solution))
+    assert again.trajectory == solution.trajectory and again.gains == solution.gains
+    assert again.summary == solution.summary and again.multipliers == solution.multipliers
 
 
-def test_one_thread_solves_a_motion_at_a_time(model):
-    motion = bielle.Motion.make(model, bielle.Request(motion="squat"))
-    guesses = []
-
-    def meddle(iteration):
-        iterate = motion.guess
-        with pytest.raises(RuntimeError, match="another thread is using this motion"):
-            motion.guess = iterate
-        guesses.append(iterate)
-        return False
-
-    motion.solve(callback=meddle)
-    assert guesses == [motion.guess]
+def test_a_motion_is_made_again_where_its_stages_are_too_long(model):
+    options = {"speed": 0.4, "single_support": 0.25, "swing_height": 0.14, "steps": 2}
+    motion = bielle.Motion.make(model, bielle.Request(motion="walk", options=options))
+    solution = motion.solve()
+    assert solution.converged and solution.motion.num_stages == 2 * motion.num_stages
+    assert solution.motion.options["time_step"] == 0.006 and motion.options["time_step"] == 0
+    assert motion.solve(refine=False).motion is motion
 
 
 def make_hopper():
@@ -215,12 +217,13 @@ def make_hop(model, q, height, timing):
 def test_a_problem_made_from_nothing(timing, tmp_path):
     model, q = make_hopper()
     motion = bielle.Motion(model, make_hop(model, q, 0.55, timing))
-    assert motion.solve(bielle.SolverOptions(initial_regularization=1e-5)).converged
-    assert model.com(motion.guess.xs[-1][:3])[2] == pytest.approx(0.55, abs=0.01)
+    solution = motion.solve()
+    assert solution.converged
+    assert model.com(solution.trajectory.xs[-1][:3])[2] == pytest.approx(0.55, abs=0.01)
     assert [(phase.nodes, len(phase.contacts)) for phase in motion.schedule.phases] == [(15, 1), (8, 0)]
-    assert "<iframe" in motion._repr_html_()
+    assert "<iframe" in solution._repr_html_()
     bielle.Robot(name="hopper", model=model).write(str(tmp_path / "hopper"))
-    result = bielle.make_result(motion, motion.summary, bielle.load_robot(str(tmp_path / "hopper")))
+    result = bielle.make_result(solution, bielle.load_robot(str(tmp_path / "hopper")))
     assert result.converged and (result.schedule.phases[0].dt != 0.02) == (timing.phase >= 0)
     assert np.abs(result.record.contact_wrenches[15:]).max() == 0
     forces = np.linalg.norm(result.record.contact_wrenches[:15, :3], axis=1)  # in the frame of the foot, which is inclined

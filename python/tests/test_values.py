@@ -42,6 +42,7 @@ VALUES.update(
         "Cost": lambda: make_plan().stages[0].costs[0],
         "LibraryResidual": lambda: make_plan().stages[0].costs[0].residual,
         "Motion": lambda: bielle.Motion(bielle.load_robot("fivebar_leg").model, make_plan()),
+        "Solution": lambda: bielle.Motion(bielle.load_robot("fivebar_leg").model, make_plan()).solve(),
         "Parametrization": lambda: bielle.Parametrization.generated(
             "fivebar_leg", [bielle.DesignVariable(name="upper", lower=0.1, upper=0.3, parameter="upper_length")]
         ),
@@ -73,13 +74,15 @@ def test_every_public_value_pickles(name):
 
 
 def same(a, b):
-    """Of errors and tuples of arrays, which have no == of their own; of Motion and Parametrization by what they make."""
+    """Of errors and tuples of arrays, which have no == of their own; of Motion, Solution and Parametrization by what they hold or make."""
     if isinstance(a, bielle.ModelError):
         return (str(a), vars(a)) == (str(b), vars(b))
     if isinstance(a, bielle.Residual):
         return vars(a) == vars(b)
     if isinstance(a, bielle.Motion):
         return a.guess == b.guess and all(a.stage(k) == b.stage(k) for k in range(a.num_stages + 1))
+    if isinstance(a, bielle.Solution):
+        return a.trajectory == b.trajectory and a.summary == b.summary and a.gains == b.gains
     if isinstance(a, bielle.Parametrization):
         return a.variables == b.variables
     if isinstance(a, tuple):

@@ -8,15 +8,15 @@ import pytest
 import bielle
 
 @pytest.fixture(scope="module")
-def motion(model):
-    motion = bielle.Motion.make(model, bielle.Request(motion="squat", options={"depth": 0.9}))
-    assert motion.solve().converged
-    return motion
+def solution(model):
+    solution = bielle.Motion.make(model, bielle.Request(motion="squat", options={"depth": 0.9})).solve()
+    assert solution.converged
+    return solution
 
 
 @pytest.fixture(scope="module")
-def controller(motion):
-    return bielle.Controller.policy(motion)
+def controller(solution):
+    return bielle.Controller.policy(solution)
 
 
 def follow(world, controller, duration, period=2e-3):
@@ -27,20 +27,25 @@ def follow(world, controller, duration, period=2e-3):
     return state
 
 
-def test_policy(motion, controller, model):
+def test_policy(solution, controller, model):
+    motion = solution.motion
     assert controller.duration == pytest.approx(motion.schedule.phases[0].dt * motion.num_stages)
     q, v = controller.reference(0.6)
     there = controller.update(0.6, q, v)
-    assert there == pytest.approx(bielle.Controller.policy(motion, gains=False).update(0.6, q, v))
+    assert there == pytest.approx(bielle.Controller.policy(solution, gains=False).update(0.6, q, v))
     moved = controller.update(0.6, model.integrate(q, 1e-3 * np.eye(model.nv)[2]), v)
     assert np.abs(moved - there).max() > 0.01
     with pytest.raises(ValueError, match=r"q: expected shape \(61,\), got \(3,\)".replace("61", str(model.nq))):
         controller.update(0, np.zeros(3), v)
 
 
-def test_gains_need_a_solve(model):
-    with pytest.raises(RuntimeError, match="solve the motion first"):
-        bielle.Controller.policy(bielle.Motion.make(model, bielle.Request(motion="squat")))
+def test_the_least_peak_torque_has_no_gains(model):
+    problem = bielle.ProblemOptions(objective=bielle.ObjectiveOptions(objective=bielle.Objective.PEAK_TORQUE))
+    peak = bielle.Motion.make(model, bielle.Request(motion="squat", options={"depth": 0.95}), problem)
+    solution = peak.solve(bielle.SolverOptions(max_iterations=1))
+    assert solution.gains == ()
+    with pytest.raises(RuntimeError, match="gains=False"):
+        bielle.Controller.policy(solution)
 
 
 def test_squat_stands_in_the_world(controller, model):
@@ -114,11 +119,11 @@ def test_wrong_arguments(model):
 
 
 @pytest.mark.parametrize("own_thread", [False, True])
-def test_predictive_control(motion, model, own_thread):
+def test_predictive_control(solution, model, own_thread):
     options = bielle.PredictiveOptions(nodes=20, own_thread=own_thread)
-    plan = bielle.Motion.plan(model, motion.request)
-    controller = bielle.Controller.predictive(model, plan, motion.guess, options=options)
-    reference = bielle.Controller.policy(motion)
+    plan = bielle.Motion.plan(model, solution.motion.request)
+    controller = bielle.Controller.predictive(model, plan, solution.trajectory, options=options)
+    reference = bielle.Controller.policy(solution)
     world = bielle.World(model)
     state = world.reset(*reference.reference(0))
     for _ in range(100):
@@ -186,8 +191,8 @@ def test_sensors_need_one_world_and_a_start(model):
         bielle.Sensors(bielle.World(model)).read()
 
 
-def test_simulate(motion, robot, tmp_path):
-    result = bielle.make_result(motion, motion.summary, robot)
+def test_simulate(solution, robot, tmp_path):
+    result = bielle.make_result(solution, robot)
     summary = bielle.simulate(result, world="bielle", control="gains")
     assert not summary["fell"] and summary["duration"] >= 1
     kept = bielle.simulate(result, tmp_path / "out", world="bielle", control="gains", no_report=True)

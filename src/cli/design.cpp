@@ -4,8 +4,8 @@
 #include <numeric>
 #include <optional>
 
-#include "bielle/io/motion_registry.h"
 #include "bielle/model/error.h"
+#include "bielle/motion/registry.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "cli/task_options.h"

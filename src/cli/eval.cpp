@@ -3,8 +3,8 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/names.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "cli/commands.h"
 #include "cli/eval_state.h"

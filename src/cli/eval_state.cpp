@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "bielle/io/names.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "io/json_text.h"
 #include "model/listing.h"
 #include "model/text_file.h"

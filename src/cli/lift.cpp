@@ -5,10 +5,10 @@
 #include <iostream>
 #include <optional>
 
-#include "bielle/io/motion_registry.h"
-#include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
+#include "bielle/motion/registry.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "io/number_option.h"

@@ -7,8 +7,6 @@
 #include <sstream>
 #include <utility>
 
-#include "bielle/io/motion_registry.h"
-#include "bielle/io/request_solver.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
@@ -156,8 +154,8 @@ bool checkResult(const std::string& directory) {
 }
 
 // Prints what is done and a line per iteration, unless quiet, and stops at a signal.
-RequestObserver makeObserver(const SolveArguments& arguments) {
-  RequestObserver observer;
+SolveObserver makeObserver(const SolveArguments& arguments) {
+  SolveObserver observer;
   observer.motion.interrupt = observer.part.interrupt = &isInterrupted();
   observer.warn = [](const std::string& line) { std::cout << line << std::endl; };
   if (arguments.quiet) return observer;
@@ -185,13 +183,15 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   problem.timings = makeTimings(arguments.timings);
   problem.step = arguments.step;
   if (serial && !problem.step) problem.step = StepRule::Euler;
-  RequestOptions options{problem, arguments.solver, {}};
-  if (!arguments.warm_start.empty()) options.warm_start = readResultRecord(arguments.warm_start);
-  RequestSolver solver(request, model, std::move(options), makeObserver(arguments));
+  const Motion motion = makeMotion(model, request, problem);
+  SolveOptions options;
+  options.solver = arguments.solver;
+  if (!arguments.warm_start.empty()) options.start = makeStart(readResultRecord(arguments.warm_start), motion);
   makeOutputDirectory(arguments.directory);
   watchInterrupts();
-  const MotionResult result = solver.solve({arguments.robot.name, robot.file, getCommandLine(),
-                                            serial ? "serial" : "closed", serial ? arguments.serial_armature : ""});
+  const MotionResult result = makeResult({arguments.robot.name, robot.file, getCommandLine(),
+                                          serial ? "serial" : "closed", serial ? arguments.serial_armature : ""},
+                                         bielle::solve(motion, options, makeObserver(arguments)));
   printResult(model, result, writeResult(arguments.directory, result));
   const bool failed = !arguments.no_check && !checkResult(arguments.directory);
   if (!arguments.no_report) addReport(arguments.directory);  // the check is part of it

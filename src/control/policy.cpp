@@ -12,7 +12,7 @@ namespace {
 double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.duration; }
 
 std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajectory& trajectory,
-                                      const std::vector<Gains>* gains) {
+                                      const std::vector<Gains>& gains) {
   const RobotProblem& problem = *motion.problem;
   if (problem.hasFreeTimings()) throw std::invalid_argument("makePolicy: the motion has free durations");
   RobotEvaluator evaluator(problem);
@@ -27,7 +27,8 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
       Policy::Stage stage;
       fillStage(problem, node, time, x, trajectory.us[node], next, stage);
       stage.phase = phase_index;
-      if (gains) problem.mapGains(evaluator.evaluate(node, x, trajectory.us[node]), (*gains)[node].K, stage.K);
+      if (!gains.empty())
+        problem.mapGains(evaluator.evaluate(node, x, trajectory.us[node]), gains[node].K, stage.K);
       stages.push_back(std::move(stage));
       time += spec.dt;
     }
@@ -149,11 +150,13 @@ void Policy::addFeedback(size_t stage, double weight, VectorRef u) const {
 }
 
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory) {
-  return {motion.problem->model(), makeStages(motion, trajectory, nullptr), calcHoldTorques(motion, trajectory)};
+  return {motion.problem->model(), makeStages(motion, trajectory, {}), calcHoldTorques(motion, trajectory)};
 }
 
-Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const std::vector<Gains>& gains) {
-  return {motion.problem->model(), makeStages(motion, trajectory, &gains), calcHoldTorques(motion, trajectory)};
+Policy makePolicy(const Solution& solution) {
+  const auto& [motion, trajectory, summary, multipliers, gains] = solution;
+  if (gains.size() != trajectory.us.size()) throw std::invalid_argument("makePolicy: the solution has no gains");
+  return {motion.problem->model(), makeStages(motion, trajectory, gains), calcHoldTorques(motion, trajectory)};
 }
 
 }  // namespace bielle

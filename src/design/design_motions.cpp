@@ -4,7 +4,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/request_solver.h"
+#include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/footsteps.h"
 #include "bielle/transmission/serial_model.h"
@@ -78,16 +78,20 @@ std::string describeFailure(const std::string& motion, const FddpSummary& summar
   return motion + ": " + getName(summary.termination) + (summary.message.empty() ? "" : ": " + summary.message);
 }
 
-// Solves from the guess. \param out  with the loaded robot, that of the motion
-void solve(Motion motion, const FddpOptions& options, const std::vector<MotorConversion>& drives, MotionOutcome& out) {
-  const FddpSummary summary = solveMotion(motion, options, {}, &out.multipliers);
-  out.message = describeFailure(motion.name, summary);
-  if (summary.termination != FddpTermination::Converged) return;
-  out.measures = calcMotionMeasures(motion.problem->model(), listSteps(*motion.problem), motion.guess, drives);
-  out.measures.cost = summary.cost;
-  out.goals = measureGoals(motion, motion.guess);
+// \param start  or null   \param out  with the loaded robot, that of the motion
+void solve(const Motion& motion, const ShootingTrajectory* start, const FddpOptions& solver,
+           const std::vector<MotorConversion>& drives, MotionOutcome& out) {
+  SolveOptions options;
+  options.solver = solver;
+  if (start) options.start = StartingPoint{*start};
+  Solution solution = bielle::solve(motion, options);
+  out.message = describeFailure(motion.name, solution.summary);
+  if (!solution.converged()) return;
+  out.measures = calcMotionMeasures(motion.problem->model(), listSteps(*motion.problem), solution.trajectory, drives);
+  out.measures.cost = solution.summary.cost;
+  out.goals = measureGoals(motion, solution.trajectory);
   out.missing = 0;
-  out.motion = std::make_unique<Motion>(std::move(motion));
+  out.solution = std::move(solution);
 }
 
 MotionOutcome load(const Model& model, const DesignMotion& motion) {
@@ -97,13 +101,14 @@ MotionOutcome load(const Model& model, const DesignMotion& motion) {
 }
 
 // Starts from the solution of the start design: its postures with the loops closed again, its torques.
-void setClosedGuess(const MotionRecord& record, Motion& motion) {
-  setGuess(record, motion);
+ShootingTrajectory makeClosedStart(const MotionRecord& record, const Motion& motion) {
+  ShootingTrajectory trajectory = makeStart(record, motion).trajectory;
   const Model& model = motion.problem->model();
-  for (VectorXd& x : motion.guess.xs) {
+  for (VectorXd& x : trajectory.xs) {
     const AssemblyResult closed = closeConfiguration(model, x.head(model.nq()));
     if (closed.status == AssemblyStatus::Closed) x.head(model.nq()) = closed.q;
   }
+  return trajectory;
 }
 
 // Extracts the coordinates of the serial model from a motion of the closed one.
@@ -134,17 +139,15 @@ LiftResult liftMotion(const Model& model, const SerialTrajectory& kept) {
 
 // Starts from the motion of the start design with the motors recomputed, which is nearly a motion of this design.
 // If that fails, starts from its postures and torques.
-void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
+ShootingTrajectory chooseStart(const Model& model, const SolvedMotion& solved, const Motion& motion) {
   if (solved.serial) {
-    const LiftResult lifted = liftMotion(model, *solved.serial);
-    const ShootingTrajectory& trajectory = lifted.trajectory;
+    LiftResult lifted = liftMotion(model, *solved.serial);
+    ShootingTrajectory& trajectory = lifted.trajectory;
     if (lifted.lifted() && trajectory.us.size() == motion.guess.us.size() &&
-        trajectory.xs.size() == motion.guess.xs.size()) {
-      motion.guess = trajectory;
-      return;
-    }
+        trajectory.xs.size() == motion.guess.xs.size())
+      return std::move(trajectory);
   }
-  setClosedGuess(solved.record, motion);
+  return makeClosedStart(solved.record, motion);
 }
 
 }  // namespace
@@ -152,11 +155,12 @@ void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
 SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, const FddpOptions& options, int postures,
                               bool must_keep) {
   MotionOutcome outcome = load(model, motion);
-  solve(makeDesignMotion(*outcome.loaded, motion, makeStandingPosture(*outcome.loaded)), options, {}, outcome);
+  solve(makeDesignMotion(*outcome.loaded, motion, makeStandingPosture(*outcome.loaded)), nullptr, options, {}, outcome);
   if (outcome.missing > 0)
     throw ModelError(model.name(), "start design", outcome.message, "request a motion that the robot can make");
-  const ShootingTrajectory& solution = outcome.motion->guess;
-  SolvedMotion out{makeRecord(*outcome.motion, solution), outcome.motion->goals, outcome.motion->schedule, {}, {}, {}};
+  const ShootingTrajectory& solution = outcome.solution->trajectory;
+  const Motion& solved = outcome.solution->motion;
+  SolvedMotion out{makeRecord(solved, solution), solved.goals, solved.schedule, {}, {}, {}};
   const int last = static_cast<int>(solution.us.size());
   for (int p = 0; p < postures; ++p)
     out.postures.push_back(solution.xs[p * last / std::max(1, postures - 1)].head(model.nq()));
@@ -171,9 +175,10 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
 MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion* start,
                            const FddpOptions& options, const std::vector<MotorConversion>& drives) {
   MotionOutcome out = load(model, motion);
-  Motion made = makeDesignMotion(*out.loaded, motion, makeStandingPosture(*out.loaded));
-  if (start) setStart(*out.loaded, *start, made);
-  solve(std::move(made), options, drives, out);
+  const Motion made = makeDesignMotion(*out.loaded, motion, makeStandingPosture(*out.loaded));
+  std::optional<ShootingTrajectory> from;
+  if (start) from = chooseStart(*out.loaded, *start, made);
+  solve(made, from ? &*from : nullptr, options, drives, out);
   return out;
 }
 
@@ -185,7 +190,7 @@ MotionOutcome solveUsually(const Model& model, const DesignMotion& motion, const
     return plan(robot, q0);
   };
   if (motion.request) request = *motion.request;
-  const MotionResult result = RequestSolver(request, *out.loaded, {}).solve({model.name(), "", {}});
+  const MotionResult result = makeResult({model.name(), "", {}}, bielle::solve(makeMotion(*out.loaded, request)));
   out.message = describeFailure(motion.name, result.solver);
   if (!result.converged()) return out;
   out.missing = 0;

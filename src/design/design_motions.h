@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/io/motion_registry.h"
+#include "bielle/motion/solve.h"
 #include "bielle/transmission/lift.h"
 #include "design/measures.h"
 #include "model/payload.h"
@@ -56,8 +56,7 @@ struct MotionOutcome {
   MotionMeasures measures;
   std::vector<GoalOutcome> goals;  ///< of the whole motion
   LiftResult lifted;               ///< of a kept motion
-  std::unique_ptr<Motion> motion;  ///< of one that was made anew: the optimum, of the loaded robot
-  Multipliers multipliers;
+  std::optional<Solution> solution;  ///< of one that was made anew, of the loaded robot
 };
 
 /// \param model  without payload, here and below   \param postures  that are listed
@@ -75,8 +74,8 @@ MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const
 MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
                          const std::vector<MotorConversion>& drives, double margin);
 
-/// As `bielle solve` gives it: by its own steps, from its own guess, solved again where it does so. Without `lifted`,
-/// `motion` and `multipliers`. \param trajectory  of the closed model, with the velocities at which motors count
+/// As `bielle solve` gives it: by its own steps, from its own guess, solved again where it does so. Without `lifted`
+/// and `solution`. \param trajectory  of the closed model, with the velocities at which motors count
 MotionOutcome solveUsually(const Model& model, const DesignMotion& motion, const std::vector<MotorConversion>& drives,
                            ShootingTrajectory& trajectory);
 

@@ -135,8 +135,9 @@ void DesignEvaluator::Data::makeMotions(const ArchitectureStart& base, const Mod
                                 ? keepMotion(model, motions[i], *from, drives, options.margin)
                                 : remakeMotion(model, motions[i], from, options.solver, drives);
     missing += outcome.missing / static_cast<double>(motions.size());
-    const bool made = addMotion(motions[i].name, base, missing,
-                                outcome.motion ? outcome.motion->guess : outcome.lifted.trajectory, outcome, out);
+    const bool made =
+        addMotion(motions[i].name, base, missing,
+                  outcome.solution ? outcome.solution->trajectory : outcome.lifted.trajectory, outcome, out);
     if (!made && !outcomes) return;
     if (outcomes) outcomes->push_back(std::move(outcome));
   }

@@ -51,7 +51,7 @@ class OptimumSlopes {
  public:
   OptimumSlopes(const MotionOutcome& outcome, Eigen::Index variables, const std::set<Measure>& requested,
                 const BodyPairs& left_out)
-      : outcome_(outcome), requested_(requested), left_out_(left_out), envelope_(*outcome.motion, outcome.multipliers) {
+      : outcome_(outcome), requested_(requested), left_out_(left_out), envelope_(*outcome.solution) {
     const MotorTrace& trace = outcome.measures.trace;
     const auto count = static_cast<size_t>(variables);
     out_.dt = trace.dt, out_.u = trace.torque, out_.v = trace.speed;
@@ -71,11 +71,10 @@ class OptimumSlopes {
     const double dcost = envelope_.calcDerivative(ahead, behind, step);
     StateMeasures at_ahead(ahead.problem->model(), ahead.problem->initialState(), requested_, left_out_),
         at_behind(behind.problem->model(), behind.problem->initialState(), requested_, left_out_);
-    const auto derivative =
-        differentiateOptimum(*outcome_.motion, outcome_.multipliers, ahead, behind, step,
-                             [&](const Motion& motion, const ShootingTrajectory& trajectory) {
-                               return read(motion, trajectory, &motion == &ahead ? at_ahead : at_behind);
-                             });
+    const auto derivative = differentiateOptimum(
+        *outcome_.solution, ahead, behind, step, [&](const Motion& motion, const ShootingTrajectory& trajectory) {
+          return read(motion, trajectory, &motion == &ahead ? at_ahead : at_behind);
+        });
     if (!std::isfinite(dcost) || !derivative) return false;
     out_.dcost[i] = dcost;
     write(derivative->value, static_cast<size_t>(i));
@@ -86,9 +85,9 @@ class OptimumSlopes {
 
  private:
   void addStates() {
-    const std::vector<VectorXd>& xs = outcome_.motion->guess.xs;
+    const std::vector<VectorXd>& xs = outcome_.solution->trajectory.xs;
     const auto nodes = static_cast<Eigen::Index>(xs.size());
-    StateMeasures at(outcome_.motion->problem->model(), xs.front(), requested_, left_out_);
+    StateMeasures at(outcome_.solution->motion.problem->model(), xs.front(), requested_, left_out_);
     if (at.hasMargins()) {
       out_.margin.resize(at.calcMargins(xs.front()).size(), nodes);
       for (Eigen::Index k = 0; k < nodes; ++k) out_.margin.col(k) = at.calcMargins(xs[static_cast<size_t>(k)]);

@@ -107,7 +107,9 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   SlopedEvaluation out{data.evaluate(x, &outcomes, &model), {}, {}};
   const bool kept = data.options.mode == MotionMode::Kept;
   const ArchitectureStart& base = data.getBase(x);
-  const auto is_made = [&](const MotionOutcome& outcome) { return kept ? outcome.lifted.lifted() : !!outcome.motion; };
+  const auto is_made = [&](const MotionOutcome& outcome) {
+    return kept ? outcome.lifted.lifted() : outcome.solution.has_value();
+  };
   if (outcomes.size() < data.motions.size() || !std::all_of(outcomes.begin(), outcomes.end(), is_made)) return out;
   const std::vector<MotorSlopes> slopes =
       kept ? data.calcKeptSlopes(base, x, outcomes)

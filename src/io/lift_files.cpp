@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"
 
@@ -68,7 +68,7 @@ MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Mot
                     (2.0 * lifted.nodes.size());
     summary.iterations += node.evaluations;
   }
-  return makeResult(run, motion, lifted.trajectory, summary);
+  return makeResult(run, {motion, lifted.trajectory, summary});
 }
 
 std::vector<std::string> writeLift(const std::string& directory, LiftMethod method, const LiftResult& lifted,

@@ -2,7 +2,7 @@
 
 #include <charconv>
 
-#include "io/record_tables.h"
+#include "motion/record_tables.h"
 
 namespace bielle {
 namespace {

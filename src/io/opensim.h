@@ -2,7 +2,7 @@
 /// \file Motions as OpenSim files, which other programs also read: a header, then tab-separated columns.
 #include <string>
 
-#include "bielle/io/record.h"
+#include "bielle/motion/record.h"
 
 namespace bielle {
 

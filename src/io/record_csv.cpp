@@ -1,7 +1,9 @@
 // Trajectories as comma-separated values.
 #include <charconv>
 
-#include "io/record_tables.h"
+#include "bielle/io/record_files.h"
+#include "io/text_file.h"
+#include "motion/record_tables.h"
 
 namespace bielle {
 namespace {
@@ -46,5 +48,7 @@ std::string formatCsv(const MotionRecord& record) {
   }
   return text + "\n";
 }
+
+void writeCsv(const std::string& path, const MotionRecord& record) { writeTextFile(path, formatCsv(record)); }
 
 }  // namespace bielle

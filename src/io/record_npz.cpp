@@ -1,9 +1,12 @@
 // Trajectories as NumPy archives.
 #include <cmath>
+#include <filesystem>
 
+#include "bielle/io/record_files.h"
 #include "bielle/model/error.h"
+#include "io/aside_file.h"
 #include "io/npz.h"
-#include "io/record_tables.h"
+#include "motion/record_tables.h"
 
 namespace bielle {
 namespace {
@@ -98,6 +101,12 @@ std::string formatNpz(const MotionRecord& record) {
   return formatArchive(arrays);
 }
 
+void writeNpz(const std::string& path, const MotionRecord& record) {
+  AsideFile file(path);
+  file.write(formatNpz(record));
+  file.commit();
+}
+
 MotionRecord readRecord(const std::string& path) {
   NpyArrays arrays = readArchive(path);
   MotionRecord record;
@@ -120,6 +129,10 @@ MotionRecord readRecord(const std::string& path) {
   record.footholds = takeFootholds(path, nodes, record.contact_names.size(), arrays);
   record.multipliers = takeMultipliers(path, nodes, arrays);
   return record;
+}
+
+MotionRecord readResultRecord(const std::string& directory) {
+  return readRecord((std::filesystem::path(directory) / "trajectory.npz").string());
 }
 
 }  // namespace bielle

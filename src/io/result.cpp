@@ -6,43 +6,18 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <optional>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
-#include "bielle/motion/footsteps.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"
-#include "io/record_tables.h"
 #include "io/result_files.h"
 #include "io/text_file.h"
-#include "math/so3.h"
 
 namespace fs = std::filesystem;
 
 namespace bielle {
 namespace {
-
-// Largest displacement of each foot since its contact began.
-void calcSlip(const Motion& motion, const MotionTrack& track, MotionResult& result) {
-  const Model& model = motion.problem->model();
-  std::vector<std::optional<SE3>> touch_down(model.contacts().size());
-  for (size_t k = 0; k < track.feet.size(); ++k) {
-    std::vector<bool> stands(model.contacts().size(), false);
-    for (const ContactTarget& target : motion.schedule.getPhase(static_cast<int>(k)).contacts) {
-      const ContactFrame& contact = model.contacts()[target.contact];
-      const SE3& X_WF = track.feet[k][target.contact];
-      std::optional<SE3>& start = touch_down[target.contact];
-      if (!start) start = X_WF;
-      const SE3 moved = start->inverseTimes(X_WF);
-      result.slip_position = std::max(result.slip_position, moved.p.norm());
-      if (contact.kind == ContactKind::Surface6D) result.slip_angle = std::max(result.slip_angle, log3(moved.R).norm());
-      stands[target.contact] = true;
-    }
-    for (size_t c = 0; c < stands.size(); ++c)
-      if (!stands[c]) touch_down[c].reset();
-  }
-}
 
 Json listOptionValues(const OptionValues& options) {
   Json out = Json::object();
@@ -183,33 +158,13 @@ Json makeSummary(const MotionResult& result) {
           {"objective",
            {{"kind", getName(result.objective.objective)},
             {"regularization", result.objective.getRegularization()},
-            {"scale", result.objective.scale}}},
+            {"scale", result.objective.scale.value_or(1)}}},
           {"electrical_energy", makeEnergy(result)},
           {"phases", makePhases(result)},
           {"free_timings", makeTimings(result)},
           {"ground", makeGround(result.ground)},
           {"log_columns", {"iteration", "cost", "gap", "violation", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
-}
-
-MotionTrack makeTrack(const Model& model, const MotionRecord& record) {
-  MotionTrack track;
-  track.time.assign(record.time.begin(), record.time.end());
-  track.contacts = record.contact_names;
-  Workspace ws(model);
-  for (Eigen::Index k = 0; k < record.time.size(); ++k) {
-    updatePlacements(model, ws, record.q.row(k).transpose());
-    track.com.push_back(record.com.row(k));
-    track.heading.push_back(calcHeading(ws.X_WB[std::min(1, model.numBodies() - 1)]));
-    track.feet.emplace_back();
-    for (const ContactFrame& contact : model.contacts())
-      track.feet.back().push_back(getPlacement(ws, contact.body, contact.X_BF));
-    if (k == record.contact_wrenches.rows()) break;
-    double load = 0;
-    for (size_t c = 0; c < model.contacts().size(); ++c) load += record.contact_wrenches.block<1, 3>(k, 6 * c).norm();
-    track.load.push_back(load);
-  }
-  return track;
 }
 
 void setFigures(const Model& model, MotionResult& result) {
@@ -235,8 +190,9 @@ void setFigures(const Model& model, MotionResult& result) {
   result.com_lowest = record.com.col(2).minCoeff();
 }
 
-MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
-                        const FddpSummary& summary) {
+MotionResult makeResult(const RunInfo& run, const Solution& solution) {
+  const Motion& motion = solution.motion;
+  const ShootingTrajectory& trajectory = solution.trajectory;
   MotionResult result;
   result.run = run;
   result.motion = motion.name;
@@ -251,13 +207,16 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
     node += phase.nodes;
   }
   result.ground = motion.ground;
-  result.solver = summary;
+  result.solver = solution.summary;
   result.record = makeRecord(motion, trajectory);
-  result.objective = motion.objective;
+  result.record.multipliers = solution.multipliers;
+  result.objective = motion.problem_options.objective;
   setFigures(motion.problem->model(), result);
   const MotionTrack track = makeTrack(motion.problem->model(), result.record);
   for (const Goal& goal : motion.goals) result.goals.push_back({goal, measureGoal(goal, track)});
-  calcSlip(motion, track, result);
+  const Slip slip = calcSlip(motion, track);
+  result.slip_position = slip.position;
+  result.slip_angle = slip.angle;
   return result;
 }
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -72,7 +73,7 @@ ObjectiveOptions readObjective(const Json& json) {
   for (Objective objective : {Objective::Energy, Objective::PeakTorque})
     if (kind == getName(objective)) options.objective = objective;
   options.regularization = json.at("regularization").get<double>();
-  options.scale = json.at("scale");
+  options.scale = json.at("scale").get<double>();
   return options;
 }
 
@@ -106,6 +107,20 @@ MotionSummary read(const Json& json) {
   return summary;
 }
 
+// The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
+std::vector<std::string> listPartMotions(const OptionValues& options) {
+  std::vector<std::string> labels, motions;
+  for (const auto& [name, value] : options) {
+    const size_t dot = name.find('.');
+    if (dot == std::string::npos) continue;
+    const std::string label = name.substr(0, dot);
+    if (std::find(labels.begin(), labels.end(), label) != labels.end()) continue;
+    labels.push_back(label);
+    motions.push_back(label.substr(0, label.find_last_not_of("0123456789") + 1));
+  }
+  return motions;
+}
+
 }  // namespace
 
 MotionSummary readSummary(const std::string& directory) {
@@ -122,6 +137,19 @@ MotionSummary readSummary(const std::string& directory) {
     throw ModelError(path, "file", describeJsonError(error), "recreate it with `bielle solve`");
   }
   throw ModelError(path, "motion", "it is a motion carried out, not a plan", "give the directory of `bielle solve`");
+}
+
+MotionRequest remakeRequest(const MotionSummary& summary) {
+  MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listPartMotions(summary.options))
+                                                      : findMotion(summary.file, summary.motion).request;
+  const auto isLimit = [](const std::string& name) {
+    for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit, kDeadPointMargin})
+      if (name.rfind(prefix, 0) == 0) return true;
+    return false;
+  };
+  for (const auto& [name, value] : summary.options)
+    if (!isLimit(name)) request.options.set(name, value);
+  return request;
 }
 
 }  // namespace bielle

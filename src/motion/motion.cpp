@@ -46,13 +46,12 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
     if (stage.dt > 0 && (plan.limited || stage.timing.phase >= 0))
       limitGains(step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
   setObjective(model, options.objective, plan.stages);
-  motion.objective = options.objective;
-  if (options.objective.objective == Objective::PeakTorque) motion.peak_limits = getPeakLimits(model, options.limits);
-  if (!plan.limited) leaveTorquesFree(model, plan.stages);
+  motion.problem_options = options;
+  if (!motion.within_limits) leaveTorquesFree(model, plan.stages);
   motion.name = std::move(plan.name);
   motion.schedule = std::move(plan.schedule);
   motion.ground = std::move(plan.ground);
-  motion.problem = std::make_unique<RobotProblem>(model, plan.q_start, VectorXd::Zero(model.nv()),
+  motion.problem = std::make_shared<RobotProblem>(model, plan.q_start, VectorXd::Zero(model.nv()),
                                                   std::move(plan.stages), options.formulation);
   motion.guess = std::move(plan.guess);
   fitTimings(*motion.problem, motion.guess);

@@ -5,6 +5,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/footsteps.h"
 #include "math/so3.h"
+#include "motion/join.h"
 
 namespace bielle {
 namespace {
@@ -73,18 +74,6 @@ void checkSoles(const Model& model, const MotionPlan& plan, const Ground& ground
     }
 }
 
-template <typename T>
-void moveAll(std::vector<T>& from, std::vector<T>& to) {
-  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
-}
-
-// The last state of a part is the first one of the next.
-void join(ShootingTrajectory& part, ShootingTrajectory& whole) {
-  if (!whole.xs.empty()) whole.xs.pop_back();
-  moveAll(part.xs, whole.xs);
-  moveAll(part.us, whole.us);
-}
-
 }  // namespace
 
 MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0) {
@@ -117,7 +106,7 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
       for (StageSpec& stage : plan.stages)
         if (stage.dt > 0) limitGains(StepRule::Euler, stage.dt, stage.constraints);
     moveAll(plan.stages, sequence.stages);
-    join(plan.guess, sequence.guess);
+    joinTrajectories(plan.guess, sequence.guess);
     for (ContactPhase& phase : plan.schedule.phases) {
       phase.name = plan.name + ": " + phase.name;
       sequence.schedule.phases.push_back(std::move(phase));
@@ -125,25 +114,6 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
     for (auto& [name, value] : plan.options) sequence.options.emplace_back(plan.name + "." + name, value);
   }
   return sequence;
-}
-
-ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
-                              const PartsOptions& options) {
-  FddpOptions solver = options.solver;
-  solver.initial_regularization = kGuessRegularization;
-  ShootingTrajectory whole;
-  VectorXd q = q0;
-  for (const SequencePart& part : parts) {
-    MotionPlan plan = part.plan(model, q);
-    q = plan.q_end;
-    ProblemOptions problem = options.problem;
-    problem.timings = selectTimings(problem.timings, plan.schedule);
-    Motion motion = makeMotion(model, std::move(plan), problem);
-    const FddpSummary summary = solveMotion(motion, solver, options.observer);
-    if (options.report) options.report(part.name, summary);
-    join(motion.guess, whole);
-  }
-  return whole;
 }
 
 Motion makeSequence(const Model& model, const std::vector<SequencePart>& parts, const ProblemOptions& problem) {

@@ -2,8 +2,8 @@
 // Numbers for the page: base64 of little-endian float32, row after row.
 #include <string>
 
-#include "bielle/io/record.h"
 #include "bielle/math/se3.h"
+#include "bielle/motion/record.h"
 #include "io/json_text.h"
 
 namespace bielle {

@@ -2,9 +2,9 @@
 
 #include <filesystem>
 
-#include "bielle/io/names.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/transmission/serial_model.h"
 

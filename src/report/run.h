@@ -3,8 +3,8 @@
 #include <optional>
 #include <string>
 
-#include "bielle/io/record.h"
 #include "bielle/model/reader.h"
+#include "bielle/motion/record.h"
 #include "io/json_text.h"
 
 namespace bielle {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "bielle/io/names.h"
+#include "bielle/model/names.h"
 #include "io/json_text.h"
 #include "study/architecture_report.h"
 #include "study/measures.h"

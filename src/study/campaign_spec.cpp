@@ -4,7 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "bielle/io/motion_registry.h"
+#include "bielle/motion/registry.h"
 #include "design/spec_parts.h"
 #include "model/text_file.h"
 #include "study/report.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <functional>
 
-#include "bielle/io/names.h"
+#include "bielle/model/names.h"
 
 namespace bielle::study {
 namespace {

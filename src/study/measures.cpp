@@ -6,9 +6,9 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/names.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "bielle/transmission/lift.h"
 #include "io/json_text.h"
 #include "transmission/linkage.h"

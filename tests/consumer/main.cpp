@@ -19,12 +19,10 @@ int main(int argc, char** argv) {
   options.duration = 0.6;
   options.settle = 0;
   options.time_step = 0.02;
-  bielle::Motion motion = bielle::makeSquat(robot.model, options);
-  const bielle::FddpResult solved = bielle::solve(*motion.problem, motion.guess);
-  const bielle::FddpSummary& summary = solved.summary;
-  const bielle::MotionResult result = bielle::makeResult({"bipetto", {}}, motion, solved.trajectory, summary);
+  const bielle::Solution solution = bielle::solve(bielle::makeSquat(robot.model, options));
+  const bielle::MotionResult result = bielle::makeResult({"bipetto", {}}, solution);
   bielle::writeResult(argc > 1 ? argv[1] : "squat", result);
-  std::printf("%s after %d iterations, lowest at %.4f m\n", getName(summary.termination), summary.iterations,
-              result.com_lowest);
+  std::printf("%s after %d iterations, lowest at %.4f m\n", getName(solution.summary.termination),
+              solution.summary.iterations, result.com_lowest);
   return result.converged() ? 0 : 1;
 }

@@ -18,8 +18,7 @@
 #include <vector>
 
 #include "bielle/control/controller.h"
-#include "bielle/motion/motion.h"
-#include "bielle/solve/gains.h"
+#include "bielle/motion/solve.h"
 
 namespace bielle {
 
@@ -72,7 +71,7 @@ class Policy : public Controller {
 
 /// The torques and states of a motion's trajectory, without feedback. The motion must not have free durations.
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory);
-/// The same with gains, about the trajectory's nodes.
-Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const std::vector<Gains>& gains);
+/// Those of a solution, with its gains. \throws std::invalid_argument when it has none
+Policy makePolicy(const Solution& solution);
 
 }  // namespace bielle

@@ -1,6 +1,6 @@
 #pragma once
 /// \file The electrical energy of a motion, from its record.
-#include "bielle/io/record.h"
+#include "bielle/motion/record.h"
 
 namespace bielle {
 

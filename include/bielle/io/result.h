@@ -4,7 +4,8 @@
 #include <vector>
 
 #include "bielle/io/electrical_energy.h"
-#include "bielle/io/record.h"
+#include "bielle/io/record_files.h"
+#include "bielle/motion/solve.h"
 #include "bielle/transmission/lift.h"
 
 namespace bielle {
@@ -44,14 +45,10 @@ struct MotionResult {
   bool interrupted() const { return solver.termination == FddpTermination::Interrupted; }
 };
 
-/// The data that goal.h measures, from a record of the model's motion.
-MotionTrack makeTrack(const Model& model, const MotionRecord& record);
-
 /// Sets what follows from the record and the objective: torques, electrical energy, gaps, heights of the centre of mass.
 void setFigures(const Model& model, MotionResult& result);
 
-MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
-                        const FddpSummary& summary);
+MotionResult makeResult(const RunInfo& run, const Solution& solution);
 
 /// The motion as the summary.json of a result describes it.
 struct MotionSummary {
@@ -83,6 +80,10 @@ struct MotionSummary {
 /// \throws ModelError naming the file, the entry and what is wrong with it: a motion carried out is no plan
 MotionSummary readSummary(const std::string& directory);
 
+/// The request recorded in a result, without limits, which are part of the problem and not of the motion.
+/// \throws ModelError when there is no such motion or option
+MotionRequest remakeRequest(const MotionSummary& summary);
+
 /// Creates the directory with its parents and verifies that files can be written there.
 /// \throws ModelError naming the directory and the reason
 void makeOutputDirectory(const std::string& directory);
@@ -98,19 +99,6 @@ struct BuildInfo {
   std::string bielle, eigen, compiler;
 };
 BuildInfo getBuildInfo();
-
-// Starting a solve from a previous result.
-
-/// Replaces the guess of a motion by states and torques of a record of the same robot. If the lengths agree, node by
-/// node, with the recorded durations where phases are free; otherwise each node takes the recorded one at the same
-/// fraction of the duration. If stance feet are more than 0.5 mm away from their places in the new motion, the base is
-/// moved there. Multipliers are not set; pass them to solveMotion().
-/// \throws ModelError when the coordinates or motors differ, or the record contains numbers that are not finite
-void setGuess(const MotionRecord& record, Motion& motion);
-
-/// The record in a directory written by writeResult().
-/// \throws ModelError naming the file and why it cannot be read
-MotionRecord readResultRecord(const std::string& directory);
 
 // Lifting: reads a serial motion and writes its lift to the closed model.
 

@@ -36,43 +36,6 @@ struct MotionPlan {
   std::vector<Goal> goals;        ///< requested quantities, to be measured on the trajectory
 };
 
-/// A problem ready to be solved, with the data that reports need.
-struct Motion {
-  std::string name;
-  ContactSchedule schedule;
-  Ground ground;
-  std::unique_ptr<RobotProblem> problem;
-  ShootingTrajectory guess;  ///< quasi-static
-  OptionValues options;      ///< every option of the motion by name
-  std::vector<Goal> goals;   ///< requested quantities, to be measured on the trajectory
-  ObjectiveOptions objective{};
-  VectorXd peak_limits{};      ///< of the peak torque, nu (getPeakLimits); empty for other objectives
-  bool within_limits = false;  ///< whether torques are limited, at s = 1 of the peak torque
-};
-
-/// The scale of an objective by Eq. (2) of objective.h. \param effort  the motion of least effort, solved, with its solution as
-/// its guess; \param limits  those of the motion
-ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& options, const LimitOptions& limits = {});
-
-/// FddpOptions with one change: a cost that changed by less than 1e-4 of itself in 20 iterations is acceptable. Motions
-/// of least effort near the limits of friction or of a linkage need that.
-FddpOptions makeMotionSolverOptions();
-
-/// Solves a motion from its guess, and leaves the solution there. For the least peak torque it solves the PeakProblem of
-/// motion.problem. The guess should then be the motion of least effort: from a quasi-static guess, motors that share a
-/// load gain nothing by sharing it better. An infeasible end is only a
-/// local statement. The solve is then repeated from the guess, with shorter first steps (regularization 1e-2);
-/// iterations, times and log are those of both attempts. Where the guess cannot be evaluated, such as with a leg that
-/// is nearly straight, the posture at the start takes its place.
-/// \param multipliers  if given, those of the constraints, which MotionEnvelope needs: to start from, where the motion has
-///   constraints of as many rows at every node, and those of the solution
-FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer = {},
-                        Multipliers* multipliers = nullptr);
-
-/// FddpOptions::initial_regularization for solves from Motion::guess. That guess is at rest: without damping, the first
-/// steps move the swing legs so far that dozens of short steps follow. Solves from a solution need no damping.
-constexpr double kGuessRegularization = 1e-5;
-
 /// Options of a problem besides those of the motion.
 struct ProblemOptions {
   Formulation formulation = Formulation::Reduced;
@@ -85,6 +48,43 @@ struct ProblemOptions {
   ProblemOptions(Formulation formulation, const LimitOptions& limits = {}) : formulation(formulation), limits(limits) {}
   ProblemOptions(Formulation formulation, StepRule step) : formulation(formulation), step(step) {}
 };
+
+struct MotionRequest;
+
+/// A problem ready to be solved (solve.h), with the data that reports need. Solving it changes nothing; copies share the problem.
+struct Motion {
+  std::string name;
+  ContactSchedule schedule;
+  Ground ground;
+  std::shared_ptr<RobotProblem> problem;
+  ShootingTrajectory guess;  ///< quasi-static: where a solve begins unless told otherwise
+  OptionValues options;      ///< every option of the motion by name
+  std::vector<Goal> goals;   ///< requested quantities, to be measured on the trajectory
+  ProblemOptions problem_options{};  ///< that the problem was made with
+  std::shared_ptr<const MotionRequest>
+      request{};               ///< that it was made of, if it was (registry.h): how to make another one like it
+  bool within_limits = false;  ///< whether torques are limited, at s = 1 of the peak torque
+};
+
+/// Where a solve begins.
+struct StartingPoint {
+  ShootingTrajectory trajectory;
+  /// Of the constraints; taken where the motion has as many rows of them at every node, else zero.
+  Multipliers multipliers{};
+};
+
+/// FddpOptions with one change: a cost that changed by less than 1e-4 of itself in 20 iterations is acceptable. Motions
+/// of least effort near the limits of friction or of a linkage need that.
+FddpOptions makeMotionSolverOptions();
+
+/// FddpOptions::initial_regularization for solves from Motion::guess. That guess is at rest: without damping, the first
+/// steps move the swing legs so far that dozens of short steps follow. Solves from a solution need no damping.
+constexpr double kGuessRegularization = 1e-5;
+
+/// The scale of an objective by Eq. (2) of objective.h. \param effort, trajectory  the motion of least effort and its
+/// solution   \param limits  those of the motion
+ObjectiveOptions scaleObjective(const Motion& effort, const ShootingTrajectory& trajectory,
+                                const ObjectiveOptions& options, const LimitOptions& limits = {});
 
 /// Turns a plan into a problem that starts at rest, adding limits, free durations, objective and step rule to its stages.
 /// Gains are limited to values that are stable for a step (limitGains), except in the paper's problems of fixed

@@ -1,13 +1,13 @@
 #pragma once
 /// \file Derivatives of an optimal motion, of its cost and of itself, with respect to the robot and to the request.
-#include "bielle/motion/motion.h"
+#include "bielle/motion/solve.h"
 #include "bielle/ocp/envelope.h"
 #include "bielle/ocp/followed_optimum.h"
 #include "bielle/solve/peak_problem.h"
 
 namespace bielle {
 
-/// The problem that solveMotion() solves for the least peak torque; null for other objectives. The motion must outlive it.
+/// The problem that solve() solves for the least peak torque; null for other objectives. The motion must outlive it.
 std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion);
 
 /// Envelope of a solved motion, whatever it minimizes. Other motions are made like it, with the same options, for a robot
@@ -15,8 +15,7 @@ std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion);
 /// Options hold, among them ObjectiveOptions::scale.
 class MotionEnvelope {
  public:
-  /// \param optimum  with its solution as its guess; must outlive it   \param multipliers  from solveMotion()
-  MotionEnvelope(const Motion& optimum, const Multipliers& multipliers);
+  explicit MotionEnvelope(const Solution& optimum);
 
   double cost() const { return envelope_.cost(); }  ///< J*
   /// As in Envelope.
@@ -26,20 +25,20 @@ class MotionEnvelope {
   }
 
  private:
+  Motion motion_;
   std::unique_ptr<PeakProblem> peak_;
   ShootingTrajectory trajectory_;
   Envelope envelope_;
 };
 
 /// The optimum of another motion like it to first order, as a trajectory of changed.problem (ocp/followed_optimum.h).
-std::optional<ShootingTrajectory> followOptimum(const Motion& optimum, const Multipliers& multipliers,
-                                                const Motion& changed, int sweeps = 2);
+std::optional<ShootingTrajectory> followOptimum(const Solution& optimum, const Motion& changed, int sweeps = 2);
 
 /// The derivative of numbers computed from the optimum of a motion (ocp/followed_optimum.h). \param ahead, behind
 /// motions like it
 /// \param read  numbers computed from a trajectory of a motion's problem
 std::optional<OptimumDerivative> differentiateOptimum(
-    const Motion& optimum, const Multipliers& multipliers, const Motion& ahead, const Motion& behind, double step,
+    const Solution& optimum, const Motion& ahead, const Motion& behind, double step,
     const std::function<VectorXd(const Motion&, const ShootingTrajectory&)>& read);
 
 }  // namespace bielle

@@ -36,7 +36,8 @@ struct ObjectiveOptions {
   Objective objective = Objective::Effort;
   double regeneration = 0;  ///< r of Eq. (1), within 0 .. 1; counts in reported energies whatever the objective
   std::optional<double> regularization{};  ///< rho, positive; if not given getDefaultRegularization()
-  double scale = 1;                        ///< (C_0 + D_0) / J_0: cost of a joule, or of s = 1
+  /// (C_0 + D_0) / J_0: cost of a joule, or of s = 1. If not given, solve() finds it for motions made of a request; else 1.
+  std::optional<double> scale{};
 
   double getRegularization() const;
 };

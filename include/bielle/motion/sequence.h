@@ -19,19 +19,6 @@ struct SequencePart {
 /// one ground
 MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0);
 
-struct PartsOptions {
-  ProblemOptions problem;
-  FddpOptions solver;
-  FddpObserver observer;                                                            ///< of every solve
-  std::function<void(const std::string& part, const FddpSummary& summary)> report;  ///< receives the outcome of each
-};
-
-/// An initial guess for the sequence: each motion solved separately. From a quasi-static guess a long sequence may fail
-/// to converge, because all motions share one step length, and the hardest one slows the closing of all gaps.
-/// Parts that do not converge contribute their last iterate.
-ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
-                              const PartsOptions& options = {});
-
 /// From the robot's standing posture.
 Motion makeSequence(const Model& model, const std::vector<SequencePart>& parts, const ProblemOptions& problem = {});
 

@@ -1,4 +1,4 @@
-#include "bielle/io/refinement.h"
+#include "bielle/motion/refinement.h"
 
 #include <algorithm>
 #include <cmath>
@@ -70,36 +70,40 @@ bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Inde
 
 double calcStepError(const Model& model, const MotionRecord& record) { return findStepError(model, record).share; }
 
-double calcStageExcess(const Model& model, const MotionResult& result) {
-  if (!result.record.has_midpoints) return 0;
+double calcStageExcess(const Motion& motion, const MotionRecord& record) {
+  if (!record.has_midpoints) return 0;
+  const Model& model = motion.problem->model();
   double reach = 0;  // of a corner, from the middle of the sole
   for (const ContactFrame& contact : model.contacts())
     reach = std::max(reach, std::hypot(contact.half_length, contact.half_width));
-  return std::max(calcStepError(model, result.record) / kLargestStepError,
-                  (result.slip_position + reach * result.slip_angle) / kLargestSlip);
+  const Slip slip = calcSlip(motion, makeTrack(model, record));
+  return std::max(calcStepError(model, record) / kLargestStepError,
+                  (slip.position + reach * slip.angle) / kLargestSlip);
 }
 
-std::optional<RefinedMotion> refineStages(MotionRequest request, const Model& model, const ProblemOptions& problem,
-                                          const Motion& solved, const MotionResult& result) {
+std::optional<RefinedMotion> refineStages(const Motion& solved, const MotionRecord& record) {
+  const ProblemOptions& problem = solved.problem_options;
+  MotionRequest request = *solved.request;
   if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
   if (!request.options.find("time_step") || request.options.get<double>("time_step") != 0) return {};
-  if (calcStageExcess(model, result) <= 1) return {};
+  if (calcStageExcess(solved, record) <= 1) return {};
   request.options.set("time_step", solved.schedule.phases.front().dt / 2);
-  Motion motion = makeRequested(request, model, problem);
-  setGuess(halveSteps(result.record), motion);
-  return RefinedMotion{std::move(request), std::move(motion)};
+  RefinedMotion refined{makeMotion(solved.problem->model(), request, problem), {}};
+  refined.start = makeStart(halveSteps(record), refined.motion);
+  return refined;
 }
 
-std::optional<Motion> avoidDeadPoints(const MotionRequest& request, const Model& model, ProblemOptions problem,
-                                      const MotionRecord& record) {
+std::optional<Motion> avoidDeadPoints(const Motion& solved, const MotionRecord& record) {
+  const Model& model = solved.problem->model();
+  ProblemOptions problem = solved.problem_options;
   double& margin = problem.limits.dead_point_margin;
   const bool widened = problem.limits.enforced && margin > 0 && margin < kWideDeadPointMargin;
-  if (!widened || !request.parts.empty()) return {};
+  if (!widened || !solved.request->parts.empty()) return {};
   if (problem.objective.objective != Objective::Effort || problem.timings.areGiven()) return {};
   const StepError error = findStepError(model, record);
   if (error.share <= kLargestStepError || !isNearDeadPoint(model, record, error.stage, margin)) return {};
   margin = kWideDeadPointMargin;
-  return makeRequested(request, model, problem);
+  return makeMotion(model, *solved.request, problem);
 }
 
 std::vector<LinkageDistance> findDeadPoints(const Model& model, const MotionRecord& record, Eigen::Index first,

@@ -34,22 +34,23 @@ struct MotionRecord {
   Multipliers multipliers;  ///< of the constraints, for warm starts; without penalty if they are not known
 };
 
+/// Without footholds and multipliers.
 MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajectory);
 
-/// One row per node under one header: time, q.<name>, v.<name>, a.<name>, u.<motor>, closure.<name>.<entry>,
-/// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle and, of midpoint steps, q_mid.<name> and
-/// v_mid.<name>. No stage starts at the last node: its cells of a, u, q_mid, v_mid and of the wrenches are empty.
-/// Numbers are the shortest that read back to the same bits. Footholds and multipliers are left out. It is for other
-/// programs; Bielle reads the archive below.
-void writeCsv(const std::string& path, const MotionRecord& record);
+/// The data that goal.h measures, from a record of the model's motion.
+MotionTrack makeTrack(const Model& model, const MotionRecord& record);
 
-/// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6, footholds, if there
-/// are any, N + 1 x contacts x 8. Multipliers, if known, are `multipliers` (node after node), `multiplier_rows` (N + 1, how many
-/// each node has) and `multiplier_penalty` (1).
-void writeNpz(const std::string& path, const MotionRecord& record);
+/// Largest displacement of a foot since its contact began.
+struct Slip {
+  double position = 0, angle = 0;  ///< m, rad
+};
+Slip calcSlip(const Motion& motion, const MotionTrack& track);
 
-/// Reads an archive that writeNpz() wrote.
-/// \throws ModelError naming the file and what is wrong with it, as the writers do when they cannot write
-MotionRecord readRecord(const std::string& path);
+/// Where a solve of a motion begins, from states and torques of a record of the same robot. If the lengths agree, node by
+/// node, with the recorded durations where phases are free; otherwise each node takes the recorded one at the same
+/// fraction of the duration. If stance feet are more than 0.5 mm away from their places in the new motion, the base is
+/// moved there. Multipliers are those of the record.
+/// \throws ModelError when the coordinates or motors differ, or the record contains numbers that are not finite
+StartingPoint makeStart(const MotionRecord& record, const Motion& motion);
 
 }  // namespace bielle

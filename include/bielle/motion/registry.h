@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "bielle/io/result.h"
 #include "bielle/motion/sequence.h"
 
 namespace bielle {
@@ -61,10 +60,6 @@ inline constexpr const char* kDeadPointMargin = "dead-point-margin";
 
 /// The motion of a request from the robot's standing posture. The limits given by motor are listed with the other options.
 /// \throws ModelError as makeMotion() does
-Motion makeRequested(const MotionRequest& request, const Model& model, const ProblemOptions& problem);
-
-/// The request recorded in a result, without limits, which are part of the problem and not of the motion.
-/// \throws ModelError when there is no such motion or option
-MotionRequest remakeRequest(const MotionSummary& summary);
+Motion makeMotion(const Model& model, const MotionRequest& request, const ProblemOptions& problem = {});
 
 }  // namespace bielle

@@ -1,4 +1,4 @@
-#include "bielle/io/names.h"
+#include "bielle/model/names.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "bielle/io/motion_registry.h"
+#include "bielle/motion/registry.h"
 
 #include <algorithm>
 #include <map>
@@ -79,20 +79,6 @@ std::vector<SequencePart> listParts(const std::vector<std::pair<std::string, Mot
     parts.push_back({name, [planner = planner, own = selectPart(options, name)](
                                const Model& model, const VectorXd& q0) { return planner(model, q0, own); }});
   return parts;
-}
-
-// The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
-std::vector<std::string> listPartMotions(const OptionValues& options) {
-  std::vector<std::string> labels, motions;
-  for (const auto& [name, value] : options) {
-    const size_t dot = name.find('.');
-    if (dot == std::string::npos) continue;
-    const std::string label = name.substr(0, dot);
-    if (std::find(labels.begin(), labels.end(), label) != labels.end()) continue;
-    labels.push_back(label);
-    motions.push_back(label.substr(0, label.find_last_not_of("0123456789") + 1));
-  }
-  return motions;
 }
 
 }  // namespace
@@ -188,8 +174,9 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
 
 std::vector<SequencePart> listParts(const MotionRequest& request) { return listParts(request.parts, request.options); }
 
-Motion makeRequested(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
+Motion makeMotion(const Model& model, const MotionRequest& request, const ProblemOptions& problem) {
   Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
+  motion.request = std::make_shared<const MotionRequest>(request);
   const LimitOptions& limits = problem.limits;
   for (const auto& [motor, value] : limits.efforts) motion.options.emplace_back(kEffortLimit + motor, value);
   for (const auto& [motor, value] : limits.velocities) motion.options.emplace_back(kVelocityLimit + motor, value);
@@ -197,19 +184,6 @@ Motion makeRequested(const MotionRequest& request, const Model& model, const Pro
   if (limits.dead_point_margin != LimitOptions().dead_point_margin)
     motion.options.emplace_back(kDeadPointMargin, limits.dead_point_margin);
   return motion;
-}
-
-MotionRequest remakeRequest(const MotionSummary& summary) {
-  MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listPartMotions(summary.options))
-                                                      : findMotion(summary.file, summary.motion).request;
-  const auto isLimit = [](const std::string& name) {
-    for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit, kDeadPointMargin})
-      if (name.rfind(prefix, 0) == 0) return true;
-    return false;
-  };
-  for (const auto& [name, value] : summary.options)
-    if (!isLimit(name)) request.options.set(name, value);
-  return request;
 }
 
 }  // namespace bielle

@@ -4,9 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/io/motion_registry.h"
-#include "bielle/io/record.h"
-#include "bielle/io/result.h"
+#include "bielle/motion/record.h"
+#include "bielle/motion/registry.h"
 
 namespace bielle {
 
@@ -18,25 +17,23 @@ inline constexpr double kLargestStepError = 0.004, kAllowedStepError = 0.005;
 
 /// Stages of a solved motion are too long if this exceeds 1: the larger of calcStepError() / kLargestStepError and the
 /// slip of standing soles / kLargestSlip; `bielle check` allows 0.1 mm off the ground. 0 for Euler steps.
-double calcStageExcess(const Model& model, const MotionResult& result);
+double calcStageExcess(const Motion& motion, const MotionRecord& record);
 inline constexpr double kLargestSlip = 1e-4;  // m, of a corner, at most
 
 struct RefinedMotion {
-  MotionRequest request;  ///< with its `time_step`
   Motion motion;
+  StartingPoint start;
 };
-/// The motion of a request with stages half as long and the solution as its guess. Made only if `time_step` was 0, no
-/// duration is free, the objective is not the peak torque, and calcStageExcess() of the solution exceeds 1.
-/// \param result  the solution of `solved`
-std::optional<RefinedMotion> refineStages(MotionRequest request, const Model& model, const ProblemOptions& problem,
-                                          const Motion& solved, const MotionResult& result);
+/// The motion of the same request with stages half as long, and the solution to start from. Made only if `time_step` was 0, no
+/// duration is free, the objective is not the peak torque, and calcStageExcess() exceeds 1.
+/// \param solved  made of a request, here and below   \param record  of its solution
+std::optional<RefinedMotion> refineStages(const Motion& solved, const MotionRecord& record);
 
-/// The motion of least effort of a request, again from its plan, with linkages farther from their dead points
+/// The motion of least effort of the same request, again from its plan, with linkages farther from their dead points
 /// (kWideDeadPointMargin). Not for sequences. Made only if no duration is free and calcStepError() exceeds
 /// kLargestStepError where a linkage is near its margin: near a dead point motors reverse within a stage of any length.
-/// The length of stages is unchanged.
-std::optional<Motion> avoidDeadPoints(const MotionRequest& request, const Model& model, ProblemOptions problem,
-                                      const MotionRecord& record);
+/// The length of stages is unchanged. \param solved  whose request it is   \param record  of the motion that is to be improved
+std::optional<Motion> avoidDeadPoints(const Motion& solved, const MotionRecord& record);
 inline constexpr double kWideDeadPointMargin = 0.4;
 
 /// How far a linkage is from its nearest dead point (transmission.h).

@@ -1,13 +1,14 @@
-#include "bielle/io/record.h"
+#include "bielle/motion/record.h"
 
 #include <limits>
+#include <optional>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/names.h"
 #include "bielle/model/error.h"
-#include "io/aside_file.h"
-#include "io/record_tables.h"
-#include "io/text_file.h"
+#include "bielle/model/names.h"
+#include "bielle/motion/footsteps.h"
+#include "math/so3.h"
+#include "motion/record_tables.h"
 
 namespace bielle {
 namespace {
@@ -130,12 +131,46 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
   return record;
 }
 
-void writeCsv(const std::string& path, const MotionRecord& record) { writeTextFile(path, formatCsv(record)); }
+MotionTrack makeTrack(const Model& model, const MotionRecord& record) {
+  MotionTrack track;
+  track.time.assign(record.time.begin(), record.time.end());
+  track.contacts = record.contact_names;
+  Workspace ws(model);
+  for (Eigen::Index k = 0; k < record.time.size(); ++k) {
+    updatePlacements(model, ws, record.q.row(k).transpose());
+    track.com.push_back(record.com.row(k));
+    track.heading.push_back(calcHeading(ws.X_WB[std::min(1, model.numBodies() - 1)]));
+    track.feet.emplace_back();
+    for (const ContactFrame& contact : model.contacts())
+      track.feet.back().push_back(getPlacement(ws, contact.body, contact.X_BF));
+    if (k == record.contact_wrenches.rows()) break;
+    double load = 0;
+    for (size_t c = 0; c < model.contacts().size(); ++c) load += record.contact_wrenches.block<1, 3>(k, 6 * c).norm();
+    track.load.push_back(load);
+  }
+  return track;
+}
 
-void writeNpz(const std::string& path, const MotionRecord& record) {
-  AsideFile file(path);
-  file.write(formatNpz(record));
-  file.commit();
+Slip calcSlip(const Motion& motion, const MotionTrack& track) {
+  Slip slip;
+  const Model& model = motion.problem->model();
+  std::vector<std::optional<SE3>> touch_down(model.contacts().size());
+  for (size_t k = 0; k < track.feet.size(); ++k) {
+    std::vector<bool> stands(model.contacts().size(), false);
+    for (const ContactTarget& target : motion.schedule.getPhase(static_cast<int>(k)).contacts) {
+      const ContactFrame& contact = model.contacts()[target.contact];
+      const SE3& X_WF = track.feet[k][target.contact];
+      std::optional<SE3>& start = touch_down[target.contact];
+      if (!start) start = X_WF;
+      const SE3 moved = start->inverseTimes(X_WF);
+      slip.position = std::max(slip.position, moved.p.norm());
+      if (contact.kind == ContactKind::Surface6D) slip.angle = std::max(slip.angle, log3(moved.R).norm());
+      stands[target.contact] = true;
+    }
+    for (size_t c = 0; c < stands.size(); ++c)
+      if (!stands[c]) touch_down[c].reset();
+  }
+  return slip;
 }
 
 }  // namespace bielle

@@ -1,13 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/names.h"
-#include "bielle/io/result.h"
 #include "bielle/model/error.h"
-
-namespace fs = std::filesystem;
+#include "bielle/model/names.h"
+#include "bielle/motion/record.h"
 
 namespace bielle {
 namespace {
@@ -38,29 +35,28 @@ Vector3d calcWayToFeet(const Model& model, Workspace& ws, const ContactPhase& ph
 
 // Moves the base over the ground so that the feet are where the motion has them, unless they slip no farther than in a solved
 // motion: states then stay consistent with velocities, and a solution stays one.
-void carryToFeet(Motion& motion) {
+void carryToFeet(const Motion& motion, std::vector<VectorXd>& xs) {
   constexpr double kSlip = 5e-4;  // m
   const Model& model = motion.problem->model();
   Workspace ws(model);
   std::vector<Vector3d> ways;
   double farthest = 0;
-  for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
-    ways.push_back(calcWayToFeet(model, ws, motion.schedule.getPhase(static_cast<int>(k)), motion.guess.xs[k]));
+  for (size_t k = 0; k < xs.size(); ++k) {
+    ways.push_back(calcWayToFeet(model, ws, motion.schedule.getPhase(static_cast<int>(k)), xs[k]));
     farthest = std::max(farthest, ways.back().norm());
   }
   if (farthest <= kSlip) return;
   for (size_t k = 0; k < ways.size(); ++k)
-    if (model.hasFreeFlyer()) motion.guess.xs[k].head<3>() += ways[k];
+    if (model.hasFreeFlyer()) xs[k].head<3>() += ways[k];
 }
 
 // Time scales of phases of free duration, from a record of as many nodes.
-void setTimeScales(const MotionRecord& record, Motion& motion) {
-  const RobotProblem& problem = *motion.problem;
+void setTimeScales(const MotionRecord& record, const RobotProblem& problem, ShootingTrajectory& trajectory) {
   double scale = 1;
   for (int k = 0; k < problem.numStages(); ++k) {
     const StageSpec& spec = problem.spec(k);
     if (spec.timing.phase < 0) continue;
-    VectorXd &x = motion.guess.xs[k], &u = motion.guess.us[k];
+    VectorXd &x = trajectory.xs[k], &u = trajectory.us[k];
     if (u.size() > problem.model().nu()) {
       scale = std::clamp((record.time[k + 1] - record.time[k]) / spec.dt, spec.timing.lower, spec.timing.upper);
       u[u.size() - 1] = scale;
@@ -72,7 +68,7 @@ void setTimeScales(const MotionRecord& record, Motion& motion) {
 
 }  // namespace
 
-void setGuess(const MotionRecord& record, Motion& motion) {
+StartingPoint makeStart(const MotionRecord& record, const Motion& motion) {
   const Model& model = motion.problem->model();
   requireSame(record.q_names, makePositionNames(model), "coordinates");
   requireSame(record.v_names, makeVelocityNames(model), "velocities");
@@ -86,20 +82,19 @@ void setGuess(const MotionRecord& record, Motion& motion) {
     throw ModelError("", "warm start", "the recorded motion is empty or contains numbers that are not finite",
                      "give the result of a successful solve");
   const int nodes = motion.problem->numStages() + 1;
+  StartingPoint start{motion.guess, record.multipliers};
+  ShootingTrajectory& trajectory = start.trajectory;
   for (int k = 0; k < nodes; ++k) {
     const int row = matchRow(k, nodes, record.q.rows());
-    VectorXd& x = motion.guess.xs[k];
+    VectorXd& x = trajectory.xs[k];
     x.head(model.nq()) = record.q.row(row).transpose();
     x.segment(model.nq(), model.nv()) = record.v.row(row).transpose();
     if (k + 1 < nodes)
-      motion.guess.us[k].head(model.nu()) = record.u.row(matchRow(k, nodes - 1, record.u.rows())).transpose();
+      trajectory.us[k].head(model.nu()) = record.u.row(matchRow(k, nodes - 1, record.u.rows())).transpose();
   }
-  carryToFeet(motion);
-  if (record.time.size() == nodes) setTimeScales(record, motion);
-}
-
-MotionRecord readResultRecord(const std::string& directory) {
-  return readRecord((fs::path(directory) / "trajectory.npz").string());
+  carryToFeet(motion, trajectory.xs);
+  if (record.time.size() == nodes) setTimeScales(record, *motion.problem, trajectory);
+  return start;
 }
 
 }  // namespace bielle

@@ -1,6 +1,6 @@
 #pragma once
 // The tables of a record, in the order of the files, shared by the CSV and NumPy formats.
-#include "bielle/io/record.h"
+#include "bielle/motion/record.h"
 
 namespace bielle {
 
@@ -20,8 +20,5 @@ void resizeRecord(int stages, MotionRecord& record);
 
 // Throws ModelError unless every table has as many rows and columns as times and names ask for.
 void requireWhole(const MotionRecord& record);
-
-std::string formatCsv(const MotionRecord& record);
-std::string formatNpz(const MotionRecord& record);
 
 }  // namespace bielle

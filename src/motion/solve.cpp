@@ -1,0 +1,293 @@
+#include "bielle/motion/solve.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "bielle/motion/motion_envelope.h"
+#include "bielle/motion/refinement.h"
+#include "model/number_text.h"
+#include "motion/join.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kCautious = 1e-2;  // regularization of a second attempt
+
+// Whether a problem has these rows of constraints at its nodes.
+bool haveRows(const ShootingProblem& problem, const Multipliers& multipliers) {
+  if (!(multipliers.penalty > 0) || static_cast<int>(multipliers.values.size()) != problem.numStages() + 1)
+    return false;
+  for (int k = 0; k <= problem.numStages(); ++k)
+    if (multipliers.values[k].size() != problem.constraintSize(k)) return false;
+  return true;
+}
+
+Solution attempt(const Motion& motion, const FddpOptions& solver, const FddpObserver& observer,
+                 const StartingPoint& start) {
+  const std::unique_ptr<PeakProblem> peak = makePeakProblem(motion);
+  const ShootingProblem& problem = peak ? static_cast<const ShootingProblem&>(*peak) : *motion.problem;
+  // The penalty that a solve ended with is too stiff for another motion.
+  Multipliers first;
+  if (haveRows(problem, start.multipliers)) first = {start.multipliers.values, solver.constraints.initial_penalty};
+  FddpResult result = bielle::solve(problem, peak ? peak->wrap(start.trajectory) : start.trajectory, solver, observer, first);
+  Solution out{motion, peak ? peak->unwrap(result.trajectory) : std::move(result.trajectory), std::move(result.summary),
+               std::move(result.multipliers)};
+  if (!peak) out.gains = std::move(result.gains);
+  return out;
+}
+
+// The better of two attempts, with the iterations and times of both.
+Solution join(Solution first, Solution second) {
+  const bool both = second.summary.termination == FddpTermination::Infeasible;
+  const FddpSummary &before = first.summary, &after = second.summary;
+  Solution& better = both && before.violation < after.violation ? first : second;
+  FddpSummary out = better.summary;
+  out.iterations = before.iterations + after.iterations;
+  out.multiplier_updates = before.multiplier_updates + after.multiplier_updates;
+  out.seconds = before.seconds + after.seconds;
+  out.evaluate_seconds = before.evaluate_seconds + after.evaluate_seconds;
+  out.linearize_seconds = before.linearize_seconds + after.linearize_seconds;
+  out.sweep_seconds = before.sweep_seconds + after.sweep_seconds;
+  out.rollout_seconds = before.rollout_seconds + after.rollout_seconds;
+  out.log = before.log;
+  out.log.insert(out.log.end(), after.log.begin(), after.log.end());
+  if (both) out.message += "; the better of two attempts";
+  better.summary = std::move(out);
+  return std::move(better);
+}
+
+// The posture at the start, carried along with the base of the guess.
+ShootingTrajectory holdPosture(const RobotProblem& problem, ShootingTrajectory trajectory) {
+  const Model& model = problem.model();
+  const int base = model.hasFreeFlyer() ? 7 : 0, joints = model.nq() - base;
+  const VectorXd posture = problem.initialState().segment(base, joints);
+  for (VectorXd& x : trajectory.xs) x.segment(base, joints) = posture;
+  return trajectory;
+}
+
+// The motion as it is.
+Solution solveAlone(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
+                    StartingPoint start) {
+  Solution result = attempt(motion, options, observer, start);
+  if (result.summary.termination == FddpTermination::Failed && result.summary.iterations == 0) {
+    start = {holdPosture(*motion.problem, std::move(start.trajectory)), {}};
+    result = attempt(motion, options, observer, start);
+  }
+  if (result.summary.termination == FddpTermination::Infeasible && options.initial_regularization < kCautious) {
+    FddpOptions cautious = options;
+    cautious.initial_regularization = kCautious;
+    start.multipliers = {};
+    result = join(std::move(result), attempt(motion, cautious, observer, start));
+  }
+  return result;
+}
+
+FddpOptions dampGuess(FddpOptions options) {
+  options.initial_regularization = std::max(options.initial_regularization, kGuessRegularization);
+  return options;
+}
+
+// "converged, 12 iterations, 0.21 s"
+std::string format(const FddpSummary& summary) {
+  return getName(summary.termination) + std::string(", ") + std::to_string(summary.iterations) + " iterations, " +
+         formatNumber(summary.seconds, "%.2f") + " s";
+}
+
+bool areKeptFromDeadPoints(const LimitOptions& limits) { return limits.enforced && limits.dead_point_margin > 0; }
+
+std::string formatDistance(const LinkageDistance& of) {
+  const bool far = of.distance > kFarthestDeadPoint;
+  return far ? "over " + formatNumber(kFarthestDeadPoint, "%.2g") : formatNumber(of.distance, "%.2g");
+}
+
+// The second solve, with the iterations and the time of both.
+FddpSummary addUp(const FddpSummary& first, FddpSummary second) {
+  second.iterations += first.iterations;
+  second.seconds += first.seconds;
+  return second;
+}
+
+// What a failure may come from: linkages that are near a dead point where the motion is nearest to one; empty for none.
+std::string describeDeadPoints(const Motion& motion, const MotionRecord& record) {
+  const Model& model = motion.problem->model();
+  if (!areKeptFromDeadPoints(motion.problem_options.limits) || !record.q.allFinite()) return "";
+  const std::vector<LinkageDistance> start = findDeadPoints(model, record, 0, 0),
+                                     nearest = findDeadPoints(model, record, 0, record.q.rows() - 1);
+  std::string near;
+  for (size_t i = 0; i < start.size(); ++i)
+    if (nearest[i].distance < kNearDeadPoint)
+      near += (near.empty() ? "" : ", ") + nearest[i].output + " " + formatDistance(nearest[i]) + " at " +
+              formatNumber(nearest[i].time, "%.3g") + " s, " + formatDistance(start[i]) + " at the start";
+  return near.empty()
+             ? ""
+             : "; linkages come near dead points, where motor and joint hardly move each other (rad or m): " + near +
+                   "; start farther from them, or request less motion towards them";
+}
+
+// An optimum whose stages are still too long is one of equations that the robot does not obey: it has not converged to a motion.
+void refuseLongStages(const MotionRecord& record, Solution& solution) {
+  const double error = calcStepError(solution.motion.problem->model(), record);
+  if (!(error > kAllowedStepError)) return;
+  const std::string near = describeDeadPoints(solution.motion, record);
+  solution.summary.termination = FddpTermination::Failed;
+  solution.summary.message =
+      "the time step is too coarse for this motion: across a stage, velocities differ from the integrated "
+      "accelerations by up to " +
+      formatNumber(100 * error, "%.2g") + " % of the largest acceleration" +
+      (near.empty() ? "; request a slower or shorter motion, or set a shorter time_step" : near);
+}
+
+// Of a motion that was made of a request.
+class RequestSolver {
+ public:
+  RequestSolver(const Motion& motion, const SolveOptions& options, const SolveObserver& observer)
+      : motion_(motion), options_(options), observer_(observer) {}
+
+  Solution solve() {
+    tellDeadPoints();
+    const bool from_parts = !options_.start && !motion_.request->parts.empty();
+    const FddpOptions from_guess = dampGuess(options_.solver);
+    FddpOptions again = options_.solver;
+    StartingPoint start = options_.start.value_or(StartingPoint{motion_.guess});
+    if (from_parts) start.trajectory = startFromParts();
+    FddpOptions solver = options_.start || from_parts ? options_.solver : from_guess;
+    const ObjectiveOptions& objective = motion_.problem_options.objective;
+    if (objective.objective != Objective::Effort) {
+      if (!objective.scale) {
+        startFromEffort(solver, start);
+        solver = again;
+      }
+      solver.acceptable_decrease = again.acceptable_decrease = 0;  // costs of other objectives fall slowly all the way
+    }
+    Solution solution = solveAlone(motion_, solver, observer_.motion, std::move(start));
+    MotionRecord record = makeRecord(solution.motion, solution.trajectory);
+    if (!solution.converged()) {
+      if (solution.summary.termination != FddpTermination::Interrupted)
+        solution.summary.message += describeDeadPoints(solution.motion, record);
+      return solution;
+    }
+    const std::optional<RefinedMotion> refined = refineStages(solution.motion, record);
+    if (refined) improve(refined->motion, refined->start, again, "with stages half as long", solution, record);
+    if (const auto apart = avoidDeadPoints(refined ? refined->motion : solution.motion, record))
+      improve(*apart, {apart->guess}, from_guess, "with linkages farther from dead points", solution, record);
+    refuseLongStages(record, solution);
+    return solution;
+  }
+
+ private:
+  void tellDeadPoints() const {
+    const LimitOptions& limits = motion_.problem_options.limits;
+    const Model& model = motion_.problem->model();
+    if (!areKeptFromDeadPoints(limits) || !(observer_.tell || observer_.warn)) return;
+    std::string list, near;
+    for (const LinkageDistance& start : findDeadPoints(model, motion_.problem->initialState().head(model.nq()))) {
+      list += (list.empty() ? "" : "; ") + start.output + " " + formatDistance(start);
+      if (start.distance < kNearDeadPoint)
+        near += (near.empty() ? "" : "; ") + start.output + " " + formatDistance(start);
+    }
+    if (!list.empty()) tell("distance from dead points at the start (rad or m): " + list);
+    const double margin = limits.dead_point_margin;
+    if (!near.empty() && observer_.warn)
+      observer_.warn("warning: this motion starts near a dead point, where motor and joint hardly move each other (" +
+                     near + "): the transmission ratio is kept within " + formatNumber(margin, "%.2g") + " to " +
+                     formatNumber(1 / margin, "%.2g") + " times that at the start; give a reference farther from it");
+  }
+
+  // Solves a motion in place of one whose stages are too long, and takes it if its own are less so.
+  void improve(const Motion& motion, const StartingPoint& start, const FddpOptions& solver, const std::string& how,
+               Solution& solution, MotionRecord& record) const {
+    tell("the time step is too coarse for this motion: solving again " + how);
+    Solution improved = solveAlone(motion, solver, observer_.motion, start);
+    MotionRecord improved_record = makeRecord(improved.motion, improved.trajectory);
+    if (improved.converged() &&
+        calcStageExcess(improved.motion, improved_record) < calcStageExcess(solution.motion, record)) {
+      improved.summary = addUp(solution.summary, std::move(improved.summary));
+      solution = std::move(improved);
+      record = std::move(improved_record);
+      return;
+    }
+    solution.summary = addUp(improved.summary, std::move(solution.summary));
+    if (observer_.warn)
+      observer_.warn(how + ": " + getName(improved.summary.termination) +
+                     (improved.converged() ? ", but not better" : "") + "; the previous motion is kept");
+  }
+
+  ShootingTrajectory startFromParts() const {
+    const Model& model = motion_.problem->model();
+    const auto report = [this](const std::string& part, const FddpSummary& summary) {
+      tell(part + " alone: " + format(summary));
+    };
+    SolveOptions options;
+    options.solver = options_.solver;
+    ShootingTrajectory whole = solveParts(model, listParts(*motion_.request), makeStandingPosture(model), makeEffort(),
+                                          options, observer_.part, report);
+    fitTimings(*motion_.problem, whole);
+    return whole;
+  }
+
+  // The same problem of least effort.
+  ProblemOptions makeEffort() const {
+    ProblemOptions problem = motion_.problem_options;
+    problem.objective = {};
+    problem.objective.regeneration = motion_.problem_options.objective.regeneration;  // of reported energies
+    return problem;
+  }
+
+  // Scales the motion by that of least effort, from which it starts.
+  void startFromEffort(const FddpOptions& solver, StartingPoint& start) {
+    const Model& model = motion_.problem->model();
+    ProblemOptions problem = motion_.problem_options;
+    const Motion effort = makeMotion(model, *motion_.request, makeEffort());
+    if (!options_.start) {
+      tell("starting with the motion of least effort:");
+      const Solution least = solveAlone(effort, solver, observer_.motion, std::move(start));
+      tell("least effort: " + format(least.summary));
+      tell(std::string("continuing with ") + getName(problem.objective.objective) + ":");
+      start = {least.trajectory};
+    }
+    problem.objective = scaleObjective(effort, start.trajectory, problem.objective, problem.limits);
+    motion_ = makeMotion(model, *motion_.request, problem);
+  }
+
+  void tell(const std::string& line) const {
+    if (observer_.tell) observer_.tell(line);
+  }
+
+  Motion motion_;
+  const SolveOptions& options_;
+  const SolveObserver& observer_;
+};
+
+}  // namespace
+
+FddpOptions makeMotionSolverOptions() {
+  FddpOptions out;
+  out.acceptable_decrease = 1e-4;
+  return out;
+}
+
+Solution solve(const Motion& motion, const SolveOptions& options, const SolveObserver& observer) {
+  if (motion.request && options.refine) return RequestSolver(motion, options, observer).solve();
+  FddpOptions solver = options.start ? options.solver : dampGuess(options.solver);
+  if (motion.problem_options.objective.objective != Objective::Effort) solver.acceptable_decrease = 0;
+  return solveAlone(motion, solver, observer.motion, options.start.value_or(StartingPoint{motion.guess}));
+}
+
+ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
+                              const ProblemOptions& problem, const SolveOptions& options, const FddpObserver& observer,
+                              const std::function<void(const std::string& part, const FddpSummary&)>& report) {
+  ShootingTrajectory whole;
+  VectorXd q = q0;
+  for (const SequencePart& part : parts) {
+    MotionPlan plan = part.plan(model, q);
+    q = plan.q_end;
+    ProblemOptions own = problem;
+    own.timings = selectTimings(problem.timings, plan.schedule);
+    Solution solution = bielle::solve(makeMotion(model, std::move(plan), own), options, {observer, {}, {}, {}});
+    if (report) report(part.name, solution.summary);
+    joinTrajectories(solution.trajectory, whole);
+  }
+  return whole;
+}
+
+}  // namespace bielle
