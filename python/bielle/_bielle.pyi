@@ -1722,6 +1722,28 @@ class Node:
         """Jacobian of that twist (6, nv); only in calc_jacobian."""
         ...
 
+class ControlBounds:
+    IGNORE: ClassVar[ControlBounds]
+    ENFORCE: ClassVar[ControlBounds]
+    __members__: ClassVar[Dict[str, ControlBounds]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class LastRollout:
+    CLOSED: ClassVar[LastRollout]
+    SEGMENTS: ClassVar[LastRollout]
+    __members__: ClassVar[Dict[str, LastRollout]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
 class ConstraintOptions:
     """How constraints are enforced.
 
@@ -1752,8 +1774,8 @@ class SolverOptions:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., acceptable_decrease: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., threads: int = ...) -> None: ...
-    def replace(self, *, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., acceptable_decrease: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., threads: int = ...) -> SolverOptions: ...
+    def __init__(self, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., acceptable_decrease: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., bounds: ControlBounds = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., last_rollout: LastRollout = ..., threads: int = ...) -> None: ...
+    def replace(self, *, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., acceptable_decrease: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., bounds: ControlBounds = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., last_rollout: LastRollout = ..., threads: int = ...) -> SolverOptions: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def max_iterations(self) -> int:
@@ -1816,12 +1838,20 @@ class SolverOptions:
         """share of the predicted decrease, in (0, 1)"""
         ...
     @property
+    def bounds(self) -> ControlBounds:
+        """ControlBounds"""
+        ...
+    @property
     def constraints(self) -> ConstraintOptions:
         """ConstraintOptions"""
         ...
     @property
     def rollout_segments(self) -> int:
         """largest number of segments of a rollout"""
+        ...
+    @property
+    def last_rollout(self) -> LastRollout:
+        """LastRollout"""
         ...
     @property
     def threads(self) -> int:
@@ -1889,8 +1919,8 @@ class Summary:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, termination: Termination = ..., message: str = ..., acceptable: bool = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., evaluate_seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> None: ...
-    def replace(self, *, termination: Termination = ..., message: str = ..., acceptable: bool = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., evaluate_seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> Summary: ...
+    def __init__(self, termination: Termination = ..., message: str = ..., acceptable: bool = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> None: ...
+    def replace(self, *, termination: Termination = ..., message: str = ..., acceptable: bool = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> Summary: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def termination(self) -> Termination:
@@ -1941,12 +1971,8 @@ class Summary:
         """s"""
         ...
     @property
-    def evaluate_seconds(self) -> float:
-        """summed over the threads, s"""
-        ...
-    @property
     def linearize_seconds(self) -> float:
-        """likewise"""
+        """summed over the threads, s"""
         ...
     @property
     def sweep_seconds(self) -> float:
@@ -1963,23 +1989,6 @@ class Summary:
     @property
     def converged(self) -> bool:
         """whether the solver ended at an optimum"""
-        ...
-
-class Gains:
-    """Feedback of a stage about a node state x_k and a control u_k: u = u_k + k + K dx, dx from x_k to x in the tangent space of the problem. K is added: it has the sign of a negative feedback.
-
-    Immutable; `replace` makes a changed copy.
-    """
-    def __init__(self, k: ArrayLike = ..., K: ArrayLike = ...) -> None: ...
-    def replace(self, *, k: ArrayLike = ..., K: ArrayLike = ...) -> Gains: ...
-    def __eq__(self, other: object) -> bool: ...
-    @property
-    def k(self) -> Array:
-        """(nu,); vanishes at an optimum"""
-        ...
-    @property
-    def K(self) -> Array:
-        """(nu, ndx); rows of controls at their bounds are zero"""
         ...
 
 class Multipliers:
@@ -2079,8 +2088,8 @@ class ObjectiveOptions:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, objective: Objective = ..., regeneration: float = ..., regularization: Optional[float] = ..., scale: float = ...) -> None: ...
-    def replace(self, *, objective: Objective = ..., regeneration: float = ..., regularization: Optional[float] = ..., scale: float = ...) -> ObjectiveOptions: ...
+    def __init__(self, objective: Objective = ..., regeneration: float = ..., regularization: Optional[float] = ..., scale: Optional[float] = ...) -> None: ...
+    def replace(self, *, objective: Objective = ..., regeneration: float = ..., regularization: Optional[float] = ..., scale: Optional[float] = ...) -> ObjectiveOptions: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def objective(self) -> Objective:
@@ -2095,8 +2104,8 @@ class ObjectiveOptions:
         """weight of the other costs; None: the default"""
         ...
     @property
-    def scale(self) -> float:
-        """cost of a joule, or of the peak"""
+    def scale(self) -> Optional[float]:
+        """cost of a joule, or of the peak; None: of the motion of least effort"""
         ...
 
 class ProblemOptions:
@@ -2412,36 +2421,65 @@ class Motion:
         ...
     @property
     def guess(self) -> Trajectory:
-        """Trajectory to start from; after a solve the solution"""
+        """Trajectory that a solve starts from"""
         ...
-    @guess.setter
-    def guess(self, value: Trajectory) -> None: ...
     def stage(self, node: int) -> Stage:
         """Stage of a node, 0 to N, including the constraints from the robot's limits."""
         ...
-    def start_from(self, record: Record) -> None:
-        """Sets the guess from the record of another motion of the robot, resampled if its length differs."""
+    def costs(self, node: int, trajectory: Optional[Trajectory] = ...) -> Dict[str, float]:
+        """Costs of a node of a Trajectory, or of the guess, by name, before scaling by the time step."""
         ...
-    def costs(self, node: int) -> Dict[str, float]:
-        """Costs of a node of the guess by name, before scaling by the time step."""
-        ...
-    def solve(self, options: SolverOptions = ..., callback: Optional[Callable[[Iteration], Optional[bool]]] = ...) -> Summary:
-        """Solves from the guess and leaves the solution there. Returns a Summary.
+    def solve(self, options: SolverOptions = ..., callback: Optional[Callable[[Iteration], Optional[bool]]] = ..., warm_start: Union[None, Trajectory, Solution, Record] = ..., refine: bool = ...) -> Solution:
+        """Solves it as `bielle solve` does. Returns a Solution; the motion stays as it is.
 
-        callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve with the current iterate in the guess.
+        callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve.
+        warm_start: a Trajectory or a Solution of as many stages, or a Record of any motion of the robot; None: the guess
+        refine: whether the motion of a Request may be made again, e.g. with shorter stages
         """
+        ...
+
+class Gains:
+    """Of a stage, about a solution: u = us + k + K (x - xs), x - xs in the tangent space.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, k: ArrayLike = ..., K: ArrayLike = ...) -> None: ...
+    def replace(self, *, k: ArrayLike = ..., K: ArrayLike = ...) -> Gains: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def k(self) -> Array:
+        """(nu,), vanishes at an optimum"""
+        ...
+    @property
+    def K(self) -> Array:
+        """(nu, ndx)"""
+        ...
+
+class Solution:
+    """A solved Motion."""
+    @property
+    def motion(self) -> Motion:
+        """Motion that was solved: the given one, or that made again of its request"""
+        ...
+    @property
+    def trajectory(self) -> Trajectory:
+        """Trajectory"""
+        ...
+    @property
+    def summary(self) -> Summary:
+        """Summary"""
         ...
     @property
     def multipliers(self) -> Multipliers:
-        """Multipliers of the last solve"""
+        """Multipliers of the constraints"""
         ...
     @property
     def gains(self) -> Tuple[Gains, ...]:
-        """Gains of the last sweep, stage by stage"""
+        """Gains of every stage, of the solver's last sweep; () for the least peak torque"""
         ...
     @property
-    def summary(self) -> Optional[Summary]:
-        """Summary of the last solve, or None"""
+    def converged(self) -> bool:
+        """whether the solver ended at an optimum"""
         ...
     def _repr_html_(self) -> str: ...
 
@@ -2724,8 +2762,8 @@ def solve(robot: Robot, request: Request, problem: ProblemOptions = ..., solver:
     """
     ...
 
-def make_result(motion: Motion, summary: Summary, robot: Robot) -> Result:
-    """The Result of a Motion that was solved."""
+def make_result(solution: Solution, robot: Robot) -> Result:
+    """The Result of a Solution."""
     ...
 
 class Replacement:
@@ -2904,8 +2942,8 @@ class Lift:
         """Result, as far as it was lifted, or None"""
         ...
 
-def lift(robot: Robot, serial: SerialModel, motion: Motion, options: LiftOptions = ...) -> Lift:
-    """Lifts a solved Motion of serial.model to the closed robot: the same serial joints, and the motor torques that follow from them.
+def lift(robot: Robot, serial: SerialModel, solution: Solution, options: LiftOptions = ...) -> Lift:
+    """Lifts the Solution of a motion of serial.model to the closed robot: the same serial joints, and the motor torques that follow from them.
 
     The motion must have Euler steps.
     """
@@ -3083,10 +3121,10 @@ def minimize(objective: Callable[[Array], Union[float, Tuple[float, ArrayLike]]]
     """
     ...
 
-def cost_gradient(motion: Motion, robot: Parametrization, x: ArrayLike) -> Array:
+def cost_gradient(solution: Solution, robot: Parametrization, x: ArrayLike) -> Array:
     """Derivatives (n,) of the optimal cost of a motion by every number of its robot, at x (n,).
 
-    motion: made from a Request and solved for `robot.make(x)`. The derivatives are those of motions solved again for every change, but nothing is solved: the multipliers of the optimum suffice (envelope theorem).
+    solution: of a motion made from a Request for `robot.make(x)`. The derivatives are those of motions solved again for every change, but nothing is solved: the multipliers of the optimum suffice (envelope theorem).
     """
     ...
 
@@ -3167,8 +3205,8 @@ class PredictedFoothold:
 class Controller:
     """A feedback law: from measured states to torques. Controller.policy and .predictive make them."""
     @staticmethod
-    def policy(motion: Motion, gains: bool = ...) -> Controller:
-        """Torques of a solved Motion, and feedback with the gains of its last sweep."""
+    def policy(solution: Solution, gains: bool = ...) -> Controller:
+        """Torques of a Solution, and feedback with its gains."""
         ...
     @staticmethod
     def predictive(model: Model, plan: MotionPlan, solved: Trajectory, problem: ProblemOptions = ..., options: PredictiveOptions = ...) -> Controller:

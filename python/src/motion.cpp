@@ -300,10 +300,6 @@ void bindHeldMotion(py::module_& module) {
 }
 
 void bindSolution(py::module_& module) {
-  Value<StageGains>(module, "Gains",
-                    "Of a stage, about a solution: u = us + k + K (x - xs), x - xs in the tangent space.")
-      .field("k", &StageGains::k, "(nu,), vanishes at an optimum")
-      .field("K", &StageGains::K, "(nu, ndx)");
   py::class_<HeldSolution, std::shared_ptr<HeldSolution>>(module, "Solution", "A solved Motion.")
       .def_readonly("motion", &HeldSolution::motion,
                     "Motion that was solved: the given one, or that made again of its request")
@@ -333,7 +329,7 @@ void bindSolution(py::module_& module) {
             auto held = std::make_shared<HeldSolution>();
             held->motion = state[0].cast<std::shared_ptr<HeldMotion>>();
             held->solution = {held->motion->motion, state[1].cast<ShootingTrajectory>(), state[2].cast<FddpSummary>(),
-                              state[3].cast<Multipliers>(), read<std::vector<StageGains>>(state[4], "gains")};
+                              state[3].cast<Multipliers>(), read<std::vector<Gains>>(state[4], "gains")};
             return held;
           }));
 }

@@ -23,7 +23,7 @@ RESULTS = {
     "Model.impact_derivatives": "ImpactDerivatives", "Model.mobility": "Dict[str, Any]", "Controller.counts": "Dict[str, int]",
     "Controller.reference": "Tuple[Array, Array]", "World.reset": "WorldState", "World.step": "WorldState",
     "World.count": "Optional[int]", "generators": "Dict[str, Dict[str, Dict[str, Any]]]", "motions": "Dict[str, Dict[str, Any]]",
-    "Motion.goals": "Tuple[Goal, ...]", "Motion.gains": "Tuple[Gains, ...]", "Motion.options": "Dict[str, Union[bool, int, float, str]]",
+    "Motion.goals": "Tuple[Goal, ...]", "Motion.options": "Dict[str, Union[bool, int, float, str]]",
     "Model.shape_pairs": "List[Tuple[int, int, bool]]", "Model.joint_forces": "Tuple[JointForce, ...]", "Model.point_springs": "Tuple[PointSpring, ...]",
     "Motion.request": "Optional[Request]", "Robot.info": "Dict[str, Any]",
     "Parametrization.variables": "Tuple[DesignVariable, ...]", "Estimator.contacts": "Dict[str, bool]", "Motion.costs": "Dict[str, float]", "Solution.gains": "Tuple[Gains, ...]", "LibraryResidual.origin": "Optional[Tuple[str, Tuple[Any, ...]]]",
