@@ -38,7 +38,7 @@ inline StageSpec makeStage(std::mt19937& rng, const Model& model, const VectorXd
                            Activation::makeBarrier(VectorXd::Ones(n), VectorXd::Zero(n), VectorXd::Constant(n, 1e12)),
                            std::move(cone)});
   }
-  for (const Transmission& linkage : listTransmissions(model, q))
+  for (const Linkage& linkage : listLinkages(model, q))
     stage.costs.push_back({"transmission", 1, quadratic(1), makeTransmission(linkage)});
   return stage;
 }

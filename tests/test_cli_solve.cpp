@@ -240,10 +240,10 @@ TEST_CASE("the distance of a linkage from its dead points is that of its closed 
                                         {"rocker_joint", rocker},
                                         {"rocker_coupler", coupler + EIGEN_PI - rocker}})
         q[model.joints()[model.findJoint(name)].idx_q] = value;
-      const std::vector<LinkageDistance> found = findDeadPoints(model, q);
+      const std::vector<DeadPointTrace> found = traceDeadPoints(model, q.transpose());
       REQUIRE(found.size() == 1);
       CHECK(found[0].output == model.joints()[model.serialJoints()[0]].name);
-      CHECK(found[0].distance == Approx(std::abs(off)).epsilon(1e-7));
+      CHECK(found[0].getNearest().distance == Approx(std::abs(off)).epsilon(1e-7));
     }
   }
 }

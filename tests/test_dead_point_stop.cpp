@@ -32,11 +32,11 @@ VectorXd getMotorPositions(const Model& model, const VectorXd& q) {
 double driveCrank(double torque, double stop, double delay) {
   const Model& model = getFourBar();
   const VectorXd q0 = makeStandingPosture(model);
-  const Transmission transmission = listTransmissions(model, q0).at(0);
+  const Linkage linkage = listLinkages(model, q0).at(0);
   DeadPointStop dead_point_stop(model, q0, stop);
   const auto world = simulation::makeBielleWorld(model);
   world->reset(q0, VectorXd::Zero(model.nv()));
-  VectorXd u(model.nu()), gradient(model.nu());
+  VectorXd u(model.nu());
   std::vector<VectorXd> sent(static_cast<size_t>(std::lround(delay / kControlPeriod)), VectorXd::Zero(model.nu()));
   double least = 1;
   for (int tick = 0; tick < 1000; ++tick) {
@@ -45,7 +45,7 @@ double driveCrank(double torque, double stop, double delay) {
     sent.push_back(u);
     world->setTorques(sent[tick]);
     REQUIRE(world->advance(kControlPeriod));
-    least = std::min(least, calcTransmission(transmission, model, world->getConfiguration(), gradient));
+    least = std::min(least, calcTransmission(linkage, model, world->getConfiguration()));
   }
   return least;
 }
@@ -57,15 +57,16 @@ TEST_CASE("dead point stop: the gradient of transmissions by the motors is that 
   const VectorXd q0 = makeStandingPosture(model);
   const VectorXd motors = getMotorPositions(model, q0);
   PassiveJoints joints(model, q0);
-  VectorXd gradient(model.nu()), unused(model.nu());
+  VectorXd gradient(model.nu());
   const double step = 1e-5;
   int tried = 0;
-  for (const Transmission& transmission : listTransmissions(model, q0)) {
+  LinkageWorkspaces memory;
+  for (const Linkage& linkage : listLinkages(model, q0)) {
     VectorXd q = q0, moved = q0;
     const VectorXd offset = VectorXd::LinSpaced(model.nu(), -0.15, 0.2);
     REQUIRE(joints.reset(q0));
     REQUIRE(joints.update(motors + offset, q) == ClosingStatus::Closed);
-    calcTransmission(transmission, model, q, gradient);
+    calcTransmission(linkage, memory, model, q, gradient);
     VectorXd differences(model.nu());
     for (int m = 0; m < model.nu(); ++m) {
       double change = 0;
@@ -73,7 +74,7 @@ TEST_CASE("dead point stop: the gradient of transmissions by the motors is that 
         VectorXd to = motors + offset;
         to[m] += sign * step;
         REQUIRE(joints.update(to, moved) == ClosingStatus::Closed);
-        change += sign * calcTransmission(transmission, model, moved, unused);
+        change += sign * calcTransmission(linkage, model, moved);
       }
       differences[m] = change / (2 * step);
     }

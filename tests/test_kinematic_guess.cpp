@@ -48,8 +48,8 @@ double measureTransmissions(const VectorXd& q) {
   const ConstraintSet closures = makeConstraintSet(model);
   double least = 1;
   VectorXd value(1);
-  for (const Transmission& transmission : listTransmissions(model, makeStandingPosture(model))) {
-    makeTransmission(transmission)->calc({model, ws, closures, none, none}, value);
+  for (const Linkage& linkage : listLinkages(model, makeStandingPosture(model))) {
+    makeTransmission(linkage)->calc({model, ws, closures, none, none}, value);
     least = std::min({least, value[0], 1 / value[0]});
   }
   return least;

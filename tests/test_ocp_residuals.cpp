@@ -88,7 +88,7 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
     add("centre of pressure in the world", makeCenterOfPressure(set, c, ForceAxes::World));
     add("centre of pressure on the ground", useGroundAxes(*makeCenterOfPressure(aslant, c)));
   }
-  for (const Transmission& linkage : listTransmissions(model, q_closed))
+  for (const Linkage& linkage : listLinkages(model, q_closed))
     add("transmission of " + linkage.output, makeTransmission(linkage));
   add("joint position", makeJointPosition(model, dofs));
   add("joint velocity", makeJointVelocity(dofs));
@@ -192,9 +192,9 @@ TEST_CASE("transmissions against differences, on every linkage of the robots, at
     const VectorXd q0 = assembleReference(model, model.references().front().name).q;
     const VectorXd q = closeConfiguration(model, model.integrate(q0, randomVector(rng, model.nv(), 0.05))).q;
     const VectorXd v = randomVector(rng, model.nv()), lambda = VectorXd::Zero(set.rows);
-    const std::vector<Transmission> linkages = listTransmissions(model, q0);
+    const std::vector<Linkage> linkages = listLinkages(model, q0);
     CHECK(linkages.size() >= (std::string(name) == "cleobot" ? 4 : model.hasFreeFlyer() ? 2 : 1));
-    for (const Transmission& linkage : linkages) {
+    for (const Linkage& linkage : linkages) {
       CAPTURE(name, linkage.output);
       const auto residual = makeTransmission(linkage);
       TestNode node(model, set);

@@ -16,7 +16,7 @@
 #include "check_derivative.h"
 #include "math/constants.h"
 #include "robot_directory.h"
-#include "transmission/linkage.h"
+#include "transmission/linkage_ratio.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -92,8 +92,8 @@ void checkRatioDerivatives(const Robot& robot, const RatioSample& sample) {
 TEST_CASE("the transmission of an optimal control problem is the inverse of the ratio, and vanishes at a dead point") {
   for (const char* joint : {"knee_right", "ankley_right"}) {
     const Robot robot(std::string(joint) == "knee_right" ? "bipetto" : "rsu_biped", {joint});
-    const std::vector<Transmission> all = listTransmissions(robot.model, robot.q);
-    const auto own = std::find_if(all.begin(), all.end(), [&](const Transmission& linkage) {
+    const std::vector<Linkage> all = listLinkages(robot.model, robot.q);
+    const auto own = std::find_if(all.begin(), all.end(), [&](const Linkage& linkage) {
       return linkage.output.find(joint) != std::string::npos;
     });
     REQUIRE(own != all.end());
@@ -111,7 +111,7 @@ TEST_CASE("the transmission of an optimal control problem is the inverse of the 
       updatePositions(robot.model, ws, robot.getWhole(sample));
       VectorXd r(1);
       residual->calc({robot.model, ws, set, none, none}, r);
-      if (sample.dead == DeadPointKind::Joint) {
+      if (sample.dead == DeadPointKind::Output) {
         ++dead;
         CHECK(std::abs(r[0]) < 1e-8);
       } else if (sample.dead == DeadPointKind::None) {
@@ -144,8 +144,8 @@ TEST_CASE("four-bar: the ratio on paper, over both branches of a full turn") {
 
   const std::vector<RatioSample> dead = sweep.getDeadPoints();
   REQUIRE(dead.size() == 2);
-  CHECK(dead[0].dead == DeadPointKind::Joint);
-  CHECK(dead[1].dead == DeadPointKind::Joint);
+  CHECK(dead[0].dead == DeadPointKind::Output);
+  CHECK(dead[1].dead == DeadPointKind::Output);
   CHECK(std::abs(dead[0].joints[0] - calcExtremeRocker(kB + kA)) < 1e-11);
   CHECK(std::abs(dead[1].joints[0] - calcExtremeRocker(kB - kA)) < 1e-11);
   CHECK(std::isinf(dead[0].ratio.R(0, 0)));
@@ -161,7 +161,7 @@ TEST_CASE("four-bar driven by its rocker: the dead points are the motor's") {
   const std::vector<RatioSample> dead = sweep.getDeadPoints();
   REQUIRE(dead.size() == 2);
   for (const RatioSample& sample : dead) {
-    CHECK(sample.dead == DeadPointKind::Motor);
+    CHECK(sample.dead == DeadPointKind::Motors);
     CHECK(std::abs(sample.ratio.R(0, 0)) < 1e-10);
   }
   const double low = std::min(dead[0].motors[0], dead[1].motors[0]);
@@ -181,7 +181,7 @@ TEST_CASE("virtual work balances in the constrained dynamics, and a wrong ratio 
     const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
     for (size_t i = 0; i < sweep.samples.size(); i += 40) {
       const RatioSample& sample = sweep.samples[i];
-      if (sample.dead == DeadPointKind::Joint) continue;
+      if (sample.dead == DeadPointKind::Output) continue;
       MatrixXd R = sample.ratio.R;
       CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), R) < 1e-10);
       R(0, 0) += 1e-3 * R.cwiseAbs().maxCoeff();
@@ -196,7 +196,7 @@ TEST_CASE("the knee of Bipetto folds as far as its motor takes it") {
   const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
   const RatioSample* dead = nullptr;
   for (const RatioSample& sample : sweep.samples)
-    if (sample.dead == DeadPointKind::Joint && sample.joints[0] > 0) dead = &sample;
+    if (sample.dead == DeadPointKind::Output && sample.joints[0] > 0) dead = &sample;
   REQUIRE(dead);
   CHECK(dead->joints[0] == Approx(1.325).margin(1e-3));
   // The largest knee angle over the motor's angle, by golden section.
@@ -224,7 +224,7 @@ TEST_CASE("the map of an ankle: the other joint is held, rows end at dead points
     CHECK(std::abs(sample.joints[1] - sweep.samples.front().joints[1]) < 1e-10);
   int motor_dead = 0;
   for (const RatioSample& sample : sweep.getDeadPoints()) {
-    if (sample.dead != DeadPointKind::Motor) continue;
+    if (sample.dead != DeadPointKind::Motors) continue;
     ++motor_dead;
     CHECK(sample.ratio.condition > 1e8);
   }
@@ -287,7 +287,7 @@ TEST_CASE("virtual work balances where the motor stands still too, and another r
   CHECK(sweep.full_turn);
   int dead = 0;
   for (const RatioSample& sample : sweep.samples) {
-    if (sample.dead == DeadPointKind::Motor) ++dead;
+    if (sample.dead == DeadPointKind::Motors) ++dead;
     CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), sample.ratio.R) < 1e-10);
     const MatrixXd other = sample.ratio.R + MatrixXd::Constant(1, 1, 1e-4);
     CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), other) > 1e-6);
@@ -339,8 +339,8 @@ TEST_CASE("joints without a linkage of their own: direct, or refused") {
 TEST_CASE("the nearest dead point is that of the sweep, by the way of joint or motor; far away there is none") {
   for (const char* name : {"fourbar", "bipetto"}) {
     const Robot robot(name, {std::string(name) == "fourbar" ? "rocker_joint" : "knee_right"});
-    const std::vector<Transmission> all = listTransmissions(robot.model, robot.q);
-    const auto own = std::find_if(all.begin(), all.end(), [&](const Transmission& linkage) {
+    const std::vector<Linkage> all = listLinkages(robot.model, robot.q);
+    const auto own = std::find_if(all.begin(), all.end(), [&](const Linkage& linkage) {
       return linkage.output == robot.linkage.joint_names.front();
     });
     REQUIRE(own != all.end());
@@ -368,14 +368,62 @@ TEST_CASE("the nearest dead point is that of the sweep, by the way of joint or m
       const DeadPoint found = findDeadPoint(*own, robot.model, robot.getWhole(sample));
       if (least < 0.99 * kFarthestDeadPoint) {
         CHECK(found.distance == Approx(least).epsilon(1e-6));
-        CHECK(found.kind == DeadPoint::Kind::Output);
+        CHECK(found.kind == DeadPointKind::Output);
         ++near;
       } else if (!sweep.full_turn && least > 1.01 * kFarthestDeadPoint) {  // a full turn goes on beyond its ends
-        CHECK(found.kind == DeadPoint::Kind::None);
+        CHECK(found.kind == DeadPointKind::None);
         ++far;
       }
     }
     CHECK(near > 10);
     CHECK((sweep.full_turn || far > 0));
+  }
+}
+
+TEST_CASE("a sweep tells the distance of each of its samples, and a motion along it the least and where") {
+  const Robot robot("bipetto", {"knee_right"});
+  RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+  addDistances(robot.model, robot.linkage, robot.q, sweep);
+  for (const RatioSample& sample : sweep.samples) {
+    REQUIRE(sample.nearest);
+    CHECK((sample.nearest->distance == 0) == (sample.dead != DeadPointKind::None));
+  }
+  // Once to and fro between the start and 0.01 rad of the motor before the dead point.
+  const auto dead = std::find_if(sweep.samples.begin(), sweep.samples.end(), [](const RatioSample& sample) {
+    return sample.dead == DeadPointKind::Output && sample.joints[0] > 0;
+  });
+  REQUIRE(dead != sweep.samples.end());
+  std::vector<VectorXd> there;
+  for (const RatioSample& sample : sweep.samples)
+    if (sample.s >= 0 && sample.s < dead->s && dead->motors[0] - sample.motors[0] > 0.01)
+      there.push_back(robot.getWhole(sample));
+  const int turned = static_cast<int>(there.size()) - 1;
+  REQUIRE(turned > 20);
+  RowMatrixXd qs(2 * turned + 1, robot.model.nq());
+  for (int k = 0; k < qs.rows(); ++k) qs.row(k) = there[static_cast<size_t>(k <= turned ? k : 2 * turned - k)];
+  for (int samples : {0, 10}) {
+    const std::vector<DeadPointTrace> traces = traceDeadPoints(robot.model, qs, samples);
+    REQUIRE(traces.size() == 4);
+    for (const DeadPointTrace& trace : traces) {
+      CHECK(trace.nodes.size() == trace.points.size());
+      CHECK(static_cast<int>(trace.nodes.size()) >= std::max(2, samples));
+      CHECK(std::is_sorted(trace.nodes.begin(), trace.nodes.end()));
+      if (trace.output != "knee_right") continue;
+      CHECK(trace.getNearestNode() == turned);
+      CHECK(trace.getNearest().kind == DeadPointKind::Output);
+      CHECK(trace.getNearest().distance == Approx(findDeadPoint(robot.linkage, robot.model, there.back()).distance));
+      CHECK(trace.getNearest().distance < 0.2);
+    }
+  }
+}
+
+TEST_CASE("a posture at a dead point has the distance 0, and is no reference of a transmission") {
+  const FourBarChain chain = makeFourBarChain(FourBarChainOptions());
+  const Linkage linkage = makeLinkage(chain.model, chain.q_closed, {"rocker1"});
+  const RatioSweep sweep = sweepRatio(chain.model, linkage, chain.q_closed);
+  REQUIRE_FALSE(sweep.getDeadPoints().empty());
+  for (const RatioSample& sample : sweep.getDeadPoints()) {
+    const VectorXd q = carryLinkage(chain.model, linkage, sample, chain.q_closed);
+    CHECK(findDeadPoint(linkage, chain.model, q).distance < 1e-6);
   }
 }

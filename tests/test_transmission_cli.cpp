@@ -72,16 +72,18 @@ TEST_CASE("ratio prints a table, and the same numbers as JSON, CSV and a figure"
   }
   REQUIRE(out["dead_points"].size() == 2);
   CHECK(out["dead_points"][1]["joints"][0].get<double>() == Approx(1.325557).margin(1e-6));
+  CHECK(out["dead_points"][1]["dead"] == "output");
+  CHECK(out["dead_points"][1]["distance"] == 0);
 
   std::istringstream csv(readFile(directory.str() + "/ratio.csv"));
   std::string line;
   std::getline(csv, line);
   CHECK(line ==
         "s,branch,q.knee_right,q.motor_knee_right,R.motor_knee_right/knee_right,"
-        "dR.motor_knee_right/knee_right,condition,dead");
+        "dR.motor_knee_right/knee_right,condition,distance,dead");
   size_t lines = 0;
   while (std::getline(csv, line)) {
-    CHECK(std::count(line.begin(), line.end(), ',') == 7);
+    CHECK(std::count(line.begin(), line.end(), ',') == 8);
     ++lines;
   }
   CHECK(lines == sweep.samples.size());

@@ -1176,8 +1176,8 @@ def robot_directories() -> List[str]:
 
 class DeadPointKind:
     NONE: ClassVar[DeadPointKind]
-    JOINT: ClassVar[DeadPointKind]
-    MOTOR: ClassVar[DeadPointKind]
+    OUTPUT: ClassVar[DeadPointKind]
+    MOTORS: ClassVar[DeadPointKind]
     __members__: ClassVar[Dict[str, DeadPointKind]]
     def __init__(self, value: int) -> None: ...
     def __int__(self) -> int: ...
@@ -1221,7 +1221,7 @@ class RatioSample:
         ...
     @property
     def branch(self) -> int:
-        """counted by dead points of the joint from the start"""
+        """counted by dead points of the output from the start"""
         ...
     @property
     def joints(self) -> Array:
@@ -1233,7 +1233,7 @@ class RatioSample:
         ...
     @property
     def ratio(self) -> LinkageRatio:
-        """at a dead point of the joint: infinite"""
+        """at a dead point of the output: infinite"""
         ...
     @property
     def dead(self) -> DeadPointKind:
@@ -2609,6 +2609,48 @@ class ElectricalEnergy:
         """total divided by weight and distance"""
         ...
 
+class DeadPoint:
+    """The nearest dead point of a linkage.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, kind: DeadPointKind = ..., distance: float = ...) -> None: ...
+    def replace(self, *, kind: DeadPointKind = ..., distance: float = ...) -> DeadPoint: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def kind(self) -> DeadPointKind:
+        """DeadPointKind: whether the output or the motors stand still there"""
+        ...
+    @property
+    def distance(self) -> float:
+        """largest way of a motor or joint to there, rad or m; inf beyond 0.5"""
+        ...
+
+class DeadPointTrace:
+    """Dead points next to a linkage along a motion.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, output: str = ..., nodes: Sequence[int] = ..., points: Sequence[DeadPoint] = ..., nearest: int = ...) -> None: ...
+    def replace(self, *, output: str = ..., nodes: Sequence[int] = ..., points: Sequence[DeadPoint] = ..., nearest: int = ...) -> DeadPointTrace: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def output(self) -> str:
+        """names of the joints or bodies that the linkage moves"""
+        ...
+    @property
+    def nodes(self) -> Tuple[int, ...]:
+        """where they were looked for, in increasing order"""
+        ...
+    @property
+    def points(self) -> Tuple[DeadPoint, ...]:
+        """DeadPoints of these nodes"""
+        ...
+    @property
+    def nearest(self) -> int:
+        """index of the least distance"""
+        ...
+
 class RunInfo:
     """The request that led to a motion.
 
@@ -2643,8 +2685,8 @@ class Result:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., options: Mapping[str, Union[bool, int, float, str]] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> None: ...
-    def replace(self, *, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., options: Mapping[str, Union[bool, int, float, str]] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> Result: ...
+    def __init__(self, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., options: Mapping[str, Union[bool, int, float, str]] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ..., dead_points: Sequence[DeadPointTrace] = ...) -> None: ...
+    def replace(self, *, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., options: Mapping[str, Union[bool, int, float, str]] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ..., dead_points: Sequence[DeadPointTrace] = ...) -> Result: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def run(self) -> RunInfo:
@@ -2733,6 +2775,10 @@ class Result:
     @property
     def com_lowest(self) -> float:
         """m"""
+        ...
+    @property
+    def dead_points(self) -> Tuple[DeadPointTrace, ...]:
+        """DeadPointTraces: how near each linkage comes to one"""
         ...
     @property
     def converged(self) -> bool:

@@ -52,6 +52,14 @@ void bindResult(py::module_& module) {
       .field("num_assumed", &ElectricalEnergy::num_assumed, "motors whose loss is not known")
       .field("distance", &ElectricalEnergy::distance, "horizontal distance of the centre of mass, m")
       .field("cost_of_transport", &ElectricalEnergy::cost_of_transport, "total divided by weight and distance");
+  Value<DeadPoint>(module, "DeadPoint", "The nearest dead point of a linkage.")
+      .field("kind", &DeadPoint::kind, "DeadPointKind: whether the output or the motors stand still there")
+      .field("distance", &DeadPoint::distance, "largest way of a motor or joint to there, rad or m; inf beyond 0.5");
+  Value<DeadPointTrace>(module, "DeadPointTrace", "Dead points next to a linkage along a motion.")
+      .field("output", &DeadPointTrace::output, "names of the joints or bodies that the linkage moves")
+      .field("nodes", &DeadPointTrace::nodes, "where they were looked for, in increasing order")
+      .field("points", &DeadPointTrace::points, "DeadPoints of these nodes")
+      .field("nearest", &DeadPointTrace::nearest, "index of the least distance");
   Value<RunInfo>(module, "RunInfo", "The request that led to a motion.")
       .field("robot", &RunInfo::robot, "name or path, as given")
       .field("robot_file", &RunInfo::robot_file, "its .urdf, absolute")
@@ -82,6 +90,7 @@ void bindResult(py::module_& module) {
       .field("slip_angle", &MotionResult::slip_angle, "rad")
       .field("com_start", &MotionResult::com_start, "height of the centre of mass, m")
       .field("com_lowest", &MotionResult::com_lowest, "m")
+      .field("dead_points", &MotionResult::dead_points, "DeadPointTraces: how near each linkage comes to one")
       .type()
       .def_property_readonly("converged", &MotionResult::converged, "whether the solver ended at an optimum")
       .def_property_readonly("interrupted", &MotionResult::interrupted,

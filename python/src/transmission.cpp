@@ -33,18 +33,18 @@ NamedSweep sweep(const Model& model, const std::string& joint, const VectorXd& q
 void bindTransmission(py::module_& module) {
   py::enum_<DeadPointKind>(module, "DeadPointKind")
       .value("NONE", DeadPointKind::None)
-      .value("JOINT", DeadPointKind::Joint)
-      .value("MOTOR", DeadPointKind::Motor);
+      .value("OUTPUT", DeadPointKind::Output)
+      .value("MOTORS", DeadPointKind::Motors);
   Value<LinkageRatio>(module, "LinkageRatio", "Speeds of the motors of a linkage by those of its joints, v_M = R v_J.")
       .field("R", &LinkageRatio::R, "(m, m), row of the motor, column of the joint")
       .field("dR", &LinkageRatio::dR, "derivatives of R by each joint, m of (m, m)")
       .field("condition", &LinkageRatio::condition, "largest over smallest singular value of R");
   Value<RatioSample>(module, "RatioSample", "A linkage at one configuration of a sweep.")
       .field("s", &RatioSample::s, "length along the curve from the start, rad or m")
-      .field("branch", &RatioSample::branch, "counted by dead points of the joint from the start")
+      .field("branch", &RatioSample::branch, "counted by dead points of the output from the start")
       .field("joints", &RatioSample::joints, "angles of the linkage's joints (m,), rad or m")
       .field("motors", &RatioSample::motors, "angles of its motors (m,), rad or m")
-      .field("ratio", &RatioSample::ratio, "at a dead point of the joint: infinite")
+      .field("ratio", &RatioSample::ratio, "at a dead point of the output: infinite")
       .field("dead", &RatioSample::dead, "DeadPointKind")
       .field("loses_rank", &RatioSample::loses_rank, "the loops can continue in several ways")
       .field("q", &RatioSample::q, "configuration of the cluster; empty for a motor on the joint");

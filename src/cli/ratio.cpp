@@ -39,7 +39,7 @@ VectorXd findStart(const LoadedRobot& robot, const std::string& reference) {
 double calcLargestBalanceError(const Model& model, const RatioReport& report, const VectorXd& q) {
   double largest = 0;
   for (const RatioSample& sample : report.sweep.samples) {
-    if (sample.dead == DeadPointKind::Joint || sample.loses_rank) continue;
+    if (sample.dead == DeadPointKind::Output || sample.loses_rank) continue;
     const VectorXd whole = carryLinkage(model, report.linkage, sample, q);
     largest = std::max(largest, calcBalanceError(model, report.linkage, whole, sample.ratio.R));
   }
@@ -55,6 +55,7 @@ int run(const RatioArguments& arguments) {
   report.linkage = makeLinkage(model, q, arguments.joints);
   report.sweep = sweepRatio(model, report.linkage, q, 0, arguments.sweep);
   if (report.linkage.size() == 2) report.map = mapRatio(model, report.linkage, q, arguments.grid, arguments.sweep);
+  addDistances(model, report.linkage, q, report.sweep);
   report.balance_error = calcLargestBalanceError(model, report, q);
   std::vector<std::string> written;
   if (!arguments.directory.empty()) {
@@ -97,9 +98,10 @@ void addRatio(CLI::App& app, Action& action) {
       "the\n"
       "joint torques R^T u. dR is its derivative with respect to the swept angle [1/rad]. The linkage is followed\n"
       "from its start until a joint limit, a loss of rank, or a full turn, through its dead points:\n"
-      "  joint  the joint stands still while the motor turns: R is infinite, the angle reverses, another branch "
+      "  output  the joint stands still while the motor turns: R is infinite, the angle reverses, another branch "
       "begins\n"
-      "  motor  the motor stands still while the joint turns: R is zero (singular), the motor does not hold the joint\n"
+      "  motors  the motor stands still while the joint turns: R is zero (singular), the motor does not hold the joint\n"
+      "The distance from the nearest of them is the largest way of a motor or joint to there [rad], up to 0.5.\n"
       "A linkage with two motors gets a 2 x 2 R, its condition number, and a map over both joints, up to the first "
       "dead\n"
       "points. Virtual work is checked by the constrained dynamics of the whole robot at every sample. Figures are "

@@ -43,16 +43,27 @@ Plot makeCurvePlot(const RatioReport& report) {
   for (const Curve& curve : plot.curves)
     for (const auto& [angle, ratio] : curve.points) negative |= ratio < 0;
   plot.y_range = {negative ? -top : 0, top};
-  for (const DeadPointKind kind : {DeadPointKind::Joint, DeadPointKind::Motor}) {
-    const bool joint = kind == DeadPointKind::Joint;
+  for (const DeadPointKind kind : {DeadPointKind::Output, DeadPointKind::Motors}) {
+    const bool joint = kind == DeadPointKind::Output;
     Curve dead{joint ? "dead (joint)" : "dead (motor)", joint ? "#b02020" : "#2060b0", CurveStyle::Lines, true, {}};
     for (const RatioSample& sample : report.sweep.getDeadPoints())
-      if ((sample.dead == DeadPointKind::Joint) == joint)
+      if ((sample.dead == DeadPointKind::Output) == joint)
         dead.points.insert(
             dead.points.end(),
             {{sample.joints[0], plot.y_range->first}, {sample.joints[0], plot.y_range->second}, {NAN, NAN}});
     plot.curves.push_back(dead);
   }
+  return plot;
+}
+
+Plot makeDistancePlot(const RatioReport& report) {
+  Plot plot{"", report.linkage.joint_names[0] + " [rad]", "distance from the nearest dead point [rad]"};
+  Curve curve{"up to 0.5 rad, from the start", kClosedColor, CurveStyle::Lines, false, {}};
+  for (const RatioSample& sample : report.sweep.samples)
+    if (sample.branch == 0 && sample.nearest)
+      curve.points.emplace_back(sample.joints[0],
+                                std::isfinite(sample.nearest->distance) ? sample.nearest->distance : NAN);
+  plot.curves = {curve};
   return plot;
 }
 
@@ -71,6 +82,8 @@ Plot makeMapPlot(const RatioReport& report) {
 
 }  // namespace
 
-Plot makeRatioPlot(const RatioReport& report) { return report.map ? makeMapPlot(report) : makeCurvePlot(report); }
+std::vector<Plot> makeRatioPlots(const RatioReport& report) {
+  return {report.map ? makeMapPlot(report) : makeCurvePlot(report), makeDistancePlot(report)};
+}
 
 }  // namespace bielle::cli

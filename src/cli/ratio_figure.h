@@ -5,7 +5,7 @@
 
 namespace bielle::cli {
 
-// R over the joint angle, or the condition number over both joint angles if there is a map.
-Plot makeRatioPlot(const RatioReport& report);
+// R over the joint angle, or the condition number over both joint angles if there is a map; then the distance from dead points.
+std::vector<Plot> makeRatioPlots(const RatioReport& report);
 
 }  // namespace bielle::cli

@@ -42,14 +42,17 @@ Json listFinite(const std::vector<double>& numbers) {  // JSON has no infinity
 }
 
 Json describeSample(const RatioSample& sample, int swept) {
-  return {{"s", sample.s},
-          {"branch", sample.branch},
-          {"joints", listFinite({sample.joints.begin(), sample.joints.end()})},
-          {"motors", listFinite({sample.motors.begin(), sample.motors.end()})},
-          {"R", listFinite(listEntries(sample.ratio.R))},
-          {"dR", sample.dead == DeadPointKind::Joint ? Json(nullptr) : listFinite(listEntries(sample.ratio.dR[swept]))},
-          {"condition", listFinite({sample.ratio.condition})[0]},
-          {"dead", getName(sample.dead)}};
+  Json json = {
+      {"s", sample.s},
+      {"branch", sample.branch},
+      {"joints", listFinite({sample.joints.begin(), sample.joints.end()})},
+      {"motors", listFinite({sample.motors.begin(), sample.motors.end()})},
+      {"R", listFinite(listEntries(sample.ratio.R))},
+      {"dR", sample.dead == DeadPointKind::Output ? Json(nullptr) : listFinite(listEntries(sample.ratio.dR[swept]))},
+      {"condition", listFinite({sample.ratio.condition})[0]},
+      {"dead", getName(sample.dead)}};
+  if (sample.nearest) json["distance"] = listFinite({sample.nearest->distance})[0];
+  return json;
 }
 
 Json describeSamples(const std::vector<RatioSample>& samples, int swept) {
@@ -71,15 +74,18 @@ std::string formatCsv(const Linkage& linkage, const std::vector<RatioSample>& sa
   for (const std::string& name : linkage.motor_names) text += ",q." + name;
   for (const std::string& name : makeEntryNames(linkage)) text += ",R." + name;
   for (const std::string& name : makeEntryNames(linkage)) text += ",dR." + name;
-  text += ",condition,dead\n";
+  const bool has_distances = !samples.empty() && samples.front().nearest;
+  text += std::string(",condition") + (has_distances ? ",distance" : "") + ",dead\n";
   for (const RatioSample& sample : samples) {
     text += formatExact(sample.s) + "," + std::to_string(sample.branch);
     for (const double x : sample.joints) text += "," + formatExact(x);
     for (const double x : sample.motors) text += "," + formatExact(x);
     for (const double x : listEntries(sample.ratio.R)) text += "," + formatExact(x);
-    const bool infinite = sample.dead == DeadPointKind::Joint;
+    const bool infinite = sample.dead == DeadPointKind::Output;
     for (const double x : listEntries(sample.ratio.dR[swept])) text += "," + (infinite ? "" : formatExact(x));
-    text += "," + formatExact(sample.ratio.condition) + "," + getName(sample.dead) + "\n";
+    text += "," + formatExact(sample.ratio.condition);
+    if (sample.nearest) text += "," + formatExact(sample.nearest->distance);
+    text += std::string(",") + getName(sample.dead) + "\n";
   }
   return text;
 }
@@ -92,18 +98,18 @@ void printSamples(std::ostream& out, const Linkage& linkage, const std::vector<R
   for (const std::string& name : makeEntryNames(linkage)) header.push_back(one ? "R" : "R " + name);
   if (one) header.push_back("dR");
   if (!one) header.push_back("condition");
-  header.push_back("dead point");
+  header.insert(header.end(), {"distance", "dead point"});
   std::vector<Row> rows = {header};
   const auto format = [](double x) { return std::isfinite(x) && std::abs(x) < 1e8 ? formatNumber(x, "%.4f") : "inf"; };
   for (const RatioSample& sample : samples) {
-    const bool infinite = sample.dead == DeadPointKind::Joint;
+    const bool infinite = sample.dead == DeadPointKind::Output;
     Row row = {std::to_string(sample.branch)};
     for (const double x : sample.joints) row.push_back(formatNumber(x, "%.6f"));
     for (const double x : sample.motors) row.push_back(formatNumber(x, "%.6f"));
     for (const double x : listEntries(sample.ratio.R)) row.push_back(format(x));
     if (one) row.push_back(infinite ? "inf" : format(sample.ratio.dR[swept](0, 0)));
     if (!one) row.push_back(format(sample.ratio.condition));
-    row.push_back(getName(sample.dead));
+    row.insert(row.end(), {formatDistance(*sample.nearest), getName(sample.dead)});
     rows.push_back(row);
   }
   printTable(out, rows);
@@ -149,20 +155,27 @@ Json describeReport(const RatioReport& report) {
 void printReport(std::ostream& out, const RatioReport& report) {
   const RatioSweep& sweep = report.sweep;
   double low = INFINITY, high = -INFINITY;
+  std::string start, first, last;  // distances
   for (const RatioSample& sample : sweep.samples) {
+    const std::string distance = formatDistance(*sample.nearest);
+    if (sample.s == 0 || start.empty()) start = distance;
     if (sample.branch != 0) continue;
     low = std::min(low, sample.joints[sweep.joint]);
     high = std::max(high, sample.joints[sweep.joint]);
+    if (first.empty()) first = distance;
+    last = distance;
   }
   out << report.robot << ": " << listItems(report.linkage.joint_names) << " driven by "
       << listItems(report.linkage.motor_names) << "\n";
   const std::string ends = sweep.begin == sweep.end ? sweep.end + ", either way" : sweep.begin + "; " + sweep.end;
-  printTable(out, std::vector<Row>{
-                      {"range of " + report.linkage.joint_names[sweep.joint],
-                       formatNumber(low, "%.6f") + " to " + formatNumber(high, "%.6f") + " (rad, or m), first branch"},
-                      {"ends", sweep.full_turn ? "none: a full turn" : ends},
-                      {"dead points", std::to_string(sweep.getDeadPoints().size())},
-                      {"virtual work", "largest relative error " + formatNumber(report.balance_error, "%.1e")}});
+  printTable(
+      out, std::vector<Row>{
+               {"range of " + report.linkage.joint_names[sweep.joint],
+                formatNumber(low, "%.6f") + " to " + formatNumber(high, "%.6f") + " (rad, or m), first branch"},
+               {"ends", sweep.full_turn ? "none: a full turn" : ends},
+               {"dead points", std::to_string(sweep.getDeadPoints().size())},
+               {"distance from them", start + " at the start; " + first + " and " + last + " at the ends (rad, or m)"},
+               {"virtual work", "largest relative error " + formatNumber(report.balance_error, "%.1e")}});
   out << "\nratio R = motor speed / joint speed" << (report.linkage.isDirect() ? ": the motor sits on the joint" : "")
       << "\n";
   printSamples(out, report.linkage, thinOut(sweep.samples), sweep.joint);
@@ -193,7 +206,7 @@ std::vector<std::string> writeReport(const std::string& directory, const RatioRe
     written.push_back(place("map.csv"));
   }
   json.commit();
-  written.push_back(drawPlots(place("ratio.svg"), {makeRatioPlot(report)})
+  written.push_back(drawPlots(place("ratio.svg"), makeRatioPlots(report))
                         ? place("ratio.svg")
                         : "no figure: gnuplot is not installed (Debian: gnuplot-nox)");
   return written;

@@ -70,6 +70,16 @@ std::string formatConstraints(const FddpSummary& solver) {
          std::to_string(solver.multiplier_updates) + " updates";
 }
 
+// Of linkages that come near one, rad or m.
+std::string formatDeadPoints(const MotionResult& result) {
+  std::string near;
+  for (const DeadPointTrace& linkage : result.dead_points)
+    if (linkage.getNearest().kind != DeadPointKind::None)
+      near += (near.empty() ? "" : ", ") + linkage.output + " " + formatDistance(linkage.getNearest()) + " at " +
+              formatNumber(result.record.time[linkage.getNearestNode()], "%.3g") + " s";
+  return (near.empty() ? formatDistance({}) : near) + " (rad or m)";
+}
+
 // Of a robot that has both kinds of motors, N m and N.
 std::string makeTorqueLabel(const Model& model) {
   bool turning = false, sliding = false;
@@ -102,6 +112,7 @@ void printResult(const Model& model, const MotionResult& result, const std::vect
                            {"contact slip", pair(result.slip_position, result.slip_angle)},
                            {makeTorqueLabel(model), torques},
                            {"electrical energy", formatEnergy(result.energy)}});
+  if (!result.dead_points.empty()) rows.push_back({"dead points", formatDeadPoints(result)});
   printTable(std::cout, rows);
   printTimings(result.timings);
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
@@ -118,9 +129,17 @@ void addReport(const std::string& directory) {
   }
 }
 
-// Printed last, to be noticed: the solver may converge and the check pass although goals are missed.
-void warnOfMissedGoals(const MotionResult& result) {
+// Printed last, to be noticed: the solver may converge and the check pass although goals are missed, or linkages end just
+// before their dead points.
+void warnOfGoalsAndDeadPoints(const MotionResult& result) {
   std::cout.flush();
+  for (const DeadPointTrace& linkage : result.dead_points)
+    if (const DeadPoint& nearest = linkage.getNearest(); nearest.distance < kNearDeadPoint)
+      std::cerr << "bielle: warning: linkage of " << linkage.output << ": " << formatDistance(nearest)
+                << " (rad, m) from a dead point at "
+                << formatNumber(result.record.time[linkage.getNearestNode()], "%.3g")
+                << " s, where motor and joint hardly move each other; request less motion towards it, or a larger "
+                   "--dead-point-margin\n";
   for (const GoalOutcome& outcome : result.goals)
     if (!outcome.met()) std::cerr << "bielle: warning: " << outcome.goal.name << ": " << formatOutcome(outcome) << "\n";
 }
@@ -195,7 +214,7 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   printResult(model, result, writeResult(arguments.directory, result));
   const bool failed = !arguments.no_check && !checkResult(arguments.directory);
   if (!arguments.no_report) addReport(arguments.directory);  // the check is part of it
-  warnOfMissedGoals(result);
+  warnOfGoalsAndDeadPoints(result);
   return result.converged() && !failed ? kOk : kFailed;
 }
 

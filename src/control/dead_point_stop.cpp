@@ -15,7 +15,7 @@ constexpr double kDamping = 0.4;     // k: a share of the motor's speed is taken
 
 DeadPointStop::DeadPointStop(const Model& model, ConstVectorRef q, double stop) : model_(model), stop_(stop) {
   if (stop_ <= 0) return;
-  transmissions_ = listTransmissions(model, q);
+  linkages_ = listLinkages(model, q);
   Workspace ws(model);
   updatePositions(model, ws, q);
   updateMassMatrix(model, ws);
@@ -25,16 +25,15 @@ DeadPointStop::DeadPointStop(const Model& model, ConstVectorRef q, double stop) 
     inertia_[m] = ws.M(dof, dof);
   }
   gradient_.setZero(model.nu());
-  for (const Transmission& transmission : transmissions_)  // allocates its memory
-    calcTransmission(transmission, model, q, gradient_);
+  for (const Linkage& linkage : linkages_) memory_.get(linkage);  // allocates
 }
 
 void DeadPointStop::add(const Measurement& measurement, VectorRef u) {
   period_ = measurement.time > time_ ? measurement.time - time_ : period_;
   time_ = measurement.time;
   if (period_ <= 0) return;  // the first instant
-  for (const Transmission& transmission : transmissions_) {
-    const double rho = calcTransmission(transmission, model_, measurement.q, gradient_);
+  for (const Linkage& linkage : linkages_) {
+    const double rho = calcTransmission(linkage, memory_, model_, measurement.q, gradient_);
     brake(rho, 1, measurement, u);
     if (rho != 0) brake(1 / rho, -1 / (rho * rho), measurement, u);
   }

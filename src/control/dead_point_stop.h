@@ -2,7 +2,7 @@
 /// \file Torques that keep linkages from passing their dead points, at every instant of control.
 ///
 /// Plans keep a margin to dead points (limits.h); a robot that is thrown off its plan may use it up, and past a dead point its
-/// linkage snaps into another configuration. With rho the transmission of a linkage (residual.h), s = rho where its joints, s =
+/// linkage snaps into another configuration. With rho the transmission of a linkage (linkage.h), s = rho where its joints, s =
 /// 1/rho where its motors come to a dead point, and g = ds/dv_M by its motors, the way to the stop at s = s_0 is
 ///     d = (s - s_0) / |g|,    d' = g . v_M / |g|                                                                    (1)
 /// to first order, of the motors, rad or m; s goes through zero at the dead point, so that d does not turn round there.
@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bielle/control/controller.h"
-#include "bielle/ocp/residual.h"
+#include "dynamics/linkage_workspace.h"
 
 namespace bielle {
 
@@ -30,7 +30,8 @@ class DeadPointStop {
 
   Model model_;
   const double stop_;
-  std::vector<Transmission> transmissions_;
+  std::vector<Linkage> linkages_;
+  LinkageWorkspaces memory_;
   VectorXd inertia_;   // of each motor with what follows it (nu)
   VectorXd gradient_;  // nu
   double time_ = 0, period_ = 0;

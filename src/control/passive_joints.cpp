@@ -1,7 +1,5 @@
 #include "control/passive_joints.h"
 
-#include <algorithm>
-
 #include "bielle/model/error.h"
 
 namespace bielle {
@@ -11,46 +9,29 @@ constexpr int kMaxSteps = 12;
 constexpr double kTolerance = 1e-11;  // of a motor's position, rad or m
 constexpr double kLongestStep = 0.2;  // of a motor, rad or m
 
-ReducedCluster makeUnweighted(ReducedCluster cluster) {
-  cluster.metric.setOnes();
-  cluster.inverse_metric.setOnes();
-  cluster.inverse_root.setOnes();
-  return cluster;
-}
-
 }  // namespace
 
-PassiveJoints::Follower::Follower(const ReducedCluster& c)
-    : cluster(makeUnweighted(c)),
+PassiveJoints::Follower::Follower(Linkage of)
+    : linkage(std::move(of)),
+      cluster(*linkage.cluster),
       scratch(cluster),
       state(cluster),
       next(cluster),
-      svd(cluster.size, cluster.size, Eigen::ComputeFullU | Eigen::ComputeFullV) {
-  for (MatrixXd* x : {&N_m, &scaled, &inverse}) x->setZero(cluster.size, cluster.size);
-  T.setZero(cluster.model.nv(), cluster.size);
-  gap.setZero(cluster.size);
-  for (VectorXd* x : {&step, &d}) x->setZero(cluster.model.nv());
-}
+      tangent(cluster),
+      gap(VectorXd::Zero(cluster.size)),
+      d(VectorXd::Zero(cluster.model.nv())) {}
 
 PassiveJoints::PassiveJoints(const Model& model, ConstVectorRef q) : model_(model), places_(model.nv()) {
   const Reduction reduction = makeReduction(model, q);
   followers_.reserve(reduction.clusters.size());
-  for (const ReducedCluster& cluster : reduction.clusters) {
-    Follower& follower = followers_.emplace_back(cluster);
-    for (int m = 0; m < model.nu(); ++m) {
-      const auto found = std::find(cluster.joints.begin(), cluster.joints.end(), model.motors()[m].joint);
-      if (found == cluster.joints.end()) continue;
-      const Joint& joint = cluster.model.joints()[found - cluster.joints.begin() + 1];  // the first one is the world
-      follower.motors.push_back(m);
-      follower.dofs.push_back(joint.idx_v);
-      follower.positions.push_back(joint.idx_q);
-    }
-    const std::string closure = model.closures()[cluster.closure_indices.front()].name;
-    if (static_cast<int>(follower.motors.size()) != cluster.size)
-      throw ModelError(model.name(), "closure '" + closure + "'",
-                       "its linkage has " + std::to_string(follower.motors.size()) + " motors and mobility " +
-                           std::to_string(cluster.size),
-                       "an estimator needs as many motors as mobility");
+  for (Linkage& linkage : selectLinkages(model, reduction)) {
+    const ReducedCluster& cluster = *linkage.cluster;
+    if (linkage.size() != cluster.size)
+      throw ModelError(
+          model.name(), "closure '" + model.closures()[cluster.closure_indices.front()].name + "'",
+          "its linkage has " + std::to_string(linkage.size()) + " motors and mobility " + std::to_string(cluster.size),
+          "an estimator needs as many motors as mobility");
+    followers_.emplace_back(std::move(linkage));
     for (size_t k = 0; k < cluster.dofs.size(); ++k)
       places_[cluster.dofs[k]] = {static_cast<int>(followers_.size()) - 1, static_cast<int>(k)};
   }
@@ -72,39 +53,26 @@ bool PassiveJoints::reset(ConstVectorRef q) {
     gatherConfiguration(model_, f.cluster, q, f.state.basis.q);
     f.next.basis.q = f.state.basis.q;
     regular = updateClusterState<double>(f.cluster, f.scratch, f.next.basis.q, f.state) && regular;
-    updateTangent(f);
+    f.updateTangent();
   }
   return regular;
-}
-
-// T, and the smallest singular value of N_m.
-double PassiveJoints::updateTangent(Follower& f) {
-  for (size_t m = 0; m < f.dofs.size(); ++m) f.N_m.row(m) = f.state.basis.N.row(f.dofs[m]);
-  f.svd.compute(f.N_m);
-  const auto& sigma = f.svd.singularValues();
-  const double least = sigma[sigma.size() - 1];
-  const double damping = std::max(0.0, kDeadPointMargin * kDeadPointMargin - least * least);
-  f.scaled = f.svd.matrixV();
-  for (Eigen::Index i = 0; i < sigma.size(); ++i) f.scaled.col(i) *= sigma[i] / (sigma[i] * sigma[i] + damping);
-  f.inverse.noalias() = f.scaled * f.svd.matrixU().transpose();
-  f.T.noalias() = f.state.basis.N * f.inverse;
-  return least;
 }
 
 // False if it does not close; the last closed state is kept.
 bool PassiveJoints::follow(Follower& f, ConstVectorRef positions) {
   for (int i = 0; i < kMaxSteps; ++i) {
-    for (size_t m = 0; m < f.motors.size(); ++m) f.gap[m] = positions[f.motors[m]] - f.state.basis.q[f.positions[m]];
+    for (int m = 0; m < f.linkage.size(); ++m)
+      f.gap[m] = positions[f.linkage.motors[m]] - f.state.basis.q[f.linkage.motor_positions[m]];
     const double largest = f.gap.cwiseAbs().maxCoeff();
     if (!(largest < std::numeric_limits<double>::infinity())) return false;
     if (largest < kTolerance) return true;
     if (largest > kLongestStep) f.gap *= kLongestStep / largest;
-    f.d.noalias() = f.T * f.gap;
+    f.d.noalias() = f.tangent.T() * f.gap;
     if (!closeCluster<double>(f.cluster, f.scratch, f.state.basis, f.d, no_guess_, f.next)) return false;
     std::swap(f.state, f.next);
-    updateTangent(f);
+    f.updateTangent();
   }
-  return f.svd.singularValues().minCoeff() < kDeadPointMargin;
+  return f.margin < kDeadPointMargin;
 }
 
 ClosingStatus PassiveJoints::update(ConstVectorRef positions, VectorRef q) {
@@ -112,9 +80,8 @@ ClosingStatus PassiveJoints::update(ConstVectorRef positions, VectorRef q) {
   margin_ = 1;
   for (Follower& f : followers_) {
     if (!follow(f, positions)) status = ClosingStatus::NotClosed;
-    const double least = f.svd.singularValues()[f.cluster.size - 1];
-    if (least < margin_) {
-      margin_ = least;
+    if (f.margin < margin_) {
+      margin_ = f.margin;
       weakest_ = &f.cluster.closures.closures.front().name;
     }
     scatterConfiguration(model_, f.cluster, f.state.basis.q, q);

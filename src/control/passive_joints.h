@@ -6,12 +6,11 @@
 ///     v = T v_m,   T = N N_m^-1                                                                                     (1)
 /// and its configuration by Newton steps, d = T (q_m - q) closed again by reduction.h, Eq. (2). The smallest singular value
 /// of N_m, the least that the motors move in a unit motion of the cluster, is zero at a dead point, where the linkage
-/// moves though its motors stand. Near one, N_m^-1 is replaced by the damped V diag(s / (s^2 + e^2 - s_min^2)) U^T.
+/// moves though its motors stand. Near one, N_m^-1 is damped (LinkageTangent).
 #include <string>
 #include <vector>
 
-#include "dynamics/reduction.h"
-#include "math/decompositions.h"
+#include "dynamics/linkage_workspace.h"
 
 namespace bielle {
 
@@ -47,7 +46,8 @@ class PassiveJoints {
       return;
     }
     const Follower& follower = followers_[place.cluster];
-    for (size_t m = 0; m < follower.motors.size(); ++m) visit(follower.motors[m], follower.T(place.index, m));
+    for (int m = 0; m < follower.linkage.size(); ++m)
+      visit(follower.linkage.motors[m], follower.tangent.T()(place.index, m));
   }
   /// Whether a joint belongs to a linkage.
   bool isLinked(const Joint& joint) const { return places_[joint.idx_v].cluster >= 0; }
@@ -57,20 +57,19 @@ class PassiveJoints {
 
  private:
   struct Follower {
-    explicit Follower(const ReducedCluster& cluster);
-    ReducedCluster cluster;
-    std::vector<int> motors, dofs, positions;  // of the motors: in the model; in the cluster's v and q
+    explicit Follower(Linkage of);
+    void updateTangent() { margin = tangent.update(state.basis.N, linkage.motor_dofs, kDeadPointMargin); }
+    Linkage linkage;
+    const ReducedCluster& cluster;  // of the linkage
     ClusterScratch scratch;
     ClusterState state, next;
-    Eigen::JacobiSVD<MatrixXd> svd;  // of N_m
-    MatrixXd N_m, scaled, inverse;   // size x size
-    MatrixXd T;                      // n x size
-    VectorXd gap, step, d;           // size; n; n
+    LinkageTangent tangent;  // T
+    double margin = 0;       // the smallest singular value of N_m
+    VectorXd gap, d;         // size; n
   };
   struct Place {
     int cluster = -1, index = -1;  // row of T of a cluster; without one, a motor, or nothing for a free-flyer
   };
-  static double updateTangent(Follower& follower);
   bool follow(Follower& follower, ConstVectorRef positions);
 
   const Model& model_;

@@ -2,7 +2,7 @@
 /// \file Conditioning of a linkage: how well its motors determine it.
 #include <vector>
 
-#include "dynamics/reduction.h"
+#include "dynamics/linkage_workspace.h"
 
 namespace bielle {
 
@@ -20,8 +20,6 @@ class LinkageConditioning {
   /// The model must outlive it.
   /// \param q  closed configuration at which ranks are determined. \throws ModelError as makeReduction
   LinkageConditioning(const Model& model, ConstVectorRef q, LinkageSide side = LinkageSide::Motors);
-  LinkageConditioning(const LinkageConditioning&) = delete;
-  LinkageConditioning& operator=(const LinkageConditioning&) = delete;
   /// The worst cluster at a closed configuration; infinite if one has lost rank.
   double calc(ConstVectorRef q);
   /// The inverse of each cluster, in their order: sigma_min(Q_M), 0 if it has lost rank.
@@ -29,13 +27,12 @@ class LinkageConditioning {
 
  private:
   struct Entry {
-    const ReducedCluster* cluster;
-    std::vector<int> rows;  // positions among the dofs of the cluster
+    std::shared_ptr<const ReducedCluster> cluster;
+    std::vector<int> dofs;  // of the cluster
     ClusterPoint point;
     VectorXd q;
   };
   const Model& model_;
-  Reduction reduction_;
   std::vector<Entry> entries_;
 };
 

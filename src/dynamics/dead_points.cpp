@@ -1,28 +1,30 @@
-// The nearest dead point of a linkage: a volume (1) of transmission.h vanishes there.
+// The nearest dead point of a linkage: a volume (1) of linkage.h vanishes there.
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <set>
 
-#include "dynamics/transmission_map.h"
+#include "bielle/model/error.h"
+#include "dynamics/linkage_workspace.h"
 #include "math/decompositions.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
-}  // namespace
-
 // A volume at the configuration of the point, and its gradient by the coordinates of N (m). With X the rows of motors
 // or O, and dN = -J^+ J' N, ds = s tr((X N)^+ (X' - X J^+ J') N).
-double TransmissionMap::calcVolume(Scratch& s, DeadPoint::Kind kind, VectorXd& gradient) const {
+double calcVolume(const Linkage& linkage, LinkageWorkspace& s, DeadPointKind kind, VectorXd& gradient) {
   const ClusterBasis& basis = s.point.basis();
-  const int m = countMotors();
-  const bool twists = kind == DeadPoint::Kind::Output && joints_.empty();
-  const std::vector<int>& rows = kind == DeadPoint::Kind::Output ? joints_ : motors_;
+  const int m = linkage.size();
+  const bool twists = kind == DeadPointKind::Output && linkage.joints.empty();
+  const std::vector<int>& rows = kind == DeadPointKind::Output ? linkage.joint_dofs : linkage.motor_dofs;
   MatrixXd X;
   if (twists) {
-    updateOutputs(s.point.workspace(), s.O);
+    updateOutput(linkage, s.point.workspace(), s.O);
     X = s.O;
   } else {
     X.setZero(m, basis.N.rows());
@@ -39,32 +41,47 @@ double TransmissionMap::calcVolume(Scratch& s, DeadPoint::Kind kind, VectorXd& g
   s.point.solveGram(y);
   gradient.setZero(m);
   for (int j = 0; j < m; ++j) {
-    updateDrift(s, basis.N.col(j));
+    updateDrift(linkage, s, basis.N.col(j));
     Eigen::RowVectorXd along = Eigen::RowVectorXd::Zero(basis.N.rows());
-    for (int i = 0; i < cluster_.rank; ++i) along -= y(i, j) * s.drift.row(basis.rows[i]);
+    for (int i = 0; i < linkage.cluster->rank; ++i) along -= y(i, j) * s.drift.row(basis.rows[i]);
     if (twists) along += C.row(j) * s.turn;
     gradient += (along * basis.N).transpose();
   }
   return sigma.prod();
 }
 
+// The largest way of the coordinates whose ways are distances.
+double calcWay(const Linkage& linkage, const VectorXd& from, const VectorXd& to) {
+  double largest = 0;
+  const auto add = [&](int i) {
+    if (i >= 0) largest = std::max(largest, std::abs(to[i] - from[i]));
+  };
+  for (int i : linkage.motor_positions) add(i);
+  for (int i : linkage.joint_positions) add(i);
+  if (linkage.joints.empty())
+    for (const Joint& joint : linkage.cluster->model.joints())
+      if (joint.nv == 1) add(joint.idx_q);
+  return largest;
+}
+
 // The way from a configuration to where a volume vanishes; infinite if that is not within kFarthestDeadPoint.
-double TransmissionMap::follow(const VectorXd& start, DeadPoint::Kind kind, int side) const {
+double follow(const Linkage& linkage, const VectorXd& start, DeadPointKind kind, int side) {
   constexpr double kLongestStep = 0.1, kDead = 1e-9;  // in all coordinates of the cluster; of a volume
   constexpr int kMostSteps = 100;
-  Scratch here(*this), there(*this);
-  if (!here.point.update(cluster_, start)) return kNone;
+  const ReducedCluster& cluster = *linkage.cluster;
+  LinkageWorkspace here(linkage), there(linkage);
+  if (!here.point.update(cluster, start)) return kNone;
   VectorXd gradient, way, before;
   bool near = false;  // within the reach of Newton's method, whichever the side
   for (int step = 0; step < kMostSteps; ++step) {
-    const double volume = calcVolume(here, kind, gradient);
+    const double volume = calcVolume(linkage, here, kind, gradient);
     const MatrixXd& N = here.point.basis().N;
     if (volume < kDead) {
-      const double distance = calcWay(start, here.point.basis().q);
+      const double distance = calcWay(linkage, start, here.point.basis().q);
       return distance <= kFarthestDeadPoint ? distance : kNone;
     }
     const double slope = gradient.norm();
-    if (countMotors() > 1 || near) {
+    if (linkage.size() > 1 || near) {
       if (!(slope > 1e-6 * volume)) return kNone;
       way = N * (-gradient / slope);
     } else {
@@ -74,35 +91,89 @@ double TransmissionMap::follow(const VectorXd& start, DeadPoint::Kind kind, int 
     const double rate = (N.transpose() * way).dot(gradient);
     const double root = rate < 0 ? volume / -rate : kNone;
     if (root < kLongestStep) near = true;
-    if (!there.point.close(cluster_, here.point.basis(), std::min(root, kLongestStep) * way, VectorXd())) return kNone;
+    if (!there.point.close(cluster, here.point.basis(), std::min(root, kLongestStep) * way, VectorXd())) return kNone;
     before = way;
     std::swap(here.point, there.point);
-    if (!(calcWay(start, here.point.basis().q) < kFarthestDeadPoint + kLongestStep)) return kNone;
+    if (!(calcWay(linkage, start, here.point.basis().q) < kFarthestDeadPoint + kLongestStep)) return kNone;
   }
   return kNone;
 }
 
-double TransmissionMap::calcWay(const VectorXd& from, const VectorXd& to) const {
-  double largest = 0;
-  for (int i : ways_) largest = std::max(largest, std::abs(to[i] - from[i]));
-  return largest;
+// Nodes where the transmission is a least or a largest one among its neighbours: the least of the least and the largest of
+// the largest, whose values differ.
+void addExtremes(VectorXd rho, std::set<int>& nodes) {
+  constexpr int kMost = 4;
+  constexpr double kApart = 0.01;  // relative
+  const int last = static_cast<int>(rho.size()) - 1;
+  std::vector<int> order(rho.size());
+  std::iota(order.begin(), order.end(), 0);
+  for (const double sign : {1.0, -1.0}) {  // least, largest
+    const auto get = [&](int k) { return sign * rho[std::clamp(k, 0, last)]; };
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return get(a) < get(b); });
+    int count = 0, before = -1;
+    for (int k : order) {
+      if (count == kMost) break;
+      if (get(k) > get(k - 1) || get(k) > get(k + 1)) continue;
+      if (before >= 0 && get(k) - get(before) < kApart * std::abs(get(before))) continue;
+      nodes.insert(k);
+      before = k;
+      ++count;
+    }
+  }
 }
 
-DeadPoint TransmissionMap::findDeadPoint(const Model& model, ConstVectorRef q) const {
-  VectorXd start(cluster_.model.nq());
-  gatherConfiguration(model, cluster_, q, start);
-  DeadPoint nearest{DeadPoint::Kind::None, kNone};
-  for (DeadPoint::Kind kind : {DeadPoint::Kind::Output, DeadPoint::Kind::Motors})
+}  // namespace
+
+const char* getName(DeadPointKind kind) {
+  return kind == DeadPointKind::Output ? "output" : kind == DeadPointKind::Motors ? "motors" : "";
+}
+
+std::string formatDistance(const DeadPoint& point) {
+  const bool far = point.kind == DeadPointKind::None;
+  return far ? "over " + formatNumber(kFarthestDeadPoint, "%.2g") : formatNumber(point.distance, "%.2g");
+}
+
+DeadPoint findDeadPoint(const Linkage& linkage, const Model& model, ConstVectorRef q) {
+  DeadPoint nearest{DeadPointKind::None, kNone};
+  if (linkage.isDirect() || linkage.size() > kMostLinkageMobility) return nearest;
+  VectorXd start(linkage.cluster->model.nq());
+  gatherConfiguration(model, *linkage.cluster, q, start);
+  for (DeadPointKind kind : {DeadPointKind::Output, DeadPointKind::Motors})
     for (int side : {-1, 1}) {
-      if (side > 0 && countMotors() > 1) continue;
-      const double distance = follow(start, kind, side);
+      if (side > 0 && linkage.size() > 1) continue;
+      const double distance = follow(linkage, start, kind, side);
       if (distance < nearest.distance) nearest = {kind, distance};
     }
   return nearest;
 }
 
-DeadPoint findDeadPoint(const Transmission& transmission, const Model& model, ConstVectorRef q) {
-  return transmission.data->findDeadPoint(model, q);
+std::vector<DeadPointTrace> traceDeadPoints(const Model& model, const RowMatrixXd& qs, int samples) {
+  std::vector<Linkage> linkages;
+  if (!qs.allFinite()) return {};
+  try {
+    linkages = listLinkagesAnywhere(model, qs.row(0).transpose());
+  } catch (const ModelError&) {  // its loops are open
+    return {};
+  }
+  std::vector<DeadPointTrace> traces;
+  LinkageWorkspaces memory;
+  for (const Linkage& linkage : linkages) {
+    VectorXd rho(qs.rows());
+    for (Eigen::Index k = 0; k < qs.rows(); ++k) {
+      const double value = calcTransmission(linkage, memory, model, qs.row(k).transpose(), nullptr);
+      rho[k] = std::isfinite(value) ? value : 0;
+    }
+    std::set<int> nodes = {0, static_cast<int>(qs.rows()) - 1};
+    addExtremes(rho, nodes);
+    for (int i = 0; i < samples; ++i) nodes.insert(static_cast<int>(i * (qs.rows() - 1) / std::max(samples - 1, 1)));
+    DeadPointTrace trace{linkage.output, {nodes.begin(), nodes.end()}, {}, 0};
+    for (int k : trace.nodes) trace.points.push_back(findDeadPoint(linkage, model, qs.row(k).transpose()));
+    const auto is_nearer = [](const DeadPoint& a, const DeadPoint& b) { return a.distance < b.distance; };
+    trace.nearest =
+        static_cast<int>(std::min_element(trace.points.begin(), trace.points.end(), is_nearer) - trace.points.begin());
+    traces.push_back(std::move(trace));
+  }
+  return traces;
 }
 
 }  // namespace bielle

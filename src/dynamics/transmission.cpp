@@ -1,24 +1,14 @@
-#include "bielle/dynamics/transmission.h"
-
+// The transmission of a linkage: Eqs. (2) and (3) of linkage.h.
 #include <algorithm>
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
-#include "dynamics/transmission_map.h"
+#include "dynamics/linkage_workspace.h"
 #include "model/listing.h"
 
 namespace bielle {
 namespace {
-
-// The dofs of the cluster that belong to these joints of the whole model.
-std::vector<int> findDofs(const Model& model, const ReducedCluster& cluster, const std::vector<int>& joints) {
-  std::vector<int> dofs;
-  for (int joint : joints)
-    for (size_t k = 0; k < cluster.dofs.size(); ++k)
-      if (model.dofs()[cluster.dofs[k]].joint == joint) dofs.push_back(static_cast<int>(k));
-  return dofs;
-}
 
 // Bodies of the cluster that carry other joints or soles; if there are none of these, frames.
 std::vector<int> findCarriers(const Model& model, const ReducedCluster& cluster) {
@@ -36,190 +26,88 @@ std::vector<int> findCarriers(const Model& model, const ReducedCluster& cluster)
   return carriers;
 }
 
+// Takes bodies as the output.
+void setBodies(const Model& model, const std::vector<int>& bodies, ConstVectorRef q_reference, Linkage& linkage) {
+  const ReducedCluster& cluster = *linkage.cluster;
+  VectorXd q(cluster.model.nq());
+  gatherConfiguration(model, cluster, q_reference, q);
+  Workspace ws(cluster.model);
+  updatePositions(cluster.model, ws, q);
+  for (auto* list : {&linkage.joints, &linkage.joint_dofs, &linkage.joint_positions}) list->clear();
+  linkage.joint_names.clear();
+  std::vector<std::string> names;
+  double size = 0;
+  for (int body : bodies) {
+    names.push_back(model.bodies()[body].name);
+    const auto found = std::find(cluster.joints.begin(), cluster.joints.end(), body);
+    Closure twist;
+    twist.kind = ClosureKind::Weld6D;
+    twist.body1 = static_cast<int>(found - cluster.joints.begin()) + 1;  // the first one is the root
+    twist.dofs = cluster.model.supportDofs(twist.body1);
+    twist.signs.assign(twist.dofs.size(), 1);
+    for (int b = 1; b < cluster.model.numBodies(); ++b)
+      size = std::max(size, (ws.X_WB[b].p - ws.X_WB[twist.body1].p).norm());
+    linkage.bodies.push_back(std::move(twist));
+  }
+  linkage.length = size > 0 ? size : 1;
+  linkage.output = listItems(names);
+}
+
+void scaleLengths(const Linkage& linkage, MatrixXd& rows) {
+  for (size_t i = 0; i < linkage.bodies.size(); ++i)
+    rows.middleRows<3>(6 * static_cast<Eigen::Index>(i)) /= linkage.length;
+}
+
 template <typename Out>
 void takeRows(const MatrixXd& all, const std::vector<int>& rows, Out& out) {
   for (size_t i = 0; i < rows.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = all.row(rows[i]);
 }
 
-}  // namespace
-
-TransmissionMap::Scratch::Scratch(const TransmissionMap& of)
-    : point(of.cluster_),
-      q(of.cluster_.model.nq()),
-      T(of.cluster_.dofs.size(), of.countMotors()),
-      z(T),
-      y(of.cluster_.rank, of.countMotors()),
-      drift(of.cluster_.closures.rows, of.cluster_.dofs.size()),
-      O(MatrixXd::Zero(of.joints_.empty() ? of.output_rows_ : 0, of.cluster_.dofs.size())),
-      turn(O),
-      Q(of.output_rows_, of.countMotors()),
-      Q_inverse(of.countMotors(), of.output_rows_),
-      derivative(of.cluster_.dofs.size()),
-      N_M(of.countMotors(), of.countMotors()),
-      inverse(N_M) {}
-
-// Scratch memory for as long as it lives; there is one per thread at a time.
-class TransmissionMap::Lease {
- public:
-  explicit Lease(const TransmissionMap& of) : of_(of) {
-    const std::lock_guard<std::mutex> lock(of_.mutex_);
-    if (of_.free_.empty()) of_.free_.push_back(std::make_unique<Scratch>(of_));
-    scratch_ = std::move(of_.free_.back());
-    of_.free_.pop_back();
-  }
-  ~Lease() {
-    const std::lock_guard<std::mutex> lock(of_.mutex_);
-    of_.free_.push_back(std::move(scratch_));
-  }
-  Lease(const Lease&) = delete;
-  Lease& operator=(const Lease&) = delete;
-  Scratch& operator*() const { return *scratch_; }
-
- private:
-  const TransmissionMap& of_;
-  std::unique_ptr<Scratch> scratch_;
-};
-
-TransmissionMap::TransmissionMap(ReducedCluster cluster, int index, std::vector<int> motors, std::vector<int> joints,
-                                 const std::vector<int>& bodies, const Model& model, ConstVectorRef q_reference)
-    : cluster_(std::move(cluster)), index_(index), motors_(std::move(motors)), joints_(std::move(joints)) {
-  cluster_.metric.setOnes();
-  cluster_.inverse_metric.setOnes();
-  cluster_.inverse_root.setOnes();
-  if (joints_.empty()) addOutputs(bodies, model, q_reference);
-  output_rows_ = joints_.empty() ? 6 * static_cast<int>(outputs_.size()) : countMotors();
-  addWays();
-  Scratch scratch(*this);
-  gatherConfiguration(model, cluster_, q_reference, scratch.q);
-  if (!updateTangent(scratch, cluster_, nullptr))
-    throw ModelError(model.name(), describe(model), "its closures lose rank", "");
-  reference_ = scratch.Q;
-  const double volume = evaluate(scratch.Q);
-  constexpr double kSingular = 1e-9;
-  regular_ = std::abs(volume) > kSingular && std::abs(volume) < 1 / kSingular;
-  if (!regular_ && !joints_.empty())
-    throw ModelError(model.name(), describe(model), "the given posture is a dead point", "give another posture");
-  reference_volume_ = volume;
+const ReducedCluster& getCluster(const Linkage& linkage, const LoopBases* bases) {
+  return bases ? bases->getCluster(linkage.index) : *linkage.cluster;
 }
 
-std::string TransmissionMap::describe(const Model& model) const {
-  return "linkage of joint '" + model.joints()[cluster_.joints.front()].name + "'";
-}
-
-double TransmissionMap::calc(const Model& model, ConstVectorRef q, const LoopBases* bases) const {
-  if (bases && !joints_.empty()) {  // needs no kinematics
-    const MatrixXd& N = bases->getBasis(index_).N;
-    Small N_M(countMotors(), countMotors()), N_O(N_M);
-    takeRows(N, motors_, N_M);
-    takeRows(N, joints_, N_O);
-    return N_O.determinant() / N_M.determinant() / reference_volume_;
-  }
-  const Lease lease(*this);
-  Scratch& s = *lease;
-  gatherConfiguration(model, cluster_, q, s.q);
-  return updateTangent(s, getCluster(bases), getBasis(bases)) ? evaluate(s.Q) : 0;
-}
-
-void TransmissionMap::calcJacobian(const Model& model, ConstVectorRef q, MatrixRef row, const LoopBases* bases) const {
-  const Lease lease(*this);
-  Scratch& s = *lease;
-  gatherConfiguration(model, cluster_, q, s.q);
-  for (int dof : cluster_.dofs) row(0, dof) = 0;
-  if (!updateTangent(s, getCluster(bases), getBasis(bases))) return;
-  updateDerivative(s, getCluster(bases));
-  for (size_t k = 0; k < cluster_.dofs.size(); ++k) row(0, cluster_.dofs[k]) = s.derivative[k];
-}
-
-double TransmissionMap::calcByMotors(const Model& model, ConstVectorRef q, VectorRef gradient) const {
-  const Lease lease(*this);
-  Scratch& s = *lease;
-  gatherConfiguration(model, cluster_, q, s.q);
-  gradient.setZero();
-  if (!updateTangent(s, cluster_, nullptr)) return 0;
-  updateDerivative(s, cluster_);
-  for (int j = 0; j < countMotors(); ++j) {
-    const int dof = cluster_.dofs[motors_[j]];
-    for (int m = 0; m < model.nu(); ++m)
-      if (model.motors()[m].dof == dof) gradient[m] = s.derivative.dot(s.T.col(j));
-  }
-  return evaluate(s.Q);
-}
-
-void TransmissionMap::addOutputs(const std::vector<int>& bodies, const Model& model, ConstVectorRef q_reference) {
-  VectorXd q(cluster_.model.nq());
-  gatherConfiguration(model, cluster_, q_reference, q);
-  Workspace ws(cluster_.model);
-  updatePositions(cluster_.model, ws, q);
-  double size = 0;
-  for (int body : bodies) {
-    const auto found = std::find(cluster_.joints.begin(), cluster_.joints.end(), body);
-    Closure twist;
-    twist.kind = ClosureKind::Weld6D;
-    twist.body1 = static_cast<int>(found - cluster_.joints.begin()) + 1;  // the first one is the root
-    twist.dofs = cluster_.model.supportDofs(twist.body1);
-    twist.signs.assign(twist.dofs.size(), 1);
-    for (int b = 1; b < cluster_.model.numBodies(); ++b)
-      size = std::max(size, (ws.X_WB[b].p - ws.X_WB[twist.body1].p).norm());
-    outputs_.push_back(std::move(twist));
-  }
-  length_ = size > 0 ? size : 1;
-}
-
-void TransmissionMap::addWays() {
-  for (size_t i = 0; i < cluster_.joints.size(); ++i) {
-    const Joint& joint = cluster_.model.joints()[i + 1];  // the first one is the root
-    if (joint.nv == 1 && (joints_.empty() || contains(motors_, joint.idx_v) || contains(joints_, joint.idx_v)))
-      ways_.push_back(joint.idx_q);
-  }
-}
-
-void TransmissionMap::scaleLengths(MatrixXd& rows) const {
-  for (size_t i = 0; i < outputs_.size(); ++i) rows.middleRows<3>(6 * static_cast<Eigen::Index>(i)) /= length_;
-}
-
-void TransmissionMap::updateOutputs(const Workspace& ws, MatrixXd& O) const {
-  for (size_t i = 0; i < outputs_.size(); ++i)
-    calcClosureJacobian<double>(ws, outputs_[i], O.middleRows(6 * static_cast<Eigen::Index>(i), 6));
-  scaleLengths(O);
-}
-
-bool TransmissionMap::updateTangent(Scratch& s, const ReducedCluster& cluster, const ClusterBasis* given) const {
-  if (given) {
-    s.basis = given;
+// T and Q of Eq. (2) at s.q, from the given basis of the cluster or a new one.
+bool updateTangent(const Linkage& linkage, LinkageWorkspace& s, const LoopBases* bases) {
+  const ReducedCluster& cluster = getCluster(linkage, bases);
+  if (bases) {
+    s.basis = &bases->getBasis(linkage.index);
     updatePositions(cluster.model, s.point.workspace(), s.q);
   } else {
     if (!s.point.update(cluster, s.q)) return false;
     s.basis = &s.point.basis();
   }
-  takeRows(s.basis->N, motors_, s.N_M);
+  takeRows(s.basis->N, linkage.motor_dofs, s.N_M);
   s.inverse = s.N_M.inverse();
   s.T.noalias() = s.basis->N * s.inverse;
-  if (joints_.empty()) {
-    updateOutputs(s.point.workspace(), s.O);
+  if (linkage.joints.empty()) {
+    updateOutput(linkage, s.point.workspace(), s.O);
     s.Q.noalias() = s.O * s.T;
   } else {
-    takeRows(s.T, joints_, s.Q);
+    takeRows(s.T, linkage.joint_dofs, s.Q);
   }
   return s.Q.allFinite();
 }
 
-double TransmissionMap::evaluate(const MatrixXd& Q) const {
-  Small square(countMotors(), countMotors());
-  if (!joints_.empty()) {
+// rho of Eq. (2).
+double evaluate(const Linkage& linkage, const MatrixXd& Q) {
+  LinkageWorkspace::Small square(linkage.size(), linkage.size());
+  if (!linkage.joints.empty()) {
     square = Q;
-    return square.determinant() / reference_volume_;
+    return square.determinant() / linkage.reference_volume;
   }
-  square.noalias() = reference_.transpose() * Q;
+  square.noalias() = linkage.reference.transpose() * Q;
   const double sign = square.determinant() < 0 ? -1 : 1;
   square.noalias() = Q.transpose() * Q;
-  return sign * std::sqrt(std::max(0.0, square.determinant())) / reference_volume_;
+  return sign * std::sqrt(std::max(0.0, square.determinant())) / linkage.reference_volume;
 }
 
-void TransmissionMap::updateDerivative(Scratch& s, const ReducedCluster& cluster) const {
-  const int m = countMotors();
-  const double rho = evaluate(s.Q);
+// Eq. (3) at the configuration of the last updateTangent(), by the dofs of the cluster.
+void updateDerivative(const Linkage& linkage, LinkageWorkspace& s, const ReducedCluster& cluster) {
+  const int m = linkage.size();
+  const double rho = evaluate(linkage, s.Q);
   // z = (Q^+ O - P_M)^T: by columns the y_j before J^+.
-  if (joints_.empty()) {
+  if (linkage.joints.empty()) {
     s.N_M.noalias() = s.Q.transpose() * s.Q;
     s.inverse = s.N_M.inverse();
     s.Q_inverse.noalias() = s.inverse * s.Q.transpose();
@@ -229,77 +117,140 @@ void TransmissionMap::updateDerivative(Scratch& s, const ReducedCluster& cluster
     s.inverse = s.N_M.inverse();
     s.z.setZero();
     for (int i = 0; i < m; ++i)
-      for (int j = 0; j < m; ++j) s.z(joints_[i], j) += s.inverse(j, i);
+      for (int j = 0; j < m; ++j) s.z(linkage.joint_dofs[i], j) += s.inverse(j, i);
   }
-  for (int j = 0; j < m; ++j) s.z(motors_[j], j) -= 1;
+  for (int j = 0; j < m; ++j) s.z(linkage.motor_dofs[j], j) -= 1;
   s.z.array().colwise() *= cluster.inverse_metric.array();
   s.y.noalias() = s.basis->J * s.z;
   solveGram(*s.basis, s.y);
   s.derivative.setZero();
   for (int j = 0; j < m; ++j) {
-    updateDrift(s, s.T.col(j));
+    updateDrift(linkage, s, s.T.col(j));
     for (int i = 0; i < cluster.rank; ++i)
       s.derivative.noalias() -= rho * s.y(i, j) * s.drift.row(s.basis->rows[i]).transpose();
-    if (joints_.empty()) s.derivative.noalias() += rho * (s.turn.transpose() * s.Q_inverse.row(j).transpose());
+    if (linkage.joints.empty()) s.derivative.noalias() += rho * (s.turn.transpose() * s.Q_inverse.row(j).transpose());
   }
 }
 
-void TransmissionMap::updateDrift(Scratch& s, ConstVectorRef v) const {
-  Workspace& ws = s.point.workspace();
-  updateVelocities(cluster_.model, ws, v);
-  s.drift.setZero();
-  for (size_t c = 0; c < cluster_.closures.closures.size(); ++c) {
-    const Closure& closure = cluster_.closures.closures[c];
-    calcClosureVelocityDerivative(ws, closure, s.drift.middleRows(cluster_.closures.offsets[c], getRows(closure.kind)));
-  }
-  for (size_t i = 0; i < outputs_.size(); ++i)
-    calcClosureVelocityDerivative(ws, outputs_[i], s.turn.middleRows(6 * static_cast<Eigen::Index>(i), 6));
-  scaleLengths(s.turn);
+// At the reference, where Q_0 may be zero or infinite.
+void setReference(const Model& model, ConstVectorRef q_reference, Linkage& linkage) {
+  LinkageWorkspace s(linkage);
+  gatherConfiguration(model, *linkage.cluster, q_reference, s.q);
+  linkage.reference.setZero(s.Q.rows(), s.Q.cols());
+  if (updateTangent(linkage, s, nullptr)) linkage.reference = s.Q;
+  linkage.reference_volume = evaluate(linkage, linkage.reference);
 }
 
-std::vector<Transmission> listTransmissions(const Model& model, ConstVectorRef q_reference) {
-  std::vector<Transmission> out;
+}  // namespace
+
+bool hasReference(const Linkage& linkage) {
+  constexpr double kSingular = 1e-9;
+  const double volume = std::abs(linkage.reference_volume);
+  return volume > kSingular && volume < 1 / kSingular;
+}
+
+std::vector<Linkage> listLinkagesAnywhere(const Model& model, ConstVectorRef q_reference) {
+  std::vector<Linkage> out;
   if (model.closures().empty()) return out;
-  std::vector<int> driven;
-  for (const Motor& motor : model.motors()) driven.push_back(motor.joint);
-  int index = -1;
-  for (ReducedCluster& cluster : makeReduction(model, q_reference).clusters) {
-    ++index;
-    std::vector<int> motors = findDofs(model, cluster, driven), joints = findDofs(model, cluster, model.serialJoints());
-    const size_t mobility = cluster.size;
-    if (motors.size() != mobility || mobility > kMostLinkageMobility) continue;
-    std::vector<int> bodies;
-    std::vector<std::string> names;
-    const auto add = [&names](const std::string& name) {
-      if (!contains(names, name)) names.push_back(name);
-    };
-    if (joints.size() == mobility) {
-      for (int k : joints) add(model.joints()[model.dofs()[cluster.dofs[k]].joint].name);
-    } else {
-      joints.clear();
-      bodies = findCarriers(model, cluster);
+  for (Linkage& linkage : selectLinkages(model, makeReduction(model, q_reference))) {
+    const int mobility = linkage.cluster->size;
+    if (mobility == 0 || linkage.size() != mobility || mobility > kMostLinkageMobility) continue;
+    const bool moves_bodies = static_cast<int>(linkage.joint_dofs.size()) != mobility;
+    if (moves_bodies) {
+      const std::vector<int> bodies = findCarriers(model, *linkage.cluster);
       if (bodies.empty()) continue;
-      for (int body : bodies) add(model.bodies()[body].name);
+      setBodies(model, bodies, q_reference, linkage);
     }
-    const auto map = std::make_shared<TransmissionMap>(std::move(cluster), index, std::move(motors), std::move(joints),
-                                                       bodies, model, q_reference);
-    if (map->isRegular()) out.push_back({listItems(names), map});
+    setReference(model, q_reference, linkage);
+    if (moves_bodies && !hasReference(linkage)) continue;  // they stand still, and are not the output
+    out.push_back(std::move(linkage));
   }
   return out;
 }
 
-double calcTransmission(const Transmission& transmission, const Model& model, ConstVectorRef q,
+std::vector<Linkage> listLinkages(const Model& model, ConstVectorRef q_reference) {
+  std::vector<Linkage> out = listLinkagesAnywhere(model, q_reference);
+  for (const Linkage& linkage : out)
+    if (!hasReference(linkage))
+      throw ModelError(model.name(), "linkage of joint '" + model.joints()[linkage.cluster->joints.front()].name + "'",
+                       "the given posture is a dead point", "give another posture");
+  return out;
+}
+
+LinkageWorkspace::LinkageWorkspace(const Linkage& linkage)
+    : point(*linkage.cluster),
+      q(linkage.cluster->model.nq()),
+      T(linkage.cluster->dofs.size(), linkage.size()),
+      z(T),
+      y(linkage.cluster->rank, linkage.size()),
+      drift(linkage.cluster->closures.rows, linkage.cluster->dofs.size()),
+      O(MatrixXd::Zero(6 * static_cast<Eigen::Index>(linkage.bodies.size()), T.rows())),
+      turn(O),
+      Q(linkage.bodies.empty() ? T.cols() : O.rows(), T.cols()),
+      Q_inverse(Q.cols(), Q.rows()),
+      derivative(T.rows()),
+      N_M(T.cols(), T.cols()),
+      inverse(N_M) {}
+
+LinkageWorkspace& LinkageWorkspaces::get(const Linkage& linkage) {
+  for (const auto& [cluster, workspace] : all_)
+    if (cluster == linkage.cluster) return *workspace;
+  return *all_.emplace_back(linkage.cluster, std::make_unique<LinkageWorkspace>(linkage)).second;
+}
+
+double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
                         const LoopBases* bases) {
-  return transmission.data->calc(model, q, bases);
+  if (bases && !linkage.joints.empty()) {  // needs no kinematics
+    const MatrixXd& N = bases->getBasis(linkage.index).N;
+    LinkageWorkspace::Small N_M(linkage.size(), linkage.size()), N_O(N_M);
+    takeRows(N, linkage.motor_dofs, N_M);
+    takeRows(N, linkage.joint_dofs, N_O);
+    return N_O.determinant() / N_M.determinant() / linkage.reference_volume;
+  }
+  LinkageWorkspace& s = memory.get(linkage);
+  gatherConfiguration(model, *linkage.cluster, q, s.q);
+  return updateTangent(linkage, s, bases) ? evaluate(linkage, s.Q) : 0;
 }
 
-double calcTransmission(const Transmission& transmission, const Model& model, ConstVectorRef q, VectorRef gradient) {
-  return transmission.data->calcByMotors(model, q, gradient);
+double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
+                        VectorRef gradient) {
+  LinkageWorkspace& s = memory.get(linkage);
+  gatherConfiguration(model, *linkage.cluster, q, s.q);
+  gradient.setZero();
+  if (!updateTangent(linkage, s, nullptr)) return 0;
+  updateDerivative(linkage, s, *linkage.cluster);
+  for (int j = 0; j < linkage.size(); ++j) gradient[linkage.motors[j]] = s.derivative.dot(s.T.col(j));
+  return evaluate(linkage, s.Q);
 }
 
-void calcTransmissionJacobian(const Transmission& transmission, const Model& model, ConstVectorRef q, MatrixRef row,
-                              const LoopBases* bases) {
-  transmission.data->calcJacobian(model, q, row, bases);
+double calcTransmission(const Linkage& linkage, const Model& model, ConstVectorRef q) {
+  LinkageWorkspaces memory;
+  return calcTransmission(linkage, memory, model, q, nullptr);
+}
+
+void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
+                              MatrixRef row, const LoopBases* bases) {
+  LinkageWorkspace& s = memory.get(linkage);
+  gatherConfiguration(model, *linkage.cluster, q, s.q);
+  const std::vector<int>& dofs = linkage.cluster->dofs;
+  for (int dof : dofs) row(0, dof) = 0;
+  if (!updateTangent(linkage, s, bases)) return;
+  updateDerivative(linkage, s, getCluster(linkage, bases));
+  for (size_t k = 0; k < dofs.size(); ++k) row(0, dofs[k]) = s.derivative[static_cast<Eigen::Index>(k)];
+}
+
+void updateOutput(const Linkage& linkage, const Workspace& ws, MatrixXd& O) {
+  for (size_t i = 0; i < linkage.bodies.size(); ++i)
+    calcClosureJacobian<double>(ws, linkage.bodies[i], O.middleRows(6 * static_cast<Eigen::Index>(i), 6));
+  scaleLengths(linkage, O);
+}
+
+void updateDrift(const Linkage& linkage, LinkageWorkspace& s, ConstVectorRef v) {
+  Workspace& ws = s.point.workspace();
+  updateDrift(*linkage.cluster, ws, v, s.drift);
+  for (size_t i = 0; i < linkage.bodies.size(); ++i)
+    calcClosureVelocityDerivative(ws, linkage.bodies[i], s.turn.middleRows(6 * static_cast<Eigen::Index>(i), 6));
+  scaleLengths(linkage, s.turn);
 }
 
 }  // namespace bielle

@@ -109,6 +109,19 @@ Json makeGoals(const MotionResult& result) {
   return goals;
 }
 
+Json makeDeadPoints(const MotionResult& result) {
+  Json linkages = Json::array();
+  for (const DeadPointTrace& linkage : result.dead_points) {
+    const auto [kind, distance] = linkage.getNearest();
+    const bool far = kind == DeadPointKind::None;
+    linkages.push_back({{"linkage", linkage.output},
+                        {"distance", far ? Json() : Json(distance)},
+                        {"of", getName(kind)},
+                        {"time_s", result.record.time[linkage.getNearestNode()]}});
+  }
+  return linkages;
+}
+
 Json makeConstraints(const FddpSummary& solver) {
   return {{"largest_violation", solver.violation},
           {"complementarity", solver.complementarity},
@@ -151,6 +164,7 @@ Json makeSummary(const MotionResult& result) {
           {"duration_s", time[time.size() - 1]},
           {"closure_gap", {{"position_m", result.gap_position}, {"angle_rad", result.gap_angle}}},
           {"contact_slip", {{"position_m", result.slip_position}, {"angle_rad", result.slip_angle}}},
+          {"dead_points", makeDeadPoints(result)},
           {"com_height", {{"start_m", result.com_start}, {"lowest_m", result.com_lowest}}},
           {"peak_torques", listByName(result.peak_torques)},
           {"rms_torques", listByName(result.rms_torques)},
@@ -188,6 +202,7 @@ void setFigures(const Model& model, MotionResult& result) {
   result.gap_angle = record.gap.col(1).maxCoeff();
   result.com_start = record.com(0, 2);
   result.com_lowest = record.com.col(2).minCoeff();
+  result.dead_points = traceDeadPoints(model, record.q);
 }
 
 MotionResult makeResult(const RunInfo& run, const Solution& solution) {

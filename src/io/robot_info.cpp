@@ -7,10 +7,10 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
-#include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/transmission.h"
-#include "bielle/model/error.h"
 #include "bielle/dynamics/ground.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/linkage.h"
+#include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "dynamics/point_spring.h"
 #include "io/json_text.h"
@@ -125,33 +125,15 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
           {"mobility", mobility.mobility}};
 }
 
-std::string describe(DeadPoint::Kind kind) {
-  switch (kind) {
-    case DeadPoint::Kind::Output:
-      return "output";
-    case DeadPoint::Kind::Motors:
-      return "motors";
-    case DeadPoint::Kind::None:
-      break;
-  }
-  return "none within " + formatNumber(kFarthestDeadPoint);
-}
-
-// Of every linkage; a posture at a dead point has none to measure from.
+// Of every linkage.
 void addDeadPoints(const Model& model, const Posture& posture, Json& out) {
-  std::vector<Transmission> transmissions;
-  try {
-    transmissions = listTransmissions(model, posture.q);
-  } catch (const ModelError& error) {
-    out.push_back(
-        {{"reference", posture.name}, {"linkage", error.element()}, {"distance", 0}, {"of", error.problem()}});
-  }
-  for (const Transmission& transmission : transmissions) {
-    const DeadPoint nearest = findDeadPoint(transmission, model, posture.q);
+  for (const DeadPointTrace& linkage : traceDeadPoints(model, posture.q.transpose())) {
+    const DeadPoint& nearest = linkage.getNearest();
+    const bool far = nearest.kind == DeadPointKind::None;
     out.push_back({{"reference", posture.name},
-                   {"linkage", transmission.output},
+                   {"linkage", linkage.output},
                    {"distance", orNull(nearest.distance)},
-                   {"of", describe(nearest.kind)}});
+                   {"of", far ? "none within " + formatNumber(kFarthestDeadPoint) : getName(nearest.kind)}});
   }
 }
 

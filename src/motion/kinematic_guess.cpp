@@ -7,6 +7,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/linkage_workspace.h"
 
 namespace bielle {
 namespace {
@@ -18,7 +19,7 @@ SE3 getBase(const VectorXd& q) {
 class FeetPlacer {
  public:
   FeetPlacer(const Model& model, const Stance& stance)
-      : model_(model), stance_(stance), transmissions_(listTransmissions(model, stance.q)) {
+      : model_(model), stance_(stance), linkages_(listLinkages(model, stance.q)) {
     height_ = stance.com.z() - 0.5 * (stance.feet[0].p.z() + stance.feet[1].p.z());
     options_.step = AssemblyStep::Shortest;
     options_.max_iterations = 15;
@@ -133,8 +134,8 @@ class FeetPlacer {
 
   double calcTransmission(const VectorXd& q) {
     double least = std::numeric_limits<double>::infinity();
-    for (const Transmission& transmission : transmissions_) {
-      const double value = bielle::calcTransmission(transmission, model_, q);
+    for (const Linkage& linkage : linkages_) {
+      const double value = bielle::calcTransmission(linkage, memory_, model_, q, nullptr);
       least = std::min({least, value, 1 / value});
     }
     return least;
@@ -151,7 +152,8 @@ class FeetPlacer {
 
   const Model& model_;
   const Stance& stance_;
-  std::vector<Transmission> transmissions_;
+  std::vector<Linkage> linkages_;
+  LinkageWorkspaces memory_;
   double height_ = 0;  // of the centre of mass over the feet
   AssemblyOptions options_;
 };

@@ -112,8 +112,7 @@ bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& 
   const VectorXd efforts = getEffortLimits(model, options);
   const std::vector<Bound> ranges = listRanges(model, q0), velocities = listVelocities(model, options),
                            powers = listPowers(model, options), voltages = listVoltages(model);
-  const std::vector<Transmission> transmissions =
-      margin > 0 ? listTransmissions(model, q0) : std::vector<Transmission>();
+  const std::vector<Linkage> linkages = margin > 0 ? listLinkages(model, q0) : std::vector<Linkage>();
   for (size_t k = 0; k < stages.size(); ++k) {
     StageSpec& stage = stages[k];
     stage.effort_limits = efforts;
@@ -123,8 +122,8 @@ bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& 
     if (k == 0) continue;
     for (const Bound& bound : ranges) addConstraint(bound, makeJointPosition(model, {bound.index}), stage);
     for (const Bound& bound : velocities) addConstraint(bound, makeJointVelocity({bound.index}), stage);
-    for (const Transmission& t : transmissions)
-      addConstraint({"dead points of " + t.output, 0, margin, 1 / margin, 1}, makeTransmission(t), stage);
+    for (const Linkage& linkage : linkages)
+      addConstraint({"dead points of " + linkage.output, 0, margin, 1 / margin, 1}, makeTransmission(linkage), stage);
     for (size_t i = 0; step && i < powers.size(); ++i)
       addConstraint(powers[i], makeMotorPower(model, {powers[i].index}), stage);
   }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
@@ -58,9 +57,9 @@ StepError findStepError(const Model& model, const MotionRecord& record) {
 bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Index stage, double margin) {
   constexpr double kNear = 1.5;  // over the margin
   const Eigen::Index first = std::max<Eigen::Index>(0, stage - 2), last = std::min(record.q.rows(), stage + 4);
-  for (const Transmission& transmission : listTransmissions(model, record.q.row(0).transpose()))
+  for (const Linkage& linkage : listLinkages(model, record.q.row(0).transpose()))
     for (Eigen::Index k = first; k < last; ++k) {
-      const double value = calcTransmission(transmission, model, record.q.row(k).transpose());
+      const double value = calcTransmission(linkage, model, record.q.row(k).transpose());
       if (std::min(value, 1 / value) < kNear * margin) return true;
     }
   return false;
@@ -104,27 +103,6 @@ std::optional<Motion> avoidDeadPoints(const Motion& solved, const MotionRecord& 
   if (error.share <= kLargestStepError || !isNearDeadPoint(model, record, error.stage, margin)) return {};
   margin = kWideDeadPointMargin;
   return makeMotion(model, *solved.request, problem);
-}
-
-std::vector<LinkageDistance> findDeadPoints(const Model& model, const MotionRecord& record, Eigen::Index first,
-                                            Eigen::Index last) {
-  std::vector<LinkageDistance> nearest;
-  for (const Transmission& transmission : listTransmissions(model, record.q.row(0).transpose())) {
-    LinkageDistance least{transmission.output, std::numeric_limits<double>::infinity(), record.time[first]};
-    for (Eigen::Index k = first; k <= last; ++k) {
-      const double distance = findDeadPoint(transmission, model, record.q.row(k).transpose()).distance;
-      if (distance < least.distance) least = {transmission.output, distance, record.time[k]};
-    }
-    nearest.push_back(least);
-  }
-  return nearest;
-}
-
-std::vector<LinkageDistance> findDeadPoints(const Model& model, ConstVectorRef q) {
-  MotionRecord record;
-  record.q = q.transpose();
-  record.time = VectorXd::Zero(1);
-  return findDeadPoints(model, record, 0, 0);
 }
 
 }  // namespace bielle

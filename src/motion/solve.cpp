@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "bielle/dynamics/linkage.h"
 #include "bielle/motion/motion_envelope.h"
 #include "bielle/motion/refinement.h"
 #include "model/number_text.h"
@@ -95,11 +96,6 @@ std::string format(const FddpSummary& summary) {
 
 bool areKeptFromDeadPoints(const LimitOptions& limits) { return limits.enforced && limits.dead_point_margin > 0; }
 
-std::string formatDistance(const LinkageDistance& of) {
-  const bool far = of.distance > kFarthestDeadPoint;
-  return far ? "over " + formatNumber(kFarthestDeadPoint, "%.2g") : formatNumber(of.distance, "%.2g");
-}
-
 // The second solve, with the iterations and the time of both.
 FddpSummary addUp(const FddpSummary& first, FddpSummary second) {
   second.iterations += first.iterations;
@@ -109,15 +105,13 @@ FddpSummary addUp(const FddpSummary& first, FddpSummary second) {
 
 // What a failure may come from: linkages that are near a dead point where the motion is nearest to one; empty for none.
 std::string describeDeadPoints(const Motion& motion, const MotionRecord& record) {
-  const Model& model = motion.problem->model();
-  if (!areKeptFromDeadPoints(motion.problem_options.limits) || !record.q.allFinite()) return "";
-  const std::vector<LinkageDistance> start = findDeadPoints(model, record, 0, 0),
-                                     nearest = findDeadPoints(model, record, 0, record.q.rows() - 1);
+  if (!areKeptFromDeadPoints(motion.problem_options.limits)) return "";
   std::string near;
-  for (size_t i = 0; i < start.size(); ++i)
-    if (nearest[i].distance < kNearDeadPoint)
-      near += (near.empty() ? "" : ", ") + nearest[i].output + " " + formatDistance(nearest[i]) + " at " +
-              formatNumber(nearest[i].time, "%.3g") + " s, " + formatDistance(start[i]) + " at the start";
+  for (const DeadPointTrace& linkage : traceDeadPoints(motion.problem->model(), record.q))
+    if (linkage.getNearest().distance < kNearDeadPoint)
+      near += (near.empty() ? "" : ", ") + linkage.output + " " + formatDistance(linkage.getNearest()) + " at " +
+              formatNumber(record.time[linkage.getNearestNode()], "%.3g") + " s, " +
+              formatDistance(linkage.points.front()) + " at the start";
   return near.empty()
              ? ""
              : "; linkages come near dead points, where motor and joint hardly move each other (rad or m): " + near +
@@ -180,10 +174,11 @@ class RequestSolver {
     const Model& model = motion_.problem->model();
     if (!areKeptFromDeadPoints(limits) || !(observer_.tell || observer_.warn)) return;
     std::string list, near;
-    for (const LinkageDistance& start : findDeadPoints(model, motion_.problem->initialState().head(model.nq()))) {
-      list += (list.empty() ? "" : "; ") + start.output + " " + formatDistance(start);
-      if (start.distance < kNearDeadPoint)
-        near += (near.empty() ? "" : "; ") + start.output + " " + formatDistance(start);
+    for (const DeadPointTrace& linkage :
+         traceDeadPoints(model, motion_.problem->initialState().head(model.nq()).transpose())) {
+      const std::string distance = linkage.output + " " + formatDistance(linkage.getNearest());
+      list += (list.empty() ? "" : "; ") + distance;
+      if (linkage.getNearest().distance < kNearDeadPoint) near += (near.empty() ? "" : "; ") + distance;
     }
     if (!list.empty()) tell("distance from dead points at the start (rad or m): " + list);
     const double margin = limits.dead_point_margin;

@@ -1,27 +1,30 @@
 #include "bielle/ocp/residual.h"
+#include "dynamics/linkage_workspace.h"
 
 namespace bielle {
 namespace {
 
 class TransmissionResidual : public Residual {
  public:
-  explicit TransmissionResidual(Transmission transmission) : transmission_(std::move(transmission)) {}
+  explicit TransmissionResidual(const Linkage& linkage) : linkage_(linkage) {}
   int size() const override { return 1; }
   void calc(const NodeView& node, VectorRef r) const override {
-    r[0] = calcTransmission(transmission_, node.model, node.ws.q, node.loops);
+    LinkageWorkspaces own;
+    r[0] = calcTransmission(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws.q, node.loops);
   }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
-    calcTransmissionJacobian(transmission_, node.model, node.ws.q, rows.q, node.loops);
+    LinkageWorkspaces own;
+    calcTransmissionJacobian(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws.q, rows.q, node.loops);
   }
 
  private:
-  Transmission transmission_;
+  Linkage linkage_;
 };
 
 }  // namespace
 
-std::unique_ptr<Residual> makeTransmission(const Transmission& transmission) {
-  return std::make_unique<TransmissionResidual>(transmission);
+std::unique_ptr<Residual> makeTransmission(const Linkage& linkage) {
+  return std::make_unique<TransmissionResidual>(linkage);
 }
 
 }  // namespace bielle

@@ -11,7 +11,7 @@
 #include "bielle/model/names.h"
 #include "bielle/transmission/lift.h"
 #include "io/json_text.h"
-#include "transmission/linkage.h"
+#include "transmission/linkage_ratio.h"
 
 namespace fs = std::filesystem;
 

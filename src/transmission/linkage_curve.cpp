@@ -186,7 +186,7 @@ RatioSample LinkageCurve::makeSample(const CurvePoint& point, DeadPointKind dead
   }
   sample.loses_rank = !hasRank(point.q);
   const bool there = from_.update(*linkage_.cluster, point.q) && calcLinkageRatio(linkage_, from_, sample.ratio);
-  if (dead == DeadPointKind::Joint || !there) {
+  if (dead == DeadPointKind::Output || !there) {
     const double infinite = std::numeric_limits<double>::infinity();
     sample.ratio.R.setConstant(m, m, infinite);
     sample.ratio.dR.assign(m, MatrixXd::Zero(m, m));

@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-#include "transmission/linkage.h"
+#include "transmission/linkage_ratio.h"
 
 namespace bielle {
 

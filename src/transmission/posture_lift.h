@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "bielle/transmission/lift.h"
-#include "transmission/linkage.h"
+#include "transmission/linkage_ratio.h"
 
 namespace bielle {
 

@@ -131,16 +131,16 @@ class Walk {
     const auto motor = [](const CurvePoint& point) { return point.motor_rate; };
     std::vector<std::pair<double, DeadPointKind>> events;
     if (joint(at) * joint(next) < 0)
-      events.emplace_back(curve_.findRoot(at, h, options_.tolerance, joint), DeadPointKind::Joint);
+      events.emplace_back(curve_.findRoot(at, h, options_.tolerance, joint), DeadPointKind::Output);
     if (motor(at) * motor(next) < 0)
-      events.emplace_back(curve_.findRoot(at, h, options_.tolerance, motor), DeadPointKind::Motor);
+      events.emplace_back(curve_.findRoot(at, h, options_.tolerance, motor), DeadPointKind::Motors);
     std::sort(events.begin(), events.end(),
               [](const auto& a, const auto& b) { return std::abs(a.first) < std::abs(b.first); });
     for (const auto& [root, kind] : events) {
       CurvePoint point;
       if (!curve_.advance(at, root, point)) continue;
       add(point, kind, branch);
-      if (kind == DeadPointKind::Joint) branch += direction;
+      if (kind == DeadPointKind::Output) branch += direction;
     }
   }
 
@@ -178,7 +178,7 @@ class Walk {
 void closeTurn(const RatioSample& start, double length, RatioSweep& sweep) {
   std::vector<RatioSample>& samples = sweep.samples;
   size_t last = samples.size();
-  while (last-- > 0 && samples[last].dead != DeadPointKind::Joint) {
+  while (last-- > 0 && samples[last].dead != DeadPointKind::Output) {
   }
   if (last >= samples.size() || samples[last].branch < 1) return;  // one branch only
   // Full turns of the angles at the end of the curve.
@@ -215,10 +215,6 @@ RatioSweep sweepDirect(const Model& model, const Linkage& linkage) {
 
 }  // namespace
 
-const char* getName(DeadPointKind kind) {
-  return kind == DeadPointKind::Joint ? "joint" : kind == DeadPointKind::Motor ? "motor" : "";
-}
-
 std::vector<RatioSample> RatioSweep::getDeadPoints() const {
   std::vector<RatioSample> points;
   for (const RatioSample& sample : samples)
@@ -251,6 +247,13 @@ RatioSweep sweepRatio(const Model& model, const Linkage& linkage, ConstVectorRef
   sweep.samples.insert(sweep.samples.end(), up.samples.begin(), up.samples.end());
   if (sweep.full_turn) closeTurn(first, up.turn, sweep);
   return sweep;
+}
+
+void addDistances(const Model& model, const Linkage& linkage, ConstVectorRef q, RatioSweep& sweep) {
+  for (RatioSample& sample : sweep.samples)
+    sample.nearest = sample.dead == DeadPointKind::None
+                         ? findDeadPoint(linkage, model, carryLinkage(model, linkage, sample, q))
+                         : DeadPoint{sample.dead, 0};
 }
 
 }  // namespace bielle

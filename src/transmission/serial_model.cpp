@@ -10,7 +10,7 @@
 #include "math/decompositions.h"
 #include "model/joint.h"
 #include "model/listing.h"
-#include "transmission/linkage.h"
+#include "transmission/linkage_ratio.h"
 
 namespace bielle {
 namespace {

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "bielle/dynamics/linkage.h"
 #include "bielle/io/electrical_energy.h"
 #include "bielle/io/record_files.h"
 #include "bielle/motion/solve.h"
@@ -40,12 +41,14 @@ struct MotionResult {
   double gap_position = 0, gap_angle = 0;    ///< largest closing error of the motion, m and rad
   double slip_position = 0, slip_angle = 0;  ///< largest displacement of a foot from its touchdown, m and rad
   double com_start = 0, com_lowest = 0;      ///< height of the centre of mass, m
+  std::vector<DeadPointTrace> dead_points;   ///< how near each linkage comes to one
 
   bool converged() const { return solver.termination == FddpTermination::Converged; }
   bool interrupted() const { return solver.termination == FddpTermination::Interrupted; }
 };
 
-/// Sets what follows from the record and the objective: torques, electrical energy, gaps, heights of the centre of mass.
+/// Sets what follows from the record and the objective: torques, electrical energy, gaps, heights of the centre of mass,
+/// distances of linkages from dead points.
 void setFigures(const Model& model, MotionResult& result);
 
 MotionResult makeResult(const RunInfo& run, const Solution& solution);

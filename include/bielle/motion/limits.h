@@ -7,7 +7,7 @@
 ///   side is open), or the limit of a velocity or power.
 /// - Voltages of motors whose winding and supply are known (Motor::hasEnvelope()), in every step: the faster a motor turns, the
 ///   smaller its largest torque. A violation of 1 is the voltage of the supply.
-/// - Dead points of linkages: the transmission of each (transmission.h) stays within margin .. 1/margin of that at the
+/// - Dead points of linkages: the transmission of each (linkage.h) stays within margin .. 1/margin of that at the
 ///   start, at the same nodes. Beyond a dead point a linkage snaps into another configuration.
 #include <map>
 #include <string>

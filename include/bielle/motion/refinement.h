@@ -36,19 +36,4 @@ std::optional<RefinedMotion> refineStages(const Motion& solved, const MotionReco
 std::optional<Motion> avoidDeadPoints(const Motion& solved, const MotionRecord& record);
 inline constexpr double kWideDeadPointMargin = 0.4;
 
-/// How far a linkage is from its nearest dead point (transmission.h).
-struct LinkageDistance {
-  std::string output;   ///< names of what the linkage moves
-  double distance = 0;  ///< rad (m where prismatic); infinite beyond kFarthestDeadPoint
-  double time = 0;      ///< s
-};
-
-/// Of every linkage of listTransmissions(), where it comes nearest to a dead point in the rows first .. last of a motion.
-std::vector<LinkageDistance> findDeadPoints(const Model& model, const MotionRecord& record, Eigen::Index first,
-                                            Eigen::Index last);
-/// The same of a single configuration (nq).
-std::vector<LinkageDistance> findDeadPoints(const Model& model, ConstVectorRef q);
-/// Nearer than this motors turn far for little motion of the joint, or the other way round, rad.
-inline constexpr double kNearDeadPoint = 0.1;
-
 }  // namespace bielle

@@ -11,9 +11,12 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/ground.h"
-#include "bielle/dynamics/transmission.h"
+#include "bielle/dynamics/linkage.h"
 
 namespace bielle {
+
+struct LoopBases;
+class LinkageWorkspaces;
 
 /// Data that a residual may read: one node with up-to-date kinematics (and, at a stage, dynamics).
 struct NodeView {
@@ -30,6 +33,8 @@ struct NodeView {
   const VectorXd* speeds = nullptr;
   /// Of the closed configuration of the node, where they are known; else null.
   const LoopBases* loops = nullptr;
+  /// Memory of the thread for linkages; null: it is allocated.
+  LinkageWorkspaces* linkages = nullptr;
 };
 
 /// Row block of the stacked residual Jacobians of a node. Entries never written stay zero.
@@ -112,8 +117,8 @@ std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constrain
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
 /// Velocity coordinates (n), rad/s or m/s.
 std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);
-/// The transmission of a linkage, over that at its reference (1): 0 or infinite at its dead points (transmission.h).
-std::unique_ptr<Residual> makeTransmission(const Transmission& transmission);
+/// The transmission of a linkage, over that at its reference (1): 0 or infinite at its dead points (linkage.h).
+std::unique_ptr<Residual> makeTransmission(const Linkage& linkage);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
 /// Voltages of motors, given by their indices in the model, from their torques and their speeds when the torques act, with the

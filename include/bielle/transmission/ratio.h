@@ -1,9 +1,9 @@
 #pragma once
-/// \file The linkage between motors and joints, and its reduction ratio at a configuration, along the motion of a
+/// \file The reduction ratio between motors and joints of a linkage (linkage.h) at a configuration, along the motion of a
 /// joint, and over the ranges of two joints (the paper's figure of the reduction ratio).
 ///
-/// A loop cluster of mobility m has m motors and m chosen joints, with coordinates q_M and q_J. With N a basis of the
-/// tangent space at a closed configuration and N_M, N_J the rows of the motors and of the joints,
+/// With q_M and q_J the coordinates of m motors and m joints, N a basis of the tangent space at a closed configuration and
+/// N_M, N_J its rows of the motors and of the joints,
 ///     v_M = R v_J,    R = N_M N_J^{-1}    (m x m),        tau_J = R^T u_M    (virtual work)                        (1)
 /// R is the paper's reduction ratio (its section IV-A), the speed of the motor over that of the joint. It does not
 /// depend on the basis. Along the tangent T = N N_J^{-1}, which has unit joint speeds, the second derivatives follow
@@ -11,9 +11,9 @@
 ///     d^2 q_M / dt^2 = a_M(w),    a(w) = -(I - T P_J) J^+ gamma(T w),    w = v_J constant                          (2)
 /// where P_J selects the joints' rows. a_M is quadratic in w, so that its polarization gives the derivative of R:
 ///     dR_ij / dq_J,k = (a_M,i(e_j + e_k) - a_M,i(e_j) - a_M,i(e_k)) / 2.                                           (3)
-/// At a dead point of the joint N_J is singular: a combination of the joints stands still while the motors move, R is
+/// At a dead point of the output N_J is singular: a combination of the joints stands still while the motors move, R is
 /// infinite, motor torques do not reach the joint, and joint torques are carried by the rods. At a dead point of the
-/// motor N_M is singular: so is R, and the motors cannot hold the joint.
+/// motors N_M is singular: so is R, and the motors cannot hold the joint.
 ///
 /// Sweeping one joint while the other joints of the linkage stand still gives a curve q(s) of closed configurations, s
 /// its length over all dofs of the cluster (rad and m alike). With C a unit vector that keeps the held joints still,
@@ -22,38 +22,16 @@
 /// The curve is followed by steps along (4), corrected onto the closures and the held angles, in both directions from
 /// the start until a joint reaches its limit, the closures lose rank or do not close, or the linkage comes back to its
 /// start after a full turn. It passes smoothly through dead points, which are roots along s of
-///     joint:  v_j(s) = N_j C,        motor:  det [N_M C, N_M H](s),   N_held H = I,                                (5)
-/// found by bracketing. At a dead point of the joint the angle reverses, and another branch of the ratio as a function
+///     output:  v_j(s) = N_j C,       motors:  det [N_M C, N_M H](s),   N_held H = I,                                (5)
+/// found by bracketing. At a dead point of the output the angle reverses, and another branch of the ratio as a function
 /// of the joint angle begins. Branch 0 contains the start.
-#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "bielle/model/model.h"
+#include "bielle/dynamics/linkage.h"
 
 namespace bielle {
-
-struct ReducedCluster;
-
-/// Motors and joints of one loop cluster, as many as its mobility; or a joint outside all loops with its own motor.
-struct Linkage {
-  std::vector<int> joints;                            ///< m, indices in the whole model, the requested ones first
-  std::vector<int> motors;                            ///< m, indices into Model::motors()
-  std::vector<int> joint_dofs, motor_dofs;            ///< m each, velocity coordinates of the cluster
-  std::vector<int> joint_positions, motor_positions;  ///< m each, entries of the cluster's q
-  std::vector<std::string> joint_names, motor_names;
-  std::shared_ptr<const ReducedCluster> cluster;  ///< with a metric of ones; no joints for a joint outside all loops
-
-  int size() const { return static_cast<int>(joints.size()); }
-  bool isDirect() const;  ///< the motor sits on the joint: R = 1 everywhere
-};
-
-/// The linkage that drives the joints. When the linkage has more mobility than joints are named, the other serial
-/// joints of the model in it are added.
-/// \param q  nq, closed: where the mobility of the linkages is evaluated
-/// \throws ModelError when a joint is unknown, has several coordinates, is not driven, or when mobility, joints and
-/// motors of the linkage do not match
-Linkage makeLinkage(const Model& model, ConstVectorRef q, const std::vector<std::string>& joints);
 
 struct LinkageRatio {
   MatrixXd R;                ///< m x m, Eq. (1): row of the motor, column of the joint; rad/rad, or m where prismatic
@@ -61,17 +39,14 @@ struct LinkageRatio {
   double condition = 1;      ///< largest over smallest singular value of R
 };
 
-enum class DeadPointKind { None, Joint, Motor };
-/// "", "joint", "motor"
-const char* getName(DeadPointKind kind);
-
 struct RatioSample {
   double s = 0;        ///< length along the curve from the start
-  int branch = 0;      ///< counted by dead points of the joint from the start
+  int branch = 0;      ///< counted by dead points of the output from the start
   VectorXd joints;     ///< m, angles of the linkage's joints (m where prismatic), not wrapped
   VectorXd motors;     ///< m
-  LinkageRatio ratio;  ///< at a dead point of the joint: infinite R and condition, zero dR
+  LinkageRatio ratio;  ///< at a dead point of the output: infinite R and condition, zero dR
   DeadPointKind dead = DeadPointKind::None;
+  std::optional<DeadPoint> nearest;  ///< from addDistances(): with the other joints free to move
   bool loses_rank = false;  ///< the loops can continue in several ways; the ratio is that of the branch followed so far
   VectorXd q;               ///< configuration of the cluster; empty for a direct linkage
 };
@@ -99,6 +74,9 @@ struct RatioSweep {
 /// \throws ModelError when the start is a dead point of the swept joint
 RatioSweep sweepRatio(const Model& model, const Linkage& linkage, ConstVectorRef q, int joint = 0,
                       const SweepOptions& options = {});
+
+/// Sets RatioSample::nearest (linkage.h); at a dead point the distance is 0. \param q  as for sweepRatio()
+void addDistances(const Model& model, const Linkage& linkage, ConstVectorRef q, RatioSweep& sweep);
 
 /// R over the ranges of both joints of a linkage of mobility two, as far as they can be reached without crossing a dead
 /// point: rows of equal angle of the first joint, along each of which the second joint is swept.

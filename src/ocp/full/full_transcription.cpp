@@ -1,5 +1,6 @@
 // The full formulation, x = (q, v) of the spanning tree: steps (full_step.h), impacts, dq+ = dq, dv+ = D_q dq + D_v dv
 // (dynamics/impact.h), and costs.
+#include "dynamics/linkage_workspace.h"
 #include "math/lane_product.h"
 #include "model/joint.h"
 #include "ocp/full/full_step.h"
@@ -10,6 +11,7 @@ namespace {
 struct FullScratch : ProblemScratch {
   FullScratch(const Model& model, int most_constraint_rows) : step(model, most_constraint_rows) {}
   FullStepScratch step;
+  LinkageWorkspaces linkages;
   ResidualJacobians jacobians;
   CountedRows counted;
   VectorXd difference;      // nv
@@ -124,7 +126,9 @@ void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const
   }
   if (specs_[node].state.weight != 0) at.state_cost = calcStateCost(specs_[node].state, at, scratch.difference);
   if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
-  costs_[node].calc({model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds}, at);
+  costs_[node].calc(
+      {model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, nullptr, &scratch.linkages},
+      at);
   if (std::isfinite(at.cost)) at.status = StepStatus::Ok;
 }
 
@@ -211,8 +215,9 @@ void FullTranscription::setResiduals(int node, const FullEvaluation& at, const C
   for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda, &jacobians.u, &jacobians.speeds})
     m->topRows(rows).setZero();
   jacobians.s.head(rows).setZero();
-  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds},
-                             scratch.counted, jacobians);
+  costs_[node].differentiate(
+      {model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, nullptr, &scratch.linkages},
+      scratch.counted, jacobians);
   if (costs_[node].needsSpeeds()) addSpeedResiduals(node, at, scratch);
   const auto gradient = scratch.counted.gradient.head(rows), hessian = scratch.counted.hessian.head(rows);
   const auto by_forces = jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows);

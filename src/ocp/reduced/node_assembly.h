@@ -20,7 +20,7 @@ class NodeAssembly {
                              const LaneView& view);
   // Sets the Gauss-Newton terms of the residuals, overwriting `out`.
   void setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
-                    const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
+                    const ConstraintWeights* constraints, const ReducedEvaluation& at, LaneView& view,
                     StageModel& out);
   // The part of the gradient of the last setResiduals() that is not due to squares, by (u, s, dy, dy_v); zero where s is not
   // free.

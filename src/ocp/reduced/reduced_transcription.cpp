@@ -77,7 +77,7 @@ class ReducedTranscription : public Transcription {
   bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
   bool isStep(int node) const { return isRunning(node) && !isImpact(node); }
   bool isMidpoint(int node) const { return isStep(node) && specs_[node].step == StepRule::Midpoint; }
-  void finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const;
+  void finishEvaluation(int node, LaneView& view, RobotEvaluation& at) const;
   void finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const;
 
   Model model_;
@@ -143,12 +143,13 @@ void ReducedTranscription::mapGains(const RobotEvaluation& at, const RowMatrixXd
 }
 
 // Computes the costs after a successful step.
-void ReducedTranscription::finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const {
+void ReducedTranscription::finishEvaluation(int node, LaneView& view, RobotEvaluation& at) const {
   if (at.status != StepStatus::Ok) return;
   if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
   const NodeBases bases(reduction_, static_cast<const ReducedEvaluation&>(at));
-  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases},
-                    at);
+  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases,
+                      &view.linkages},
+                     at);
   if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = StepStatus::Failed;
 }
 
