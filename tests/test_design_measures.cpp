@@ -3,8 +3,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "bielle/dynamics/assembly.h"
+#include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
+#include "bielle/transmission/ratio.h"
 #include "design/evaluation.h"
 #include "design/spec.h"
 #include "robot_directory.h"
@@ -184,6 +187,33 @@ TEST_CASE("measures: shares of limits by hand, distances of shapes") {
   CHECK(getMeasure(Measure::Envelope, {0}, {measures, measures}) == measures.motors[0].envelope);
   // What the winding says of heat is the default of electrical energies.
   CHECK(makeDrives(model, {})[0].motor_constant == Approx(10 * 0.1 / std::sqrt(0.5)));
+}
+
+TEST_CASE("measures: the distance from dead points is the least of all motions, up to half a radian") {
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar").model;
+  const VectorXd q = findClosedConfiguration(model).q;
+  const Linkage linkage = makeLinkage(model, q, {"rocker_joint"});
+  const RatioSweep sweep = sweepRatio(model, linkage, q);
+  const auto measure = [&](double farthest) {  // of a motion that begins where the sweep does
+    ShootingTrajectory trajectory;
+    for (const RatioSample& sample : sweep.samples) {
+      if (sample.s < 0 || sample.s > farthest || sample.dead != DeadPointKind::None) continue;
+      VectorXd x = VectorXd::Zero(model.nq() + model.nv());
+      x.head(model.nq()) = carryLinkage(model, linkage, sample, q);
+      trajectory.xs.push_back(x);
+    }
+    MotionMeasures measures;
+    addLimitMeasures(model, trajectory, {Measure::DeadPointDistance}, {}, measures);
+    double least = kFarthestDeadPoint;
+    for (const VectorXd& x : trajectory.xs)
+      least = std::min(least, findDeadPoint(linkage, model, x.head(model.nq())).distance);
+    CHECK(measures.dead_point_distance == Approx(least).epsilon(1e-9));
+    return measures;
+  };
+  const MotionMeasures near = measure(100), far = measure(0);
+  CHECK(near.dead_point_distance < 0.05);
+  CHECK(getMeasure(Measure::DeadPointDistance, {}, {far, near, far}) == near.dead_point_distance);
+  CHECK(MotionMeasures().dead_point_distance == kFarthestDeadPoint);
 }
 
 TEST_CASE("measures: drives by name") {

@@ -268,6 +268,8 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
               "variables 'other' and 'motor': both set parameter 'knee_motor_mass'");
   check("at_most: 26.5", "", "it does not have exactly one bound");
   check("mass, at_most: 26.5", "margin, at_most: 0.1", "give `at_least`");
+  check("mass, at_most: 26.5", "dead_point_distance, at_most: 0.1", "give `at_least`");
+  check("mass, at_most: 26.5", "dead_point_distance, at_least: 0.6", "dead points are looked for within 0.5 rad");
   check("mass, at_most: 26.5", "cost, at_most: 0.1", "use one of envelope");
   check("envelope}", "envelope, motors: [\"hip*\"]}", "none of the motors has such a limit");
   check("mass, at_most: 26.5}\nsearch: {searches: 1, stages: [{algorithm: crs",

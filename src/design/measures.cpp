@@ -117,6 +117,12 @@ void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, 
     for (const VectorXd& x : trajectory.xs)
       measures.margin = std::min(measures.margin, 1 / conditioning.calc(x.head(model.nq())));
   }
+  if (requested.count(Measure::DeadPointDistance)) {
+    RowMatrixXd qs(static_cast<Eigen::Index>(trajectory.xs.size()), model.nq());
+    for (Eigen::Index k = 0; k < qs.rows(); ++k) qs.row(k) = trajectory.xs[static_cast<size_t>(k)].head(model.nq());
+    for (const DeadPointTrace& linkage : traceDeadPoints(model, qs))
+      measures.dead_point_distance = std::min(measures.dead_point_distance, linkage.getNearest().distance);
+  }
   if (!requested.count(Measure::Distance)) return;
   Workspace ws(model);
   const std::vector<ShapePair> pairs = listPairsBut(left_out, model);
@@ -155,6 +161,8 @@ const char* getUnit(Measure measure) {
       return "J";
     case Measure::Mass:
       return "kg";
+    case Measure::DeadPointDistance:
+      return "rad";
     case Measure::Distance:
       return "m";
     default:
@@ -184,6 +192,8 @@ const char* getName(Measure measure) {
       return "heat";
     case Measure::Margin:
       return "margin";
+    case Measure::DeadPointDistance:
+      return "dead_point_distance";
     case Measure::Distance:
       return "distance";
     case Measure::Conditioning:
@@ -194,6 +204,10 @@ const char* getName(Measure measure) {
 
 bool isSum(Measure measure) {
   return measure == Measure::Energy || measure == Measure::ElectricalEnergy || measure == Measure::Cost;
+}
+
+bool isLeast(Measure measure) {
+  return measure == Measure::Margin || measure == Measure::DeadPointDistance || measure == Measure::Distance;
 }
 
 namespace {
@@ -218,13 +232,14 @@ double getMeasure(Measure measure, const std::vector<int>& motors, const MotionM
 
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions,
                   const std::vector<double>& weights) {
-  double value = 0;
-  if (measure == Measure::Margin) value = 1;
-  if (measure == Measure::Distance) value = std::numeric_limits<double>::infinity();
+  double value = measure == Measure::Margin ? 1 : isLeast(measure) ? std::numeric_limits<double>::infinity() : 0;
   for (size_t i = 0; i < motions.size(); ++i) {
-    if (measure == Measure::Margin) value = std::min(value, motions[i].margin);
-    if (measure == Measure::Distance) value = std::min(value, motions[i].distance);
-    if (measure == Measure::Margin || measure == Measure::Distance) continue;
+    if (isLeast(measure)) {
+      value = std::min(value, measure == Measure::Margin     ? motions[i].margin
+                              : measure == Measure::Distance ? motions[i].distance
+                                                             : motions[i].dead_point_distance);
+      continue;
+    }
     const double of_motion = (weights.empty() ? 1 : weights[i]) * getMeasure(measure, motors, motions[i]);
     value = isSum(measure) ? value + of_motion : std::max(value, of_motion);
   }

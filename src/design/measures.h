@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "bielle/dynamics/linkage.h"
 #include "bielle/model/model.h"
 #include "bielle/solve/fddp.h"
 #include "bielle/solve/shooting_problem.h"
@@ -26,7 +27,8 @@ enum class Measure {
   Envelope,  ///< most of a motor's torque, speed or voltage over what it can give
   Heat,      ///< most of a motor's root mean square torque over what it bears for ever
   Margin,    ///< from dead points: least motion of a joint in a unit motion of its linkage
-  Distance   ///< least one of bodies that are not neighbours, m
+  DeadPointDistance,  ///< least way of a motor or joint to a dead point (linkage.h), at most kFarthestDeadPoint, rad or m
+  Distance            ///< least one of bodies that are not neighbours, m
 };
 
 /// Conversion of electrical into mechanical power. For a motor with motor constant K (torque over the square root of
@@ -82,6 +84,7 @@ struct MotionMeasures {
   double conditioning = 1;            ///< the worst over the nodes (conditioning.h)
   double cost = 0;                    ///< of a motion that was optimized for the design
   double margin = 1;                  ///< least inverse of the conditioning by joints, 0 at a dead point
+  double dead_point_distance = kFarthestDeadPoint;  ///< least of the linkages, if it was requested
   double distance = std::numeric_limits<double>::infinity();  ///< least one of shapes, of those listPairsBut() names, m
   std::string nearest;                                        ///< the two bodies of it
   MotorTrace trace;
@@ -91,7 +94,7 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
                                   const ShootingTrajectory& trajectory,
                                   const std::vector<MotorConversion>& drives = {});
 
-/// Envelope and heat of the limits of the motors, into the motors of a motion; margin and distance if they are among those requested.
+/// Envelope and heat of the limits of the motors, into the motors of a motion; margin and distances if they are among those requested.
 /// \param trajectory  closed at its nodes   \param left_out  of distances
 void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& requested,
                       const BodyPairs& left_out, MotionMeasures& measures);
@@ -100,6 +103,8 @@ const char* getName(Measure measure);
 /// Of torques that of motors that turn, and empty where there is none.
 const char* getUnit(Measure measure);
 bool isOfMotors(Measure measure);
+/// Whether larger values are better, and that of all motions is the least of them.
+bool isLeast(Measure measure);
 /// Whether that of all motions is the sum over them, as of energies and costs.
 bool isSum(Measure measure);
 

@@ -9,6 +9,7 @@
 #include "bielle/robots/generators.h"
 #include "design/spec_parts.h"
 #include "model/motor_catalogue.h"
+#include "model/number_text.h"
 #include "model/text_file.h"
 
 namespace bielle {
@@ -262,20 +263,22 @@ DesignConstraint readConstraint(const Entry& entry) {
   DesignConstraint constraint;
   constraint.measure = readChoice<Measure>(
       require(fields, "measure", entry),
-      {Measure::Envelope, Measure::Heat, Measure::Mass, Measure::Margin, Measure::Distance, Measure::PeakTorque,
-       Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy, Measure::Conditioning});
+      {Measure::Envelope, Measure::Heat, Measure::Mass, Measure::Margin, Measure::DeadPointDistance, Measure::Distance,
+       Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy, Measure::Conditioning});
   const Entry *most = find(fields, "at_most"), *least = find(fields, "at_least"), *motors = find(fields, "motors");
   if (motors && !isOfMotors(constraint.measure)) motors->fail("the measure does not depend on motors", "remove it");
   if (motors) constraint.motors = motors->getTexts();
   const bool is_share = constraint.measure == Measure::Envelope || constraint.measure == Measure::Heat;
   if ((most && least) || (!most && !least && !is_share))
     entry.fail("it does not have exactly one bound", "give one of `at_most` and `at_least`");
-  const bool is_least = constraint.measure == Measure::Margin || constraint.measure == Measure::Distance;
+  const bool is_least = isLeast(constraint.measure);
   if (is_least && most) most->fail("larger values of this measure are better", "give `at_least`");
   if (!is_least && constraint.measure != Measure::Mass && least)
     least->fail("smaller values of this measure are better", "give `at_most`");
   if (most) constraint.bound = most->getNumber();
   if (least) constraint.bound = least->getNumber(), constraint.at_least = true;
+  if (constraint.measure == Measure::DeadPointDistance && constraint.bound > kFarthestDeadPoint)
+    least->fail("dead points are looked for within " + formatNumber(kFarthestDeadPoint) + " rad", "give less");
   if (const Entry* except = find(fields, "except")) {
     if (constraint.measure != Measure::Distance) except->fail("only distances can exclude bodies", "remove it");
     for (const Entry& pair : except->getList()) {

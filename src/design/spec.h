@@ -40,6 +40,7 @@
 ///   - {measure: heat}            # root mean square torque over what it bears for ever
 ///   - {measure: mass, at_most: 26}
 ///   - {measure: margin, at_least: 0.2}       # from dead points
+///   - {measure: dead_point_distance, at_least: 0.1}   # way of a motor or joint to there, up to 0.5 rad
 ///   - {measure: distance, at_least: 0.005, except: [["thigh*", "rod_knee*"]]}     # of bodies that are not neighbours and
 ///                                # do not overlap as they are drawn (near_bodies.h), m; but for these
 /// drives:                        # for electrical_energy (measures.h)
