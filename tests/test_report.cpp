@@ -105,6 +105,17 @@ TEST_CASE("the page holds the placements of the bodies, seen by the centre of ma
   const json run = getData(makeReport({place}))["runs"][0];
   const RowMatrixXd placements = readTable(run["motion"]["placements"]);
   REQUIRE(placements.cols() == 7 * model.numBodies());
+  const std::vector<DeadPointTrace> linkages = traceDeadPoints(model, record.q, 60);
+  const RowMatrixXd distances = readTable(run["motion"]["dead_points"]);
+  REQUIRE(run["motion"]["linkages"].size() == linkages.size());
+  REQUIRE(distances.cols() == static_cast<Eigen::Index>(linkages.size()));
+  REQUIRE(distances.rows() == record.q.rows());
+  for (size_t i = 0; i < linkages.size(); ++i) {
+    CHECK(run["motion"]["linkages"][i] == linkages[i].output);
+    const double least = linkages[i].getNearest().distance,
+                 shown = distances(linkages[i].getNearestNode(), static_cast<Eigen::Index>(i));
+    CHECK((std::isfinite(least) ? shown == Approx(least) : std::isnan(shown)));
+  }
   for (int k = 0; k < placements.rows(); ++k) {
     Vector3d moment = Vector3d::Zero();
     for (int i = 1; i < model.numBodies(); ++i) {

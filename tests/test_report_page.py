@@ -186,7 +186,8 @@ class ReportPage(unittest.TestCase):
         for count in ink:
             self.assertGreater(count, 300)
         titles = self.browser.evaluate("Array.from(document.querySelectorAll('.plot h2')).map(h => h.textContent)")
-        for title in ("Centre of mass", "Motor torques", "Closure gaps", "Contact forces", "Centres of pressure"):
+        for title in ("Centre of mass", "Motor torques", "Distances from dead points", "Closure gaps", "Contact forces",
+                      "Centres of pressure"):
             self.assertIn(title, titles)
         # A click at the middle of a plot goes to that time, and the cursors of all plots go with it.
         box = self.browser.evaluate("""(() => { const area = document.querySelector('.plot .area');

@@ -3,6 +3,7 @@
 
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/linkage.h"
 #include "report/drawing.h"
 #include "report/pack.h"
 #include "report/run.h"
@@ -119,6 +120,24 @@ RowMatrixXd makePressureCentres(const Model& model, const MotionRecord& record) 
   return centres;
 }
 
+// Distance of each linkage from its nearest dead point; between the nodes where it was looked for, that of a straight line.
+RowMatrixXd makeDeadPointTable(const std::vector<DeadPointTrace>& linkages, Eigen::Index nodes) {
+  RowMatrixXd distances = RowMatrixXd::Constant(nodes, static_cast<Eigen::Index>(linkages.size()), kNone);
+  for (size_t i = 0; i < linkages.size(); ++i) {
+    const DeadPointTrace& linkage = linkages[i];
+    for (size_t n = 0; n < linkage.nodes.size(); ++n) {
+      const int last = linkage.nodes[n], first = n > 0 ? linkage.nodes[n - 1] : last;
+      const double at_last = linkage.points[n].distance, at_first = n > 0 ? linkage.points[n - 1].distance : at_last;
+      for (int k = n > 0 ? first + 1 : last; k <= last; ++k) {
+        const double share = last > first ? static_cast<double>(k - first) / (last - first) : 1;
+        const double distance = k == last ? at_last : at_first + share * (at_last - at_first);
+        if (std::isfinite(distance)) distances(k, static_cast<Eigen::Index>(i)) = distance;
+      }
+    }
+  }
+  return distances;
+}
+
 }  // namespace
 
 Json describeRobot(const LoadedRobot& robot) {
@@ -152,13 +171,19 @@ Json describeRobot(const LoadedRobot& robot) {
 
 Json describeMotion(const ReportRun& run) {
   const MotionRecord& record = run.record;
+  constexpr int kSearches = 60;  // for dead points
   const NodeTables tables = makeNodeTables(run.robot.model, record);
+  const std::vector<DeadPointTrace> linkages = traceDeadPoints(run.robot.model, record.q, kSearches);
+  Json outputs = Json::array();
+  for (const DeadPointTrace& linkage : linkages) outputs.push_back(linkage.output);
   Json json = {{"time", packTable(record.time)},
                {"placements", packTable(tables.placements)},
                {"tilt", packTable(tables.tilt)},
                {"feet", packTable(tables.feet)},
                {"footprints", tables.footprints},
                {"gaps", packTable(tables.gaps)},
+               {"linkages", outputs},
+               {"dead_points", packTable(makeDeadPointTable(linkages, record.q.rows()))},
                {"q", packTable(record.q)},
                {"v", packTable(record.v)},
                {"u", packTable(record.u)},

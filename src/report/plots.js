@@ -142,6 +142,12 @@ function listPlots(runs) {
       list: run => listJoints(run, run.v, joint => (hasSerial ? joint.serial : !isMotor(run, joint)), speed)
     },
     {
+      title: 'Distances from dead points',
+      unit: 'rad',
+      list: run => run.linkages.map((name, i) => ({name, values: run.dead_points.getColumn(i)}))
+                       .filter(({values}) => values.some(Number.isFinite))
+    },
+    {
       title: 'Closure gaps',
       unit: 'm',
       log: true,

@@ -77,6 +77,14 @@ function fillGoals(parent, runs) {
   }
 }
 
+// Of all linkages; undefined where there are none.
+function describeNearestDeadPoint(run) {
+  const linkages = (run.summary.dead_points || []).filter(linkage => typeof linkage.distance === 'number');
+  const nearest = linkages.sort((a, b) => a.distance - b.distance)[0];
+  return nearest &&
+      nearest.linkage + ' ' + formatNumber(nearest.distance) + ' rad (or m) at ' + formatNumber(nearest.time_s) + ' s';
+}
+
 function fillSummary(parent, runs) {
   const units = (value, unit) => (typeof value === 'number' ? formatNumber(value) + ' ' + unit : undefined);
   const solved = read => run => (run.summary.outcome === undefined ? read(run) : undefined);
@@ -104,6 +112,7 @@ function fillSummary(parent, runs) {
     ['centre of mass, lowest', run => units(dig(run.summary, 'com_height', 'lowest_m'), 'm high')],
     ['largest closure gap', run => units(dig(run.summary, 'closure_gap', 'position_m'), 'm')],
     ['largest slip of a foot', run => units(dig(run.summary, 'contact_slip', 'position_m'), 'm')],
+    ['nearest dead point', describeNearestDeadPoint],
     ['electrical energy', run => units(dig(run.summary, 'electrical_energy', 'total_J'), 'J')],
     ['cost of transport', run => dig(run.summary, 'electrical_energy', 'cost_of_transport')],
     ['friction coefficient', run => dig(run.summary, 'ground', 'friction')],
