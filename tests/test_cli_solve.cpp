@@ -276,6 +276,49 @@ TEST_CASE("a motion that starts near a dead point says so at its start and in it
   CHECK_THAT(out.readSummary()["message"], Catch::Contains("knee_left 0.07"));
 }
 
+// Its knees end just before the dead point of their four-bar at 1.3256 rad, and nothing keeps them from it.
+TEST_CASE("a squat that ends just before a dead point: solve, summary, check and report tell how far, and so do info and ratio") {
+  const OutputDirectory out;
+  const CommandResult solved = run({"solve", "squat", "--robot", "bipetto", "--depth", "0.72", "--dead-point-margin",
+                                    "0", "--quiet", "-o", out.str()});
+  INFO(solved.out << solved.err);
+  const json summary = out.readSummary();
+  const json* nearest = nullptr;
+  for (const json& linkage : summary["dead_points"])
+    if (linkage["distance"].is_number() && (!nearest || linkage["distance"] < (*nearest)["distance"])) nearest = &linkage;
+  REQUIRE(nearest);
+  const double distance = (*nearest)["distance"];
+  const std::string name = (*nearest)["linkage"];
+  CHECK(distance < 0.1);
+  CHECK_THAT(name, Catch::StartsWith("knee_"));
+  CHECK((*nearest)["of"] == "output");
+
+  // The same number by the posture of that node alone, as `info` and `ratio` take it.
+  const Model model = loadRobot("bipetto").model;
+  const MotionRecord record = out.readTrajectory();
+  Eigen::Index node = 0;
+  (record.time.array() - (*nearest)["time_s"].get<double>()).abs().minCoeff(&node);
+  const VectorXd q = record.q.row(node);
+  CHECK(findDeadPoint(makeLinkage(model, q, {name}), model, q).distance == Approx(distance).epsilon(1e-6));
+
+  const std::string text = formatDistance({DeadPointKind::Output, distance});
+  CHECK_THAT(solved.out, Catch::Contains("  dead points ") && Catch::Contains(name + " " + text));
+  CHECK_THAT(solved.err, Catch::Contains("linkage of " + name + ": " + text));
+  const std::string check = out.str() + "/check.json";
+  if (fs::exists(check)) {  // by Simbody
+    bool told = false;
+    for (const json& row : json::parse(readFile(check))["rows"])
+      if (row["name"] == "linkages: from dead points") {
+        told = true;
+        CHECK(row["value"].get<double>() == Approx(distance).epsilon(1e-3).margin(1e-4));
+        CHECK_THAT(row["note"].get<std::string>(), Catch::Contains("knee_"));
+        CHECK(row["pass"] == true);
+      }
+    CHECK(told);
+  }
+  CHECK_THAT(readFile(out.str() + "/report.html"), Catch::Contains("\"linkages\"") && Catch::Contains("\"dead_points\""));
+}
+
 TEST_CASE("a leg on a rail squats on one foot, and is told what steps need") {
   const OutputDirectory directory;
   const std::vector<std::string> rest = {"--robot", "fivebar_leg", "--max-iterations", "1", "--no-check", "--no-report",

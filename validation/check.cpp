@@ -114,6 +114,7 @@ CheckReport checkMotion(const CheckedMotion& motion) {
   addStanceRows(context);
   addSwingRows(context);
   addShapeRows(context);
+  addLinkageRows(context);
   addForceRows(context);
   addLimitRows(context);
   addGoalRows(context);

@@ -25,6 +25,7 @@ class Worst {
   }
   bool empty() const { return node_ < 0; }
   double value() const { return value_; }
+  int node() const { return node_; }
 
   // "node 96, 1.440 s, knee_left"
   std::string describePlace(const CheckedMotion& motion) const;
@@ -58,6 +59,7 @@ void addEnergyRows(CheckContext& context);
 void addStanceRows(CheckContext& context);
 void addSwingRows(CheckContext& context);
 void addShapeRows(CheckContext& context);
+void addLinkageRows(CheckContext& context);
 void addForceRows(CheckContext& context);
 void addLimitRows(CheckContext& context);
 void addGoalRows(CheckContext& context);
