@@ -3,15 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <string>
 
 namespace bielle::simulation {
 namespace {
 
 constexpr size_t kMostBoxes = 32;  // of MuJoCo at once
 constexpr double kDepth = 1;       // boxes reach this far below their tops, m
-
-std::string formatName(size_t box) { return "box." + std::to_string(box + 1); }
 
 }  // namespace
 
@@ -27,18 +25,15 @@ MujocoGround::MujocoGround(const Model& model, const Ground& ground) : model_(mo
   }
 }
 
-std::string MujocoGround::format() const {
-  std::ostringstream out;
-  out.precision(17);
-  out << "    <geom name=\"ground\" class=\"ground\" type=\"plane\" size=\"0 0 1\" pos=\"0 0 " << height_ << "\"/>\n";
-  for (size_t i = 0; i < std::min(boxes_.size(), kMostBoxes); ++i)
-    out << "    <geom name=\"" << formatName(i) << "\" class=\"ground\" type=\"box\" size=\"1 1 1\"/>\n";
-  return out.str();
+void MujocoGround::addTo(MjcfOptions& robot) const {
+  robot.ground_height = height_;
+  robot.num_boxes = static_cast<int>(std::min(boxes_.size(), kMostBoxes));
 }
 
 void MujocoGround::bind(const mjModel& mj) {
-  for (size_t i = 0; i < std::min(boxes_.size(), kMostBoxes); ++i)
-    geoms_.push_back(mj_name2id(&mj, mjOBJ_GEOM, formatName(i).c_str()));
+  for (size_t i = 1; i <= std::min(boxes_.size(), kMostBoxes); ++i)
+    if (const int geom = mj_name2id(&mj, mjOBJ_GEOM, ("box." + std::to_string(i)).c_str()); geom >= 0)
+      geoms_.push_back(geom);
   for (const ContactFrame& contact : model_.contacts())
     soles_.push_back(
         {mj_name2id(&mj, mjOBJ_SITE, contact.name.c_str()), std::hypot(contact.half_length, contact.half_width)});

@@ -5,11 +5,11 @@
 /// which are moved to those of the ground that are near the soles.
 #include <mujoco/mujoco.h>
 
-#include <string>
 #include <vector>
 
 #include "bielle/dynamics/ground.h"
 #include "bielle/model/model.h"
+#include "io/mjcf.h"
 
 namespace bielle::simulation {
 
@@ -17,8 +17,8 @@ class MujocoGround {
  public:
   explicit MujocoGround(const Model& model, const Ground& ground);
 
-  /// Its elements for MjcfOptions::ground.
-  std::string format() const;
+  /// Its plane and boxes.
+  void addTo(MjcfOptions& robot) const;
   /// Finds them in the compiled model.
   void bind(const mjModel& mj);
   /// Moves boxes under the soles as they stand in `data`. To be called whenever these may have moved by kReach.

@@ -21,7 +21,7 @@ MjcfOptions makeRobotOptions(const MujocoWorldOptions& options, const MujocoGrou
   MjcfOptions robot = options.robot;
   if (options.world.time_step > 0) robot.time_step = options.world.time_step;
   robot.friction = options.world.ground.friction;
-  robot.ground = ground.format();
+  ground.addTo(robot);
   return robot;
 }
 

@@ -266,7 +266,7 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
     CHECK_THAT(error, Catch::StartsWith(directory.path() + "/swing.xml: " + element + ": " + problem));
     CHECK(error.find("; ") != std::string::npos);
   };
-  checkError("<mujoco>", "document", "it is not well-formed XML");
+  checkError("<mujoco>", "line 1", "it is not well-formed XML");
   checkError("<robot/>", "document", "its outermost element is not <mujoco>");
   checkError(makeSwing("", "<include file=\"a.xml\"/>"), "<include> (line 1)", "such elements are not supported");
   checkError(makeSwing("<replicate/>"), "<replicate> (line 1)", "such elements are not supported");

@@ -124,8 +124,8 @@ TEST_CASE("SDF: limits, springs and names move or change as told, and planar joi
   builder.addJointForce("a", force);
   builder.addMotor("a", 0, 7, 3);
   const SdfText text = formatSdf(builder.build(), VectorXd::Constant(1, 0.5));
-  for (const char* part : {"<joint name=\"a_joint\" type=\"revolute\">", "<lower>-1.5</lower><upper>1.5</upper>",
-                           "<effort>7</effort><velocity>3</velocity>", "<spring_reference>0</spring_reference>",
+  for (const char* part : {"<joint name=\"a_joint\" type=\"revolute\">", "<lower>-1.5</lower>", "<upper>1.5</upper>",
+                           "<effort>7</effort>", "<velocity>3</velocity>", "<spring_reference>0</spring_reference>",
                            "<spring_stiffness>4</spring_stiffness>"})
     CHECK_THAT(text.xml, Catch::Contains(part));
   REQUIRE(text.warnings.size() == 3);

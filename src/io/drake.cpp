@@ -2,14 +2,12 @@
 
 #include <cmath>
 #include <set>
-#include <sstream>
 
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "io/format_warnings.h"
 #include "io/robot_text.h"
 #include "io/urdf_writer.h"
-#include "io/xml_text.h"
 #include "model/number_text.h"
 
 namespace bielle {
@@ -45,17 +43,17 @@ class DrakeWriter {
   }
 
   UrdfText write() {
-    for (const Closure& closure : parts_.closures) writeClosure(closure);
-    for (const PointSpring& spring : parts_.point_springs) writeSpring(spring);
-    for (const Motor& motor : parts_.motors) writeMotor(motor);
-    const UrdfDialect dialect{true, " xmlns:drake=\"http://drake.mit.edu\"", out_.str()};
-    const Model model = ModelBuilder::restore(parts_);
-    const std::string text = formatUrdfTree(model, dialect, warnings_);
+    XMLDocument document;
+    XMLElement& robot = addUrdfTree(ModelBuilder::restore(parts_), true, document, warnings_);
+    setAttributes(robot, {{"xmlns:drake", "http://drake.mit.edu"}});
+    for (const Closure& closure : parts_.closures) writeClosure(closure, robot);
+    for (const PointSpring& spring : parts_.point_springs) writeSpring(spring, robot);
+    for (const Motor& motor : parts_.motors) writeMotor(motor, robot);
     warnMassless();
     warnings_.addArmature(false);
     warnings_.addTargets();
     warnings_.addYamlOnly(MotorData::Gears);
-    return {text, warnings_.get()};
+    return {formatXml(document), warnings_.get()};
   }
 
  private:
@@ -92,23 +90,25 @@ class DrakeWriter {
     parts_.frames.push_back({ground_, 0, SE3()});
   }
 
-  std::string getLink(int body) const { return escapeXml(body == 0 ? ground_ : parts_.bodies[body].name); }
+  const std::string& getLink(int body) const { return body == 0 ? ground_ : parts_.bodies[body].name; }
 
-  void writeEntry(const std::string& tag, const char* attribute, const std::string& text) {
-    out_ << "    <drake:" << tag << " " << attribute << "=\"" << text << "\"/>\n";
+  // The names of its entries begin with its own.
+  static void addEntry(XMLElement& e, const char* entry, const char* attribute, const std::string& text) {
+    addElement(e, (getTag(e) + entry).c_str(), {{attribute, text}});
   }
 
-  void writeClosure(const Closure& c) {
+  void writeClosure(const Closure& c, XMLElement& robot) {
     const std::string element = "closure '" + c.name + "'";
     if (c.kp != 0 || c.kd != 0) warn(element, "its gains kp and kd are left out");
     switch (c.kind) {
       case ClosureKind::Ball3D:
-        return writeBall(c, "", Vector3d::Zero());
+        return writeBall(c, "", Vector3d::Zero(), robot);
       case ClosureKind::Hinge5D:
-        writeBall(c, ".1", kDrakeHingeLever * c.axis);
-        return writeBall(c, ".2", -kDrakeHingeLever * c.axis);
+        writeBall(c, ".1", kDrakeHingeLever * c.axis, robot);
+        return writeBall(c, ".2", -kDrakeHingeLever * c.axis, robot);
       case ClosureKind::Weld6D:
-        for (int k = 0; k < 3; ++k) writeBall(c, "." + std::to_string(k + 1), kDrakeWeldLever * Vector3d::Unit(k));
+        for (int k = 0; k < 3; ++k)
+          writeBall(c, "." + std::to_string(k + 1), kDrakeWeldLever * Vector3d::Unit(k), robot);
         return;
       case ClosureKind::Coupler:  // a <mimic> of the tree, or told there
         return;
@@ -116,18 +116,17 @@ class DrakeWriter {
   }
 
   // Holds a point of both frames together. Drake does not look at the name, our reader does.
-  void writeBall(const Closure& c, const std::string& suffix, const Vector3d& point) {
+  void writeBall(const Closure& c, const std::string& suffix, const Vector3d& point, XMLElement& robot) {
     std::string name = c.name + suffix;
     while (!balls_.insert(name).second) name += "_";
-    out_ << "\n  <drake:ball_constraint name=\"" << escapeXml(name) << "\">\n";
-    writeEntry("ball_constraint_body_A", "name", getLink(c.body1));
-    writeEntry("ball_constraint_body_B", "name", getLink(c.body2));
-    writeEntry("ball_constraint_p_AP", "value", formatExact(c.X_B1.act(point)));
-    writeEntry("ball_constraint_p_BQ", "value", formatExact(c.X_B2.act(point)));
-    out_ << "  </drake:ball_constraint>\n";
+    XMLElement& ball = addElement(robot, "drake:ball_constraint", {{"name", name}});
+    addEntry(ball, "_body_A", "name", getLink(c.body1));
+    addEntry(ball, "_body_B", "name", getLink(c.body2));
+    addEntry(ball, "_p_AP", "value", formatExact(c.X_B1.act(point)));
+    addEntry(ball, "_p_BQ", "value", formatExact(c.X_B2.act(point)));
   }
 
-  void writeSpring(const PointSpring& spring) {
+  void writeSpring(const PointSpring& spring, XMLElement& robot) {
     const std::string element = "point spring '" + spring.name + "'";
     double rest = spring.rest;
     if (spring.stiffness != 0)
@@ -139,29 +138,27 @@ class DrakeWriter {
       return warn(element, "it is left out: it would have no tension at a length of " + formatNumber(rest) +
                                " m, which Drake requires to be positive");
     if (!(rest > 0)) rest = 1;  // of a damper alone, on which it has no effect
-    out_ << "\n  <drake:linear_spring_damper name=\"" << escapeXml(spring.name) << "\">\n";
-    writeEntry("linear_spring_damper_body_A", "name", getLink(spring.body1));
-    writeEntry("linear_spring_damper_p_AP", "value", formatExact(spring.point1));
-    writeEntry("linear_spring_damper_body_B", "name", getLink(spring.body2));
-    writeEntry("linear_spring_damper_p_BQ", "value", formatExact(spring.point2));
-    writeEntry("linear_spring_damper_free_length", "value", formatExact(rest));
-    writeEntry("linear_spring_damper_stiffness", "value", formatExact(spring.stiffness));
-    writeEntry("linear_spring_damper_damping", "value", formatExact(spring.damping));
-    out_ << "  </drake:linear_spring_damper>\n";
+    XMLElement& e = addElement(robot, "drake:linear_spring_damper", {{"name", spring.name}});
+    addEntry(e, "_body_A", "name", getLink(spring.body1));
+    addEntry(e, "_p_AP", "value", formatExact(spring.point1));
+    addEntry(e, "_body_B", "name", getLink(spring.body2));
+    addEntry(e, "_p_BQ", "value", formatExact(spring.point2));
+    addEntry(e, "_free_length", "value", formatExact(rest));
+    addEntry(e, "_stiffness", "value", formatExact(spring.stiffness));
+    addEntry(e, "_damping", "value", formatExact(spring.damping));
   }
 
   // The gear of the drive, unless the armature is given beside it.
-  void writeMotor(const Motor& motor) {
+  void writeMotor(const Motor& motor, XMLElement& robot) {
     const double ratio = motor.drive.ratio, reflected = ratio * ratio * motor.drive.rotor_inertia;
     const bool by_drive = ratio > 0 && std::abs(reflected - motor.armature) <= 1e-12 * motor.armature;
-    const std::string name = escapeXml(motor.name);
-    out_ << "\n  <transmission name=\"" << name << "_transmission\">\n"
-         << "    <type>transmission_interface/SimpleTransmission</type>\n    <joint name=\"" << name
-         << "\"><hardwareInterface>EffortJointInterface</hardwareInterface></joint>\n    <actuator name=\"" << name
-         << "\">\n      <drake:rotor_inertia value=\""
-         << formatExact(by_drive ? motor.drive.rotor_inertia : motor.armature)
-         << "\"/>\n      <drake:gear_ratio value=\"" << formatExact(by_drive ? ratio : 1)
-         << "\"/>\n    </actuator>\n  </transmission>\n";
+    XMLElement& e = addElement(robot, "transmission", {{"name", motor.name + "_transmission"}});
+    addText(e, "type", "transmission_interface/SimpleTransmission");
+    addText(addElement(e, "joint", {{"name", motor.name}}), "hardwareInterface", "EffortJointInterface");
+    XMLElement& actuator = addElement(e, "actuator", {{"name", motor.name}});
+    const double inertia = by_drive ? motor.drive.rotor_inertia : motor.armature;
+    addElement(actuator, "drake:rotor_inertia", {{"value", formatExact(inertia)}});
+    addElement(actuator, "drake:gear_ratio", {{"value", formatExact(by_drive ? ratio : 1)}});
   }
 
   void warnMassless() {
@@ -174,7 +171,6 @@ class DrakeWriter {
   ModelParts parts_;
   std::string ground_;
   std::set<std::string> balls_;  // their names
-  std::ostringstream out_;
 };
 
 }  // namespace

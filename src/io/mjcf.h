@@ -25,7 +25,8 @@ struct MjcfOptions {
   double friction = 0.7;       ///< Coulomb coefficient between soles and ground
   double sole_radius = 5e-3;   ///< of the spheres of soles, m
   double hinge_lever = 0.02;   ///< distance of the two points of a hinge from its frame, m
-  std::string ground;          ///< elements of `worldbody` that soles touch; empty: the plane z = 0
+  double ground_height = 0;    ///< of the plane that soles touch, m
+  int num_boxes = 0;           ///< that soles touch, too: "box.1" ..., for whoever moves them
 };
 
 struct MjcfText {

@@ -2,15 +2,14 @@
 
 #include <cmath>
 #include <set>
-#include <sstream>
 
 #include "bielle/model/error.h"
 #include "io/format_warnings.h"
 #include "io/robot_text.h"
-#include "io/xml_text.h"
 #include "math/so3.h"
 #include "model/joint.h"
 #include "model/number_text.h"
+#include "model/xml_document.h"
 
 namespace bielle {
 namespace {
@@ -28,21 +27,23 @@ class SdfWriter {
   SdfWriter(const Model& model, ConstVectorRef q_ref) : model_(model), q_ref_(q_ref) {}
 
   SdfText write() {
-    out_ << "<?xml version=\"1.0\"?>\n<sdf version=\"1.7\">\n  <model name=\"" << escapeXml(model_.name()) << "\">\n";
+    XMLDocument document;
+    document.InsertEndChild(document.NewDeclaration("xml version=\"1.0\""));
+    XMLElement& sdf = addElement(document, "sdf", {{"version", "1.7"}});
+    XMLElement& robot = addElement(sdf, "model", {{"name", model_.name()}});
     for (int i = 1; i < model_.numBodies(); ++i) {
-      writeJoint(i);
-      writeLink(i);
+      writeJoint(i, robot);
+      writeLink(i, robot);
     }
     for (const Frame& frame : model_.frames())
-      if (frame.name != model_.bodies()[frame.body].name) writeFrame(frame);
-    for (const Closure& closure : model_.closures()) writeClosure(closure);
-    out_ << "  </model>\n</sdf>\n";
+      if (frame.name != model_.bodies()[frame.body].name) writeFrame(frame, robot);
+    for (const Closure& closure : model_.closures()) writeClosure(closure, robot);
     listOmissions();
-    return {out_.str(), warnings_.get()};
+    return {formatXml(document), warnings_.get()};
   }
 
  private:
-  std::string getLink(int body) const { return body == 0 ? "world" : escapeXml(model_.bodies()[body].name); }
+  std::string getLink(int body) const { return body == 0 ? "world" : model_.bodies()[body].name; }
 
   [[noreturn]] void refuse(const Joint& joint, const std::string& problem) const {
     throw ModelError(model_.name(), "joint '" + joint.name + "'", problem + ", which SDF cannot express",
@@ -55,77 +56,85 @@ class SdfWriter {
     return joint.X_PJ * calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq));
   }
 
-  void writePose(const SE3& X, int relative_to, const char* indent) {
-    out_ << indent << "<pose";
-    if (relative_to > 0) out_ << " relative_to=\"" << getLink(relative_to) << "\"";
-    out_ << ">" << formatPose(X) << "</pose>\n";
+  void writePose(const SE3& X, int relative_to, XMLElement& e) {
+    XMLElement& pose = addElement(e, "pose");
+    if (relative_to > 0) setAttributes(pose, {{"relative_to", getLink(relative_to)}});
+    pose.SetText(formatPose(X).c_str());
   }
 
-  void writeLink(int i) {
+  void writeLink(int i, XMLElement& robot) {
     const Inertia& inertia = model_.bodies()[i].inertia;
-    out_ << "    <link name=\"" << getLink(i) << "\">\n";
-    writePose(calcPlacement(i), model_.joints()[i].parent, "      ");
+    XMLElement& link = addElement(robot, "link", {{"name", getLink(i)}});
+    writePose(calcPlacement(i), model_.joints()[i].parent, link);
     const Matrix3d& I = inertia.I_com;
-    out_ << "      <inertial>\n        <pose>" << formatExact(inertia.com) << " 0 0 0</pose>\n        <mass>"
-         << formatExact(inertia.mass) << "</mass>\n        <inertia>";
-    const auto write = [&](const char* name, double value) {
-      out_ << "<" << name << ">" << formatExact(value) << "</" << name << ">";
-    };
-    write("ixx", I(0, 0)), write("ixy", I(0, 1)), write("ixz", I(0, 2));
-    write("iyy", I(1, 1)), write("iyz", I(1, 2)), write("izz", I(2, 2));
-    out_ << "</inertia>\n      </inertial>\n";
+    XMLElement& inertial = addElement(link, "inertial");
+    addText(inertial, "pose", formatExact(inertia.com) + " 0 0 0");
+    addText(inertial, "mass", formatExact(inertia.mass));
+    XMLElement& moments = addElement(inertial, "inertia");
+    for (const auto& [name, value] : {std::pair("ixx", I(0, 0)),
+                                      {"ixy", I(0, 1)},
+                                      {"ixz", I(0, 2)},
+                                      {"iyy", I(1, 1)},
+                                      {"iyz", I(1, 2)},
+                                      {"izz", I(2, 2)}})
+      addText(moments, name, formatExact(value));
     if (!(inertia.mass > 0))
       warn("link '" + model_.bodies()[i].name + "'", "it has no mass, which SDF requires to be positive");
     int count = 0;
     for (const Visual& visual : model_.visuals())
-      if (visual.body == i) writeVisual(visual, ++count);
+      if (visual.body == i) writeVisual(visual, ++count, link);
     count = 0;
     for (const Shape& shape : model_.shapes())
-      if (shape.body == i && !shape.fitted) writeShape(shape, ++count);
-    out_ << "    </link>\n";
+      if (shape.body == i && !shape.fitted) writeShape(shape, ++count, link);
   }
 
   // A box with rounded edges is written as the box around it.
-  void writeShape(const Shape& shape, int count) {
-    out_ << "      <collision name=\"collision_" << count << "\">\n";
-    writePose(shape.X_BS, 0, "        ");
-    out_ << "        <geometry>";
-    const std::string radius = "<radius>" + formatExact(shape.radius) + "</radius>";
-    if (shape.half.isZero())
-      out_ << "<sphere>" << radius << "</sphere>";
-    else if (shape.half.head<2>().isZero() && shape.radius > 0)
-      out_ << "<capsule>" << radius << "<length>" << formatExact(2 * shape.half.z()) << "</length></capsule>";
-    else
-      out_ << "<box><size>" << formatExact(2 * (shape.half + Vector3d::Constant(shape.radius))) << "</size></box>";
-    out_ << "</geometry>\n      </collision>\n";
+  void writeShape(const Shape& shape, int count, XMLElement& link) {
+    XMLElement& collision = addElement(link, "collision", {{"name", "collision_" + std::to_string(count)}});
+    writePose(shape.X_BS, 0, collision);
+    XMLElement& geometry = addElement(collision, "geometry");
+    if (shape.half.isZero()) {
+      addText(addElement(geometry, "sphere"), "radius", formatExact(shape.radius));
+    } else if (shape.half.head<2>().isZero() && shape.radius > 0) {
+      XMLElement& capsule = addElement(geometry, "capsule");
+      addText(capsule, "radius", formatExact(shape.radius));
+      addText(capsule, "length", formatExact(2 * shape.half.z()));
+    } else {
+      addText(addElement(geometry, "box"), "size", formatExact(2 * (shape.half + Vector3d::Constant(shape.radius))));
+    }
   }
 
-  void writeVisual(const Visual& visual, int count) {
-    out_ << "      <visual name=\"visual_" << count << "\">\n";
-    writePose(visual.X_BV, 0, "        ");
-    out_ << "        <geometry>";
+  void writeVisual(const Visual& visual, int count, XMLElement& link) {
+    XMLElement& e = addElement(link, "visual", {{"name", "visual_" + std::to_string(count)}});
+    writePose(visual.X_BV, 0, e);
+    XMLElement& geometry = addElement(e, "geometry");
     const Vector3d& size = visual.size;
     switch (visual.shape) {
       case Visual::Shape::Box:
-        out_ << "<box><size>" << formatExact(size) << "</size></box>";
+        addText(addElement(geometry, "box"), "size", formatExact(size));
         break;
-      case Visual::Shape::Cylinder:
-        out_ << "<cylinder><radius>" << formatExact(size[0]) << "</radius><length>" << formatExact(size[1])
-             << "</length></cylinder>";
+      case Visual::Shape::Cylinder: {
+        XMLElement& cylinder = addElement(geometry, "cylinder");
+        addText(cylinder, "radius", formatExact(size[0]));
+        addText(cylinder, "length", formatExact(size[1]));
         break;
+      }
       case Visual::Shape::Sphere:
-        out_ << "<sphere><radius>" << formatExact(size[0]) << "</radius></sphere>";
+        addText(addElement(geometry, "sphere"), "radius", formatExact(size[0]));
         break;
-      case Visual::Shape::Mesh:
-        out_ << "<mesh><uri>" << escapeXml(visual.mesh) << "</uri><scale>" << formatExact(size) << "</scale></mesh>";
+      case Visual::Shape::Mesh: {
+        XMLElement& mesh = addElement(geometry, "mesh");
+        addText(mesh, "uri", visual.mesh);
+        addText(mesh, "scale", formatExact(size));
         break;
+      }
     }
-    const std::string color = formatExact(visual.rgba.head<3>()) + " " + formatExact(visual.rgba[3]);
-    out_ << "</geometry>\n        <material><ambient>" << color << "</ambient><diffuse>" << color
-         << "</diffuse></material>\n      </visual>\n";
+    XMLElement& material = addElement(e, "material");
+    for (const char* light : {"ambient", "diffuse"})
+      addText(material, light, formatExact(visual.rgba.head<3>()) + " " + formatExact(visual.rgba[3]));
   }
 
-  void writeJoint(int i) {
+  void writeJoint(int i, XMLElement& robot) {
     const Joint& joint = model_.joints()[i];
     if (joint.kind == JointKind::Planar) refuse(joint, "it is planar");
     if (joint.kind == JointKind::FreeFlyer) {
@@ -140,52 +149,50 @@ class SdfWriter {
     const std::string name = makeName(joint.name, "_joint");
     if (name != joint.name)
       warn("joint '" + joint.name + "'", "it is renamed to '" + name + "' because a link has its name");
-    out_ << "    <joint name=\"" << escapeXml(name) << "\" type=\"" << type << "\">\n      <parent>"
-         << getLink(joint.parent) << "</parent>\n      <child>" << getLink(i) << "</child>\n";
+    XMLElement& e = addElement(robot, "joint", {{"name", name}, {"type", type}});
+    addText(e, "parent", getLink(joint.parent));
+    addText(e, "child", getLink(i));
     // The frame of the joint is that of its child, where the axes of ours are given at neutral.
     if (joint.kind == JointKind::Universal) {
       const Matrix3d back = makeAxisRotation(joint.axis2, -q_ref_[joint.idx_q + 1]);
-      writeAxis(joint, 0, "axis", back * joint.axis);
-      writeAxis(joint, 1, "axis2", joint.axis2);
+      writeAxis(joint, 0, back * joint.axis, addElement(e, "axis"));
+      writeAxis(joint, 1, joint.axis2, addElement(e, "axis2"));
     } else if (joint.nv == 1) {
-      writeAxis(joint, 0, "axis", joint.axis);
+      writeAxis(joint, 0, joint.axis, addElement(e, "axis"));
     } else {
       reportLimits(joint);
     }
-    out_ << "    </joint>\n";
   }
 
   // Its coordinate counts from q_ref.
-  void writeAxis(const Joint& joint, int k, const char* tag, const Vector3d& axis) {
+  void writeAxis(const Joint& joint, int k, const Vector3d& axis, XMLElement& e) {
     const int dof = joint.idx_v + k, motor = model_.findMotor(joint.name);
     const double q = q_ref_[joint.idx_q + k], lower = model_.lowerLimits()[dof] - q,
                  upper = model_.upperLimits()[dof] - q;
     const double effort = motor < 0 ? HUGE_VAL : model_.motors()[motor].effort_limit;
-    out_ << "      <" << tag << ">\n        <xyz>" << formatExact(axis) << "</xyz>\n";
+    addText(e, "xyz", formatExact(axis));
     if (q != 0) shifted_ += (shifted_.empty() ? "'" : ", '") + joint.name + "' " + formatNumber(q);
     constexpr double kFar = 1e16;  // none, in SDF
-    std::ostringstream limit;
-    const auto write = [](std::ostream& out, const char* name, double value) {
-      out << "<" << name << ">" << formatExact(value) << "</" << name << ">";
-    };
+    XMLElement& limit = addElement(e, "limit");
     if (std::isfinite(lower) || std::isfinite(upper)) {
-      write(limit, "lower", std::max(lower, -kFar));
-      write(limit, "upper", std::min(upper, kFar));
+      addText(limit, "lower", formatExact(std::max(lower, -kFar)));
+      addText(limit, "upper", formatExact(std::min(upper, kFar)));
     }
-    if (std::isfinite(effort)) write(limit, "effort", effort);
-    if (std::isfinite(model_.velocityLimits()[dof])) write(limit, "velocity", model_.velocityLimits()[dof]);
-    if (!limit.str().empty()) out_ << "        <limit>" << limit.str() << "</limit>\n";
+    if (std::isfinite(effort)) addText(limit, "effort", formatExact(effort));
+    if (std::isfinite(model_.velocityLimits()[dof]))
+      addText(limit, "velocity", formatExact(model_.velocityLimits()[dof]));
+    if (limit.NoChildren()) e.DeleteChild(&limit);
     for (const JointForce& force : model_.jointForces())
-      if (force.dof == dof) writeJointForce(joint, force, q);
-    out_ << "      </" << tag << ">\n";
+      if (force.dof == dof) writeJointForce(joint, force, q, e);
   }
 
-  void writeJointForce(const Joint& joint, const JointForce& force, double q) {
-    out_ << "        <dynamics><damping>" << formatExact(force.damping) << "</damping><friction>"
-         << formatExact(force.friction) << "</friction><spring_reference>"
-         << formatExact(force.stiffness == 0 ? 0 : force.rest + force.preload / force.stiffness - q)
-         << "</spring_reference><spring_stiffness>" << formatExact(force.stiffness)
-         << "</spring_stiffness></dynamics>\n";
+  void writeJointForce(const Joint& joint, const JointForce& force, double q, XMLElement& axis) {
+    XMLElement& dynamics = addElement(axis, "dynamics");
+    addText(dynamics, "damping", formatExact(force.damping));
+    addText(dynamics, "friction", formatExact(force.friction));
+    addText(dynamics, "spring_reference",
+            formatExact(force.stiffness == 0 ? 0 : force.rest + force.preload / force.stiffness - q));
+    addText(dynamics, "spring_stiffness", formatExact(force.stiffness));
     if (force.stiffness == 0 && force.preload != 0)
       warn("joint '" + joint.name + "'", "its preload without a spring is left out");
     if (force.friction != 0) warn("joint '" + joint.name + "'", "its friction becomes that of the simulator");
@@ -198,10 +205,9 @@ class SdfWriter {
       warn("joint '" + joint.name + "'", "the limits of its coordinates are left out");
   }
 
-  void writeFrame(const Frame& frame) {
+  void writeFrame(const Frame& frame, XMLElement& robot) {
     if (frame.body == 0) return warn("frame '" + frame.name + "'", "it is left out: it is fixed to the world");
-    out_ << "    <frame name=\"" << escapeXml(frame.name) << "\" attached_to=\"" << getLink(frame.body)
-         << "\">\n      <pose>" << formatPose(frame.X_BF) << "</pose>\n    </frame>\n";
+    writePose(frame.X_BF, 0, addElement(robot, "frame", {{"name", frame.name}, {"attached_to", getLink(frame.body)}}));
   }
 
   // In SDF links, joints and frames of a model share their names.
@@ -210,7 +216,7 @@ class SdfWriter {
     return name;
   }
 
-  void writeClosure(const Closure& closure) {
+  void writeClosure(const Closure& closure, XMLElement& robot) {
     const std::string element = "closure '" + closure.name + "'";
     if (closure.kind == ClosureKind::Coupler) return warn(element, "it is left out: SDF cannot couple joints");
     const std::string name = makeName(closure.name, "_closure");
@@ -219,16 +225,14 @@ class SdfWriter {
     const bool swap = closure.body2 == 0;
     const int parent = swap ? closure.body2 : closure.body1, child = swap ? closure.body1 : closure.body2;
     const SE3& X = swap ? closure.X_B1 : closure.X_B2;
-    out_ << "    <joint name=\"" << escapeXml(name) << "\" type=\""
-         << (closure.kind == ClosureKind::Weld6D   ? "fixed"
-             : closure.kind == ClosureKind::Ball3D ? "ball"
-                                                   : "continuous")
-         << "\">\n";
-    writePose(X, 0, "      ");
-    out_ << "      <parent>" << getLink(parent) << "</parent>\n      <child>" << getLink(child) << "</child>\n";
-    if (closure.kind == ClosureKind::Hinge5D)
-      out_ << "      <axis><xyz>" << formatExact(closure.axis) << "</xyz></axis>\n";
-    out_ << "    </joint>\n";
+    const char* type = closure.kind == ClosureKind::Weld6D   ? "fixed"
+                       : closure.kind == ClosureKind::Ball3D ? "ball"
+                                                             : "continuous";
+    XMLElement& e = addElement(robot, "joint", {{"name", name}, {"type", type}});
+    writePose(X, 0, e);
+    addText(e, "parent", getLink(parent));
+    addText(e, "child", getLink(child));
+    if (closure.kind == ClosureKind::Hinge5D) addText(addElement(e, "axis"), "xyz", formatExact(closure.axis));
     if (closure.kp != 0 || closure.kd != 0) warn(element, "its gains kp and kd are left out");
   }
 
@@ -247,7 +251,6 @@ class SdfWriter {
 
   const Model& model_;
   const VectorXd q_ref_;
-  std::ostringstream out_;
   std::set<std::string> taken_;  // names of joints
   std::string shifted_;          // joints with their coordinates at q_ref
   FormatWarnings warnings_{model_};

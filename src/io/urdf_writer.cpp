@@ -3,11 +3,9 @@
 #include <cmath>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include "bielle/io/robot_writer.h"
 #include "io/robot_text.h"
-#include "io/xml_text.h"
 
 namespace bielle {
 namespace {
@@ -20,60 +18,59 @@ Vector3d calcRollPitchYaw(const Matrix3d& R) {
   return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
 }
 
-std::string formatOrigin(const SE3& X) {
-  std::string text = "<origin xyz=\"" + formatRounded(X.p) + "\"";
-  if (!X.R.isIdentity(1e-15)) text += " rpy=\"" + formatRounded(calcRollPitchYaw(X.R)) + "\"";
-  return text + "/>";
+void addOrigin(XMLElement& e, const SE3& X) {
+  XMLElement& origin = addElement(e, "origin", {{"xyz", formatRounded(X.p)}});
+  if (!X.R.isIdentity(1e-15)) setAttributes(origin, {{"rpy", formatRounded(calcRollPitchYaw(X.R))}});
 }
 
 class UrdfWriter {
  public:
-  explicit UrdfWriter(const Model& model) : model_(model), free_root_(hasImpliedFreeFlyer(model)) {
+  UrdfWriter(const Model& model, XMLDocument& document)
+      : model_(model), free_root_(hasImpliedFreeFlyer(model)), document_(document) {
     for (const Body& body : model.bodies()) bodies_.insert(body.name);
   }
 
   /// A URDF that must do without a YAML file; what it cannot say of its tree goes to `warnings`.
-  std::string formatUrdfAlone(const UrdfDialect& dialect, FormatWarnings& warnings) {
-    dialect_ = &dialect;
+  void writeAlone(bool for_drake, FormatWarnings& warnings) {
+    for_drake_ = for_drake;
     warnings_ = &warnings;
     for (int i = 1; i < model_.numBodies(); ++i) {
       const JointKind kind = model_.joints()[i].kind;
-      if (!dialect.for_drake && (kind == JointKind::Spherical || kind == JointKind::Universal))
+      if (!for_drake && (kind == JointKind::Spherical || kind == JointKind::Universal))
         refuseToWrite(model_, std::string(getName(kind)) + " joint '" + model_.joints()[i].name + "'",
                       "URDF does not support such joints");
     }
     for (const Closure& c : model_.closures()) {
-      if (dialect.for_drake && c.kind != ClosureKind::Coupler) continue;
+      if (for_drake && c.kind != ClosureKind::Coupler) continue;
       // The joint that mimics: the later one, or the other one if that mimics already.
       int y = 1;
       if (c.terms.size() == 2 && mimics_.count(c.terms[1].joint)) y = 0;
       if (c.terms.size() != 2 || mimics_.count(c.terms[y].joint))
-        warn("closure '" + c.name + "'", dialect.for_drake ? "it is left out: <mimic> couples a joint to one other"
-                                                           : "it is left out because a URDF is a tree");
+        warn("closure '" + c.name + "'", for_drake ? "it is left out: <mimic> couples a joint to one other"
+                                                   : "it is left out because a URDF is a tree");
       else
         mimics_[c.terms[y].joint] = {c.terms[1 - y].joint, -c.terms[1 - y].coefficient / c.terms[y].coefficient,
                                      c.offset / c.terms[y].coefficient};
     }
-    return formatUrdf("");
+    write("");
   }
 
-  std::string formatUrdf(const std::string& remark) {
-    std::ostringstream links;
+  void write(const std::string& remark) {
+    document_.InsertEndChild(document_.NewDeclaration("xml version=\"1.0\""));
+    if (!remark.empty()) document_.InsertEndChild(document_.NewComment((" " + remark + " ").c_str()));
+    robot_ = &addElement(document_, "robot", {{"name", model_.name()}});
     for (int i = free_root_ ? 1 : 0; i < model_.numBodies(); ++i) {
-      writeLink(i, links);
-      if (i > (free_root_ ? 1 : 0)) writeJoint(i, links);
+      writeLink(i);
+      if (i > (free_root_ ? 1 : 0)) writeJoint(i);
       for (const Frame& frame : model_.frames())
-        if (frame.body == i && !bodies_.count(frame.name)) writeFrame(frame.name, i, frame.X_BF, links);
-      writeMadeFrames(i, links);
+        if (frame.body == i && !bodies_.count(frame.name)) writeFrame(frame.name, i, frame.X_BF);
+      writeMadeFrames(i);
     }
-    std::ostringstream out;
-    out << "<?xml version=\"1.0\"?>\n";
-    if (!remark.empty()) out << "<!-- " << remark << " -->\n";
-    out << "<robot name=\"" << escapeXml(model_.name()) << "\"" << (dialect_ ? dialect_->attributes : "") << ">\n";
-    for (const auto& [color, name] : colors_)
-      out << "  <material name=\"" << name << "\"><color rgba=\"" << color << "\"/></material>\n";
-    out << links.str() << (dialect_ ? dialect_->elements : "") << "</robot>\n";
-    return out.str();
+    for (auto color = colors_.rbegin(); color != colors_.rend(); ++color) {
+      XMLElement& material = addElement(*robot_, "material", {{"name", color->second}});
+      addElement(material, "color", {{"rgba", color->first}});
+      robot_->InsertFirstChild(&material);
+    }
   }
 
  private:
@@ -84,105 +81,104 @@ class UrdfWriter {
     return it->second;
   }
 
-  void writeLink(int i, std::ostream& out) {
+  void writeLink(int i) {
     const Body& body = model_.bodies()[i];
-    out << "\n  <link name=\"" << escapeXml(body.name) << "\">\n";
+    XMLElement& link = addElement(*robot_, "link", {{"name", body.name}});
     if (body.inertia.mass > 0) {
       const Matrix3d& I = body.inertia.I_com;
-      out << "    <inertial>\n      <origin xyz=\"" << formatRounded(body.inertia.com) << "\"/>\n      <mass value=\""
-          << formatRobotNumber(body.inertia.mass) << "\"/>\n      <inertia";
+      XMLElement& inertial = addElement(link, "inertial");
+      addElement(inertial, "origin", {{"xyz", formatRounded(body.inertia.com)}});
+      addElement(inertial, "mass", {{"value", formatRobotNumber(body.inertia.mass)}});
       const double least = 1e-12 * I.diagonal().maxCoeff();  // products below it are rounding
-      const auto write = [&](const char* name, double value) {
-        out << " " << name << "=\"" << formatRobotNumber(std::abs(value) < least ? 0 : value) << "\"";
-      };
-      write("ixx", I(0, 0)), write("iyy", I(1, 1)), write("izz", I(2, 2));
-      write("ixy", I(0, 1)), write("ixz", I(0, 2)), write("iyz", I(1, 2));
-      out << "/>\n    </inertial>\n";
+      const auto format = [&](double value) { return formatRobotNumber(std::abs(value) < least ? 0 : value); };
+      addElement(inertial, "inertia",
+                 {{"ixx", format(I(0, 0))},
+                  {"iyy", format(I(1, 1))},
+                  {"izz", format(I(2, 2))},
+                  {"ixy", format(I(0, 1))},
+                  {"ixz", format(I(0, 2))},
+                  {"iyz", format(I(1, 2))}});
     }
     for (const Visual& visual : model_.visuals())
-      if (visual.body == i) writeVisual(visual, out);
+      if (visual.body == i) writeVisual(visual, addElement(link, "visual"));
     for (const Shape& shape : model_.shapes())
-      if (shape.body == i && !shape.fitted) writeShape(shape, out);
-    out << "  </link>\n";
+      if (shape.body == i && !shape.fitted) writeShape(shape, addElement(link, "collision"));
   }
 
-  void writeVisual(const Visual& visual, std::ostream& out) {
-    out << "    <visual>\n      " << formatOrigin(visual.X_BV) << "\n      <geometry>";
+  void writeVisual(const Visual& visual, XMLElement& e) {
+    addOrigin(e, visual.X_BV);
+    XMLElement& geometry = addElement(e, "geometry");
     const Vector3d& size = visual.size;
     switch (visual.shape) {
       case Visual::Shape::Box:
-        out << "<box size=\"" << formatRounded(size) << "\"/>";
+        addElement(geometry, "box", {{"size", formatRounded(size)}});
         break;
       case Visual::Shape::Cylinder:
-        out << "<cylinder radius=\"" << formatRounded(size[0]) << "\" length=\"" << formatRounded(size[1]) << "\"/>";
+        addElement(geometry, "cylinder", {{"radius", formatRounded(size[0])}, {"length", formatRounded(size[1])}});
         break;
       case Visual::Shape::Sphere:
-        out << "<sphere radius=\"" << formatRounded(size[0]) << "\"/>";
+        addElement(geometry, "sphere", {{"radius", formatRounded(size[0])}});
         break;
       case Visual::Shape::Mesh:
-        out << "<mesh filename=\"" << escapeXml(visual.mesh) << "\" scale=\"" << formatRounded(size) << "\"/>";
+        addElement(geometry, "mesh", {{"filename", visual.mesh}, {"scale", formatRounded(size)}});
         break;
     }
-    out << "</geometry>\n      <material name=\"" << getMaterial(visual.rgba) << "\"/>\n    </visual>\n";
+    addElement(e, "material", {{"name", getMaterial(visual.rgba)}});
   }
 
   // URDF has no capsules: a cylinder that is long enough is read as one (fitShape). What else is rounded is written as the box
   // around it.
-  void writeShape(const Shape& shape, std::ostream& out) {
-    out << "    <collision>\n      " << formatOrigin(shape.X_BS) << "\n      <geometry>";
+  void writeShape(const Shape& shape, XMLElement& e) {
+    addOrigin(e, shape.X_BS);
+    XMLElement& geometry = addElement(e, "geometry");
     const Vector3d& half = shape.half;
     Visual cylinder;
     cylinder.shape = Visual::Shape::Cylinder;
     cylinder.size = {shape.radius, 2 * half.z(), 0};
     if (half.isZero())
-      out << "<sphere radius=\"" << formatRounded(shape.radius) << "\"/>";
+      addElement(geometry, "sphere", {{"radius", formatRounded(shape.radius)}});
     else if (half.head<2>().isZero() && shape.radius > 0 && fitShape(cylinder)->radius > 0)
-      out << "<cylinder radius=\"" << formatRounded(shape.radius) << "\" length=\"" << formatRounded(2 * half.z())
-          << "\"/>";
+      addElement(geometry, "cylinder",
+                 {{"radius", formatRounded(shape.radius)}, {"length", formatRounded(2 * half.z())}});
     else
-      out << "<box size=\"" << formatRounded(2 * (half + Vector3d::Constant(shape.radius))) << "\"/>";
-    out << "</geometry>\n    </collision>\n";
+      addElement(geometry, "box", {{"size", formatRounded(2 * (half + Vector3d::Constant(shape.radius)))}});
   }
 
-  void writeJoint(int i, std::ostream& out) {
+  void writeJoint(int i) {
     const Joint& joint = model_.joints()[i];
     const char* type = "continuous";  // universal and spherical joints get their kind by the YAML file
     if (joint.kind == JointKind::Prismatic) type = "prismatic";
     if (joint.kind == JointKind::Planar) type = "planar";
     if (joint.kind == JointKind::FreeFlyer) type = "floating";
     if (joint.kind == JointKind::Revolute) type = "revolute";
-    const bool is_custom = isForDrake() && (joint.kind == JointKind::Spherical || joint.kind == JointKind::Universal);
+    const bool is_custom = for_drake_ && (joint.kind == JointKind::Spherical || joint.kind == JointKind::Universal);
     if (is_custom) type = joint.kind == JointKind::Spherical ? "ball" : "universal";
-    const std::string tag = is_custom ? "drake:joint" : "joint";
-    out << "  <" << tag << " name=\"" << escapeXml(joint.name) << "\" type=\"" << type << "\">\n    "
-        << formatOrigin(joint.X_PJ) << "\n    <parent link=\"" << escapeXml(model_.bodies()[joint.parent].name)
-        << "\"/>\n    <child link=\"" << escapeXml(model_.bodies()[i].name) << "\"/>\n";
-    if (joint.nv == 1 || joint.kind == JointKind::Planar)
-      out << "    <axis xyz=\"" << formatRounded(joint.axis) << "\"/>\n";
-    writeLimits(joint, out);
-    if (dialect_) writeMimicAndDynamics(i, out);
-    out << "  </" << tag << ">\n";
+    XMLElement& e = addElement(*robot_, is_custom ? "drake:joint" : "joint", {{"name", joint.name}, {"type", type}});
+    addOrigin(e, joint.X_PJ);
+    addElement(e, "parent", {{"link", model_.bodies()[joint.parent].name}});
+    addElement(e, "child", {{"link", model_.bodies()[i].name}});
+    if (joint.nv == 1 || joint.kind == JointKind::Planar) addElement(e, "axis", {{"xyz", formatRounded(joint.axis)}});
+    writeLimits(joint, e);
+    if (warnings_) writeMimicAndDynamics(i, e);
   }
 
-  bool isForDrake() const { return dialect_ && dialect_->for_drake; }
-
-  void writeLimits(const Joint& joint, std::ostream& out) {
+  void writeLimits(const Joint& joint, XMLElement& e) {
     const auto lower = model_.lowerLimits().segment(joint.idx_v, joint.nv),
                upper = model_.upperLimits().segment(joint.idx_v, joint.nv),
                velocity = model_.velocityLimits().segment(joint.idx_v, joint.nv);
-    if (isForDrake()) return writeDrakeLimits(joint, lower, upper, velocity, out);
+    if (for_drake_) return writeDrakeLimits(joint, lower, upper, velocity, e);
     const bool ranged = lower.allFinite() && upper.allFinite();
     const bool open = lower.array().isInf().all() && upper.array().isInf().all();
     const bool slow = velocity.allFinite();
     if ((!ranged && !open) || (joint.nv != 1 && (ranged || slow)))
       refuseToWrite(model_, "joint '" + joint.name + "'",
                     "it has a limit on one side only, or several coordinates with limits");
-    const double effort = dialect_ ? getEffortLimit(joint) : HUGE_VAL;
+    const double effort = warnings_ ? getEffortLimit(joint) : HUGE_VAL;
     if (!ranged && !slow && std::isinf(effort) && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
-    out << "    <limit";
-    if (ranged) out << " lower=\"" << formatRounded(lower[0]) << "\" upper=\"" << formatRounded(upper[0]) << "\"";
-    out << " effort=\"" << formatRobotNumber(std::isfinite(effort) ? effort : 0) << "\" velocity=\""
-        << formatRobotNumber(slow ? velocity[0] : 0) << "\"/>\n";
+    XMLElement& limit = addElement(e, "limit");
+    if (ranged) setAttributes(limit, {{"lower", formatRounded(lower[0])}, {"upper", formatRounded(upper[0])}});
+    setAttributes(limit, {{"effort", formatRobotNumber(std::isfinite(effort) ? effort : 0)},
+                          {"velocity", formatRobotNumber(slow ? velocity[0] : 0)}});
   }
 
   double getEffortLimit(const Joint& joint) const {
@@ -192,56 +188,59 @@ class UrdfWriter {
 
   // Each alone, because a 0 would be a limit.
   void writeDrakeLimits(const Joint& joint, ConstVectorRef lower, ConstVectorRef upper, ConstVectorRef velocity,
-                        std::ostream& out) {
+                        XMLElement& e) {
     if (joint.nv != 1) {
       if (!(lower.array().isInf().all() && upper.array().isInf().all() && velocity.array().isInf().all()))
         warn("joint '" + joint.name + "'", "the limits of its coordinates are left out");
       return;
     }
-    std::string text;
+    XMLElement& limit = addElement(e, "limit");
     for (const auto& [name, value] : {std::pair("lower", lower[0]),
                                       {"upper", upper[0]},
                                       {"effort", getEffortLimit(joint)},
                                       {"velocity", velocity[0]}})
-      if (std::isfinite(value)) text += std::string(" ") + name + "=\"" + formatRobotNumber(value, "%.17g") + "\"";
-    if (!text.empty()) out << "    <limit" << text << "/>\n";
+      if (std::isfinite(value)) setAttributes(limit, {{name, formatRobotNumber(value, "%.17g")}});
+    if (!limit.FirstAttribute()) e.DeleteChild(&limit);
   }
 
-  void writeMimicAndDynamics(int i, std::ostream& out) {
+  void writeMimicAndDynamics(int i, XMLElement& e) {
     if (const auto it = mimics_.find(i); it != mimics_.end())
-      out << "    <mimic joint=\"" << escapeXml(model_.joints()[it->second.joint].name) << "\" multiplier=\""
-          << formatRobotNumber(it->second.multiplier, "%.17g") << "\" offset=\""
-          << formatRobotNumber(it->second.offset, "%.17g") << "\"/>\n";
+      addElement(e, "mimic",
+                 {{"joint", model_.joints()[it->second.joint].name},
+                  {"multiplier", formatRobotNumber(it->second.multiplier, "%.17g")},
+                  {"offset", formatRobotNumber(it->second.offset, "%.17g")}});
     for (const JointForce& force : model_.jointForces()) {
       if (force.joint != i) continue;
       const std::string element = "joint '" + model_.joints()[i].name + "'";
       if (force.damping != 0 || force.friction != 0)
-        out << "    <dynamics damping=\"" << formatRobotNumber(force.damping, "%.17g") << "\" friction=\""
-            << formatRobotNumber(force.friction, "%.17g") << "\"/>\n";
+        addElement(e, "dynamics",
+                   {{"damping", formatRobotNumber(force.damping, "%.17g")},
+                    {"friction", formatRobotNumber(force.friction, "%.17g")}});
       if (force.friction != 0 && force.friction_speed != JointForce().friction_speed)
         warn(element, "its friction_speed is left out");
-      if (force.friction != 0 && isForDrake()) warn(element, "its friction is written, but Drake ignores it");
+      if (force.friction != 0 && for_drake_) warn(element, "its friction is written, but Drake ignores it");
       if (force.stiffness != 0 || force.preload != 0) warn(element, "its spring is left out");
     }
   }
 
   void warn(const std::string& element, const std::string& problem) { warnings_->add(element, problem); }
 
-  void writeFrame(const std::string& name, int body, const SE3& X_BF, std::ostream& out) {
-    out << "  <link name=\"" << escapeXml(name) << "\"/>\n  <joint name=\"" << escapeXml(name)
-        << "_frame\" type=\"fixed\">\n    " << formatOrigin(X_BF) << "\n    <parent link=\""
-        << escapeXml(model_.bodies()[body].name) << "\"/>\n    <child link=\"" << escapeXml(name)
-        << "\"/>\n  </joint>\n";
+  void writeFrame(const std::string& name, int body, const SE3& X_BF) {
+    addElement(*robot_, "link", {{"name", name}});
+    XMLElement& joint = addElement(*robot_, "joint", {{"name", name + "_frame"}, {"type", "fixed"}});
+    addOrigin(joint, X_BF);
+    addElement(joint, "parent", {{"link", model_.bodies()[body].name}});
+    addElement(joint, "child", {{"link", name}});
   }
 
   // Frames of closures and contacts that have no name.
-  void writeMadeFrames(int body, std::ostream& out) {
+  void writeMadeFrames(int body) {
     const auto write = [&](int owner, const SE3& X, const std::string& made) {
       if (owner == body && findFrameName(model_, owner, X, made) == made && model_.findFrame(made) < 0)
-        writeFrame(made, body, X, out);
+        writeFrame(made, body, X);
     };
     for (const Closure& c : model_.closures()) {
-      if (c.kind == ClosureKind::Coupler || isForDrake()) continue;
+      if (c.kind == ClosureKind::Coupler || for_drake_) continue;
       write(c.body1, c.X_B1, c.name + "_frame1");
       write(c.body2, c.X_B2, c.name + "_frame2");
     }
@@ -250,6 +249,8 @@ class UrdfWriter {
 
   const Model& model_;
   const bool free_root_;
+  XMLDocument& document_;
+  XMLElement* robot_ = nullptr;
   std::set<std::string> bodies_;
   std::map<std::string, std::string> colors_;
 
@@ -258,27 +259,31 @@ class UrdfWriter {
     int joint = 0;
     double multiplier = 1, offset = 0;
   };
-  const UrdfDialect* dialect_ = nullptr;
+  bool for_drake_ = false;
   std::map<int, Mimic> mimics_;
   FormatWarnings* warnings_ = nullptr;
 };
 
 }  // namespace
 
-std::string formatUrdfTree(const Model& model, const UrdfDialect& dialect, FormatWarnings& warnings) {
-  return UrdfWriter(model).formatUrdfAlone(dialect, warnings);
+XMLElement& addUrdfTree(const Model& model, bool for_drake, XMLDocument& document, FormatWarnings& warnings) {
+  UrdfWriter(model, document).writeAlone(for_drake, warnings);
+  return *document.RootElement();
 }
 
 std::string formatUrdfBesideYaml(const Model& model, const std::string& remark) {
-  return UrdfWriter(model).formatUrdf(remark);
+  XMLDocument document;
+  UrdfWriter(model, document).write(remark);
+  return formatXml(document);
 }
 
 UrdfText formatUrdf(const Model& model) {
   FormatWarnings warnings(model);
-  const std::string text = formatUrdfTree(model, {}, warnings);
+  XMLDocument document;
+  addUrdfTree(model, false, document, warnings);
   warnings.addBeyondTree();
   warnings.addYamlOnly();
-  return {text, warnings.get()};
+  return {formatXml(document), warnings.get()};
 }
 
 }  // namespace bielle

@@ -4,19 +4,14 @@
 
 #include "bielle/model/model.h"
 #include "io/format_warnings.h"
+#include "model/xml_document.h"
 
 namespace bielle {
 
-struct UrdfDialect {
-  /// Joints as <drake:joint> where URDF has none, limits only where there are some, no frames for loops.
-  bool for_drake = false;
-  std::string attributes;  ///< of <robot>, each with a space before it
-  std::string elements;    ///< after all links and joints
-};
-
-/// The tree with its mimics; whatever of it the dialect cannot say goes to `warnings`.
+/// The tree with its mimics as <robot>; whatever of it the file cannot say goes to `warnings`.
+/// \param for_drake  joints are <drake:joint> where URDF has none, limits are only where there are some, and frames for loops nowhere
 /// \throws ModelError for joints that it does not have
-std::string formatUrdfTree(const Model& model, const UrdfDialect& dialect, FormatWarnings& warnings);
+XMLElement& addUrdfTree(const Model& model, bool for_drake, XMLDocument& document, FormatWarnings& warnings);
 
 /// The URDF of a pair with a YAML file: frames of closures and contacts without a name get one.
 /// \param remark  comment at its head

@@ -19,12 +19,12 @@ std::string getDefaultTag(const std::string& tag) {
   return actuators.count(tag) ? "general" : tag;
 }
 
-void merge(const TiXmlElement& element, const std::string& path, MjcfAttributes& attributes) {
-  for (const TiXmlAttribute* a = element.FirstAttribute(); a; a = a->Next())
-    attributes[a->Name()] = {a->Value(), element.Row()};
+void merge(const XMLElement& element, const std::string& path, MjcfAttributes& attributes) {
+  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next())
+    attributes[a->Name()] = {a->Value(), element.GetLineNum()};
   if (attributes.size() > kMostAttributes)
-    throw ModelError(path, "<" + element.ValueStr() + "> (line " + std::to_string(element.Row()) + ")",
-                     "it has more than " + std::to_string(kMostAttributes) + " attributes", "remove the unused ones");
+    throw ModelError(path, describe(element), "it has more than " + std::to_string(kMostAttributes) + " attributes",
+                     "remove the unused ones");
 }
 
 bool parseNumbers(const std::string& text, std::vector<double>& numbers) {
@@ -83,31 +83,28 @@ std::vector<std::string> MjcfNotes::format(const std::string& path) const {
   return out;
 }
 
-void readMjcfDefaults(const TiXmlElement& element, const std::string& parent, MjcfSettings& settings) {
+void readMjcfDefaults(const XMLElement& element, const std::string& parent, MjcfSettings& settings) {
   const char* text = element.Attribute("class");
   const std::string name = text ? text : parent.empty() ? "main" : "";
-  if (name.empty())
-    throw ModelError(settings.path, "<default> (line " + std::to_string(element.Row()) + ")", "it has no class",
-                     "name it");
+  if (name.empty()) throw ModelError(settings.path, describe(element), "it has no class", "name it");
   if (!settings.defaults.count(name))
     settings.defaults[name] = parent.empty() ? std::map<std::string, MjcfAttributes>() : settings.defaults.at(parent);
   auto& defaults = settings.defaults[name];
   for (const auto& [tag, attributes] : defaults) settings.num_defaults += 1 + attributes.size();
   if (settings.num_defaults > kMostDefaults)
-    throw ModelError(settings.path, "<default> (line " + std::to_string(element.Row()) + ")",
-                     "there are more defaults than any robot needs", "remove classes");
-  for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement())
-    if (e->ValueStr() != "default") merge(*e, settings.path, defaults[getDefaultTag(e->ValueStr())]);
-  for (const TiXmlElement* e = element.FirstChildElement("default"); e; e = e->NextSiblingElement("default"))
-    readMjcfDefaults(*e, name, settings);
+    throw ModelError(settings.path, describe(element), "there are more defaults than any robot needs",
+                     "remove classes");
+  for (const XMLElement* e : getChildren(element))
+    if (getTag(*e) != "default") merge(*e, settings.path, defaults[getDefaultTag(getTag(*e))]);
+  for (const XMLElement* e : getChildren(element, "default")) readMjcfDefaults(*e, name, settings);
 }
 
-MjcfElement::MjcfElement(const TiXmlElement& element, const std::string& childclass, MjcfSettings& settings)
-    : MjcfElement(element, childclass, settings, getDefaultTag(element.ValueStr())) {}
+MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings)
+    : MjcfElement(element, childclass, settings, getDefaultTag(getTag(element))) {}
 
-MjcfElement::MjcfElement(const TiXmlElement& element, const std::string& childclass, MjcfSettings& settings,
+MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings,
                          const std::string& kind)
-    : settings_(settings), tag_(element.ValueStr()), line_(element.Row()) {
+    : settings_(settings), tag_(getTag(element)), line_(element.GetLineNum()) {
   if (const char* name = element.Attribute("name")) name_ = name;
   const char* text = element.Attribute("class");
   const std::string own = text ? text : childclass.empty() ? "main" : childclass;

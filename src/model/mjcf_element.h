@@ -44,15 +44,15 @@ struct MjcfSettings {
 };
 
 /// Reads <default>, which nest.
-void readMjcfDefaults(const TiXmlElement& element, const std::string& parent, MjcfSettings& settings);
+void readMjcfDefaults(const XMLElement& element, const std::string& parent, MjcfSettings& settings);
 
 /// An element with the defaults of its class. Attributes that were not asked for until the end are noted.
 class MjcfElement {
  public:
   /// \param childclass  class of elements that name none
-  MjcfElement(const TiXmlElement& element, const std::string& childclass, MjcfSettings& settings);
+  MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings);
   /// \param kind  whose defaults hold for it, in place of its tag
-  MjcfElement(const TiXmlElement& element, const std::string& childclass, MjcfSettings& settings,
+  MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings,
               const std::string& kind);
   ~MjcfElement();
   MjcfElement(const MjcfElement&) = delete;

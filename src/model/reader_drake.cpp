@@ -15,22 +15,22 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool isOfDrake(const std::string& name) { return name.rfind("drake:", 0) == 0; }
 
-bool hasDrakeElement(const TiXmlElement& element) {
-  for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement())
-    if (isOfDrake(e->ValueStr()) || hasDrakeElement(*e)) return true;
+bool hasDrakeElement(const XMLElement& element) {
+  for (const XMLElement* e : getChildren(element))
+    if (isOfDrake(getTag(*e)) || hasDrakeElement(*e)) return true;
   return false;
 }
 
 class DrakeReader {
  public:
-  DrakeReader(const TiXmlElement& robot, UrdfFile& file, YamlFile& settings)
+  DrakeReader(const XMLElement& robot, UrdfFile& file, YamlFile& settings)
       : robot_(robot), file_(file), settings_(settings) {}
 
   void read() {
-    for (const TiXmlElement* e = robot_.FirstChildElement(); e; e = e->NextSiblingElement())
+    for (const XMLElement* e : getChildren(robot_))
       if (isJoint(*e)) readJoint(*e);
-    for (const TiXmlElement* e = robot_.FirstChildElement(); e; e = e->NextSiblingElement()) {
-      const std::string& tag = e->ValueStr();
+    for (const XMLElement* e : getChildren(robot_)) {
+      const std::string& tag = getTag(*e);
       if (tag == "transmission")
         readTransmission(*e);
       else if (tag == "drake:ball_constraint")
@@ -44,28 +44,24 @@ class DrakeReader {
   }
 
  private:
-  static std::string getElement(const TiXmlElement& e) {
-    return "<" + e.ValueStr() + "> (line " + std::to_string(e.Row()) + ")";
+  [[noreturn]] void fail(const XMLElement& e, const std::string& problem, const std::string& remedy) const {
+    throw ModelError(file_.path, describe(e), problem, remedy);
   }
 
-  [[noreturn]] void fail(const TiXmlElement& e, const std::string& problem, const std::string& remedy) const {
-    throw ModelError(file_.path, getElement(e), problem, remedy);
+  void warn(const XMLElement& e, const std::string& problem) {
+    file_.warnings.push_back(file_.path + ": " + describe(e) + ": " + problem);
   }
 
-  void warn(const TiXmlElement& e, const std::string& problem) {
-    file_.warnings.push_back(file_.path + ": " + getElement(e) + ": " + problem);
-  }
+  static std::string getText(const XMLElement& e) { return e.GetText() ? e.GetText() : ""; }
 
-  static std::string getText(const TiXmlElement& e) { return e.GetText() ? e.GetText() : ""; }
-
-  const TiXmlElement& getChild(const TiXmlElement& e, const std::string& tag) const {
-    const TiXmlElement* child = e.FirstChildElement(tag);
+  const XMLElement& getChild(const XMLElement& e, const std::string& tag) const {
+    const XMLElement* child = e.FirstChildElement(tag.c_str());
     if (!child) fail(e, "it has no <" + tag + ">", "give one");
     return *child;
   }
 
   // Finite numbers of an attribute.
-  std::vector<double> getNumbers(const TiXmlElement& e, const char* attribute, size_t count) const {
+  std::vector<double> getNumbers(const XMLElement& e, const char* attribute, size_t count) const {
     const std::string text = getAttribute(&e, attribute);
     std::istringstream stream(text);
     stream.imbue(std::locale::classic());
@@ -80,23 +76,23 @@ class DrakeReader {
     return values;
   }
 
-  double getNumber(const TiXmlElement& e) const { return getNumbers(e, "value", 1)[0]; }
+  double getNumber(const XMLElement& e) const { return getNumbers(e, "value", 1)[0]; }
 
-  double getChildNumber(const TiXmlElement& e, const std::string& tag, bool may_be_zero) const {
-    const TiXmlElement& child = getChild(e, tag);
+  double getChildNumber(const XMLElement& e, const std::string& tag, bool may_be_zero) const {
+    const XMLElement& child = getChild(e, tag);
     const double value = getNumber(child);
     if (value < 0 || (value == 0 && !may_be_zero))
       fail(child, "its value is not " + std::string(may_be_zero ? "zero or more" : "positive"), "correct it");
     return value;
   }
 
-  Vector3d getChildVector(const TiXmlElement& e, const std::string& tag) const {
+  Vector3d getChildVector(const XMLElement& e, const std::string& tag) const {
     const std::vector<double> values = getNumbers(getChild(e, tag), "value", 3);
     return {values[0], values[1], values[2]};
   }
 
-  std::string getLink(const TiXmlElement& e, const std::string& tag) const {
-    const TiXmlElement& child = getChild(e, tag);
+  std::string getLink(const XMLElement& e, const std::string& tag) const {
+    const XMLElement& child = getChild(e, tag);
     const std::string name = getAttribute(&child, "name");
     if (!file_.links.count(name))
       fail(child, "there is no link '" + name + "'", "declare the link or correct the name");
@@ -109,9 +105,9 @@ class DrakeReader {
     return it == file_.joints.end() ? nullptr : &*it;
   }
 
-  void readJoint(const TiXmlElement& e) {
+  void readJoint(const XMLElement& e) {
     UrdfJoint& joint = *findJoint(getAttribute(&e, "name"));
-    const TiXmlElement* limit = e.FirstChildElement("limit");
+    const XMLElement* limit = e.FirstChildElement("limit");
     if (!limit || getNv(joint.joint.kind) != 1) return;
     const bool lower = limit->Attribute("lower"), upper = limit->Attribute("upper");
     if (lower != upper && joint.joint.kind != JointKind::Continuous) {
@@ -121,13 +117,13 @@ class DrakeReader {
     if (limit->Attribute("effort") && !joint.effort) effortless_.insert(joint.joint.name);
   }
 
-  void readTransmission(const TiXmlElement& e) {
-    const TiXmlElement* kind = e.FirstChildElement("type");
+  void readTransmission(const XMLElement& e) {
+    const XMLElement* kind = e.FirstChildElement("type");
     const std::string type = kind ? getText(*kind) : getAttribute(&e, "type");
     if (type.empty()) fail(e, "it has no <type>", "give transmission_interface/SimpleTransmission");
     if (type.find("SimpleTransmission") == std::string::npos)
       return warn(e, "it is left out: it is not a SimpleTransmission");
-    const TiXmlElement &driven = getChild(e, "joint"), &actuator = getChild(e, "actuator");
+    const XMLElement &driven = getChild(e, "joint"), &actuator = getChild(e, "actuator");
     const std::string name = getAttribute(&driven, "name");
     const UrdfJoint* joint = findJoint(name);
     if (!joint) fail(driven, "there is no joint '" + name + "'", "correct the name");
@@ -148,10 +144,9 @@ class DrakeReader {
       motor.drive.ratio = ratio;  // the armature is that of the drive
       motor.drive.rotor_inertia = inertia;
     }
-    if (const TiXmlElement* gains = actuator.FirstChildElement("drake:controller_gains"))
-      warn(*gains, "it is left out");
-    for (const TiXmlElement* owner : {&e, &actuator})
-      if (const TiXmlElement* reduction = owner->FirstChildElement("mechanicalReduction");
+    if (const XMLElement* gains = actuator.FirstChildElement("drake:controller_gains")) warn(*gains, "it is left out");
+    for (const XMLElement* owner : {&e, &actuator})
+      if (const XMLElement* reduction = owner->FirstChildElement("mechanicalReduction");
           reduction && getText(*reduction) != "1")
         warn(*reduction, "it is left out, as by Drake; <drake:gear_ratio> gives the gear");
     settings_.motors.push_back(motor);
@@ -176,13 +171,13 @@ class DrakeReader {
   }
 
   // Drake gives them no names; ours are in an attribute that it does not look at.
-  static std::string getName(const TiXmlElement& e, const std::string& prefix) {
+  static std::string getName(const XMLElement& e, const std::string& prefix) {
     const std::string name = getAttribute(&e, "name");
-    return name.empty() ? prefix + std::to_string(e.Row()) : name;
+    return name.empty() ? prefix + std::to_string(e.GetLineNum()) : name;
   }
 
-  void readBallConstraint(const TiXmlElement& e) {
-    const std::string tag = e.ValueStr();
+  void readBallConstraint(const XMLElement& e) {
+    const std::string tag = getTag(e);
     ClosureSpec closure;
     closure.name = getName(e, "ball_");
     closure.kind = ClosureKind::Ball3D;
@@ -193,8 +188,8 @@ class DrakeReader {
     settings_.closures.push_back(closure);
   }
 
-  void readSpringDamper(const TiXmlElement& e) {
-    const std::string tag = e.ValueStr();
+  void readSpringDamper(const XMLElement& e) {
+    const std::string tag = getTag(e);
     PointSpringSpec spec{getLink(e, tag + "_body_A"), getLink(e, tag + "_body_B"), {}};
     spec.spring.name = getName(e, "spring_");
     spec.spring.point1 = getChildVector(e, tag + "_p_AP");
@@ -207,7 +202,7 @@ class DrakeReader {
     settings_.point_springs.push_back(spec);
   }
 
-  const TiXmlElement& robot_;
+  const XMLElement& robot_;
   UrdfFile& file_;
   YamlFile& settings_;
   std::set<std::string> effortless_;  // joints with a limit of effort of zero, which Drake does not drive
@@ -215,31 +210,25 @@ class DrakeReader {
 
 }  // namespace
 
-bool isForDrake(const TiXmlElement& robot) { return robot.Attribute("xmlns:drake") || hasDrakeElement(robot); }
+bool isForDrake(const XMLElement& robot) { return robot.Attribute("xmlns:drake") || hasDrakeElement(robot); }
 
-bool isJoint(const TiXmlElement& element) {
-  return element.ValueStr() == "joint" || element.ValueStr() == "drake:joint";
-}
+bool isJoint(const XMLElement& element) { return getTag(element) == "joint" || getTag(element) == "drake:joint"; }
 
-std::string formatWithoutDrake(const TiXmlDocument& document) {
-  TiXmlDocument plain(document);
-  for (TiXmlElement* e = plain.RootElement()->FirstChildElement(); e; e = e->NextSiblingElement()) {
+void removeDrake(XMLElement& robot) {
+  for (XMLElement* e = robot.FirstChildElement(); e; e = e->NextSiblingElement()) {
     if (!isJoint(*e)) continue;
-    if (e->ValueStr() == "drake:joint" && getAttribute(e, "type") != "planar") e->SetAttribute("type", "floating");
-    if (TiXmlElement* dynamics = e->FirstChildElement("dynamics"); dynamics && e->ValueStr() == "drake:joint")
-      e->RemoveChild(dynamics);  // of several numbers
-    e->SetValue("joint");
-    if (!e->FirstChildElement("limit")) e->InsertEndChild(TiXmlElement("limit"));
-    TiXmlElement* limit = e->FirstChildElement("limit");
+    if (getTag(*e) == "drake:joint" && getAttribute(e, "type") != "planar") e->SetAttribute("type", "floating");
+    if (XMLElement* dynamics = e->FirstChildElement("dynamics"); dynamics && getTag(*e) == "drake:joint")
+      e->DeleteChild(dynamics);  // of several numbers
+    e->SetName("joint");
+    XMLElement* limit = e->FirstChildElement("limit");
+    if (!limit) limit = &addElement(*e, "limit");
     for (const char* attribute : {"effort", "velocity"})
       if (!limit->Attribute(attribute)) limit->SetAttribute(attribute, "0");
   }
-  TiXmlPrinter printer;
-  plain.Accept(&printer);
-  return printer.Str();
 }
 
-void readDrakeElements(const TiXmlElement& robot, UrdfFile& file, YamlFile& settings) {
+void readDrakeElements(const XMLElement& robot, UrdfFile& file, YamlFile& settings) {
   settings.path = file.path;
   DrakeReader(robot, file, settings).read();
 }

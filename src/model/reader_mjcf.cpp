@@ -19,7 +19,7 @@ VectorXd toXyzw(const Matrix3d& R) { return Eigen::Quaterniond(R).coeffs(); }
 
 }  // namespace
 
-MjcfReader::MjcfReader(const std::string& path, const TiXmlElement& root) : root_(root) {
+MjcfReader::MjcfReader(const std::string& path, const XMLElement& root) : root_(root) {
   settings_.path = path;
   tree_.path = yaml_.path = path;
   tree_.root = "world";
@@ -32,32 +32,31 @@ MjcfReader::MjcfReader(const std::string& path, const TiXmlElement& root) : root
 MjcfFile MjcfReader::read() {
   readModel();
   readSettings();
-  for (const TiXmlElement* e = root_.FirstChildElement("default"); e; e = e->NextSiblingElement("default"))
-    readMjcfDefaults(*e, "", settings_);
-  forEach("asset", [this](const TiXmlElement& e) { readAsset(e); });
-  forEachSection("actuator", [this](const TiXmlElement& section) { listDriven(section); });
-  forEachSection("worldbody", [this](const TiXmlElement& e) { readContents(e, places_.at("world"), ""); });
-  forEach("tendon", [this](const TiXmlElement& e) { readTendon(e); });
-  forEach("equality", [this](const TiXmlElement& e) { readEquality(e); });
+  for (const XMLElement* e : getChildren(root_, "default")) readMjcfDefaults(*e, "", settings_);
+  forEach("asset", [this](const XMLElement& e) { readAsset(e); });
+  forEachSection("actuator", [this](const XMLElement& section) { listDriven(section); });
+  forEachSection("worldbody", [this](const XMLElement& e) { readContents(e, places_.at("world"), ""); });
+  forEach("tendon", [this](const XMLElement& e) { readTendon(e); });
+  forEach("equality", [this](const XMLElement& e) { readEquality(e); });
   joinHinges();
   addClosures();
-  forEach("actuator", [this](const TiXmlElement& e) { readActuator(e); });
-  forEach("custom", [this](const TiXmlElement& e) { readCustom(e); });
-  forEach("keyframe", [this](const TiXmlElement& e) { readKey(e); });
+  forEach("actuator", [this](const XMLElement& e) { readActuator(e); });
+  forEach("custom", [this](const XMLElement& e) { readCustom(e); });
+  forEach("keyframe", [this](const XMLElement& e) { readKey(e); });
   addStart();
-  for (const TiXmlElement* e = root_.FirstChildElement(); e; e = e->NextSiblingElement()) noteSection(*e);
+  for (const XMLElement* e : getChildren(root_)) noteSection(*e);
   for (const auto& [name, tendon] : tendons_)
     if (!tendon.is_used) settings_.notes.add("<fixed>", tendon.line, "the tendon is left out");
   tree_.warnings = settings_.notes.format(settings_.path);
   return {std::move(tree_), std::move(yaml_)};
 }
 
-void MjcfReader::noteElement(const TiXmlElement& e, const std::string& problem) {
-  settings_.notes.add("<" + e.ValueStr() + ">", e.Row(), problem);
+void MjcfReader::noteElement(const XMLElement& e, const std::string& problem) {
+  settings_.notes.add("<" + getTag(e) + ">", e.GetLineNum(), problem);
 }
 
-void MjcfReader::refuse(const TiXmlElement& e, const std::string& problem, const std::string& remedy) const {
-  throw ModelError(settings_.path, "<" + e.ValueStr() + "> (line " + std::to_string(e.Row()) + ")", problem, remedy);
+void MjcfReader::refuse(const XMLElement& e, const std::string& problem, const std::string& remedy) const {
+  throw ModelError(settings_.path, describe(e), problem, remedy);
 }
 
 // A name that nothing else has: that of the file, or one made from `made`.
@@ -74,17 +73,16 @@ void MjcfReader::readModel() {
 }
 
 void MjcfReader::readSettings() {
-  forEachSection("compiler", [this](const TiXmlElement& e) { readCompiler(e); });
-  forEachSection("option", [this](const TiXmlElement& e) {
+  forEachSection("compiler", [this](const XMLElement& e) { readCompiler(e); });
+  forEachSection("option", [this](const XMLElement& e) {
     MjcfElement option(e, "", settings_);
     yaml_.gravity = option.getVector("gravity", yaml_.gravity.value_or(Vector3d(0, 0, -9.81)));
-    for (const TiXmlElement* flag = e.FirstChildElement(); flag; flag = flag->NextSiblingElement())
-      MjcfElement(*flag, "", settings_);
+    for (const XMLElement* flag : getChildren(e)) MjcfElement(*flag, "", settings_);
   });
   if (!yaml_.gravity) yaml_.gravity = Vector3d(0, 0, -9.81);
 }
 
-void MjcfReader::readCompiler(const TiXmlElement& e) {
+void MjcfReader::readCompiler(const XMLElement& e) {
   MjcfElement compiler(e, "", settings_);
   const std::string angle = compiler.getText("angle"), euler = compiler.getText("eulerseq", settings_.euler);
   if (!angle.empty() && angle != "degree" && angle != "radian")
@@ -103,8 +101,8 @@ void MjcfReader::readCompiler(const TiXmlElement& e) {
   mesh_directory_ = compiler.getText("meshdir", compiler.getText("assetdir", mesh_directory_));
 }
 
-void MjcfReader::readAsset(const TiXmlElement& e) {
-  if (e.ValueStr() != "mesh") return noteElement(e);
+void MjcfReader::readAsset(const XMLElement& e) {
+  if (getTag(e) != "mesh") return noteElement(e);
   MjcfElement mesh(e, "", settings_);
   const std::string file = mesh.getText("file");
   std::string name = getAttribute(&e, "name");
@@ -117,25 +115,25 @@ void MjcfReader::readAsset(const TiXmlElement& e) {
 }
 
 // Sections that are not read.
-void MjcfReader::noteSection(const TiXmlElement& e) {
+void MjcfReader::noteSection(const XMLElement& e) {
   static const std::set<std::string> read = {"compiler", "option",   "default",  "asset",  "worldbody",
                                              "tendon",   "equality", "actuator", "custom", "keyframe"};
   static const std::set<std::string> unable = {"include", "deformable", "extension"};
-  const std::string& tag = e.ValueStr();
+  const std::string& tag = getTag(e);
   if (read.count(tag)) return;
   if (unable.count(tag))
     refuse(e, "such elements are not supported",
            "save the model with MuJoCo as one file (mj_saveLastXML), or remove it");
   if (!e.FirstChildElement()) return noteElement(e);
-  for (const TiXmlElement* c = e.FirstChildElement(); c; c = c->NextSiblingElement())
-    settings_.notes.add("<" + tag + "> <" + c->ValueStr() + ">", c->Row(), "left out");
+  for (const XMLElement* c : getChildren(e))
+    settings_.notes.add("<" + tag + "> <" + getTag(*c) + ">", c->GetLineNum(), "left out");
 }
 
 // The children of a body, also those in <frame>.
-void MjcfReader::flatten(const TiXmlElement& body, const SE3& X_BF, const std::string& childclass,
+void MjcfReader::flatten(const XMLElement& body, const SE3& X_BF, const std::string& childclass,
                          std::vector<Child>& out) {
-  for (const TiXmlElement* e = body.FirstChildElement(); e; e = e->NextSiblingElement()) {
-    if (e->ValueStr() != "frame") {
+  for (const XMLElement* e : getChildren(body)) {
+    if (getTag(*e) != "frame") {
       out.push_back({e, X_BF, childclass});
       continue;
     }
@@ -145,7 +143,7 @@ void MjcfReader::flatten(const TiXmlElement& body, const SE3& X_BF, const std::s
   }
 }
 
-void MjcfReader::readContents(const TiXmlElement& e, const BodyPlace& place, const std::string& childclass) {
+void MjcfReader::readContents(const XMLElement& e, const BodyPlace& place, const std::string& childclass) {
   std::vector<Child> children;
   flatten(e, {}, childclass, children);
   readContents(children, place);
@@ -154,7 +152,7 @@ void MjcfReader::readContents(const TiXmlElement& e, const BodyPlace& place, con
 void MjcfReader::readContents(const std::vector<Child>& children, const BodyPlace& place) {
   readShapes(children, place);
   for (const Child& child : children) {
-    const std::string& tag = child.element->ValueStr();
+    const std::string& tag = getTag(*child.element);
     static const std::set<std::string> read = {"geom", "site", "joint", "freejoint", "inertial"};
     static const std::set<std::string> unable = {"include", "attach", "replicate", "composite", "flexcomp", "plugin"};
     if (unable.count(tag))
@@ -168,11 +166,11 @@ void MjcfReader::readContents(const std::vector<Child>& children, const BodyPlac
 }
 
 void MjcfReader::readBody(const Child& child, const BodyPlace& parent) {
-  const TiXmlElement& e = *child.element;
+  const XMLElement& e = *child.element;
   MjcfElement body(e, "", settings_);
   if (body.getFlag("mocap", false)) body.note("it cannot be moved from outside");
   std::string file_name = getAttribute(&e, "name");
-  const std::string name = makeName(file_name.empty() ? "body_" + std::to_string(e.Row()) : file_name);
+  const std::string name = makeName(file_name.empty() ? "body_" + std::to_string(e.GetLineNum()) : file_name);
   if (!file_name.empty() && name != file_name) body.fail("its name is taken", "rename it");
   const SE3 X_PB = child.X_BF * body.getPose();
   std::vector<Child> children;
@@ -189,7 +187,7 @@ SE3 MjcfReader::addJoints(const MjcfElement& body, const std::string& link, cons
                           const BodyPlace& parent, const SE3& X_PB) {
   std::vector<Element> elements;
   for (const Child& child : children)
-    if (child.element->ValueStr() == "joint" || child.element->ValueStr() == "freejoint")
+    if (getTag(*child.element) == "joint" || getTag(*child.element) == "freejoint")
       elements.push_back(readJoint(child, link));
   const SE3 X_LP = parent.X_LB;
   if (elements.empty()) {
@@ -347,7 +345,7 @@ MjcfReader::Element MjcfReader::readJoint(const Child& child, const std::string&
   Element out;
   out.line = e.line();
   const std::string given = getAttribute(child.element, "name");
-  const bool is_free = child.element->ValueStr() == "freejoint";
+  const bool is_free = getTag(*child.element) == "freejoint";
   out.type = is_free ? "free" : e.getText("type", "hinge");
   if (out.type != "free" && out.type != "ball" && out.type != "slide" && out.type != "hinge")
     e.fail("its type '" + out.type + "' is unknown", "use hinge, slide, ball or free");
@@ -425,12 +423,8 @@ MjcfFile readMjcf(const std::string& path) {
   if (xml.size() > kMostBytes)
     throw ModelError(path, "file", "it exceeds the largest size of a MuJoCo file (16 MB)",
                      "give one without embedded data");
-  TiXmlDocument document;
-  parseXml(xml, path, document);
-  const TiXmlElement* root = document.RootElement();
-  if (!root || root->ValueStr() != "mujoco")
-    throw ModelError(path, "document", "its outermost element is not <mujoco>", "give a MuJoCo file (MJCF)");
-  return MjcfReader(path, *root).read();
+  XMLDocument document;
+  return MjcfReader(path, parseXml(xml, path, "mujoco", document)).read();
 }
 
 }  // namespace bielle

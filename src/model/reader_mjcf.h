@@ -21,7 +21,7 @@ inline SE3 translate(const Vector3d& p) { return {Matrix3d::Identity(), p}; }
 
 class MjcfReader {
  public:
-  MjcfReader(const std::string& path, const TiXmlElement& root);
+  MjcfReader(const std::string& path, const XMLElement& root);
   MjcfFile read();
 
  private:
@@ -58,7 +58,7 @@ class MjcfReader {
 
   // An element in a body, with the class whose defaults hold for it.
   struct Child {
-    const TiXmlElement* element;
+    const XMLElement* element;
     SE3 X_BF;  // of the frames around it
     std::string childclass;
   };
@@ -87,28 +87,28 @@ class MjcfReader {
 
   template <typename F>
   void forEachSection(const char* tag, const F& f) {
-    for (const TiXmlElement* e = root_.FirstChildElement(tag); e; e = e->NextSiblingElement(tag)) f(*e);
+    for (const XMLElement* e : getChildren(root_, tag)) f(*e);
   }
   template <typename F>
   void forEach(const char* tag, const F& f) {
-    forEachSection(tag, [&](const TiXmlElement& section) {
-      for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) f(*e);
+    forEachSection(tag, [&](const XMLElement& section) {
+      for (const XMLElement* e : getChildren(section)) f(*e);
     });
   }
-  void noteElement(const TiXmlElement& e, const std::string& problem = "left out");
-  [[noreturn]] void refuse(const TiXmlElement& e, const std::string& problem, const std::string& remedy) const;
+  void noteElement(const XMLElement& e, const std::string& problem = "left out");
+  [[noreturn]] void refuse(const XMLElement& e, const std::string& problem, const std::string& remedy) const;
   std::string makeName(const std::string& made);
 
   // the whole file: reader_mjcf.cpp
   void readModel();
   void readSettings();
-  void readCompiler(const TiXmlElement& e);
-  void readAsset(const TiXmlElement& e);
-  void noteSection(const TiXmlElement& e);
+  void readCompiler(const XMLElement& e);
+  void readAsset(const XMLElement& e);
+  void noteSection(const XMLElement& e);
 
   // bodies and joints: reader_mjcf.cpp
-  void flatten(const TiXmlElement& body, const SE3& X_BF, const std::string& childclass, std::vector<Child>& out);
-  void readContents(const TiXmlElement& e, const BodyPlace& place, const std::string& childclass);
+  void flatten(const XMLElement& body, const SE3& X_BF, const std::string& childclass, std::vector<Child>& out);
+  void readContents(const XMLElement& e, const BodyPlace& place, const std::string& childclass);
   void readContents(const std::vector<Child>& children, const BodyPlace& place);
   void readBody(const Child& child, const BodyPlace& parent);
   SE3 addJoints(const MjcfElement& body, const std::string& link, const std::vector<Child>& children,
@@ -138,7 +138,7 @@ class MjcfReader {
   // loops, couplers, springs, motors and postures: reader_mjcf_relations.cpp
   const BodyPlace& findBody(MjcfElement& e, const char* attribute);
   const BodyPlace& findSite(MjcfElement& e, const char* attribute);
-  void readEquality(const TiXmlElement& element);
+  void readEquality(const XMLElement& element);
   void readTie(MjcfElement& e, const std::string& name);
   void joinHinges();
   void addClosures();
@@ -146,16 +146,16 @@ class MjcfReader {
   const Slot& findSlot(const MjcfElement& e, const std::string& joint) const;
   std::array<double, 2> readLine(MjcfElement& e);
   void readJointEquality(MjcfElement& e, const std::string& name);
-  void readTendon(const TiXmlElement& element);
-  void readSpatialTendon(const TiXmlElement& element);
+  void readTendon(const XMLElement& element);
+  void readSpatialTendon(const XMLElement& element);
   void readTendonEquality(MjcfElement& e, const std::string& name);
-  void listDriven(const TiXmlElement& section);
-  void readActuator(const TiXmlElement& element);
-  void readCustom(const TiXmlElement& element);
-  void readKey(const TiXmlElement& element);
+  void listDriven(const XMLElement& section);
+  void readActuator(const XMLElement& element);
+  void readCustom(const XMLElement& element);
+  void readKey(const XMLElement& element);
   void addStart();
 
-  const TiXmlElement& root_;
+  const XMLElement& root_;
   MjcfSettings settings_;
   UrdfFile tree_;
   YamlFile yaml_;

@@ -22,7 +22,7 @@ const MjcfReader::BodyPlace& MjcfReader::findSite(MjcfElement& e, const char* at
   return it->second;
 }
 
-void MjcfReader::readEquality(const TiXmlElement& element) {
+void MjcfReader::readEquality(const XMLElement& element) {
   MjcfElement e(element, "", settings_, "equality");
   if (!e.getFlag("active", true)) return e.leaveOut("it is not active, and left out");
   std::string name = getAttribute(&element, "name");
@@ -152,13 +152,13 @@ void MjcfReader::readJointEquality(MjcfElement& e, const std::string& name) {
   addCoupler(name, coupler, e);
 }
 
-void MjcfReader::readTendon(const TiXmlElement& element) {
-  if (element.ValueStr() == "spatial") return readSpatialTendon(element);
-  if (element.ValueStr() != "fixed") return noteElement(element, "the tendon is left out");
+void MjcfReader::readTendon(const XMLElement& element) {
+  if (getTag(element) == "spatial") return readSpatialTendon(element);
+  if (getTag(element) != "fixed") return noteElement(element, "the tendon is left out");
   MjcfElement e(element, "", settings_, "tendon");
   FixedTendon tendon;
   tendon.line = e.line();
-  for (const TiXmlElement* j = element.FirstChildElement("joint"); j; j = j->NextSiblingElement("joint")) {
+  for (const XMLElement* j : getChildren(element, "joint")) {
     MjcfElement term(*j, "", settings_, "");
     const std::string joint = term.getText("joint");
     findSlot(term, joint);
@@ -172,15 +172,15 @@ void MjcfReader::readTendon(const TiXmlElement& element) {
 }
 
 // A spring or damper between two sites; a tendon that bends or carries only load of its own has no like here.
-void MjcfReader::readSpatialTendon(const TiXmlElement& element) {
+void MjcfReader::readSpatialTendon(const XMLElement& element) {
   MjcfElement e(element, "", settings_, "tendon");
-  std::vector<const TiXmlElement*> sites;
-  for (const TiXmlElement* s = element.FirstChildElement(); s; s = s->NextSiblingElement()) {
-    if (s->ValueStr() != "site") return e.leaveOut("it bends about a <" + s->ValueStr() + ">, and is left out");
+  std::vector<const XMLElement*> sites;
+  for (const XMLElement* s : getChildren(element)) {
+    if (getTag(*s) != "site") return e.leaveOut("it bends about a <" + getTag(*s) + ">, and is left out");
     sites.push_back(s);
   }
   if (sites.size() != 2) return e.leaveOut("it does not run between two sites, and is left out");
-  const auto find = [&](const TiXmlElement& site) {
+  const auto find = [&](const XMLElement& site) {
     MjcfElement end(site, "", settings_, "");
     return findSite(end, "site");
   };
@@ -227,13 +227,13 @@ void MjcfReader::readTendonEquality(MjcfElement& e, const std::string& name) {
   addCoupler(name, coupler, e);
 }
 
-void MjcfReader::listDriven(const TiXmlElement& section) {
-  for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement())
+void MjcfReader::listDriven(const XMLElement& section) {
+  for (const XMLElement* e : getChildren(section))
     driven_.insert(getAttribute(e, "joint")), driven_.insert(getAttribute(e, "jointinparent"));
   driven_.erase("");
 }
 
-void MjcfReader::readActuator(const TiXmlElement& element) {
+void MjcfReader::readActuator(const XMLElement& element) {
   static const std::set<std::string> servos = {"position", "velocity", "intvelocity", "damper", "general"};
   MjcfElement e(element, "", settings_);
   const std::string joint = e.getText("joint", e.getText("jointinparent"));
@@ -282,14 +282,15 @@ void MjcfReader::readActuator(const TiXmlElement& element) {
   if (!name.empty() && name != joint) e.note("it is renamed after its joint");
 }
 
-void MjcfReader::readCustom(const TiXmlElement& element) {
+void MjcfReader::readCustom(const XMLElement& element) {
   const std::string name = getAttribute(&element, "name"),
                     joint = name.substr(std::min(name.size(), kMjcfMotorData.size()));
   const auto motor =
       std::find_if(yaml_.motors.begin(), yaml_.motors.end(), [&joint](const MotorSpec& m) { return m.joint == joint; });
-  if (element.ValueStr() != "text" || name != kMjcfMotorData + joint || motor == yaml_.motors.end())
-    return settings_.notes.add("<custom> <" + element.ValueStr() + ">", element.Row(), "left out");
-  const std::string lines_above(std::max(0, element.Row() - 1), '\n');  // so that errors name the line of the file
+  if (getTag(element) != "text" || name != kMjcfMotorData + joint || motor == yaml_.motors.end())
+    return settings_.notes.add("<custom> <" + getTag(element) + ">", element.GetLineNum(), "left out");
+  const std::string lines_above(std::max(0, element.GetLineNum() - 1),
+                                '\n');  // so that errors name the line of the file
   readYamlDocument(settings_.path, lines_above + "{'" + kMjcfMotorData + "': {" + getAttribute(&element, "data") + "}}",
                    [&](const YamlEntry& root) {
                      const std::optional<double> effort = motor->effort;
@@ -299,8 +300,8 @@ void MjcfReader::readCustom(const TiXmlElement& element) {
                    });
 }
 
-void MjcfReader::readKey(const TiXmlElement& element) {
-  if (element.ValueStr() != "key") return noteElement(element);
+void MjcfReader::readKey(const XMLElement& element) {
+  if (getTag(element) != "key") return noteElement(element);
   MjcfElement e(element, "", settings_);
   std::string name = getAttribute(&element, "name");
   if (name.empty()) name = "key_" + std::to_string(yaml_.references.size() + 1);

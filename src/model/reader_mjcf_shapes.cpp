@@ -31,10 +31,10 @@ double round(double length) { return std::round(std::abs(length) * 1e12) / 1e12;
 }  // namespace
 
 Inertia MjcfReader::readInertia(const std::vector<Child>& children) {
-  const TiXmlElement* given = nullptr;
+  const XMLElement* given = nullptr;
   SE3 X;
   for (const Child& child : children) {
-    if (child.element->ValueStr() != "inertial") continue;
+    if (getTag(*child.element) != "inertial") continue;
     if (given) refuse(*child.element, "the body has two inertias", "keep one");
     given = child.element;
     X = child.X_BF;
@@ -44,7 +44,7 @@ Inertia MjcfReader::readInertia(const std::vector<Child>& children) {
     if (given) noteElement(*given, "left out, because inertiafromgeom is true");
     if (inertia_from_geom_ == "false") return {};
     for (const Child& child : children)
-      if (child.element->ValueStr() == "geom") sum = sum + readSolid(child);
+      if (getTag(*child.element) == "geom") sum = sum + readSolid(child);
     return sum;
   }
   MjcfElement e(*given, "", settings_);
@@ -137,17 +137,16 @@ void MjcfReader::readShapes(const std::vector<Child>& children, const BodyPlace&
   std::set<std::string> soles;
   for (const Child& child : children) {
     const std::string name = getAttribute(child.element, "name");
-    if (child.element->ValueStr() != "geom" || name.empty()) continue;
+    if (getTag(*child.element) != "geom" || name.empty()) continue;
     MjcfElement e(*child.element, child.childclass, settings_);
     for (const char* read : kGeomAttributes) e.find(read);
     const Shape shape = readShape(e, child.X_BF);
     if (shape.type == "sphere") spheres[name] = {shape.X_BG.p, shape.size[0]};
   }
   for (const Child& child : children)
-    if (child.element->ValueStr() == "site") readSite(child, place, spheres, soles);
+    if (getTag(*child.element) == "site") readSite(child, place, spheres, soles);
   for (const Child& child : children)
-    if (child.element->ValueStr() == "geom" && !soles.count(getAttribute(child.element, "name")))
-      readVisual(child, place);
+    if (getTag(*child.element) == "geom" && !soles.count(getAttribute(child.element, "name"))) readVisual(child, place);
 }
 
 void MjcfReader::readSite(const Child& child, const BodyPlace& place, const std::map<std::string, Sphere>& spheres,

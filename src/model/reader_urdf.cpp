@@ -1,4 +1,4 @@
-// The only file that uses urdfdom. TinyXML, on which urdfdom is based, first provides what urdfdom discards or accepts:
+// The only file that uses urdfdom. The document itself first provides what urdfdom discards or accepts:
 // the order of the joints, links with two parents, detached cycles, the place of a bad number.
 #include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>
@@ -71,28 +71,27 @@ bool areFiniteNumbers(const std::string& text, int count) {
   return stream.eof() && n == count;
 }
 
-void checkNumbers(const TiXmlElement& element, const std::string& owner, const std::string& path) {
+void checkNumbers(const XMLElement& element, const std::string& owner, const std::string& path) {
   // Of damping, joints of Drake may have several numbers, or none that we use.
-  if (element.ValueStr() == "dynamics" && element.Parent()->ValueStr() == "drake:joint") return;
+  if (getTag(element) == "dynamics" && element.Parent()->Value() == std::string("drake:joint")) return;
   for (const NumberRule& rule : kNumbers) {
-    const char* text = element.ValueStr() == rule.tag ? element.Attribute(rule.attribute) : nullptr;
+    const char* text = getTag(element) == rule.tag ? element.Attribute(rule.attribute) : nullptr;
     if (text && !areFiniteNumbers(text, rule.count))
       throw ModelError(path, owner,
-                       "<" + element.ValueStr() + " " + rule.attribute + "=\"" + text + "\"> (line " +
-                           std::to_string(element.Row()) + ") is not made of " + std::to_string(rule.count) +
+                       "<" + getTag(element) + " " + rule.attribute + "=\"" + text + "\"> (line " +
+                           std::to_string(element.GetLineNum()) + ") is not made of " + std::to_string(rule.count) +
                            " finite number(s)",
                        "correct it");
   }
-  for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement())
-    checkNumbers(*e, owner, path);
+  for (const XMLElement* e : getChildren(element)) checkNumbers(*e, owner, path);
 }
 
 // Names of the links or of the joints; also checks their numbers.
-std::set<std::string> collectNames(const TiXmlElement& robot, const std::string& tag, const std::string& path) {
+std::set<std::string> collectNames(const XMLElement& robot, const std::string& tag, const std::string& path) {
   std::set<std::string> names;
-  for (const TiXmlElement* e = robot.FirstChildElement(); e; e = e->NextSiblingElement()) {
-    if (tag == "joint" ? !isJoint(*e) : e->ValueStr() != tag) continue;
-    const std::string name = getAttribute(e, "name"), line = " (line " + std::to_string(e->Row()) + ")";
+  for (const XMLElement* e : getChildren(robot)) {
+    if (tag == "joint" ? !isJoint(*e) : getTag(*e) != tag) continue;
+    const std::string name = getAttribute(e, "name"), line = " (line " + std::to_string(e->GetLineNum()) + ")";
     if (name.empty()) throw ModelError(path, tag + line, "it has no name", "give it a name attribute");
     const std::string element = tag + " '" + name + "'";
     if (!names.insert(name).second)
@@ -102,16 +101,16 @@ std::set<std::string> collectNames(const TiXmlElement& robot, const std::string&
   return names;
 }
 
-const std::map<std::string, JointKind>& getKinds(const TiXmlElement& joint) {
-  return joint.ValueStr() == "joint" ? kKinds : kDrakeKinds;
+const std::map<std::string, JointKind>& getKinds(const XMLElement& joint) {
+  return getTag(joint) == "joint" ? kKinds : kDrakeKinds;
 }
 
-bool isGiven(const TiXmlElement& element, const char* attribute) {
+bool isGiven(const XMLElement& element, const char* attribute) {
   return getAttribute(&element, attribute).find_first_not_of("+-0. ") != std::string::npos;
 }
 
 // Errors in a joint that urdfdom accepts.
-void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<std::string>& warnings) {
+void checkJoint(const XMLElement& joint, const std::string& path, std::vector<std::string>& warnings) {
   const std::map<std::string, JointKind>& kinds = getKinds(joint);
   const std::string element = "joint '" + getAttribute(&joint, "name") + "'", type = getAttribute(&joint, "type");
   if (!kinds.count(type)) {
@@ -121,19 +120,10 @@ void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<
   }
   if (joint.FirstChildElement("mimic") && kinds.at(type) == JointKind::Fixed)
     warnings.push_back(path + ": " + element + ": it is fixed, so <mimic> is ignored");
-  const TiXmlElement* dynamics = joint.FirstChildElement("dynamics");
+  const XMLElement* dynamics = joint.FirstChildElement("dynamics");
   if (dynamics && getNv(kinds.at(type)) != 1 && (isGiven(*dynamics, "damping") || isGiven(*dynamics, "friction")))
-    warnings.push_back(path + ": " + element + ": its <dynamics> (line " + std::to_string(dynamics->Row()) +
+    warnings.push_back(path + ": " + element + ": its <dynamics> (line " + std::to_string(dynamics->GetLineNum()) +
                        ") is left out: only joints of one coordinate have damping and friction");
-}
-
-const TiXmlElement& getRobot(const TiXmlDocument& document, const std::string& path) {
-  const TiXmlElement* robot = document.RootElement();
-  if (!robot || robot->ValueStr() != "robot")
-    throw ModelError(path, "document", "its outermost element is not <robot>", "give a URDF file");
-  if (getAttribute(robot, "name").empty())
-    throw ModelError(path, "element 'robot'", "it has no name", "give it a name attribute");
-  return *robot;
 }
 
 struct Edge {
@@ -142,11 +132,11 @@ struct Edge {
 };
 
 // All joints in the order of the file, their links checked to exist and to have one parent at most.
-std::vector<Edge> collectEdges(const TiXmlElement& robot, const std::set<std::string>& links, const std::string& path,
+std::vector<Edge> collectEdges(const XMLElement& robot, const std::set<std::string>& links, const std::string& path,
                                std::vector<std::string>& warnings) {
   std::vector<Edge> edges;
   std::map<std::string, std::string> carrier;  // link -> the joint that carries it
-  for (const TiXmlElement* j = robot.FirstChildElement(); j; j = j->NextSiblingElement()) {
+  for (const XMLElement* j : getChildren(robot)) {
     if (!isJoint(*j)) continue;
     checkJoint(*j, path, warnings);
     const Edge edge = {getAttribute(j, "name"), getAttribute(j->FirstChildElement("parent"), "link"),
@@ -166,8 +156,10 @@ std::vector<Edge> collectEdges(const TiXmlElement& robot, const std::set<std::st
   return edges;
 }
 
-Tree makeTree(const TiXmlElement& robot, const std::string& path) {
+Tree makeTree(const XMLElement& robot, const std::string& path) {
   const std::set<std::string> links = collectNames(robot, "link", path);
+  if (getAttribute(&robot, "name").empty())
+    throw ModelError(path, "element 'robot'", "it has no name", "give it a name attribute");
   if (links.empty()) throw ModelError(path, "element 'robot'", "it has no links", "declare at least one");
   collectNames(robot, "joint", path);
   Tree tree;
@@ -327,18 +319,20 @@ std::string warnOfMeshes(const std::vector<std::string>& unread, const std::stri
 
 }  // namespace
 
-UrdfFile parseUrdf(std::string xml, const std::string& path, YamlFile& settings) {
-  TiXmlDocument document;
-  parseXml(xml, path, document);
-  const TiXmlElement& robot = getRobot(document, path);
+UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& settings) {
+  XMLDocument document(true, tinyxml2::COLLAPSE_WHITESPACE);
+  const XMLElement& robot = parseXml(xml, path, "robot", document);
   Tree tree = makeTree(robot, path);
   const bool for_drake = isForDrake(robot);
-  if (for_drake) xml = formatWithoutDrake(document);
+  XMLDocument
+      plain;  // printed for urdfdom, which recurses through whatever TinyXML makes of a text that is not well-formed
+  document.DeepCopy(&plain);
+  if (for_drake) removeDrake(*plain.RootElement());
   urdf::ModelInterfaceSharedPtr model;
   std::string complaints;
   {
     LogCapture capture;
-    model = urdf::parseURDF(xml);
+    model = urdf::parseURDF(formatXml(plain));
     complaints = capture.text();
   }
   // urdfdom continues after some errors (a link whose inertial it could not read has none); we do not.

@@ -103,7 +103,7 @@ struct YamlFile {
 /// \param path  named in errors, and the place of meshes
 /// \param settings  gets what elements of Drake say
 /// \throws ModelError for anything but one tree of named links with finite numbers
-UrdfFile parseUrdf(std::string xml, const std::string& path, YamlFile& settings);
+UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& settings);
 
 /// \throws ModelError for unknown keys, wrong types, lists that do not match
 YamlFile parseYaml(const std::string& text, const std::string& path);
