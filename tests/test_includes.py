@@ -29,7 +29,7 @@ ROOMS = {
 TOP = ("engines", "simulation", "validation", "workers")  # rooms outside src
 # Prefixes of third-party headers, and the files or folders that may include them.
 OTHERS = {
-    "yaml-cpp/": ["src/model/yaml_entry.cpp"],
+    "yaml-cpp/": ["src/model/yaml_entry.cpp", "src/io/robot_writer.cpp", "src/io/adopt.cpp", "src/io/mjcf.cpp"],
     "urdf_": ["src/model/reader_urdf.cpp"],
     "tinyxml": ["src/model/xml_document.h"],
     "zip.h": ["src/io/npz.cpp"],

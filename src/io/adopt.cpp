@@ -1,8 +1,9 @@
 #include "io/adopt.h"
 
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -12,6 +13,8 @@
 
 namespace bielle {
 namespace {
+
+using YAML::BeginMap, YAML::BeginSeq, YAML::EndMap, YAML::EndSeq, YAML::Flow, YAML::Key, YAML::Value;
 
 constexpr double kUpright = 0.9;                      // least cosine between the z axis of a sole and up
 constexpr double kMirror = 0.06, kSameHeight = 0.02;  // of a pair of feet, m: published models are not quite symmetric
@@ -30,12 +33,6 @@ std::string format(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", std::abs(value) < 1e-9 ? 0.0 : value);
   return text;
-}
-
-std::string quoteYaml(const std::string& name) {
-  std::string out = "\"";
-  for (char c : name) out += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
-  return out + "\"";
 }
 
 bool isNamedFoot(std::string name) {
@@ -59,13 +56,14 @@ class Adopter {
 
   Adoption write() {
     findFeet();
-    out_ << "# A first guess by `bielle adopt`: correct each entry, then delete the comment above it.\nmodel: "
-         << quoteYaml(path_) << "\n";
+    out_ << YAML::Comment("A first guess by `bielle adopt`: correct each entry, then delete the comment above it.")
+         << BeginMap << Key << "model" << Value << path_;
     writeMotors();
     writeContacts();
     writePosture();
     writeSerialJoints();
-    return {out_.str(), guesses_};
+    out_ << EndMap;
+    return {out_.c_str() + std::string("\n"), guesses_};
   }
 
  private:
@@ -76,7 +74,7 @@ class Adopter {
   // A guess as a comment, before what it explains.
   void guess(const std::string& text) {
     guesses_.push_back(text);
-    out_ << "\n# " << text << "\n";
+    out_ << YAML::Newline << YAML::Newline << YAML::Comment(text);
   }
 
   void findFeet() {
@@ -119,15 +117,9 @@ class Adopter {
       return guess("Motors: none are given, and none are guessed. Name joints under `motors`.");
     const double least = model_.mass() * 9.81 * kLever;
     bool unlimited = false, guessed = false;
-    std::ostringstream lines;
     for (const Motor& motor : model_.motors()) {
-      const bool is_weak = motor.effort_limit < least;
-      unlimited |= is_weak;
+      unlimited |= motor.effort_limit < least;
       guessed |= motor.armature == 0;
-      const auto limit = [&](double value) { return is_weak || std::isinf(value) ? ".inf" : format(value); };
-      lines << "  " << quoteYaml(motor.name) << ": {armature: " << format(motor.armature > 0 ? motor.armature : kRotor)
-            << ", effort: " << limit(motor.effort_limit) << ", velocity: " << limit(motor.velocity_limit)
-            << formatMotorData(motor) << "}\n";
     }
     guess("Motors: those of the robot." +
           std::string(
@@ -138,7 +130,18 @@ class Adopter {
                            " N m, which could not hold the weight on 20 mm, are taken for "
                            "placeholders."
                      : ""));
-    out_ << "motors:\n" << lines.str();
+    out_ << Key << "motors" << Value << BeginMap;
+    for (const Motor& motor : model_.motors()) {
+      const bool is_weak = motor.effort_limit < least;
+      const auto limit = [&](double value) { return is_weak || std::isinf(value) ? ".inf" : format(value); };
+      out_ << Key << motor.name << Value << Flow << BeginMap;
+      out_ << Key << "armature" << Value << format(motor.armature > 0 ? motor.armature : kRotor);
+      out_ << Key << "effort" << Value << limit(motor.effort_limit);
+      out_ << Key << "velocity" << Value << limit(motor.velocity_limit);
+      for (const auto& [key, value] : getMotorData(motor)) out_ << Key << key << Value << value;
+      out_ << EndMap;
+    }
+    out_ << EndMap;
   }
 
   // Length and width of the shapes of a foot along x and y of its frame; empty without shapes.
@@ -159,7 +162,6 @@ class Adopter {
   }
 
   void writeContacts() {
-    std::ostringstream lines;
     bool is_measured = true;
     ModelParts parts = takeParts(model_);
     parts.contacts.clear();
@@ -169,8 +171,6 @@ class Adopter {
       std::vector<double> sole = measureSole(feet_[i]);
       is_measured &= !sole.empty();
       if (sole.empty()) sole = {kSole, kSole};
-      lines << "  " << getContactName(i) << ": {frame: " << quoteYaml(frame.name) << ", type: 6d, sole: ["
-            << format(sole[0]) << ", " << format(sole[1]) << "]}\n";
       parts.contacts.push_back(
           {getContactName(i), frame.body, frame.X_BF, ContactKind::Surface6D, sole[0] / 2, sole[1] / 2});
     }
@@ -180,8 +180,16 @@ class Adopter {
                              : ": only one, without a mirror image."));
     guesses_.push_back(is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
                                    : "Soles: 0.1 m square, because the feet have no readable shapes.");
-    out_ << "# " << guesses_.back() << "\ncontacts:\n" << lines.str();
     with_feet_ = ModelBuilder::restore(std::move(parts));
+    out_ << YAML::Newline << YAML::Comment(guesses_.back()) << Key << "contacts" << Value << BeginMap;
+    for (size_t i = 0; i < feet_.size(); ++i) {
+      const ContactFrame& contact = with_feet_->contacts()[i];
+      out_ << Key << contact.name << Value << Flow << BeginMap;
+      out_ << Key << "frame" << Value << model_.frames()[feet_[i].frame].name << Key << "type" << Value << "6d";
+      out_ << Key << "sole" << Value << BeginSeq << format(2 * contact.half_length) << format(2 * contact.half_width)
+           << EndSeq << EndMap;
+    }
+    out_ << EndMap;
   }
 
   // The posture at this share of the height of the base over the feet.
@@ -258,32 +266,37 @@ class Adopter {
         "the base at " + format(100 * share) +
         " % of its height there. Its loops close; angles under `joints` determine how the legs bend.";
     guesses_.back() += " " + more;
-    out_ << "# " << more << "\nreferences:\n  half_sitting:\n    joints:\n";
+    out_ << YAML::Newline << YAML::Comment(more) << Key << "references" << Value << BeginMap;
+    out_ << Key << r.name << Value << BeginMap << Key << "joints" << Value << BeginMap;
     for (const auto& [name, values] : r.joints) {
-      std::string list;
-      for (double value : values) list += (list.empty() ? "" : ", ") + format(value);
-      out_ << "      " << quoteYaml(name) << ": " << (values.size() == 1 ? list : "[" + list + "]") << "\n";
+      out_ << Key << name << Value;
+      if (values.size() != 1) out_ << Flow << BeginSeq;
+      for (double value : values) out_ << format(value);
+      if (values.size() != 1) out_ << EndSeq;
     }
-    out_ << "    height: {frame: " << quoteYaml(r.height_frame) << ", value: " << format(r.height) << "}\n    feet:\n";
-    for (const auto& [name, place] : r.feet) out_ << "      " << name << ": [0, " << format(place.y()) << ", 0]\n";
+    out_ << EndMap << Key << "height" << Value << Flow << BeginMap << Key << "frame" << Value << r.height_frame;
+    out_ << Key << "value" << Value << format(r.height) << EndMap << Key << "feet" << Value << BeginMap;
+    for (const auto& [name, place] : r.feet)
+      out_ << Key << name << Value << Flow << BeginSeq << "0" << format(place.y()) << "0" << EndSeq;
+    out_ << EndMap << EndMap << EndMap;
   }
 
   void writeSerialJoints() {
-    std::string lines, legs;
+    std::vector<std::string> all;
     for (const Foot& foot : feet_) {
       std::vector<std::string> joints;
       bool is_simple = true;
       for (int i = model_.frames()[foot.frame].body; i > 1; i = model_.joints()[i].parent) {
         is_simple &= model_.joints()[i].nv == 1;
-        joints.insert(joints.begin(), "  - " + quoteYaml(model_.joints()[i].name) + "\n");
+        joints.insert(joints.begin(), model_.joints()[i].name);
       }
       if (!is_simple || joints.size() != 6)
         return guess("Serial joints: none guessed, because " + std::to_string(joints.size()) +
                      " joints lead from the base to a foot. Name six per leg under `serial_joints`.");
-      for (const std::string& joint : joints) lines += joint;
+      all.insert(all.end(), joints.begin(), joints.end());
     }
     guess("Serial joints: all from the base to the feet.");
-    out_ << "serial_joints:\n" << lines;
+    out_ << Key << "serial_joints" << Value << all;
   }
 
   const Model& model_;
@@ -291,7 +304,7 @@ class Adopter {
   Workspace ws_;
   std::vector<Foot> feet_;
   std::optional<Model> with_feet_;
-  std::ostringstream out_;
+  YAML::Emitter out_;
   std::vector<std::string> guesses_;
 };
 

@@ -1,5 +1,7 @@
 #include "io/mjcf.h"
 
+#include <yaml-cpp/yaml.h>
+
 #include <charconv>
 #include <cmath>
 #include <set>
@@ -398,10 +400,15 @@ class MjcfWriter {
   // Windings, gears, losses and limits of speed are what our YAML file says of them, as text that MuJoCo keeps and does not use.
   void writeMotorData(XMLElement& section) {
     for (const Motor& motor : model_.motors()) {
-      std::string data = formatMotorData(motor);
+      YAML::Emitter data;
+      data << YAML::Flow << YAML::BeginMap;
+      for (const auto& [key, value] : getMotorData(motor)) data << YAML::Key << key << YAML::Value << value;
       if (std::isfinite(model_.velocityLimits()[motor.dof]))
-        data += ", velocity: " + formatMjcf(model_.velocityLimits()[motor.dof]);
-      if (!data.empty()) addElement(section, "text", {{"name", kMjcfMotorData + motor.name}, {"data", data.substr(2)}});
+        data << YAML::Key << "velocity" << YAML::Value << formatMjcf(model_.velocityLimits()[motor.dof]);
+      data << YAML::EndMap;
+      const std::string map = data.c_str();
+      if (map != "{}")
+        addElement(section, "text", {{"name", kMjcfMotorData + motor.name}, {"data", map.substr(1, map.size() - 2)}});
     }
   }
 

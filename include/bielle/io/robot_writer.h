@@ -1,6 +1,7 @@
 #pragma once
 /// \file A model written as the files that loadRobot reads (model/reader.h).
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bielle/model/model.h"
@@ -33,8 +34,7 @@ UrdfText formatUrdf(const Model& model);
 /// \throws ModelError as above, or when they cannot be written
 void writeRobot(const Model& model, const std::string& directory, const std::string& remark = "");
 
-/// The entry of a motor in a YAML file besides its armature and limits: its loss, drive and continuous effort, each as
-/// ", key: value".
-std::string formatMotorData(const Motor& motor);
+/// The entry of a motor in a YAML file besides its armature and limits: its loss, drive and continuous effort, as keys and values.
+std::vector<std::pair<const char*, std::string>> getMotorData(const Motor& motor);
 
 }  // namespace bielle
