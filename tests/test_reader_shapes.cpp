@@ -86,10 +86,41 @@ std::string makeText(const std::vector<Vector3d>& corners, const std::string& ke
   return out.str();
 }
 
+// In centimetres, and moved back by its node.
+std::string makeCollada(const std::vector<Vector3d>& corners, const std::string& more = "") {
+  std::ostringstream numbers, indices;
+  numbers.precision(9);
+  for (size_t i = 0; i < corners.size(); ++i) {
+    numbers << (100 * corners[i] + Vector3d(1, 2, 3)).transpose() << ' ';
+    indices << i << ' ';
+  }
+  const std::string count = std::to_string(corners.size());
+  return R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="centimeter" meter="0.01"/><up_axis>Y_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+  <source id="p"><float_array id="a" count=")" +
+         std::to_string(3 * corners.size()) + "\">" + numbers.str() + R"(</float_array><technique_common>
+    <accessor source="#a" count=")" +
+         count +
+         R"(" stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+    </accessor></technique_common></source>
+  <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+  <triangles count=")" +
+         std::to_string(corners.size() / 3) + R"("><input semantic="VERTEX" source="#v" offset="0"/><p>)" +
+         indices.str() +
+         R"(</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><translate>-1 -2 -3</translate>
+  <instance_geometry url="#g"/></node>)" +
+         more + R"(</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>
+)";
+}
+
 }  // namespace
 
 TEST_CASE(
-    "shapes are fitted to meshes of STL and OBJ files: boxes and capsules around all vertices, damaged files to none") {
+    "shapes are fitted to meshes of STL, OBJ and COLLADA files: boxes and capsules around all vertices, damaged files "
+    "to none") {
   const RobotDirectory directory;
   const auto load = [&](const std::string& mesh, const std::string& content, const std::string& kind = "visual") {
     directory.write(mesh, content);
@@ -104,7 +135,8 @@ TEST_CASE(
   const std::vector<Vector3d> corners = listCorners({4, 2, 1}, R);
   for (const auto& [mesh, content] : {std::pair<std::string, std::string>("a.stl", makeBinaryStl(corners)),
                                       {"b.STL", "solid b\n" + makeText(corners, "vertex")},
-                                      {"c.obj", makeText(corners, "v") + "vn 0 0 1\nf 1 2 3\n"}}) {
+                                      {"c.obj", makeText(corners, "v") + "vn 0 0 1\nf 1 2 3\n"},
+                                      {"d.dae", makeCollada(corners)}}) {
     CAPTURE(mesh);
     for (const std::string kind : {"visual", "collision"}) {
       const LoadedRobot robot = load(mesh, content, kind);
@@ -141,7 +173,10 @@ TEST_CASE(
                                       {"d.stl", makeBinaryStl(infinite)},
                                       {"d.stl", "vertex 1 2"},
                                       {"d.obj", "v 1 2 x"},
-                                      {"d.dae", binary}}) {
+                                      {"d.dae", binary},
+                                      {"d.dae", makeCollada(corners).substr(0, 900)},
+                                      {"d.dae", makeCollada(corners, "<node id='m'><instance_node url='#m'/></node>")},
+                                      {"d.ply", binary}}) {
     CAPTURE(mesh, content);
     const LoadedRobot robot = load(mesh, content);
     CHECK(robot.model.shapes().empty());
@@ -157,7 +192,8 @@ TEST_CASE("mutated meshes give finite shapes or none") {
   int fitted = 0, none = 0;
   for (const auto& [mesh, content] : {std::pair<std::string, std::string>("a.stl", makeBinaryStl(corners)),
                                       {"b.stl", makeText(corners, "vertex")},
-                                      {"c.obj", makeText(corners, "v")}})
+                                      {"c.obj", makeText(corners, "v")},
+                                      {"d.dae", makeCollada(corners)}})
     for (int i = 0; i < 300; ++i) {
       std::string mutated = content;
       for (int n = 0; n <= i % 4; ++n) mutated[rng() % mutated.size()] = static_cast<char>(rng());

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "math/decompositions.h"
+#include "model/collada.h"
 
 namespace fs = std::filesystem;
 
@@ -70,10 +71,11 @@ Points readMesh(const std::string& mesh, const std::string& directory) {
   const std::string extension = getExtension(mesh);
   const fs::path place = findMesh(mesh, directory);
   std::error_code error;
-  if ((extension != ".stl" && extension != ".obj") || place.empty() || fs::file_size(place, error) > kLargest || error)
+  if ((extension != ".stl" && extension != ".obj" && extension != ".dae") || place.empty() || fs::file_size(place, error) > kLargest || error)
     return {};
   std::ifstream file(place, std::ios::binary);
   const std::string content{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (extension == ".dae") return readCollada(content);
   if (extension == ".obj") return readVertices(content, "v");
   return isBinaryStl(content) ? readBinaryStl(content) : readVertices(content, "vertex");
 }

@@ -12,8 +12,8 @@ namespace bielle {
 // or in $ROS_PACKAGE_PATH, or for rest beside the robot.
 std::filesystem::path findMesh(const std::string& mesh, const std::string& directory);
 
-// The box or capsule of least volume around the vertices of an STL or OBJ file, along the axes of the file or the principal
-// ones of the vertices; none if the file is missing, of another kind, damaged, or larger than 100 MB.
+// The box or capsule of least volume around the vertices of an STL, OBJ or COLLADA (.dae) file, along the axes of the file or the
+// principal ones of the vertices; none if the file is missing, of another kind, damaged, or larger than 100 MB.
 std::optional<Shape> fitMesh(const std::string& mesh, const std::string& directory, const Vector3d& scale);
 
 }  // namespace bielle

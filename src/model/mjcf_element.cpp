@@ -1,10 +1,10 @@
 #include "model/mjcf_element.h"
 
-#include <charconv>
 #include <cmath>
 
 #include "bielle/model/error.h"
 #include "math/so3.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -25,24 +25,6 @@ void merge(const XMLElement& element, const std::string& path, MjcfAttributes& a
   if (attributes.size() > kMostAttributes)
     throw ModelError(path, describe(element), "it has more than " + std::to_string(kMostAttributes) + " attributes",
                      "remove the unused ones");
-}
-
-bool parseNumbers(const std::string& text, std::vector<double>& numbers) {
-  const char *at = text.data(), *end = at + text.size();
-  while (at != end) {
-    if (std::isspace(static_cast<unsigned char>(*at))) {
-      ++at;
-      continue;
-    }
-    if (*at == '+') ++at;
-    double value = 0;
-    const auto [rest, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || !std::isfinite(value)) return false;
-    if (rest != end && !std::isspace(static_cast<unsigned char>(*rest))) return false;
-    numbers.push_back(value);
-    at = rest;
-  }
-  return true;
 }
 
 std::string formatLines(const std::set<int>& lines) {

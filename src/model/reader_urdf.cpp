@@ -313,7 +313,8 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
 
 std::string warnOfMeshes(const std::vector<std::string>& unread, const std::string& path) {
   return path + ": " + std::to_string(unread.size()) + " mesh(es) cannot be read, among them '" + unread.front() +
-         "': their bodies have no shape from them, so distances ignore them; replace them by STL or OBJ files or give "
+         "': their bodies have no shape from them, so distances ignore them; replace them by STL, OBJ or "
+         "COLLADA files or give "
          "<collision> with boxes, cylinders or spheres";
 }
 

@@ -1,4 +1,4 @@
-// An STL or OBJ file: a shape of finite size, or none.
+// An STL, OBJ or COLLADA file: a shape of finite size, or none.
 #include "model/mesh.h"
 #include "scratch.h"
 
@@ -6,7 +6,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace bielle;
   const fuzz::Scratch& scratch = fuzz::getScratch();
   const std::string content = fuzz::toText(data, size);
-  for (const char* mesh : {"mesh.stl", "mesh.obj"}) {
+  for (const char* mesh : {"mesh.stl", "mesh.obj", "mesh.dae"}) {
     scratch.write(mesh, content);
     const std::optional<Shape> shape = fitMesh(mesh, scratch.path(), Vector3d(1, 2, -3));
     if (!shape) continue;
