@@ -32,6 +32,7 @@ OTHERS = {
     "yaml-cpp/": ["src/model/yaml_entry.cpp", "src/io/robot_writer.cpp", "src/io/adopt.cpp", "src/io/mjcf.cpp"],
     "urdf_": ["src/model/reader_urdf.cpp"],
     "tinyxml": ["src/model/xml_document.h"],
+    "sdf/": ["tests/test_sdf.cpp"],
     "zip.h": ["src/io/npz.cpp"],
     "nlopt": ["src/transmission/slsqp.cpp", "src/design/nlopt_search.h"],
     "pagmo/": ["src/design/front_search.cpp"],

@@ -1,8 +1,7 @@
-// Robots as SDF: bodies, joints and loops where they are, and what is lost.
+// Robots as SDF: libsdformat finds bodies, joints and loops where they are; and what is lost.
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <regex>
-#include <sstream>
+#include <sdf/sdf.hh>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -17,72 +16,51 @@ using namespace bielle::testing;
 
 namespace {
 
-// The poses of links and joints of an SDF file in the world, by name; their frames are those of their bodies.
-struct SdfPlaces {
-  std::map<std::string, SE3> links;
-  struct TiedFrame {
-    std::string type, parent, child;
-    SE3 X_WJ;
-  };
-  std::map<std::string, TiedFrame> joints;
-  std::vector<double> masses;
-};
-
-SE3 readPose(const std::string& text) {
-  std::istringstream in(text);
-  Vector3d p, angles;
-  for (double* x : {&p[0], &p[1], &p[2], &angles[0], &angles[1], &angles[2]}) in >> *x;
-  REQUIRE(!in.fail());
-  const auto turn = [](double angle, const Vector3d& axis) { return Eigen::AngleAxisd(angle, axis); };
-  return {(turn(angles[2], Vector3d::UnitZ()) * turn(angles[1], Vector3d::UnitY()) * turn(angles[0], Vector3d::UnitX()))
-              .toRotationMatrix(),
-          p};
+SE3 toSE3(const ignition::math::Pose3d& pose) {
+  const auto& q = pose.Rot();
+  return {Eigen::Quaterniond(q.W(), q.X(), q.Y(), q.Z()).toRotationMatrix(),
+          {pose.Pos().X(), pose.Pos().Y(), pose.Pos().Z()}};
 }
 
-SdfPlaces readSdf(const std::string& xml) {
-  SdfPlaces out;
-  const auto forEach = [&xml](const std::string& pattern, const auto& visit) {
-    const std::regex regex(pattern);
-    for (std::sregex_iterator it(xml.begin(), xml.end(), regex), end; it != end; ++it) visit(*it);
-  };
-  forEach("<link name=\"([^\"]*)\">\\s*<pose(?: relative_to=\"([^\"]*)\")?>([^<]*)</pose>", [&](const std::smatch& m) {
-    out.links[m[1]] = (m[2].matched ? out.links.at(m[2]) : SE3()) * readPose(m[3]);
-  });
-  forEach("<mass>([^<]*)</mass>", [&](const std::smatch& m) { out.masses.push_back(std::stod(m[1])); });
-  forEach(
-      "<joint name=\"([^\"]*)\" "
-      "type=\"([^\"]*)\">\\s*(?:<pose>([^<]*)</pose>\\s*)?<parent>([^<]*)</parent>\\s*<child>([^<]*)<",
-      [&](const std::smatch& m) {
-        const SE3 X_WL = out.links.at(m[5]);
-        out.joints[m[1]] = {m[2], m[4], m[5], m[3].matched ? X_WL * readPose(m[3]) : X_WL};
-      });
-  return out;
+// The place of a link or a joint in the world.
+template <typename Element>
+SE3 getPlacement(const Element& element) {
+  ignition::math::Pose3d pose;
+  REQUIRE(element.SemanticPose().Resolve(pose, "__model__").empty());
+  return toSE3(pose);
 }
 
 // Of the places of bodies and of the frames of closures, and of masses.
 double calcSdfError(const Model& model, ConstVectorRef q_ref, const std::string& xml) {
-  const SdfPlaces sdf = readSdf(xml);
+  sdf::Root root;
+  const sdf::Errors errors = root.LoadSdfString(xml);
+  CAPTURE(errors.empty() ? "" : errors[0].Message());
+  REQUIRE(errors.empty());
+  const sdf::Model& robot = *root.Model();
   Workspace ws(model);
   updatePositions(model, ws, q_ref);
   double worst = 0;
   const auto compare = [&worst](const SE3& a, const SE3& b) {
     worst = std::max({worst, (a.p - b.p).norm(), (a.R - b.R).norm()});
   };
-  REQUIRE(static_cast<int>(sdf.links.size()) == model.numBodies() - 1);
+  REQUIRE(static_cast<int>(robot.LinkCount()) == model.numBodies() - 1);
   for (int i = 1; i < model.numBodies(); ++i) {
-    compare(sdf.links.at(model.bodies()[i].name), ws.X_WB[i]);
-    worst = std::max(worst, std::abs(sdf.masses[i - 1] - model.bodies()[i].inertia.mass));
+    const sdf::Link& link = *robot.LinkByName(model.bodies()[i].name);
+    compare(getPlacement(link), ws.X_WB[i]);
+    worst = std::max(worst, std::abs(link.Inertial().MassMatrix().Mass() - model.bodies()[i].inertia.mass));
   }
   for (const Closure& closure : model.closures()) {
     if (closure.kind == ClosureKind::Coupler) continue;
-    const SdfPlaces::TiedFrame& joint =
-        sdf.joints.at(sdf.joints.count(closure.name) ? closure.name : closure.name + "_closure");
-    const bool first = joint.child == model.bodies()[closure.body1].name;
-    compare(joint.X_WJ, first ? ws.X_WB[closure.body1] * closure.X_B1 : ws.X_WB[closure.body2] * closure.X_B2);
-    CHECK(joint.parent == model.bodies()[first ? closure.body2 : closure.body1].name);
-    CHECK(joint.type == (closure.kind == ClosureKind::Weld6D   ? "fixed"
-                         : closure.kind == ClosureKind::Ball3D ? "ball"
-                                                               : "continuous"));
+    const sdf::Joint* joint = robot.JointByName(closure.name);
+    if (!joint) joint = robot.JointByName(closure.name + "_closure");
+    REQUIRE(joint);
+    const bool first = joint->ChildLinkName() == model.bodies()[closure.body1].name;
+    compare(getPlacement(*joint), first ? ws.X_WB[closure.body1] * closure.X_B1 : ws.X_WB[closure.body2] * closure.X_B2);
+    const int parent = first ? closure.body2 : closure.body1;
+    CHECK(joint->ParentLinkName() == (parent == 0 ? "world" : model.bodies()[parent].name));
+    CHECK(joint->Type() == (closure.kind == ClosureKind::Weld6D   ? sdf::JointType::FIXED
+                            : closure.kind == ClosureKind::Ball3D ? sdf::JointType::BALL
+                                                                  : sdf::JointType::CONTINUOUS));
   }
   return worst;
 }
