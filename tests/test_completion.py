@@ -50,7 +50,6 @@ for name, complete in shells.items():
     assert complete(["solve", "squat", "--robot", "bip"]) == ["bipetto"]
     assert complete(["solve", "squat", "--formulation", ""]) == ["full", "reduced"]
     assert complete(["info", ""]) == robots
-    assert "all" in complete(["study", ""])
     assert complete(["solve", "squat", "--depth", ""]) == []  # a number: the shell's own completion
     assert complete(["no-such-command", "x"]) == [], name
 print(f"{len(helps)} commands in {' and '.join(shells)}")

@@ -24,9 +24,11 @@ ROOMS = {
     "engines": ["io"],
     "simulation": ["control", "engines", "report"],
     "validation": ["engines"],
+    "paper": ["study"],
     "workers": [],
 }
 TOP = ("engines", "simulation", "validation", "workers")  # rooms outside src
+PAPER = "validation/paper/"  # the room "paper"
 # Prefixes of third-party headers, and the files or folders that may include them.
 OTHERS = {
     "yaml-cpp/": ["src/model/yaml_entry.cpp", "src/io/robot_writer.cpp", "src/io/adopt.cpp", "src/io/mjcf.cpp"],
@@ -65,6 +67,8 @@ def find_room(path):
         if path.startswith(folder):
             rest = path[len(folder):]
             return rest.split("/")[0] if "/" in rest else None
+    if path.startswith(PAPER):
+        return "paper"
     folder = path.split("/")[0]
     return folder if folder in TOP else None
 

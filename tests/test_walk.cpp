@@ -258,20 +258,6 @@ TEST_CASE("side walk and turns: where they were requested to go") {
   for (const ContactTarget& foot : last.contacts) CHECK(calcHeading(foot.X_WT) == Approx(-1.2).margin(0.01));
 }
 
-TEST_CASE("walk: with the published weights the feet land where they like") {
-  WalkOptions options;
-  setPaperWeights(options);
-  const SolvedWalk solved = solveWalk(makeWalk(getBipetto(), options));
-  CAPTURE(solved.summary.message, solved.summary.iterations);
-  CHECK(solved.summary.termination == FddpTermination::Converged);
-  const double speed = calcSpeed(solved.measures).x();
-  CHECK(speed > 0.25);
-  CHECK(speed < 0.35);  // the velocity is one cost among others
-  CHECK(solved.measures.foothold > 0.02);
-  CHECK(solved.measures.slip < 5e-3);
-  CHECK(solved.measures.load > 5);
-}
-
 TEST_CASE("walk: feet that have room land near their footholds, and stand where they landed") {
   WalkOptions options;
   options.speed = 0.4;

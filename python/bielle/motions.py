@@ -68,18 +68,16 @@ def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Resu
     """The function of a motion from its entry in the registry."""
     options: Dict[str, Any] = described["options"]
     files: List[str] = list(described["files"])
-    presets: List[str] = list(described["weights"])
     common = ["problem", "solver", "warm_start", "callback"]
 
     def function(robot: Union[str, Robot], **keywords: Any) -> Result:
-        unknown = set(keywords) - set(options) - set(files) - set(common) - ({"weights"} if presets else set())
+        unknown = set(keywords) - set(options) - set(files) - set(common)
         if unknown:
             raise TypeError(f"{name} has no option '{sorted(unknown)[0]}'; it has: {', '.join(options)}")
         request = Request(
             motion=motion,
             options={key: value for key, value in keywords.items() if key in options},
             files={key: str(value) for key, value in keywords.items() if key in files},
-            weights=keywords.get("weights", ""),
         )
         return solve_request(robot, request, **{key: value for key, value in keywords.items() if key in common})
 
@@ -88,14 +86,12 @@ def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Resu
     function.__module__ = "bielle"
     lines = [f"    {key}: {o['help']} [{_get_kind(o)}], default {_format(o['default'])}" for key, o in options.items()]
     lines += [f"    {key}: path of a file" for key in files]
-    lines += [f"    weights: {' or '.join(map(repr, presets))}"] if presets else []
     function.__doc__ = described["help"] + ".\n" + _COMMON + "\n".join(lines) + "\n"
     keyword = inspect.Parameter.KEYWORD_ONLY
     function.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [inspect.Parameter("robot", inspect.Parameter.POSITIONAL_OR_KEYWORD)]
         + [inspect.Parameter(key, keyword, default=o["default"]) for key, o in options.items()]
         + [inspect.Parameter(key, keyword) for key in files]
-        + ([inspect.Parameter("weights", keyword, default="")] if presets else [])
         + [inspect.Parameter(key, keyword, default=None) for key in common]
     )
     return function

@@ -40,7 +40,7 @@ def solve_squat(robot: Union[str, Robot], *, depth: float = ..., duration: float
     """
     ...
 
-def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps forward or backward on level ground, from standing to standing.
 
     robot: a Robot, or the name of one
@@ -62,7 +62,6 @@ def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int = ...
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
     rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
@@ -86,11 +85,10 @@ def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int = ...
     contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
     closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
     closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
-    weights: 'paper'
     """
     ...
 
-def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps to the left or to the right.
 
     robot: a Robot, or the name of one
@@ -112,7 +110,6 @@ def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int 
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
     rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
@@ -136,11 +133,10 @@ def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: int 
     contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
     closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
     closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
-    weights: 'paper'
     """
     ...
 
-def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = ..., steps: int = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps on the spot or along an arc, to another heading.
 
     robot: a Robot, or the name of one
@@ -163,7 +159,6 @@ def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = 
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
     rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
@@ -190,7 +185,7 @@ def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = 
     """
     ...
 
-def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float = ..., slope: float = ..., stairs: int = ..., speed: float = ..., width: float = ..., start_support: float = ..., start_pressure: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float = ..., slope: float = ..., stairs: int = ..., speed: float = ..., width: float = ..., start_support: float = ..., start_pressure: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """climb or descend stairs, one foot per step.
 
     robot: a Robot, or the name of one
@@ -215,7 +210,6 @@ def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float 
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.9
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
     rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
@@ -239,11 +233,10 @@ def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float 
     contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
     closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
     closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
-    weights: 'paper'
     """
     ...
 
-def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., footholds: str, problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., footholds: str, problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """steps on uneven footholds from a file.
 
     robot: a Robot, or the name of one
@@ -264,7 +257,6 @@ def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.85
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
     rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
@@ -292,7 +284,7 @@ def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support
     """
     ...
 
-def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = ..., width: float = ..., distance: float = ..., down: bool = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = ..., width: float = ..., distance: float = ..., down: bool = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """a step onto a box, and down again if requested.
 
     robot: a Robot, or the name of one
@@ -317,7 +309,6 @@ def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = 
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.75
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
     rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
@@ -344,7 +335,7 @@ def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = 
     """
     ...
 
-def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float = ..., depth: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: bool = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float = ..., depth: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: bool = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """a step over a gap in the ground.
 
     robot: a Robot, or the name of one
@@ -367,7 +358,6 @@ def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float =
     swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
-    published: the paper's problem, with free landing places, instead of footholds and Bielle's costs [bool], default False
     rigid_landing: a rigid impact at every landing, as a separate stage [bool], default False
     landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
     foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
@@ -394,7 +384,7 @@ def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float =
     """
     ...
 
-def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float = ..., stand: float = ..., push: float = ..., land: float = ..., settle: float = ..., stretch: float = ..., clearance: float = ..., friction: float = ..., cone_margin: float = ..., time_step: float = ..., published: bool = ..., apex_weight: float = ..., com_weight: float = ..., state_weight: float = ..., torso_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., swing_weight: float = ..., swing_rotation_weight: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
+def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float = ..., stand: float = ..., push: float = ..., land: float = ..., settle: float = ..., stretch: float = ..., clearance: float = ..., friction: float = ..., cone_margin: float = ..., time_step: float = ..., apex_weight: float = ..., com_weight: float = ..., state_weight: float = ..., torso_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., swing_weight: float = ..., swing_rotation_weight: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
     """push off, fly for a given time, land; the time determines the height of the centre of mass at mid-flight.
 
     robot: a Robot, or the name of one
@@ -413,7 +403,6 @@ def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float =
     friction: friction coefficient [1], default 0.7
     cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
     time_step: length of a shooting stage [s], default 0.002
-    published: the paper's problem, with feet free in flight, instead of Bielle's costs [bool], default False
     apex_weight: height of the centre of mass at mid-flight [1/m^2], default 10000
     com_weight: height of the centre of mass on the ground [1/m^2], default 1000
     state_weight: stay near the standing posture, at rest [1], default 0.02
@@ -427,7 +416,6 @@ def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float =
     terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
     contact_kp: position gain of the stabilisation of contacts and closures (at most 1/(3 h^2) with the time step h; Euler steps: 1/(2 h^2)) [1/s^2], default 10000
     contact_kd: velocity gain of the stabilisation of contacts and closures (at most 1/h) [1/s], default 200
-    weights: 'paper'
     """
     ...
 

@@ -13,14 +13,6 @@ namespace bielle::python {
 
 MotionRequest Request::make() const {
   MotionRequest request = sequence.empty() ? findMotion("", motion).request : makeSequenceRequest(sequence);
-  if (!weights.empty()) {
-    const auto preset = std::find_if(request.presets.begin(), request.presets.end(),
-                                     [this](const MotionPreset& p) { return p.name == weights; });
-    if (preset == request.presets.end())
-      throw ModelError("", "weights '" + weights + "'", "motion '" + motion + "' has no weights of this name",
-                       request.presets.empty() ? "leave them out" : "choose '" + request.presets.front().name + "'");
-    preset->apply(request);
-  }
   for (const auto& [name, value] : options) request.options.set(name, value);
   for (const MotionFile& file : std::vector<MotionFile>(request.files)) {
     if (!files.count(file.name))
@@ -214,7 +206,6 @@ void bindRequests(py::module_& module) {
       .field("motion", &Request::motion, "name, one of `motions`; empty for a sequence")
       .field("options", &Request::options, "values by name: bool, int, float, or the name of a choice")
       .field("sequence", &Request::sequence, "names of motions that follow one another; options are \"NAME.option\"")
-      .field("weights", &Request::weights, "name of a preset, e.g. \"paper\"; or empty")
       .field("files", &Request::files, "paths by name, e.g. \"footholds\"");
   module.def(
       "motions",
@@ -227,13 +218,12 @@ void bindRequests(py::module_& module) {
           py::dict motion;
           motion["help"] = entry.help;
           motion["options"] = options;
-          motion["weights"] = show(getNames(request.presets), {});
           motion["files"] = show(getNames(request.files), {});
           out[py::str(entry.name)] = motion;
         }
         return out;
       },
-      "The motions by name: what they do, their options with defaults and units, presets of weights, files.");
+      "The motions by name: what they do, their options with defaults and units, files.");
 }
 
 void bindHeldMotion(py::module_& module) {

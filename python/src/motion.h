@@ -14,10 +14,9 @@ struct Request {
   std::string motion;                          // of the registry; of a sequence empty
   std::vector<std::string> sequence;           // names of its motions
   std::map<std::string, OptionValue> options;  // by name
-  std::string weights;                         // name of a preset, or empty
   std::map<std::string, std::string> files;
 
-  /// \throws ModelError when motion, option, preset or file do not exist
+  /// \throws ModelError when motion, option or file do not exist
   MotionRequest make() const;
 };
 

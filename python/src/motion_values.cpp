@@ -31,7 +31,7 @@ void bindProblemOptions(py::module_& module) {
       .field("scale", &ObjectiveOptions::scale, "cost of a joule, or of the peak; None: of the motion of least effort");
   Value<ProblemOptions>(module, "ProblemOptions", "Options of a problem besides those of the motion.")
       .field("formulation", &ProblemOptions::formulation, "Formulation")
-      .field("step", &ProblemOptions::step, "StepRule; None: midpoint, or Euler for the paper's problems")
+      .field("step", &ProblemOptions::step, "StepRule")
       .field("limits", &ProblemOptions::limits, "LimitOptions")
       .field("timings", &ProblemOptions::timings, "TimingOptions")
       .field("objective", &ProblemOptions::objective, "ObjectiveOptions");
@@ -87,7 +87,6 @@ void bindTrajectory(py::module_& module) {
       .field("guess", &MotionPlan::guess, "Trajectory to start from")
       .field("q_start", &MotionPlan::q_start, "standing posture (nq,)")
       .field("q_end", &MotionPlan::q_end, "standing posture (nq,)")
-      .field("limited", &MotionPlan::limited, "whether limits of the robot apply")
       .field("options", &MotionPlan::options, "every option of the motion by name")
       .field("goals", &MotionPlan::goals, "Goals");
 }

@@ -134,19 +134,6 @@ void bindFrameResiduals(py::module_& m) {
       py::arg("model"), py::arg("frame"), py::arg("reference") = py::make_tuple(0, 0, 0, 0, 0, 0),
       "Velocity of the frame's origin and angular velocity in world axes, minus a reference (6,), m/s and rad/s.");
   def(
-      m, "fly_high",
-      +[](SharedModel model, const std::string& frame, double slope, double ground) -> Made {
-        return makeFlyHigh(getBodyFrame(*model, frame), slope, ground);
-      },
-      py::arg("model"), py::arg("frame"), py::arg("slope"), py::arg("ground") = 0,
-      "Horizontal velocity times exp(-slope height) (2,), m/s; slope in 1/m.");
-  def(
-      m, "frame_distance",
-      +[](SharedModel model, const std::string& a, const std::string& b) -> Made {
-        return makeFrameDistance(getBodyFrame(*model, a), getBodyFrame(*model, b));
-      },
-      py::arg("model"), py::arg("a"), py::arg("b"), "Horizontal distance between two frames (1,), m.");
-  def(
       m, "sole_clearance",
       +[](SharedModel model, const std::string& sole, double half_length, double half_width, const Ground& ground,
           double ramp) -> Made {

@@ -31,7 +31,6 @@ void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);
 void addRatio(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
-void addStudy(CLI::App& app, Action& action);
 void addCampaign(CLI::App& app, Action& action);
 
 // bielle validate, bielle check and bielle simulate: only their help lines; their arguments are those of other programs.

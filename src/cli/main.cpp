@@ -67,7 +67,6 @@ int run(int argc, char** argv) {
   addCompare(app, action);
   addRatio(app, action);
   addLift(app, action);
-  addStudy(app, action);
   addCampaign(app, action);
   addBench(app, action);
   addCompanions(app);

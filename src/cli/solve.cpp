@@ -27,7 +27,7 @@ struct SolveArguments {
   RobotArgument robot;
   std::string directory;
   ProblemOptions problem;
-  std::optional<StepRule> step;  // if not given: Euler for the serial model, whose motions may be lifted
+  std::optional<StepRule> step;  // if not given: Euler for the serial model, whose motions may be lifted, else midpoint
   bool serial = false;
   std::string serial_armature = "1e-3";
   std::vector<std::string> settings;                                      // name=value
@@ -200,8 +200,7 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   ProblemOptions problem = arguments.problem;
   problem.limits = makeLimits(arguments);
   problem.timings = makeTimings(arguments.timings);
-  problem.step = arguments.step;
-  if (serial && !problem.step) problem.step = StepRule::Euler;
+  problem.step = arguments.step.value_or(serial ? StepRule::Euler : StepRule::Midpoint);
   const Motion motion = makeMotion(model, request, problem);
   SolveOptions options;
   options.solver = arguments.solver;
@@ -216,25 +215,6 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   if (!arguments.no_report) addReport(arguments.directory);  // the check is part of it
   warnOfGoalsAndDeadPoints(result);
   return result.converged() && !failed ? kOk : kFailed;
-}
-
-// Added before the individual options, so that these take precedence.
-void addPresets(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
-  if (request->presets.empty()) return;
-  std::vector<std::string> names;
-  std::string help = "weights by name:";
-  for (const MotionPreset& preset : request->presets) {
-    names.push_back(preset.name);
-    help += " " + preset.name + " (" + preset.help + ")";
-  }
-  sub.add_option_function<std::string>(
-         "--weights",
-         [request](const std::string& name) {
-           for (const MotionPreset& preset : request->presets)
-             if (preset.name == name) preset.apply(*request);
-         },
-         help)
-      ->check(CLI::IsMember(names));
 }
 
 void addFiles(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
@@ -290,8 +270,8 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
          [arguments](const std::string& name) {
            arguments->step = name == getName(StepRule::Euler) ? StepRule::Euler : StepRule::Midpoint;
          },
-         "midpoint: second-order steps; euler: first-order steps, as in the paper. Published problems and --model "
-         "serial use euler unless a rule is given")
+         "midpoint: second-order steps; euler: first-order steps, as in the paper, which --model serial uses unless a rule "
+         "is given")
       ->check(CLI::IsMember({getName(StepRule::Euler), getName(StepRule::Midpoint)}))
       ->default_str(getName(StepRule::Midpoint));
   sub.add_option_function<std::string>(
@@ -331,7 +311,6 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   const auto request = std::make_shared<MotionRequest>(motion.request);
   addOutput(sub, arguments);
   addFiles(sub, request);
-  addPresets(sub, request);
   for (const std::string& flag : motion.flags)
     addOption(sub, request->options.get(flag),
               [request, flag](const OptionValue& value) { request->options.set(flag, value); });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
@@ -82,6 +83,7 @@ StageSpec makeRegularizedStage(const BenchmarkScene& scene, double state_weight,
   const Model& model = scene.model;
   StageSpec stage;
   stage.dt = scene.options.time_step;
+  stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
   stage.state = {state_weight, scene.q0, VectorXd::Zero(model.nv()), scene.state_weights};
   stage.control = {control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
   return stage;
@@ -150,30 +152,30 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   updatePositions(model, ws, scene.q0);
   scene.com0 = calcCom(model, ws);
 
-  MotionPlan plan;
-  plan.name = "benchmark walk";
-  std::vector<StageSpec>& stages = plan.stages;
+  Motion motion;  // without limits of joints and gains, unlike those of makeMotion()
+  motion.name = "benchmark walk";
+  std::vector<StageSpec> stages;
   const int last_switch = o.start_nodes + 2 * o.cycles * (o.swing_nodes + o.switch_nodes);
   for (const BenchmarkPhase& phase : phases) {
     const std::vector<ContactTarget> contacts =
         makeContactTargets(model, scene.q0, getStance(scene, phase.kind), o.contact_kp, o.contact_kd);
-    plan.schedule.phases.push_back({getName(phase.kind), phase.nodes, o.time_step, contacts});
+    motion.schedule.phases.push_back({getName(phase.kind), phase.nodes, o.time_step, contacts});
     const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), scene.q0).u;
     for (int i = 0; i < phase.nodes; ++i) {
       const int node = static_cast<int>(stages.size());
       const double time = o.time_step * (std::clamp(node, o.start_nodes, last_switch) - o.start_nodes);
       stages.push_back(makeStage(scene, phase.kind, contacts, (i + 1.0) / (phase.nodes + 1.0), time));
-      plan.guess.us.push_back(u);
+      motion.guess.us.push_back(u);
     }
   }
   stages.push_back(makeTerminalStage(scene));
   VectorXd x0 = VectorXd::Zero(model.nq() + model.nv());
   x0.head(model.nq()) = scene.q0;
-  plan.guess.xs.assign(stages.size(), x0);
-  plan.q_start = plan.q_end = scene.q0;
-  plan.limited = false;
-  plan.options = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", o.total_nodes}};
-  return makeMotion(model, std::move(plan), {formulation, StepRule::Euler});
+  motion.guess.xs.assign(stages.size(), x0);
+  motion.options = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", o.total_nodes}};
+  motion.problem =
+      std::make_unique<RobotProblem>(model, scene.q0, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  return motion;
 }
 
 }  // namespace bielle

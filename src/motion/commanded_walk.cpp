@@ -13,7 +13,7 @@ constexpr int kForeseenSteps = 2;    // beyond that whose stages are made; one m
 
 LocomotionOptions complete(LocomotionOptions options) {
   options.timing.flight = options.landing_speed = 0;
-  options.rigid_landing = options.published = false;
+  options.rigid_landing = false;
   if (options.timing.time_step == 0) options.timing.time_step = kTimeStep;
   return options;
 }

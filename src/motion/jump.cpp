@@ -68,7 +68,7 @@ StageSpec makeStage(const JumpScene& scene, const std::vector<ContactTarget>& co
   StageSpec stage;
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
-  if (!o.published) setClosureGains(scene.gains, stage.constraints);
+  setClosureGains(scene.gains, stage.constraints);
   stage.state = {o.state_weight, scene.q0, VectorXd::Zero(model.nv()), scene.state_weights};
   stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
   return stage;
@@ -100,7 +100,7 @@ void addHeightCost(const JumpScene& scene, const std::string& name, double weigh
 
 // Node i of n in flight. The first one is where the feet stood.
 void addFlightConstraints(const JumpScene& scene, int i, int n, StageSpec& stage) {
-  if (i == 0 || scene.options.published) return;
+  if (i == 0) return;
   Ground ground;
   ground.height = scene.before.front().X_WT.p.z();
   for (const ContactTarget& start : scene.before)
@@ -108,16 +108,8 @@ void addFlightConstraints(const JumpScene& scene, int i, int n, StageSpec& stage
 }
 
 void addTouchdown(const JumpScene& scene, StageSpec& stage) {
-  const LandingWeights& weights = scene.options.paper.touchdown;
-  const double h = stage.dt;
-  for (const ContactTarget& target : scene.after) {
-    const ContactFrame& contact = scene.model.contacts()[target.contact];
-    if (!scene.options.published)
-      addLanding(contact, target.X_WT, 0, 0, stage);
-    else
-      addFreeLanding({contact.body, contact.X_BF}, target.X_WT,
-                     {weights.height / h, weights.tilt / h, weights.velocity / h}, stage, " " + contact.name);
-  }
+  for (const ContactTarget& target : scene.after)
+    addLanding(scene.model.contacts()[target.contact], target.X_WT, 0, 0, stage);
 }
 
 StageSpec makeTerminalStage(const JumpScene& scene) {
@@ -125,14 +117,6 @@ StageSpec makeTerminalStage(const JumpScene& scene) {
   StageSpec stage = makeStage(scene, {});
   stage.constraints = {};
   stage.control.weight = 0;
-  if (o.published) {
-    const VectorXd selected = selectMainJoints(scene.model);
-    stage.state.weight = o.paper.terminal;
-    stage.state.weights << selected, selected;
-    if (scene.model.hasFreeFlyer())
-      stage.state.weights.head<6>() << 0, 0, 100, 0, 0, 2500;  // height 10, yaw 50, squared
-    return stage;
-  }
   stage.costs.push_back({"com", o.terminal_weight, Activation::makeQuadratic(Vector3d::Ones()),
                          makeComPosition(scene.com + scene.shift), true});
   addRest(scene.model, stage);
@@ -143,10 +127,6 @@ JumpScene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0
   JumpScene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {},
                   {},    {}};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
-  if (o.published) {  // hips count like other joints, the heading does not
-    scene.state_weights.head(model.nv()) = selectMainJoints(model);
-    if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3) << o.torso_weight, o.torso_weight, 0;
-  }
   raiseMotorWeights(model, o.motor_weight, scene.state_weights);
   std::vector<int> feet;
   for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
@@ -163,16 +143,6 @@ JumpScene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0
   updatePositions(model, ws, scene.q0);
   scene.com = calcCom(model, ws);
   return scene;
-}
-
-// Load on all feet together, Eq. (2); the paper uses its average while pushing and landing.
-double calcLoad(const JumpScene& scene, JumpPhase phase, double com_acceleration) {
-  const double m = scene.model.mass(), g = scene.model.gravity().norm();
-  const JumpFigures& f = scene.figures;
-  if (!scene.options.published) return m * (g + com_acceleration);
-  if (phase == JumpPhase::Push) return m * (g + f.take_off / f.push);
-  if (phase == JumpPhase::Land) return m * (g + f.take_off / f.land);
-  return m * g;
 }
 
 // The initial posture, moving by Eq. (1).
@@ -252,7 +222,6 @@ void describe(OptionFields& f, JumpOptions& o) {
   f.number("friction", o.friction, "1", kPositive, "friction coefficient");
   f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
   f.number("time_step", o.time_step, "s", kPositive, "length of a shooting stage");
-  f.flag("published", o.published, "the paper's problem, with feet free in flight, instead of Bielle's costs");
   f.number("apex_weight", o.apex_weight, "1/m^2", kNotNegative, "height of the centre of mass at mid-flight");
   f.number("com_weight", o.com_weight, "1/m^2", kNotNegative, "height of the centre of mass on the ground");
   f.number("state_weight", o.state_weight, "1", kNotNegative, "stay near the standing posture, at rest");
@@ -274,25 +243,6 @@ void describe(OptionFields& f, JumpOptions& o) {
            "velocity gain of the stabilisation of contacts and closures (at most 1/h)");
 }
 
-void setPaperWeights(JumpOptions& o) {
-  o.time_step = 0.015;
-  o.stand = o.push = o.land = o.settle = 10 * o.time_step;
-  o.flight = 26 * o.time_step;
-  o.stretch = 0;
-  o.apex_weight = 1e5 * o.time_step;  // a running cost there
-  o.com_weight = 0;
-  o.state_weight = 0.7;
-  o.torso_weight = 2500;
-  o.motor_weight = 0;
-  o.control_weight = 0.05;
-  o.published = true;
-  o.force_weight = 500;
-  o.pressure_weight = 5;
-  o.swing_weight = o.swing_rotation_weight = 0;
-  o.contact_kp = 0;
-  o.contact_kd = 100;
-}
-
 MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0) {
   check(model, options);
   const JumpScene scene = makeScene(model, options, q0);
@@ -300,11 +250,9 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   plan.name = "jump";
   plan.ground.height = scene.before.front().X_WT.p.z();
   plan.ground.friction = options.friction;
-  plan.limited = !options.published;
   std::vector<StageSpec>& stages = plan.stages;
   const double g = model.gravity().norm();
-  const GroundCosts ground{options.force_weight, options.pressure_weight,
-                           options.published ? ForceAxes::World : ForceAxes::Contact};
+  const GroundCosts ground{options.force_weight, options.pressure_weight};
   for (JumpPhase phase : {JumpPhase::Stand, JumpPhase::Push, JumpPhase::Flight, JumpPhase::Land, JumpPhase::Settle}) {
     const bool over = phase == JumpPhase::Land || phase == JumpPhase::Settle;
     const std::vector<ContactTarget> none,
@@ -318,9 +266,9 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
       const JumpHeight com = calcJumpHeight(options, g, stages.size() * options.time_step);
       stages.push_back(makeStage(scene, contacts));
       StageSpec& stage = stages.back();
-      const double load = calcLoad(scene, phase, com.acceleration);
+      const double load = model.mass() * (g + com.acceleration);  // on all feet together, Eq. (2)
       addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
-      if (!options.published) addWrenchCones(model, options.friction, options.cone_margin, stage);
+      addWrenchCones(model, options.friction, options.cone_margin, stage);
       if (phase != JumpPhase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, false, stage);
       if (phase == JumpPhase::Flight && 2 * i == nodes)
         addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, true, stage);

@@ -59,7 +59,6 @@ void check(const Scene& scene) {
 
 std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& schedule) {
   constexpr double kTolerance = 0.01;  // m
-  if (isPublished(scene)) return {};
   const double room = std::hypot(scene.options.foothold_room, scene.options.foothold_room);
   Goal goal{GoalKind::Footholds, "footholds", 0, std::max(kTolerance, room), 0, schedule.numStages()};
   const std::vector<int> landings = listLandings(schedule);
@@ -121,7 +120,7 @@ std::vector<VectorXd> makeGuesses(const Scene& scene) {
                         getFeet(scene, node),
                         {phase.stands(Side::Left), phase.stands(Side::Right)}});
   }
-  if (isPublished(scene) || NeighbourPlans::get()) return xs;
+  if (NeighbourPlans::get()) return xs;
   const std::vector<VectorXd> qs = placeFeet(scene.model, scene.stance, postures);
   for (size_t k = 0; k < xs.size(); ++k) xs[k].head(scene.model.nq()) = qs[k];
   return xs;
@@ -145,8 +144,6 @@ Gait makeStartingGait(const Model& model, const Stance& stance, const Locomotion
     if (options.start_pressure == 0 || half == 0 || T > kLongest) return gait;
   }
 }
-
-Side getFirstFoot(const LocomotionOptions& options) { return options.published ? Side::Left : Side::Right; }
 
 std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
                                  int steps_per_cycle) {
@@ -189,10 +186,8 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   if (options.timing.time_step == 0) options.timing.time_step = chooseTimeStep(task, options.timing, options.swing);
   Scene scene{
       model, stance, task, options, makeStartingGait(model, stance, task, options), makeStageWeights(model, options)};
-  if (!isPublished(scene)) {
-    check(scene);
-    if (options.timing.flight == 0) keepReach(scene);
-  }
+  check(scene);
+  if (options.timing.flight == 0) keepReach(scene);
   std::vector<ContactTarget> soles;
   for (const GaitPhase& phase : scene.gait.phases)
     for (const ContactTarget& sole : makeTargets(scene, phase)) soles.push_back(sole);
@@ -201,7 +196,6 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   plan.name = task.name;
   plan.ground = task.ground;
   plan.ground.friction = options.friction;
-  plan.limited = !options.published;
   const std::vector<VectorXd> guess = makeGuesses(scene);
   size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {

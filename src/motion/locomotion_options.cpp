@@ -1,4 +1,4 @@
-// The options of a locomotion by name, and the published values.
+// The options of a locomotion by name.
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {
@@ -23,8 +23,6 @@ void describe(OptionFields& f, LocomotionOptions& o) {
            "time at which the swing foot is above its foothold, from 0 to 1");
   f.number("friction", o.friction, "1", kPositive, "friction coefficient");
   f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
-  f.flag("published", o.published,
-         "the paper's problem, with free landing places, instead of footholds and Bielle's costs");
   f.flag("rigid_landing", o.rigid_landing, "a rigid impact at every landing, as a separate stage");
   f.number("landing_speed", o.landing_speed, "m/s", kNotNegative,
            "with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest");
@@ -62,31 +60,6 @@ void describe(OptionFields& f, LocomotionOptions& o) {
            "position gain of the stabilisation of closures (full formulation)");
   f.number("closure_kd", o.closure_kd, "1/s", kNotNegative,
            "velocity gain of the stabilisation of closures (full formulation)");
-}
-
-void setPaperWeights(LocomotionOptions& o) {
-  // Durations are truncated to whole time steps; the last step has its node of double support, then the end follows.
-  const double h = o.timing.time_step = 0.015;
-  o.timing.start = 13 * h;   // 0.2 s
-  o.timing.single = 26 * h;  // 0.4 s
-  o.timing.both = h;
-  o.timing.end = 14 * h;  // h + 0.2 s
-  o.published = true;
-  o.start_pressure = 0;
-  o.state_weight = 1;
-  o.torso_weight = 2500;
-  o.heading_weight = 0;
-  o.motor_weight = 0;
-  o.control_weight = 0.02;
-  o.com_weight = 0;
-  o.com_height_weight = 1000;
-  o.com_velocity_weight = 100;
-  o.swing_weight = o.swing_rotation_weight = o.swing_velocity_weight = 0;
-  o.force_weight = 10;
-  o.pressure_weight = 10;
-  o.contact_kp = 0;
-  o.contact_kd = 100;
-  o.closure_kp = o.closure_kd = 0;
 }
 
 }  // namespace bielle

@@ -71,25 +71,15 @@ void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   VectorXd loads(set.closures.size() - set.num_loops);
   for (int i = 0; i < loads.size(); ++i) {
     const bool left = set.contacts[i] == scene.stance.contacts[0];
-    const double share = isPublished(scene) ? 1.0 / loads.size() : node.load[left ? 0 : 1];
-    loads[i] = std::max(1.0, weight * share);
+    loads[i] = std::max(1.0, weight * node.load[left ? 0 : 1]);
   }
-  const ForceAxes axes = isPublished(scene) ? ForceAxes::World : ForceAxes::Contact;
-  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, axes}, loads, stage);
-  if (isPublished(scene)) return;
+  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight}, loads, stage);
   addWrenchCones(scene.model, o.friction, o.cone_margin, stage);
   if (isFree(scene)) layOnGround(stage);
 }
 
 Vector6d makeVector(double x, double z, double rotation) {
   return (Vector6d() << x, x, z, Vector3d::Constant(rotation)).finished();
-}
-
-// Height of the ground for the fly-high cost; on stairs it rises along the swing.
-double calcGround(const Scene& scene, const GaitNode& node, const Footstep& step) {
-  const auto feet = scene.task.plan.getStance(scene.gait.phases[node.phase].steps_done);
-  const double standing = feet[static_cast<int>(getOther(step.side))].p.z();
-  return standing + node.swings[static_cast<int>(step.side)].progress * (step.X_WF.p.z() - standing);
 }
 
 void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& step, StageSpec& stage) {
@@ -105,19 +95,10 @@ void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& ste
           makeVector(free && !leaves ? 0 : o.swing_velocity_weight, o.swing_velocity_weight,
                      free ? kTurnShare * o.swing_velocity_weight : o.swing_velocity_weight),
           makeFrameVelocity(foot, swing.V_F), true);
-  if (!isPublished(scene)) return;
-  addCost(stage, "fly high", o.paper.fly_high, Eigen::Vector2d::Ones(),
-          makeFlyHigh(foot, o.paper.fly_high_slope, calcGround(scene, node, step)));
-  if (o.paper.feet_distance_weight != 0)
-    stage.costs.push_back({"feet distance", o.paper.feet_distance_weight,
-                           Activation::makeBarrier(VectorXd::Ones(1), VectorXd::Constant(1, o.paper.feet_distance),
-                                                   VectorXd::Constant(1, 1e12)),
-                           makeFrameDistance(getFoot(scene, Side::Left), getFoot(scene, Side::Right))});
 }
 
 // A foot at the first node in the air is where it stood.
 void addSwingConstraints(const Scene& scene, const GaitNode& node, int k, StageSpec& stage) {
-  if (isPublished(scene)) return;
   const std::array<SE3, 2> feet = getFeet(scene, node);
   bool apart = false;
   for (Side side : {Side::Left, Side::Right}) {
@@ -137,17 +118,12 @@ void addSwingConstraints(const Scene& scene, const GaitNode& node, int k, StageS
 }
 
 void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
+  const LocomotionOptions& o = scene.options;
   const double h = stage.kind == StageKind::Impact ? 1 : stage.dt;
-  if (!isPublished(scene)) {
-    const LocomotionOptions& o = scene.options;
-    if (o.foothold_room > 0)
-      addCost(stage, "foothold", o.foothold_weight / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
-              makeFramePlacement(getFoot(scene, step.side), step.X_WF));
-    return addLanding(getContact(scene, step.side), step.X_WF, o.foothold_room, o.landing_speed, stage);
-  }
-  const LandingWeights& weights = scene.options.paper.landing;
-  addFreeLanding(getFoot(scene, step.side), step.X_WF, {weights.height / h, weights.tilt / h, weights.velocity / h},
-                 stage);
+  if (o.foothold_room > 0)
+    addCost(stage, "foothold", o.foothold_weight / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
+            makeFramePlacement(getFoot(scene, step.side), step.X_WF));
+  addLanding(getContact(scene, step.side), step.X_WF, o.foothold_room, o.landing_speed, stage);
 }
 
 }  // namespace
@@ -210,7 +186,7 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
   stage.control.weight *= scene.options.timing.time_step;  // torques have no effect here and go to zero
   addLanding(scene, scene.task.plan.steps[node.landed], stage);
   const LocomotionOptions& o = scene.options;
-  if (o.landing_speed > 0 && !isPublished(scene))
+  if (o.landing_speed > 0)
     addImpulseCones(scene.model, o.friction, o.cone_margin,
                     scene.stance.contacts[static_cast<int>(scene.task.plan.steps[node.landed].side)], stage);
   return stage;
@@ -220,10 +196,6 @@ VectorXd makeGuess(const Scene& scene, const GaitNode& node) {
   const Model& model = scene.model;
   VectorXd x = VectorXd::Zero(model.nq() + model.nv());
   x.head(model.nq()) = scene.stance.q;
-  if (isPublished(scene)) {  // on stairs at the height of the path, since fly high grows exponentially below the ground
-    x[2] += node.com.z() - scene.stance.com.z();
-    return x;
-  }
   const Matrix3d turn = makeAxisRotation(Vector3d::UnitZ(), node.heading);
   x.head<3>() = node.com + turn * (scene.stance.q.head<3>() - scene.stance.com);
   x.segment<4>(3) = makeHeading(scene, node);
@@ -232,14 +204,8 @@ VectorXd makeGuess(const Scene& scene, const GaitNode& node) {
 
 StageSpec makeTerminalStage(const Scene& scene) {
   const GaitNode& node = scene.gait.nodes.back();
-  const int nv = scene.model.nv();
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.control.weight = 0;
-  if (isPublished(scene)) {
-    stage.state = {scene.options.paper.terminal, scene.stance.q, VectorXd::Zero(nv), VectorXd::Zero(2 * nv)};
-    stage.state.weights.tail(nv) = selectMainJoints(scene.model);
-    return stage;
-  }
   addCost(stage, "com", scene.options.terminal_weight, Vector3d::Ones(), makeComPosition(node.com), true);
   addRest(scene.model, stage);
   return stage;

@@ -15,7 +15,6 @@ struct Scene {
   double ramp = 0;         ///< around the steps of the ground, m
 };
 
-inline bool isPublished(const Scene& scene) { return scene.options.published; }
 VectorXd makeStageWeights(const Model& model, const LocomotionOptions& options);
 
 /// The gait of a task from rest: the first double support is lengthened until locomotion.h Eq. (1) holds.

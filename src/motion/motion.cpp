@@ -35,16 +35,13 @@ void leaveTorquesFree(const Model& model, std::vector<StageSpec>& stages) {
 }  // namespace
 
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
-  const StepRule step = options.step.value_or(plan.limited ? StepRule::Midpoint : StepRule::Euler);
-  for (StageSpec& stage : plan.stages) stage.step = step;
+  for (StageSpec& stage : plan.stages) stage.step = options.step;
   Motion motion;
-  requireOption(plan.limited || !options.limits.areGiven(), "limit", "the paper's problem has no limits",
-                "leave it out");
-  if (plan.limited) motion.within_limits = addLimits(model, options.limits, plan.q_start, plan.stages);
+  motion.within_limits = addLimits(model, options.limits, plan.q_start, plan.stages);
   freeTimings(options.timings, plan.schedule, plan.stages);
   for (StageSpec& stage : plan.stages)  // at an impact h vanishes, and gains have no effect
-    if (stage.dt > 0 && (plan.limited || stage.timing.phase >= 0))
-      limitGains(step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
+    if (stage.dt > 0)
+      limitGains(options.step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
   setObjective(model, options.objective, plan.stages);
   motion.problem_options = options;
   if (!motion.within_limits) leaveTorquesFree(model, plan.stages);
@@ -236,16 +233,6 @@ void raiseMotorWeights(const Model& model, double weight, VectorXd& weights) {
     double& w = weights[model.nv() + motor.dof];
     w = std::max(w, isLinear(model, motor) ? weight / (kScrewArm * kScrewArm) : weight);
   }
-}
-
-void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
-                    const std::string& suffix) {
-  stage.costs.push_back({"landing height" + suffix, weights.height, Activation::makeQuadratic(Vector3d::UnitZ()),
-                         makeFrameTranslation(foot, X_WF.p)});
-  stage.costs.push_back({"landing tilt" + suffix, weights.tilt, Activation::makeQuadratic(Vector3d(1, 1, 0)),
-                         makeFrameRotation(foot, X_WF.R)});
-  stage.costs.push_back({"landing velocity" + suffix, weights.velocity, Activation::makeQuadratic(Vector6d::Ones()),
-                         makeFrameVelocity(foot)});
 }
 
 namespace {

@@ -17,12 +17,6 @@ namespace bielle {
 namespace {
 
 template <typename Options>
-struct Preset {
-  const char *name, *help;
-  void (*apply)(Options&);
-};
-
-template <typename Options>
 MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&), const Options& others) {
   return [=](const Model& model, const VectorXd& q0, const OptionSet& options) {
     return plan(model, readOptions(options, others), q0);
@@ -31,17 +25,8 @@ MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const
 
 // describe() is found by the type of the options.
 template <typename Options>
-MotionRequest makeRequest(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&),
-                          const std::vector<Preset<Options>>& presets = {}) {
-  MotionRequest request{listOptions(Options()), {}, {}, makePlanner(plan, Options()), {}};
-  for (const Preset<Options>& preset : presets)
-    request.presets.push_back({preset.name, preset.help, [=](MotionRequest& changed) {
-                                 auto options = readOptions<Options>(changed.options);
-                                 preset.apply(options);
-                                 changed.options = listOptions(options);
-                                 changed.planner = makePlanner(plan, options);
-                               }});
-  return request;
+MotionRequest makeRequest(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&)) {
+  return {listOptions(Options()), {}, makePlanner(plan, Options()), {}};
 }
 
 MotionRequest makeFootholdsRequest() {
@@ -69,9 +54,6 @@ OptionSet selectPart(const OptionSet& options, const std::string& part) {
   return selected;
 }
 
-constexpr const char* kPaper = "the problem published with the paper: a velocity instead of footholds";
-constexpr const char* kPaperJump = "the problem published with the paper: only the height at mid-flight, no foot paths";
-
 std::vector<SequencePart> listParts(const std::vector<std::pair<std::string, MotionPlanner>>& planners,
                                     const OptionSet& options) {
   std::vector<SequencePart> parts;
@@ -94,12 +76,12 @@ const std::vector<MotionEntry>& getMotions() {
        "steps forward or backward on level ground, from standing to standing",
        "bielle solve walk --robot bipetto --speed 0.5 -o walk",
        {"speed", "steps", "single_support", "double_support", "swing_height"},
-       makeRequest<WalkOptions>(planWalk, {{"paper", kPaper, setPaperWeights}})},
+       makeRequest(planWalk)},
       {"side-walk",
        "steps to the left or to the right",
        "bielle solve side-walk --robot bipetto --speed -0.2 -o side",
        {"speed", "steps", "single_support", "double_support", "swing_height"},
-       makeRequest<SideWalkOptions>(planSideWalk, {{"paper", kPaper, setPaperWeights}})},
+       makeRequest(planSideWalk)},
       {"turn",
        "steps on the spot or along an arc, to another heading",
        "bielle solve turn --robot bipetto --angle 1.57 --radius 0.5 -o turn",
@@ -109,7 +91,7 @@ const std::vector<MotionEntry>& getMotions() {
        "climb or descend stairs, one foot per step",
        "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
        {"height", "depth", "slope", "stairs", "speed", "width", "double_support", "swing_height"},
-       makeRequest<StairsOptions>(planStairs, {{"paper", kPaper, setPaperWeights}})},
+       makeRequest(planStairs)},
       {"footholds",
        "steps on uneven footholds from a file",
        "bielle solve footholds --robot bipetto --footholds stones.yaml -o stones",
@@ -129,7 +111,7 @@ const std::vector<MotionEntry>& getMotions() {
        "push off, fly for a given time, land; the time determines the height of the centre of mass at mid-flight",
        "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
        {"flight", "length"},
-       makeRequest<JumpOptions>(planJump, {{"paper", kPaperJump, setPaperWeights}})},
+       makeRequest(planJump)},
       {"run",
        "steps with flights between them, from standing to standing",
        "bielle solve run --robot bipetto --speed 1 -o run",

@@ -11,7 +11,7 @@ constexpr int kSteadySteps = 8;  // shorter runs do not reach their speed: the s
 
 // Supports and flights have options of their own.
 void describeGait(OptionFields& f, LocomotionOptions& gait) {
-  f.omit({"single_support", "double_support", "published"});
+  f.omit({"single_support", "double_support"});
   describe(f, gait);
   f.omit({});
   f.number("stretch", gait.stretch, "m", {-0.5, 0.5},

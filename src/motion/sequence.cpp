@@ -90,7 +90,6 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
   for (const MotionPlan& plan : plans) checkSoles(model, plan, sequence.ground);
   sequence.q_start = q0;
   sequence.q_end = plans.back().q_end;
-  for (const MotionPlan& plan : plans) sequence.limited &= plan.limited;
   for (size_t i = 0; i < plans.size(); ++i) {
     MotionPlan& plan = plans[i];
     const int start = sequence.schedule.numStages();
@@ -102,9 +101,6 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
       sequence.goals.push_back(std::move(goal));
     }
     if (i + 1 < plans.size()) plan.stages.pop_back();
-    if (plan.limited && !sequence.limited)  // beside the paper's problems, whose gains are as they are
-      for (StageSpec& stage : plan.stages)
-        if (stage.dt > 0) limitGains(StepRule::Euler, stage.dt, stage.constraints);
     moveAll(plan.stages, sequence.stages);
     joinTrajectories(plan.guess, sequence.guess);
     for (ContactPhase& phase : plan.schedule.phases) {

@@ -23,7 +23,7 @@ void check(const Model& model, const Stance& stance, const StairsOptions& o) {
 FootstepPlan planFootholds(const Stance& stance, const StairsOptions& o) {
   FootstepPlan plan{stance.feet, {}};
   const Vector3d up = calcMiddle(stance.feet[0], stance.feet[1]).R * Vector3d(o.depth, 0, o.height);
-  Side side = getFirstFoot(o.gait);
+  Side side = Side::Right;
   for (int i = 1; i <= o.stairs + 1; ++i, side = getOther(side)) {
     SE3 X = stance.feet[static_cast<int>(side)];
     X.p += std::min(i, o.stairs) * up;
@@ -61,26 +61,6 @@ void describe(OptionFields& f, StairsOptions& o) {
   f.omit({"single_support"});
   describe(f, o.gait);
   f.omit({});
-}
-
-void setPaperWeights(StairsOptions& o) {
-  setPaperWeights(o.gait);
-  // The ground rises by 0.1 m/s; a foot is 0.5 s in the air, truncated to 33 time steps, and 7 on the ground: 0.6 s.
-  const double h = o.gait.timing.time_step;
-  o.height = 0.1 * 40 * h;
-  o.speed = 0.3;
-  o.depth = o.speed * 40 * h;
-  o.stairs = 7;
-  o.gait.timing.start = 6 * h;       // 0.1 s
-  o.gait.timing.both = 7 * h;        // about 0.1 s
-  o.gait.timing.end = (7 + 33) * h;  // 0.5 s after the last double support
-  o.gait.state_weight = 0.05;
-  o.gait.control_weight = 0.002;
-  o.gait.com_height_weight = 0;
-  o.gait.com_velocity_weight = 1e3;
-  o.gait.pressure_weight = 1;
-  o.gait.paper.feet_distance_weight = 0;
-  o.gait.paper.fly_high = 50;
 }
 
 Ground makeStairsGround(const StairsOptions& o, const SE3& X_WP) {

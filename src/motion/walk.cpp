@@ -57,23 +57,9 @@ void describe(OptionFields& f, TurnOptions& o) {
   describe(f, o.gait);
 }
 
-void setPaperWeights(WalkOptions& o) {
-  setPaperWeights(o.gait);
-  o.steps = 8;
-}
-
-void setPaperWeights(SideWalkOptions& o) {
-  setPaperWeights(o.gait);
-  o.speed = -0.4;
-  o.steps = 8;
-  o.gait.state_weight = 0.3;
-  o.gait.pressure_weight = 1;
-  o.gait.paper.feet_distance_weight = 10;
-}
-
 MotionPlan planWalk(const Model& model, const WalkOptions& o, const VectorXd& q0) {
   StepsPlan plan = planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d::UnitX(), o.speed,
-                             getFirstFoot(o.gait), o, q0);
+                             Side::Right, o, q0);
   addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(0)), plan.motion);
   return std::move(plan.motion);
 }
@@ -81,7 +67,7 @@ MotionPlan planWalk(const Model& model, const WalkOptions& o, const VectorXd& q0
 MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const VectorXd& q0) {
   const Side opening = o.speed > 0 ? Side::Left : Side::Right;
   StepsPlan plan = planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d::UnitY(),
-                             o.speed, o.gait.published ? getFirstFoot(o.gait) : opening, o, q0);
+                             o.speed, opening, o, q0);
   addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(1), 2), plan.motion);
   return std::move(plan.motion);
 }

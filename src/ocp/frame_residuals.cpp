@@ -98,57 +98,6 @@ class FrameVelocity : public Residual {
   Vector6d reference_;
 };
 
-class FlyHigh : public Residual {
- public:
-  FlyHigh(const BodyFrame& frame, double slope, double ground) : frame_(frame), slope_(slope), ground_(ground) {}
-  int size() const override { return 2; }
-  void calc(const NodeView& node, VectorRef r) const override {
-    const Vector3d p = getPlacement(node, frame_).p;
-    r = calcPointVelocity(node.ws.V[frame_.body], p).head<2>() * calcFade(p);
-  }
-  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
-    const Vector6d& V = node.ws.V[frame_.body];
-    const Vector3d p = getPlacement(node, frame_).p, velocity = calcPointVelocity(V, p);
-    const double fade = calcFade(p);
-    for (int k : node.model.supportDofs(frame_.body)) {
-      const Vector6d dV = calcVelocityDerivative(node, frame_.body, k);
-      const Vector3d dp = calcPointVelocity(node.ws.J.col(k), p);
-      const Vector3d dvelocity = calcPointVelocity(dV, p) + Vector3d(V.tail<3>()).cross(dp);
-      rows.q.col(k) = fade * (dvelocity.head<2>() - slope_ * dp.z() * velocity.head<2>());
-      rows.v.col(k) = fade * dp.head<2>();
-    }
-  }
-
- private:
-  double calcFade(const Vector3d& p) const { return std::exp(-slope_ * (p.z() - ground_)); }
-  BodyFrame frame_;
-  double slope_, ground_;
-};
-
-class FrameDistance : public Residual {
- public:
-  FrameDistance(const BodyFrame& a, const BodyFrame& b) : a_(a), b_(b) {}
-  int size() const override { return 1; }
-  void calc(const NodeView& node, VectorRef r) const override { r[0] = calcOffset(node).norm(); }
-  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
-    const Eigen::Vector2d offset = calcOffset(node);
-    const Eigen::Vector2d direction = offset / std::max(offset.norm(), 1e-9);
-    const Vector3d pa = getPlacement(node, a_).p, pb = getPlacement(node, b_).p;
-    for (int body : {a_.body, b_.body})
-      for (int k : node.model.supportDofs(body)) rows.q(0, k) = 0;
-    for (int k : node.model.supportDofs(a_.body))
-      rows.q(0, k) += direction.dot(calcPointVelocity(node.ws.J.col(k), pa).head<2>());
-    for (int k : node.model.supportDofs(b_.body))
-      rows.q(0, k) -= direction.dot(calcPointVelocity(node.ws.J.col(k), pb).head<2>());
-  }
-
- private:
-  Eigen::Vector2d calcOffset(const NodeView& node) const {
-    return (getPlacement(node, a_).p - getPlacement(node, b_).p).head<2>();
-  }
-  BodyFrame a_, b_;
-};
-
 }  // namespace
 
 BodyFrame getBodyFrame(const Model& model, const std::string& name) {
@@ -171,12 +120,6 @@ std::unique_ptr<Residual> makeFrameRotation(const BodyFrame& frame, const Matrix
 }
 std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector6d& reference) {
   return std::make_unique<FrameVelocity>(frame, reference);
-}
-std::unique_ptr<Residual> makeFlyHigh(const BodyFrame& frame, double slope, double ground) {
-  return std::make_unique<FlyHigh>(frame, slope, ground);
-}
-std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame& b) {
-  return std::make_unique<FrameDistance>(a, b);
 }
 
 }  // namespace bielle

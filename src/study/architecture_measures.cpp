@@ -6,7 +6,7 @@
 #include "bielle/model/names.h"
 #include "io/json_text.h"
 #include "study/architecture_report.h"
-#include "study/measures.h"
+#include "study/cells.h"
 
 namespace fs = std::filesystem;
 

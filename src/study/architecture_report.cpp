@@ -8,7 +8,7 @@
 
 #include "io/plot.h"
 #include "io/text_file.h"
-#include "study/report.h"
+#include "study/cells.h"
 
 namespace bielle::study {
 namespace {

@@ -7,7 +7,7 @@
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "study/cases.h"
-#include "study/report.h"
+#include "study/cells.h"
 #include "tasks/child.h"
 
 namespace bielle::study {

@@ -7,7 +7,7 @@
 #include "bielle/motion/registry.h"
 #include "design/spec_parts.h"
 #include "model/text_file.h"
-#include "study/report.h"
+#include "study/cells.h"
 
 namespace fs = std::filesystem;
 

@@ -33,7 +33,7 @@ class CommandedWalk {
   };
 
   /// From the standing posture q0, at time 0.
-  /// \param options  `flight`, `rigid_landing`, `landing_speed` and `published` are
+  /// \param options  `flight`, `rigid_landing` and `landing_speed` are
   /// ignored; a time step of 0 is 12 ms
   /// \throws ModelError as planLocomotion() and addLimits() do
   CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits, CommandSource command,

@@ -23,21 +23,9 @@
 /// - touchdown, at the first node of the landing: the feet are at their places, flat and at rest, so that the legs fold
 ///   as fast as the body falls;
 /// - at the end the centre of mass is at rest and the torso does not turn.
-///
-/// With `published`, the problem is that of the paper's example code: there are no constraints; feet are free in
-/// flight; at touchdown their costs are height, tilt and velocity; the load is the average of Eq. (2) while pushing and
-/// landing, the weight before and after; hips are weighted like other joints; contacts have the gains given, without
-/// limits; limits of motors and joints do not apply; the terminal costs are the height and the heading of the base, and
-/// the joints of the legs (Model::serialJoints) with their velocities.
 #include "bielle/motion/motion.h"
 
 namespace bielle {
-
-/// Only for the published problem, which has no constraints.
-struct PaperJumpWeights {
-  LandingWeights touchdown{1e5, 1e3, 1e3};  ///< over h
-  double terminal = 1e3;                    ///< of the final velocities
-};
 
 struct JumpOptions {
   double flight = 0.3;               ///< time in the air, s; rounded to an even number of time steps
@@ -50,7 +38,6 @@ struct JumpOptions {
   double clearance = 0.04;           ///< least height of the soles at mid-flight, m
   double friction = 0.7;             ///< coefficient, 1
   double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
-  bool published = false;            ///< the paper's problem, see above, instead of our costs
   double time_step = 0.002;          ///< s
 
   double apex_weight = 1e4;            ///< of the CoM's height at mid-flight, over h, 1/m^2
@@ -64,16 +51,11 @@ struct JumpOptions {
   double swing_weight = 1e5;           ///< of the feet's path in flight, 1/m^2
   double swing_rotation_weight = 1e2;  ///< of their orientation, 1
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
-  PaperJumpWeights paper;
   double contact_kp = 1e4;  ///< stabilisation of contacts and closures, 1/s^2; limited (limitGains)
   double contact_kd = 200;  ///< 1/s; likewise
 };
 
 void describe(OptionFields& fields, JumpOptions& options);
-
-/// The paper's problem with the weights and durations of its jump (its example code), as far as they can be read from
-/// its figures.
-void setPaperWeights(JumpOptions& options);
 
 /// Figures of a jump by Eq. (1), with durations rounded to the time step.
 struct JumpFigures {

@@ -27,17 +27,6 @@
 /// tau = sqrt(z / g), a centre of pressure held back by d for a time T brings the robot onto the pendulum's path if
 ///     d (1 - exp(-T / tau)) = v tau,                                                                           (1)
 /// where v falls with T as well. The first double support is long enough for d to fit in the soles.
-///
-/// With `published`, the problem is that of the paper's example code, whose walk is known to the last digit:
-/// - no constraints;
-/// - no footholds: only the velocity of the CoM leads forward. The costs of a landing foot are its height, tilt and
-///   velocity; its place, its heading and the path of a swing have no costs, but its horizontal velocity near the
-///   ground does ("fly high"), and so do feet that come near each other;
-/// - the force reference is the weight on one foot, half of it on each of two, and changes at once; forces and centres
-///   of pressure are in the axes of the world;
-/// - contacts and closures have the gains given, without limits; limits of motors and joints do not apply;
-/// - the only terminal costs are the velocities of the joints of the legs (Model::serialJoints);
-/// - the guess is the standing posture at rest, as high as the path of the centre of mass.
 #include "bielle/motion/footsteps.h"
 #include "bielle/motion/motion.h"
 
@@ -62,16 +51,6 @@ struct SwingShape {
   double leave = 0, arrive = 0.95;  ///< the horizontal motion takes place between these
 };
 
-/// Only for the published problem, which has no constraints.
-struct PaperWeights {
-  double fly_high = 100;                  ///< s^2/m^2
-  double fly_high_slope = 75;             ///< 1/m
-  LandingWeights landing{1e4, 1e4, 1e4};  ///< over h
-  double feet_distance = 0.2;             ///< least distance of the feet, m
-  double feet_distance_weight = 100;      ///< of coming nearer, 1/m^2
-  double terminal = 1e4;                  ///< of the final velocities
-};
-
 struct LocomotionOptions {
   GaitTiming timing;
   double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as given
@@ -79,7 +58,6 @@ struct LocomotionOptions {
   SwingShape swing;
   double friction = 0.7;             ///< coefficient, 1
   double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
-  bool published = false;            ///< the paper's problem, see above, instead of footholds
   /// Every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. Otherwise the contact's
   /// stabilisation stops any remaining velocity of a foot.
   bool rigid_landing = false;
@@ -102,7 +80,6 @@ struct LocomotionOptions {
   double pressure_weight = 10;         ///< of the centre of pressure, over the half size of the sole squared
   double feet_distance = 0.01;         ///< least distance of the soles, or what the footholds leave if less, m
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
-  PaperWeights paper;
   double contact_kp = 2e3;  ///< stabilisation of the contacts, 1/s^2; limited (limitGains)
   double contact_kd = 100;  ///< 1/s; likewise
   double closure_kp = 1e4;  ///< stabilisation of the closures, limited like that of the contacts; used only by
@@ -113,9 +90,6 @@ struct LocomotionOptions {
 
 void describe(OptionFields& fields, LocomotionOptions& options);
 
-/// The paper's problem with the weights and durations of its walk (its example code).
-void setPaperWeights(LocomotionOptions& options);
-
 /// The robot as it stands before the first step.
 struct Stance {
   VectorXd q;                     ///< nq, standing posture
@@ -125,9 +99,6 @@ struct Stance {
 };
 /// The stance in a closed posture q0. \throws ModelError when the robot lacks a foot
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0);
-
-/// The foot that steps first if the motion does not determine it: the left one in the published problem.
-Side getFirstFoot(const LocomotionOptions& options);
 
 /// The steps to take and the ground to take them on.
 struct LocomotionTask {
@@ -145,7 +116,7 @@ struct LocomotionTask {
 std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
                                  int steps_per_cycle = 1);
 
-/// Its goals are the footholds, unless the costs leave them free.
+/// Its goals are the footholds.
 /// \throws ModelError when the request is impossible: footholds out of the legs' reach, soles that collide, durations
 MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
                           const LocomotionOptions& options);

@@ -1,7 +1,6 @@
 #pragma once
 /// \file A motion: from a few intuitive numbers to a shooting problem with its initial guess.
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,7 +30,6 @@ struct MotionPlan {
   std::vector<StageSpec> stages;  ///< N running stages and the terminal stage
   ShootingTrajectory guess;       ///< quasi-static
   VectorXd q_start, q_end;        ///< standing postures, nq
-  bool limited = true;            ///< whether limits of the robot apply: not in the paper's problems
   OptionValues options;           ///< every option of the motion by name
   std::vector<Goal> goals;        ///< requested quantities, to be measured on the trajectory
 };
@@ -39,7 +37,7 @@ struct MotionPlan {
 /// Options of a problem besides those of the motion.
 struct ProblemOptions {
   Formulation formulation = Formulation::Reduced;
-  std::optional<StepRule> step;  ///< if not given: midpoint, or Euler for the paper's problems
+  StepRule step = StepRule::Midpoint;
   LimitOptions limits;
   TimingOptions timings;
   ObjectiveOptions objective;
@@ -87,10 +85,8 @@ ObjectiveOptions scaleObjective(const Motion& effort, const ShootingTrajectory& 
                                 const ObjectiveOptions& options, const LimitOptions& limits = {});
 
 /// Turns a plan into a problem that starts at rest, adding limits, free durations, objective and step rule to its stages.
-/// Gains are limited to values that are stable for a step (limitGains), except in the paper's problems of fixed
-/// durations.
-/// \throws ModelError as addLimits(), freeTimings() and setObjective() do, or when limits are given for a problem of the
-/// paper, which has none
+/// Gains are limited to values that are stable for a step (limitGains).
+/// \throws ModelError as addLimits(), freeTimings() and setObjective() do
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as far as possible: with a = v = 0,
@@ -149,16 +145,6 @@ struct GroundCosts {
   double pressure_weight = 1;           ///< of the centre of pressure, over the half size of the sole squared
   ForceAxes axes = ForceAxes::Contact;  ///< of force reference and centre of pressure
 };
-/// Weights of a foot that may land anywhere, as in the paper: height of a place, no tilt, no velocity.
-struct LandingWeights {
-  double height = 0;    ///< 1/m^2
-  double tilt = 0;      ///< of the rotation about x and y of the place, 1
-  double velocity = 0;  ///< and angular velocity, s^2/m^2 and s^2
-};
-/// \param suffix  of the names of the costs, if several feet land at once
-void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
-                    const std::string& suffix = "");
-
 /// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), reduced by `margin` in
 /// friction and in size, and by a thousandth of the robot's weight in the normal force. Its pyramids of
 /// friction/sqrt(2) are inscribed in round cones. A violation of 1 is the weight of the robot.

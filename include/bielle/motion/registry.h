@@ -10,12 +10,6 @@ namespace bielle {
 
 struct MotionRequest;
 
-/// Values of many options under one name (`--weights NAME`).
-struct MotionPreset {
-  std::string name, help;
-  std::function<void(MotionRequest&)> apply;
-};
-
 /// Data of a motion that come from a file (`--NAME FILE`).
 struct MotionFile {
   std::string name, help;
@@ -27,7 +21,6 @@ using MotionPlanner = std::function<MotionPlan(const Model&, const VectorXd& q0,
 /// A motion by name with its options, a value.
 struct MotionRequest {
   OptionSet options;
-  std::vector<MotionPreset> presets;
   std::vector<MotionFile> files;
   MotionPlanner planner;
   std::vector<std::pair<std::string, MotionPlanner>> parts;  ///< of a sequence, by name

@@ -23,9 +23,6 @@ struct StairsOptions {
 /// Without the duration of single support, which follows from depth and speed.
 void describe(OptionFields& fields, StairsOptions& options);
 
-/// Weights and durations of the paper's stairs.
-void setPaperWeights(StairsOptions& options);
-
 /// The stairs in front of feet whose middle (calcMiddle) is initially X_WP.
 Ground makeStairsGround(const StairsOptions& options, const SE3& X_WP);
 

@@ -29,10 +29,6 @@ void describe(OptionFields& fields, WalkOptions& options);
 void describe(OptionFields& fields, SideWalkOptions& options);
 void describe(OptionFields& fields, TurnOptions& options);
 
-/// Weights and durations of the paper's walk and side walk.
-void setPaperWeights(WalkOptions& options);
-void setPaperWeights(SideWalkOptions& options);
-
 /// From the standing posture q0. \throws ModelError when the request is impossible (see locomotion.h)
 MotionPlan planWalk(const Model& model, const WalkOptions& options, const VectorXd& q0);
 MotionPlan planSideWalk(const Model& model, const SideWalkOptions& options, const VectorXd& q0);

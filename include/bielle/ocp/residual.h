@@ -82,11 +82,6 @@ std::unique_ptr<Residual> makeFrameTranslation(const BodyFrame& frame, const Vec
 std::unique_ptr<Residual> makeFrameRotation(const BodyFrame& frame, const Matrix3d& R_WT);
 /// Velocity of the frame's origin and angular velocity, in world axes, minus a reference (6), m/s and rad/s.
 std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector6d& reference = Vector6d::Zero());
-/// Fly high: horizontal velocity of the frame's origin times exp(-slope z) (2), z its height over `ground`, m/s; slope
-/// in 1/m.
-std::unique_ptr<Residual> makeFlyHigh(const BodyFrame& frame, double slope, double ground);
-/// Horizontal distance between two frames (1), m.
-std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame& b);
 /// Heights of the corners of a sole over the ground (4), of its origin if it has no size (1), m. Around a step the
 /// ground is taken to rise to its top over `ramp` m, so that the residual is continuous, and never exceeds the true
 /// height.

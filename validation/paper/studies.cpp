@@ -1,8 +1,8 @@
-#include "study/studies.h"
+#include "paper/studies.h"
 
 #include "model/number_text.h"
 
-namespace bielle::study {
+namespace bielle::paper {
 namespace {
 
 // first, first + step, ... last; each the nearest double to its decimal number.
@@ -16,30 +16,62 @@ std::string makeName(const Study& study, double value, const char* model) {
   return study.stem + "-" + study.parameter + formatNumber(value, "-%.4g-") + model;
 }
 
-std::vector<std::string> makeSolve(const Study& study, double value, const std::string& robot, const char* output) {
-  std::vector<std::string> arguments = {
-      "solve",      study.motion, "--robot", robot,   "--set",   study.parameter + "=" + formatNumber(value, "%.12g"),
-      "--threads",  "1",          "--step",  "euler", "--quiet", "--no-check",
-      "--no-report"};
-  arguments.insert(arguments.end(), study.settings.begin(), study.settings.end());
-  arguments.insert(arguments.end(), {"-o", std::string("@") + output});
+std::vector<std::string> makeSolve(const Study& study, double value, const std::string& robot, bool serial) {
+  const std::string number = formatNumber(value, "%.12g");
+  std::vector<std::string> arguments;
+  if (study.is_papers) {
+    arguments = {"walk", "--robot", robot, "--speed", number};
+    if (serial) arguments.push_back("--serial");
+  } else {
+    arguments = {"solve",      study.motion, "--robot", robot,   "--set",   study.parameter + "=" + number,
+                 "--threads",  "1",          "--step",  "euler", "--quiet", "--no-check",
+                 "--no-report"};
+    arguments.insert(arguments.end(), study.settings.begin(), study.settings.end());
+    if (serial) arguments.insert(arguments.end(), {"--model", "serial"});
+  }
+  arguments.insert(arguments.end(), {"-o", std::string("@") + (serial ? kSerial : kClosed)});
   return arguments;
+}
+
+std::vector<std::string> makeLift(const Study& study, const char* output) {
+  return {study.is_papers ? "lift-walk" : "lift", std::string("@") + kSerial, "-o", std::string("@") + output};
 }
 
 }  // namespace
 
 const std::vector<Study>& getStudies() {
-  // Eight steps, as in the paper: four are steady. Its weights, and ours, which ask for footholds instead of a
-  // velocity.
-  const std::vector<std::string> paper = {"--weights", "paper", "--steps", "8"}, ours = {"--steps", "8"};
+  // Eight steps, as in the paper: four are steady. Its walk, and ours, which asks for footholds instead of a velocity.
+  const std::vector<std::string> ours = {"--steps", "8"};
   const std::vector<double> heights = makeRange(50, 120, 5, 100), speeds = makeRange(0, 12, 1, 10);
   const std::vector<double> stairs = makeRange(2, 10, 2, 100), flights = makeRange(20, 40, 5, 100);
   const char *height_label = "lowest height of the CoM / initial height", *speed_label = "speed [m/s]";
   const char* stair_label = "height of a stair [m]";
   static const std::vector<Study> studies = {
       {"squat", "Squats", "V-A.1", "squat", "depth", height_label, heights, "squat", {}, Window::Whole, 0.6},
-      {"walk", "Walk on flat ground", "V-A.2", "walk", "speed", speed_label, {0.5}, "walk", paper, Window::Steady, 0.5},
-      {"speed", "Speed of the walk", "V-A.3", "walk", "speed", speed_label, speeds, "walk", paper, Window::Steady, 0.9},
+      {"walk",
+       "Walk on flat ground",
+       "V-A.2",
+       "walk",
+       "speed",
+       speed_label,
+       {0.5},
+       "walk",
+       {},
+       Window::Steady,
+       0.5,
+       true},
+      {"speed",
+       "Speed of the walk",
+       "V-A.3",
+       "walk",
+       "speed",
+       speed_label,
+       speeds,
+       "walk",
+       {},
+       Window::Steady,
+       0.9,
+       true},
       {"footholds", "Speed of the walk, on given footholds", "V-A.3", "walk", "speed", speed_label, speeds, "footholds",
        ours, Window::Steady, 0.9},
       {"stairs", "Stairs", "V-A.4", "stairs", "height", stair_label, stairs, "stairs", {}, Window::Whole, 0.06},
@@ -49,16 +81,14 @@ const std::vector<Study>& getStudies() {
 }
 
 Case makeClosedCase(const Study& study, double value, const std::string& robot) {
-  return {makeName(study, value, "closed"), {makeSolve(study, value, robot, kClosed)}, robot};
+  return {makeName(study, value, "closed"), {makeSolve(study, value, robot, false)}, robot};
 }
 
 Case makeSerialCase(const Study& study, double value, const std::string& robot) {
-  std::vector<std::string> solve = makeSolve(study, value, robot, kSerial);
-  solve.insert(solve.end(), {"--model", "serial"});
+  std::vector<std::string> stepped = makeLift(study, kStepped);
+  stepped.insert(stepped.end(), {"--method", "nlopt"});
   return {makeName(study, value, "serial"),
-          {solve,
-           {"lift", std::string("@") + kSerial, "-o", std::string("@") + kLifted},
-           {"lift", std::string("@") + kSerial, "-o", std::string("@") + kStepped, "--method", "nlopt"}},
+          {makeSolve(study, value, robot, true), makeLift(study, kLifted), stepped},
           robot};
 }
 
@@ -76,4 +106,4 @@ std::vector<Case> makeCases(const Study& study, const std::string& robot) {
   return cases;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

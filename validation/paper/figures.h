@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "io/plot.h"
-#include "study/claims.h"
+#include "paper/claims.h"
 
-namespace bielle::study {
+namespace bielle::paper {
 
 struct Figure {
   std::string name;  // of the file, without extension
@@ -16,4 +16,4 @@ struct Figure {
 
 std::vector<Figure> makeFigures(const StudyResult& result, const ComparedRobot& robot);
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

@@ -1,17 +1,17 @@
 #pragma once
 // Quantities read from the results of a study.
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "bielle/io/result.h"
 #include "bielle/model/reader.h"
-#include "study/studies.h"
+#include "paper/studies.h"
+#include "study/cells.h"
 
-namespace bielle::study {
+namespace bielle::paper {
 
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+using study::kMissing;
 
 // The robot, and the motors of the compared joints.
 struct ComparedRobot {
@@ -66,4 +66,4 @@ Comparison readComparison(const Study& study, double value, const ComparedRobot&
 // Paths of the contact frames of the closed robot: N + 1 x 3 each, m.
 std::vector<RowMatrixXd> calcFeet(const Model& model, const MotionRecord& record);
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

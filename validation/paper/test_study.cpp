@@ -34,7 +34,7 @@ class StudyDirectory {
   ~StudyDirectory() { fs::remove_all(path_); }
 
   std::vector<std::string> makeCommand(const std::string& name, const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments = {BIELLE_COMMAND, "study", name, "-o", path_.string()};
+    std::vector<std::string> arguments = {BIELLE_PAPER, "study", name, "-o", path_.string()};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }

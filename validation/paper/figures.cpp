@@ -1,11 +1,11 @@
-#include "study/figures.h"
+#include "paper/figures.h"
 
 #include <cmath>
 #include <functional>
 
 #include "bielle/model/names.h"
 
-namespace bielle::study {
+namespace bielle::paper {
 namespace {
 
 using Getter = std::function<double(const Comparison&)>;
@@ -177,4 +177,4 @@ std::vector<Figure> makeFigures(const StudyResult& result, const ComparedRobot& 
   return figures;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

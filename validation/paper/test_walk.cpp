@@ -10,9 +10,10 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/robot_loader.h"
-#include "bielle/motion/walk.h"
 #include "bielle/solve/fddp.h"
-#include "change_option.h"
+#include "measure_steps.h"
+#include "own_robots.h"
+#include "paper/walk.h"
 #include "problem_probe.h"
 #include "published_robots.h"
 #include "solve_in_place.h"
@@ -78,16 +79,9 @@ std::optional<PaperWalk> readReference() {
   return out;
 }
 
-Motion makePaperWalk(const PaperWalk& reference, const WalkOptions& options,
-                     Formulation formulation = Formulation::Full) {
+Motion makePaperWalk(const PaperWalk& reference, const paper::WalkOptions& options = {}) {
   const VectorXd q0 = reference.guess.xs.front().head(reference.model.nq());
-  return makeMotion(reference.model, planWalk(reference.model, options, q0), formulation);
-}
-
-WalkOptions makePaperOptions() {
-  WalkOptions options;
-  setPaperWeights(options);
-  return options;
+  return paper::makeWalk(reference.model, options, q0, Formulation::Full);
 }
 
 // The name here of a term there. The published frames of the feet hang under the other leg.
@@ -181,7 +175,7 @@ double calcSteadySpeed(const Motion& walk, const ShootingTrajectory& t) {
 TEST_CASE("the paper's walk: every cost term at the guess and at the solution") {
   const std::optional<PaperWalk> reference = readReference();
   if (!reference) return;
-  Motion walk = makePaperWalk(*reference, makePaperOptions());
+  Motion walk = makePaperWalk(*reference);
   for (size_t k = 0; k + 1 < reference->standing.size(); ++k) {
     int standing = 0;
     for (const ContactTarget& contact : walk.schedule.getPhase(static_cast<int>(k)).contacts)
@@ -203,7 +197,7 @@ TEST_CASE("the paper's walk: every cost term at the guess and at the solution") 
 TEST_CASE("the paper's walk: solved from its first guess, it ends below the paper's cost, at its speed") {
   const std::optional<PaperWalk> reference = readReference();
   if (!reference) return;
-  Motion walk = makePaperWalk(*reference, makePaperOptions());
+  Motion walk = makePaperWalk(*reference);
   walk.guess = reference->guess;
   FddpOptions solver;
   solver.gradient_tolerance = 1e-10;
@@ -220,23 +214,50 @@ TEST_CASE("the paper's walk: solved from its first guess, it ends below the pape
 TEST_CASE("the paper's walk: a wrong weight is noticed") {
   const std::optional<PaperWalk> reference = readReference();
   if (!reference) return;
-  const auto expectNotice = [&](const std::string& name, const std::function<void(WalkOptions&)>& change) {
+  using Options = paper::WalkOptions;
+  const auto expectNotice = [&](const std::string& name, const std::function<void(Options&)>& change) {
     CAPTURE(name);
-    WalkOptions options = makePaperOptions();
+    Options options;
     change(options);
     Motion walk = makePaperWalk(*reference, options);
     CHECK(compareTerms(walk, reference->solution, reference->terms_of_solution).relative > 1e-6);
   };
-  for (const char* name : {"state_weight", "torso_weight", "control_weight", "com_height_weight", "com_velocity_weight",
-                           "force_weight", "pressure_weight", "speed", "contact_kd", "contact_kp", "closure_kd"})
-    expectNotice(name, [name](WalkOptions& options) {
-      const double value = listOptions(options).get<double>(name);
-      options = changeOption(options, name, value == 0 ? 1 : 1.001 * value);
-    });
-  for (double PaperWeights::*weight :
-       {&PaperWeights::fly_high, &PaperWeights::fly_high_slope, &PaperWeights::feet_distance,
-        &PaperWeights::feet_distance_weight, &PaperWeights::terminal})
-    expectNotice("of the paper alone", [weight](WalkOptions& options) { options.gait.paper.*weight *= 1.001; });
-  for (double LandingWeights::*weight : {&LandingWeights::height, &LandingWeights::tilt, &LandingWeights::velocity})
-    expectNotice("landing", [weight](WalkOptions& options) { options.gait.paper.landing.*weight *= 1.001; });
+  const std::vector<std::pair<const char*, double Options::*>> weights = {
+      {"speed", &Options::speed},
+      {"state", &Options::state_weight},
+      {"torso", &Options::torso_weight},
+      {"control", &Options::control_weight},
+      {"com height", &Options::com_height_weight},
+      {"com velocity", &Options::com_velocity_weight},
+      {"force", &Options::force_weight},
+      {"pressure", &Options::pressure_weight},
+      {"fly high", &Options::fly_high_weight},
+      {"slope", &Options::fly_high_slope},
+      {"feet distance", &Options::feet_distance},
+      {"its weight", &Options::feet_distance_weight},
+      {"terminal", &Options::terminal_weight}};
+  for (const auto& [name, weight] : weights)
+    expectNotice(name, [weight = weight](Options& options) { options.*weight *= 1.001; });
+  for (double paper::LandingWeights::*weight :
+       {&paper::LandingWeights::height, &paper::LandingWeights::tilt, &paper::LandingWeights::velocity})
+    expectNotice("landing", [weight](Options& options) { options.landing.*weight *= 1.001; });
+  expectNotice("contact_kd", [](Options& options) { options.contacts.kd *= 1.001; });
+  expectNotice("contact_kp", [](Options& options) { options.contacts.kp = 1; });
+  expectNotice("closure_kd", [](Options& options) { options.closures.kd = 1; });
+}
+
+TEST_CASE("the paper's walk: on Bipetto the feet land where they like") {
+  const Model& model = getBipetto();
+  Motion walk = paper::makeWalk(model, {}, makeStandingPosture(model));
+  FddpOptions solver;
+  solver.initial_regularization = kGuessRegularization;
+  solver.max_iterations = 100;
+  const FddpSummary summary = Fddp(solver).solve(*walk.problem, walk.guess);
+  CAPTURE(summary.message, summary.iterations);
+  CHECK(summary.termination == FddpTermination::Converged);
+  CHECK(calcSteadySpeed(walk, walk.guess) == Approx(0.3).margin(0.05));  // the velocity is one cost among others
+  const StepMeasures measures = StepMeter(walk, walk.guess).measure();
+  CHECK(measures.foothold > 0.02);
+  CHECK(measures.slip < 5e-3);
+  CHECK(measures.load > 5);
 }

@@ -10,7 +10,11 @@
 
 #include "study/cases.h"
 
-namespace bielle::study {
+namespace bielle::paper {
+
+using study::Case;
+using study::CaseOutcome;
+using study::StepOutcome;
 
 // The part of a motion from which torques are taken.
 enum class Window {
@@ -28,7 +32,8 @@ struct Study {
   std::string stem;                   // of the names of its cases; studies that share it share cases
   std::vector<std::string> settings;  // further arguments of `bielle solve`
   Window window = Window::Whole;
-  double shown = 0;  // value whose motion is drawn over time, if it is among the values
+  double shown = 0;        // value whose motion is drawn over time, if it is among the values
+  bool is_papers = false;  // the paper's own walk, of `bielle-paper walk`
 };
 
 const std::vector<Study>& getStudies();
@@ -51,4 +56,4 @@ Case makeRatioCase(const std::string& robot);  // of the first knee
 // All cases of a study, in the order of its values: closed, serial, closed, ...
 std::vector<Case> makeCases(const Study& study, const std::string& robot);
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

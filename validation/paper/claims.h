@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "study/measures.h"
+#include "paper/measures.h"
 
-namespace bielle::study {
+namespace bielle::paper {
 
 // The reduction ratio along the range of a joint that contains the starting posture (branch 0 of ratio.json).
 struct RatioFinding {
@@ -35,4 +35,4 @@ struct Claim {
 
 std::vector<Claim> judgeClaims(const StudyResult& result, const Model& model);
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

@@ -1,4 +1,4 @@
-#include "study/claims.h"
+#include "paper/claims.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include "io/json_text.h"
 
-namespace bielle::study {
+namespace bielle::paper {
 namespace {
 
 using Comparisons = std::vector<Comparison>;
@@ -288,4 +288,4 @@ std::vector<Claim> judgeClaims(const StudyResult& result, const Model& model) {
   return judgeRatio(result, model);
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

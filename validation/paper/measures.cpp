@@ -1,4 +1,4 @@
-#include "study/measures.h"
+#include "paper/measures.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::paper {
 namespace {
 
 constexpr const char* kCaseRemedy = "remove its directory to repeat the case";
@@ -168,4 +168,4 @@ std::vector<RowMatrixXd> calcFeet(const Model& model, const MotionRecord& record
   return feet;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

@@ -1,14 +1,19 @@
-#include "study/report.h"
+#include "paper/report.h"
 
-#include <charconv>
 #include <cmath>
 #include <functional>
 #include <sstream>
 
 #include "io/text_file.h"
-#include "study/figures.h"
+#include "paper/figures.h"
+#include "study/cells.h"
 
-namespace bielle::study {
+namespace bielle::paper {
+
+using study::formatCell;
+using study::formatExact;
+using study::quoteCsv;
+
 namespace {
 
 // Measures of a motion that ends early are in parentheses.
@@ -126,27 +131,6 @@ void printNumbers(std::ostream& page, const StudyResult& result) {
 
 }  // namespace
 
-std::string formatExact(double value) {
-  if (!std::isfinite(value)) return "";
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
-
-std::string formatCell(double value, int digits) {
-  if (!std::isfinite(value)) return "–";
-  std::ostringstream text;
-  text.setf(std::ios::fixed);
-  text.precision(digits);
-  text << value;
-  return text.str();
-}
-
-std::string quoteCsv(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
-}
-
 StudyPage writeStudy(const std::string& directory, const StudyResult& result, const ComparedRobot& robot) {
   StudyPage page;
   const std::string base = directory + "/" + result.study.name;
@@ -193,4 +177,4 @@ std::string writeReport(const std::string& directory, const std::string& robot, 
   return path;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

@@ -3,16 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "study/claims.h"
+#include "paper/claims.h"
 
-namespace bielle::study {
-
-// With the given number of decimals; a dash for NaN.
-std::string formatCell(double value, int digits);
-// The shortest text that reads back to the same number; empty for NaN.
-std::string formatExact(double value);
-// A text as a field of a CSV table.
-std::string quoteCsv(const std::string& text);
+namespace bielle::paper {
 
 // The files written for one study.
 struct StudyPage {
@@ -28,4 +21,4 @@ StudyPage writeStudy(const std::string& directory, const StudyResult& result, co
 std::string writeReport(const std::string& directory, const std::string& robot, const std::string& command,
                         const std::vector<StudyPage>& pages);
 
-}  // namespace bielle::study
+}  // namespace bielle::paper

@@ -1,10 +1,10 @@
 // Verdicts of a study, from handwritten results.
 #include <catch2/catch.hpp>
 
-#include "study/claims.h"
+#include "paper/claims.h"
 
 using namespace bielle;
-using namespace bielle::study;
+using namespace bielle::paper;
 
 namespace {
 
