@@ -1654,6 +1654,7 @@ class Stage:
 class ForceAxes:
     CONTACT: ClassVar[ForceAxes]
     WORLD: ClassVar[ForceAxes]
+    GROUND: ClassVar[ForceAxes]
     __members__: ClassVar[Dict[str, ForceAxes]]
     def __init__(self, value: int) -> None: ...
     def __int__(self) -> int: ...

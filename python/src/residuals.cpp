@@ -225,7 +225,10 @@ std::vector<LibraryResidual> rememberResiduals(const std::vector<StageSpec>& sta
 }
 
 void bindResiduals(py::module_& module) {
-  py::enum_<ForceAxes>(module, "ForceAxes").value("CONTACT", ForceAxes::Contact).value("WORLD", ForceAxes::World);
+  py::enum_<ForceAxes>(module, "ForceAxes")
+      .value("CONTACT", ForceAxes::Contact)
+      .value("WORLD", ForceAxes::World)
+      .value("GROUND", ForceAxes::Ground);
   py::class_<LibraryResidual>(module, "LibraryResidual", "A residual of the library; `bielle.residuals` makes them.")
       .def_property_readonly(
           "size", [](const LibraryResidual& r) { return r.residual->size(); }, "number of rows")

@@ -6,7 +6,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "control/clock.h"
 #include "control/policy_stages.h"
-#include "motion/foot_constraints.h"
+#include "motion/foot_tasks.h"
 
 namespace bielle {
 namespace {
@@ -118,7 +118,7 @@ bool WindowPlanner::isOverFoothold(int landing, int contact, ConstVectorRef q) {
   const ContactFrame& foot = model_.contacts()[contact];
   updatePlacements<double>(model_, feet_, q);
   const Vector3d off = X_WT.R.transpose() * (getPlacement(feet_, foot.body, foot.X_BF).p - X_WT.p);
-  const double room = getLandingRoom(foot, getSpec(landing)) + kLandingWay;
+  const double room = getLandingRoom(contact, getSpec(landing)) + kLandingWay;
   return off.head<2>().cwiseAbs().maxCoeff() <= room;
 }
 
@@ -158,7 +158,7 @@ void WindowPlanner::lower(int foot, int landing) {
   late_ = {foot, landing, 0};
   for (int k = landing - kLowering; k <= landing; ++k) {
     StageSpec spec = getSpec(k);
-    lowerFoot(model_.contacts()[foot], kLoweringSpeed, spec);
+    lowerFoot(model_, foot, kLoweringSpeed, spec);
     problem_.replaceStage(horizon_->getNode(k), std::move(spec));
   }
 }

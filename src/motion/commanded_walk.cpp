@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "motion/foot_constraints.h"
+#include "motion/foot_tasks.h"
 #include "motion/locomotion_stages.h"
 
 namespace bielle {

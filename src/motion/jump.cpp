@@ -4,7 +4,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
-#include "motion/foot_constraints.h"
+#include "motion/foot_tasks.h"
 #include "motion/motor_scale.h"
 #include "motion/quintic.h"
 
@@ -84,11 +84,9 @@ void addSwingCosts(const JumpScene& scene, double s, StageSpec& stage) {
   const JumpOptions& o = scene.options;
   const Vector3d p = Vector3d::Constant(o.swing_weight), r = Vector3d::Constant(o.swing_rotation_weight);
   for (const ContactTarget& start : scene.before) {
-    const ContactFrame& contact = scene.model.contacts()[start.contact];
     SE3 target = start.X_WT;
     target.p += calcFootOffset(scene, s);
-    stage.costs.push_back({"swing " + contact.name, 1, Activation::makeQuadratic((Vector6d() << p, r).finished()),
-                           makeFramePlacement({contact.body, contact.X_BF}, target)});
+    addSwing(scene.model, start.contact, target, (Vector6d() << p, r).finished(), stage);
   }
 }
 
@@ -104,12 +102,11 @@ void addFlightConstraints(const JumpScene& scene, int i, int n, StageSpec& stage
   Ground ground;
   ground.height = scene.before.front().X_WT.p.z();
   for (const ContactTarget& start : scene.before)
-    addClearance(scene.model.contacts()[start.contact], ground, 0, isMidSwing(i, n) ? kMidSwingClearance : 0, stage);
+    addClearance(scene.model, start.contact, ground, 0, isMidSwing(i, n) ? kMidSwingClearance : 0, stage);
 }
 
 void addTouchdown(const JumpScene& scene, StageSpec& stage) {
-  for (const ContactTarget& target : scene.after)
-    addLanding(scene.model.contacts()[target.contact], target.X_WT, 0, 0, stage);
+  for (const ContactTarget& target : scene.after) addLanding(scene.model, target.contact, target.X_WT, 0, 0, stage);
 }
 
 StageSpec makeTerminalStage(const JumpScene& scene) {

@@ -9,7 +9,7 @@
 #include "bielle/model/error.h"
 #include "math/so3.h"
 #include "model/number_text.h"
-#include "motion/foot_constraints.h"
+#include "motion/foot_tasks.h"
 #include "motion/kinematic_guess.h"
 #include "motion/locomotion_stages.h"
 #include "motion/neighbour_plans.h"

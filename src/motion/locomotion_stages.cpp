@@ -4,21 +4,15 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "math/so3.h"
-#include "motion/foot_constraints.h"
+#include "motion/foot_tasks.h"
 #include "motion/motor_scale.h"
-#include "ocp/ground_forces.h"
 
 namespace bielle {
 namespace {
 
-const ContactFrame& getContact(const Scene& scene, Side side) {
-  return scene.model.contacts()[scene.stance.contacts[static_cast<int>(side)]];
-}
+int getContact(const Scene& scene, Side side) { return scene.stance.contacts[static_cast<int>(side)]; }
 
-BodyFrame getFoot(const Scene& scene, Side side) {
-  const ContactFrame& contact = getContact(scene, side);
-  return {contact.body, contact.X_BF};
-}
+const ContactFrame& getFoot(const Scene& scene, Side side) { return scene.model.contacts()[getContact(scene, side)]; }
 
 // Quaternion (x y z w) of the base: the initial one with a new heading.
 Eigen::Vector4d makeHeading(const Scene& scene, const GaitNode& node) {
@@ -56,14 +50,6 @@ constexpr double kTurnShare = 0.1;
 
 bool isFree(const Scene& scene) { return scene.options.foothold_room > 0; }
 
-// Feet that may land anywhere stand as they landed, perhaps aslant on an edge.
-void layOnGround(StageSpec& stage) {
-  for (Cost& cost : stage.costs)
-    if (auto turned = useGroundAxes(*cost.residual)) cost.residual = std::move(turned);
-  for (PathConstraint& constraint : stage.path_constraints)
-    if (auto turned = useGroundAxes(*constraint.residual)) constraint.residual = std::move(turned);
-}
-
 void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
   const double weight = scene.model.mass() * scene.model.gravity().norm();
@@ -73,28 +59,27 @@ void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
     const bool left = set.contacts[i] == scene.stance.contacts[0];
     loads[i] = std::max(1.0, weight * node.load[left ? 0 : 1]);
   }
-  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight}, loads, stage);
-  addWrenchCones(scene.model, o.friction, o.cone_margin, stage);
-  if (isFree(scene)) layOnGround(stage);
+  // Feet that may land anywhere stand as they landed, perhaps aslant on an edge.
+  const ForceAxes axes = isFree(scene) ? ForceAxes::Ground : ForceAxes::Contact;
+  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, axes}, loads, stage);
+  addWrenchCones(scene.model, o.friction, o.cone_margin, stage, axes);
 }
 
 Vector6d makeVector(double x, double z, double rotation) {
   return (Vector6d() << x, x, z, Vector3d::Constant(rotation)).finished();
 }
 
-void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& step, StageSpec& stage) {
+void addSwingCosts(const Scene& scene, const GaitNode& node, Side side, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
-  const BodyFrame foot = getFoot(scene, step.side);
-  const SwingNode& swing = node.swings[static_cast<int>(step.side)];
+  const SwingNode& swing = node.swings[static_cast<int>(side)];
   const bool free = isFree(scene), leaves = swing.progress < o.swing.leave;
-  addCost(stage, "swing", 1,
-          makeVector(free ? o.foothold_weight : o.swing_weight, o.swing_weight, o.swing_rotation_weight),
-          makeFramePlacement(foot, swing.X_WF));
+  addSwing(scene.model, getContact(scene, side), swing.X_WF,
+           makeVector(free ? o.foothold_weight : o.swing_weight, o.swing_weight, o.swing_rotation_weight), stage);
   // Until it moves along its path a free foot rises straight, or its toes would be caught by the side of a higher tile.
-  addCost(stage, "swing velocity", 1,
-          makeVector(free && !leaves ? 0 : o.swing_velocity_weight, o.swing_velocity_weight,
-                     free ? kTurnShare * o.swing_velocity_weight : o.swing_velocity_weight),
-          makeFrameVelocity(foot, swing.V_F), true);
+  addSwingVelocity(scene.model, getContact(scene, side), swing.V_F,
+                   makeVector(free && !leaves ? 0 : o.swing_velocity_weight, o.swing_velocity_weight,
+                              free ? kTurnShare * o.swing_velocity_weight : o.swing_velocity_weight),
+                   stage);
 }
 
 // A foot at the first node in the air is where it stood.
@@ -108,10 +93,10 @@ void addSwingConstraints(const Scene& scene, const GaitNode& node, int k, StageS
     const int since = k - span.begin, n = span.end - span.begin;
     // A free foot may leave from below the ground that was planned.
     if (!(isFree(scene) && scene.task.ground.steps.empty() && 4 * since < n))
-      addClearance(getContact(scene, side), scene.task.ground, scene.ramp,
+      addClearance(scene.model, getContact(scene, side), scene.task.ground, scene.ramp,
                    isMidSwing(since, n) ? kMidSwingClearance : 0, stage);
     if (!apart)
-      addDistance(getContact(scene, side), feet[foot], getContact(scene, getOther(side)), feet[1 - foot],
+      addDistance(getFoot(scene, side), feet[foot], getFoot(scene, getOther(side)), feet[1 - foot],
                   scene.options.feet_distance, stage);
     apart = true;
   }
@@ -120,10 +105,11 @@ void addSwingConstraints(const Scene& scene, const GaitNode& node, int k, StageS
 void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
   const double h = stage.kind == StageKind::Impact ? 1 : stage.dt;
+  const ContactFrame& foot = getFoot(scene, step.side);
   if (o.foothold_room > 0)
     addCost(stage, "foothold", o.foothold_weight / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
-            makeFramePlacement(getFoot(scene, step.side), step.X_WF));
-  addLanding(getContact(scene, step.side), step.X_WF, o.foothold_room, o.landing_speed, stage);
+            makeFramePlacement({foot.body, foot.X_BF}, step.X_WF));
+  addLanding(scene.model, getContact(scene, step.side), step.X_WF, o.foothold_room, o.landing_speed, stage);
 }
 
 }  // namespace
@@ -170,8 +156,8 @@ StageSpec makeStage(const Scene& scene, int k, const std::vector<ContactTarget>&
   setClosureGains({o.closure_kp, o.closure_kd}, stage.constraints);
   addComCosts(scene, node, stage);
   addForceCosts(scene, node, stage);
-  for (int step : phase.steps)
-    if (step >= 0) addSwingCosts(scene, node, scene.task.plan.steps[step], stage);
+  for (Side side : {Side::Left, Side::Right})
+    if (!phase.stands(side)) addSwingCosts(scene, node, side, stage);
   if (node.landed >= 0 && !o.rigid_landing) addLanding(scene, scene.task.plan.steps[node.landed], stage);
   addSwingConstraints(scene, node, k, stage);
   return stage;

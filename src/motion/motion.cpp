@@ -27,7 +27,7 @@ void requireOption(bool ok, const std::string& option, const std::string& proble
 
 namespace {
 
-// The bounds of the motors are not those of the paper's problem.
+// A problem without limits has none of the motors either.
 void leaveTorquesFree(const Model& model, std::vector<StageSpec>& stages) {
   for (StageSpec& stage : stages) stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
 }
@@ -40,8 +40,7 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
   motion.within_limits = addLimits(model, options.limits, plan.q_start, plan.stages);
   freeTimings(options.timings, plan.schedule, plan.stages);
   for (StageSpec& stage : plan.stages)  // at an impact h vanishes, and gains have no effect
-    if (stage.dt > 0)
-      limitGains(options.step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
+    if (stage.dt > 0) limitGains(options.step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
   setObjective(model, options.objective, plan.stages);
   motion.problem_options = options;
   if (!motion.within_limits) leaveTorquesFree(model, plan.stages);
@@ -239,11 +238,11 @@ namespace {
 
 // \param unit  force or impulse that counts as 1   \param normal, others  least of the normal row and of all others, over it
 void addCone(const Model& model, int c, double friction, double margin, double unit, double normal, double others,
-             StageSpec& stage) {
+             ForceAxes axes, StageSpec& stage) {
   const ConstraintSet& set = stage.constraints;
   const ContactFrame& contact = model.contacts()[set.getContact(c)];
   const double X = (1 - margin) * contact.half_length, Y = (1 - margin) * contact.half_width;
-  std::unique_ptr<Residual> cone = makeWrenchCone(set, c, X, Y, (1 - margin) * friction / std::sqrt(2));
+  std::unique_ptr<Residual> cone = makeWrenchCone(set, c, X, Y, (1 - margin) * friction / std::sqrt(2), axes);
   const int rows = cone->size();
   VectorXd scale = VectorXd::Constant(rows, unit);
   if (rows > 5) {
@@ -260,11 +259,11 @@ void addCone(const Model& model, int c, double friction, double margin, double u
 
 }  // namespace
 
-void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage) {
+void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage, ForceAxes axes) {
   constexpr double kLeastLoad = 1e-3;
   const ConstraintSet& set = stage.constraints;
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c)
-    addCone(model, c, friction, margin, model.mass() * model.gravity().norm(), kLeastLoad, 0, stage);
+    addCone(model, c, friction, margin, model.mass() * model.gravity().norm(), kLeastLoad, 0, axes, stage);
 }
 
 void addImpulseCones(const Model& model, double friction, double margin, int landing, StageSpec& stage) {
@@ -272,7 +271,7 @@ void addImpulseCones(const Model& model, double friction, double margin, int lan
   const ConstraintSet& set = stage.constraints;
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const double least = set.getContact(c) == landing ? 0 : -kApex;
-    addCone(model, c, friction, margin, model.mass(), least, least, stage);
+    addCone(model, c, friction, margin, model.mass(), least, least, ForceAxes::Contact, stage);
   }
 }
 

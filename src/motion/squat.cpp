@@ -5,7 +5,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "math/constants.h"
-#include "motion/foot_constraints.h"
+#include "motion/foot_tasks.h"
 #include "motion/motor_scale.h"
 
 namespace bielle {

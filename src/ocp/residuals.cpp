@@ -3,7 +3,6 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/ocp/residual.h"
-#include "ocp/ground_forces.h"
 
 namespace bielle {
 namespace {
@@ -47,16 +46,13 @@ class ForceResidual : public Residual {
   ForceResidual(const ConstraintSet& set, int constraint, ForceAxes axes)
       : row_(set.offsets[constraint]),
         rows_(getRows(set.closures[constraint].kind)),
-        turns_(axes == ForceAxes::World),
+        turns_(axes != ForceAxes::Contact),
         body_(set.closures[constraint].body1),
-        R_BF_(set.closures[constraint].X_B1.R),
-        R_TW_(set.closures[constraint].X_B2.R.transpose()) {}
+        R_BF_(set.closures[constraint].X_B1.R) {
+    if (axes == ForceAxes::Ground) R_AW_ = set.closures[constraint].X_B2.R.transpose();
+  }
   bool needsForces() const override { return true; }
   bool needsMotion() const override { return turns_; }
-  void useGroundAxes() {
-    turns_ = true;
-    R_AW_ = R_TW_;
-  }
 
  protected:
   using Force = VectorUpTo6<double>;
@@ -94,7 +90,7 @@ class ForceResidual : public Residual {
 
   bool turns_;
   int body_;
-  Matrix3d R_BF_, R_TW_;
+  Matrix3d R_BF_;
   Matrix3d R_AW_ = Matrix3d::Identity();  // from the world to the axes of F
 };
 
@@ -142,8 +138,8 @@ class CenterOfPressure : public ForceResidual {
 // Linear in the force: r = A F.
 class WrenchCone : public ForceResidual {
  public:
-  WrenchCone(const ConstraintSet& set, int constraint, double X, double Y, double mu)
-      : ForceResidual(set, constraint, ForceAxes::Contact), A_(MatrixXd::Zero(rows_ == 6 ? 17 : 5, rows_)) {
+  WrenchCone(const ConstraintSet& set, int constraint, double X, double Y, double mu, ForceAxes axes)
+      : ForceResidual(set, constraint, axes), A_(MatrixXd::Zero(rows_ == 6 ? 17 : 5, rows_)) {
     A_.col(2).setConstant(mu);
     A_(0, 2) = 1;
     for (int side = 0; side < 2; ++side) {
@@ -168,15 +164,6 @@ class WrenchCone : public ForceResidual {
  private:
   MatrixXd A_;
 };
-
-template <typename T>
-std::shared_ptr<const Residual> copyInGroundAxes(const Residual& residual) {
-  const T* found = dynamic_cast<const T*>(&residual);
-  if (!found) return nullptr;
-  auto copy = std::make_shared<T>(*found);
-  copy->useGroundAxes();
-  return copy;
-}
 
 class JointPosition : public Residual {
  public:
@@ -322,13 +309,8 @@ std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int con
   return std::make_unique<CenterOfPressure>(set, constraint, axes);
 }
 std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,
-                                         double half_width, double mu) {
-  return std::make_unique<WrenchCone>(set, constraint, half_length, half_width, mu);
-}
-std::shared_ptr<const Residual> useGroundAxes(const Residual& residual) {
-  if (auto copy = copyInGroundAxes<ContactForce>(residual)) return copy;
-  if (auto copy = copyInGroundAxes<CenterOfPressure>(residual)) return copy;
-  return copyInGroundAxes<WrenchCone>(residual);
+                                         double half_width, double mu, ForceAxes axes) {
+  return std::make_unique<WrenchCone>(set, constraint, half_length, half_width, mu, axes);
 }
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs) {
   return std::make_unique<JointPosition>(model, dofs);

@@ -150,7 +150,8 @@ struct GroundCosts {
 /// friction/sqrt(2) are inscribed in round cones. A violation of 1 is the weight of the robot.
 /// \param friction  coefficient of the ground, positive   \param margin  relative reduction; at least a hundredth,
 /// otherwise rounded results may leave the cone
-void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage);
+void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage,
+                    ForceAxes axes = ForceAxes::Contact);
 /// The same of the impulses of an impact, where a violation of 1 is the mass of the robot times 1 m/s. Feet that
 /// already stood may receive almost no impulse, so that their cones are lowered by 1e-4 of that: a cone has no interior
 /// at its apex.

@@ -89,8 +89,11 @@ std::unique_ptr<Residual> makeSoleClearance(const BodyFrame& sole, double half_l
                                             const Ground& ground, double ramp);
 /// Distance between two shapes (1), m; negative where they overlap (distance.h).
 std::unique_ptr<Residual> makeShapeDistance(const Shape& a, const Shape& b);
-/// The axes in which the force of a contact is expressed; its moment is always about the origin of the contact frame.
-enum class ForceAxes { Contact, World };
+/// The axes in which the force of a contact is expressed: its own, those of the world, or those of the ground, i.e. of the place
+/// where it belongs (ContactTarget::X_WT). Its moment is always about the origin of the contact frame. A sole that rests aslant
+/// on an edge is pushed along the normal of the ground, not along its own: with a friction of 0.3 its own cone holds no force that
+/// carries the robot once it leans by 0.3 rad.
+enum class ForceAxes { Contact, World, Ground };
 /// Rows of the force of a contact minus a reference, N and N m (6 or 3). `constraint` is the index in the
 /// ConstraintSet.
 std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
@@ -98,7 +101,7 @@ std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constra
 /// Centre of pressure of a 6D contact about the origin of its frame (x, y) (2), m.
 std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint,
                                                ForceAxes axes = ForceAxes::Contact);
-/// Wrench cone of a rectangular sole, in the axes of the contact frame, whose origin is in the middle of the sole: inside when
+/// Wrench cone of a rectangular sole, whose origin is in the middle of the sole: inside when
 /// all rows are positive (17), N and N m. With f the force, n the moment, X and Y half the length and width, and four corners
 /// that each bear a pyramid of friction mu (Caron, Pham, Nakamura, "Stability of surface contacts for humanoid robots", ICRA
 /// 2015):
@@ -107,7 +110,7 @@ std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int con
 ///     mu (X + Y) f_z - n_z + s (Y f_x + mu n_x) + t (X f_y + mu n_y)   for s, t = -1, 1.                            (2)
 /// A 3D contact has the first five rows: it pushes, within the friction pyramid.
 std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,
-                                         double half_width, double mu);
+                                         double half_width, double mu, ForceAxes axes = ForceAxes::Contact);
 /// Coordinates of joints with one dof (all those with finite limits if `dofs` is empty) (n), rad or m.
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
 /// Velocity coordinates (n), rad/s or m/s.

@@ -43,6 +43,7 @@
 ///
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and likewise for
 /// v and u.
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,20 @@ struct FreeTiming {
   double lower = 1, upper = 1;  ///< bounds of s, likewise
 };
 
+/// What a foot that moves does in a stage: it follows its path in the air, or it lands where the stage begins. The others stand,
+/// those of the constraints in force.
+enum class FootRole { Swing, Landing };
+
+/// A foot that moves, and what was made of it: so predictive control finds a foot whose ground is not where it was planned.
+struct FootTask {
+  int contact = 0;
+  FootRole role = FootRole::Swing;
+  double room = 0;  ///< of a landing: largest distance from its place along each horizontal axis of that, m
+  /// Residuals of its place and its velocity, in the costs of a swing or the path constraints of a landing, and of its clearance
+  /// over the ground; null where the stage has none.
+  std::shared_ptr<const Residual> place{}, velocity{}, clearance{};
+};
+
 /// One stage of the horizon (or the terminal node, which uses neither kind, dt nor constraints).
 struct StageSpec {
   StageKind kind = StageKind::Dynamics;
@@ -75,6 +90,7 @@ struct StageSpec {
   FreeTiming timing;
   double time_weight = 0;  ///< cost per second, not negative
   ConstraintSet constraints;
+  std::vector<FootTask> feet;  ///< those that move
   StateCost state;
   ControlCost control;
   std::vector<Cost> costs;

@@ -1,24 +1,30 @@
 #pragma once
-// Path constraints of feet, and of the end of a motion.
+// What feet do in a stage (StageSpec::feet), with their costs and constraints; and constraints of the end of a motion. Contacts are
+// indices in the model.
 #include "bielle/motion/motion.h"
 
 namespace bielle {
 
+// A foot in the air follows its path: a cost of its placement. \param weights  1/m^2 and 1, in the axes of X_WF; all 0: no cost
+void addSwing(const Model& model, int contact, const SE3& X_WF, const Vector6d& weights, StageSpec& stage);
+// And one of its velocity, m/s and rad/s in world axes, which defines the motion.
+void addSwingVelocity(const Model& model, int contact, const Vector6d& V_F, const Vector6d& weights, StageSpec& stage);
+
 // The sole lies at a place, at rest; of a contact at a point only the point does. It may be `room` m off along x and y of the
 // place, and turned about z such that its corners move by as much; and it comes down at `speed`, m/s.
-void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, double speed, StageSpec& stage);
+void addLanding(const Model& model, int contact, const SE3& X_WF, double room, double speed, StageSpec& stage);
 
 // How far from its foothold a foot may land with this stage, along x and y, m; infinite where the stage has no landing of it.
-double getLandingRoom(const ContactFrame& contact, const StageSpec& stage);
+double getLandingRoom(int contact, const StageSpec& stage);
 
 // All corners of the sole are at least `least` m over the ground, whose steps have ramps (makeSoleClearance).
-void addClearance(const ContactFrame& contact, const Ground& ground, double ramp, double least, StageSpec& stage);
+void addClearance(const Model& model, int contact, const Ground& ground, double ramp, double least, StageSpec& stage);
 // Whether check and motion ask for full clearance at node i of n in the air: in the middle half.
 inline bool isMidSwing(int i, int n) { return 4 * i >= n && 4 * i <= 3 * n; }
 inline constexpr double kMidSwingClearance = 6e-3;  // m
 // A foot that is about to land, or lands, finds its ground lower than planned: it goes on down at `speed`, m/s, from and to
 // any height, as flat and over the same place as before.
-void lowerFoot(const ContactFrame& contact, double speed, StageSpec& stage);
+void lowerFoot(const Model& model, int contact, double speed, StageSpec& stage);
 
 // Width of the ramps around steps that leave the soles on the ground free, at most 2 cm, m.
 double chooseRamp(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles);

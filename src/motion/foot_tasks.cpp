@@ -1,0 +1,154 @@
+#include "motion/foot_tasks.h"
+
+#include <cmath>
+
+#include "bielle/dynamics/distance.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kFree = std::numeric_limits<double>::infinity();
+// Violations that count as 1.
+constexpr double kPosition = 0.01, kAngle = 0.1, kVelocity = 0.1;  // m, rad, m/s and rad/s
+
+// Makes the first rows zero and leaves the others free.
+PathConstraint makeEquation(const std::string& name, std::unique_ptr<Residual> residual, int rows,
+                            const VectorXd& scale) {
+  VectorXd bound = VectorXd::Constant(scale.size(), kFree);
+  bound.head(rows).setZero();
+  return {name, std::move(residual), -bound, bound, scale};
+}
+
+Shape makeSoleCapsule(const ContactFrame& contact) {
+  const bool along_x = contact.half_length >= contact.half_width;
+  const Vector3d half = along_x ? Vector3d(contact.half_length, 0, 0) : Vector3d(0, contact.half_width, 0);
+  return makeCapsule(contact.body, contact.X_BF.act(-half), contact.X_BF.act(half),
+                     std::min(contact.half_length, contact.half_width));
+}
+
+BodyFrame getFrame(const ContactFrame& contact) { return {contact.body, contact.X_BF}; }
+
+FootTask& getTask(int contact, FootRole role, StageSpec& stage) {
+  for (FootTask& foot : stage.feet)
+    if (foot.contact == contact && foot.role == role) return foot;
+  stage.feet.push_back({contact, role});
+  return stage.feet.back();
+}
+
+}  // namespace
+
+void addSwing(const Model& model, int contact, const SE3& X_WF, const Vector6d& weights, StageSpec& stage) {
+  if (weights.isZero(0)) return;
+  const ContactFrame& foot = model.contacts()[contact];
+  stage.costs.push_back(
+      {"swing " + foot.name, 1, Activation::makeQuadratic(weights), makeFramePlacement(getFrame(foot), X_WF)});
+  getTask(contact, FootRole::Swing, stage).place = stage.costs.back().residual;
+}
+
+void addSwingVelocity(const Model& model, int contact, const Vector6d& V_F, const Vector6d& weights, StageSpec& stage) {
+  if (weights.isZero(0)) return;
+  const ContactFrame& foot = model.contacts()[contact];
+  stage.costs.push_back({"swing velocity " + foot.name, 1, Activation::makeQuadratic(weights),
+                         makeFrameVelocity(getFrame(foot), V_F), true});
+  getTask(contact, FootRole::Swing, stage).velocity = stage.costs.back().residual;
+}
+
+void addLanding(const Model& model, int contact, const SE3& X_WF, double room, double speed, StageSpec& stage) {
+  const ContactFrame& foot = model.contacts()[contact];
+  const BodyFrame frame = getFrame(foot);
+  const bool point = foot.kind != ContactKind::Surface6D;
+  const Vector3d position = Vector3d::Constant(kPosition), angle = Vector3d::Constant(kAngle);
+  PathConstraint place = point
+                             ? makeEquation("landing of " + foot.name, makeFrameTranslation(frame, X_WF.p), 3, position)
+                             : makeEquation("landing of " + foot.name, makeFramePlacement(frame, X_WF), 6,
+                                            (Vector6d() << position, angle).finished());
+  place.upper.head<2>().setConstant(room);
+  const double reach = std::hypot(foot.half_length, foot.half_width);
+  if (!point && reach > 0) place.upper[5] = room / reach;
+  place.lower = -place.upper;
+  PathConstraint velocity = makeEquation("landing velocity of " + foot.name, makeFrameVelocity(frame), point ? 3 : 6,
+                                         Vector6d::Constant(kVelocity));
+  velocity.lower.head<3>().setConstant(-speed);
+  velocity.upper.head<3>() << speed, speed, -speed;
+  stage.feet.push_back({contact, FootRole::Landing, room, place.residual, velocity.residual});
+  stage.path_constraints.push_back(std::move(place));
+  stage.path_constraints.push_back(std::move(velocity));
+}
+
+double getLandingRoom(int contact, const StageSpec& stage) {
+  for (const FootTask& foot : stage.feet)
+    if (foot.contact == contact && foot.role == FootRole::Landing) return foot.room;
+  return kFree;
+}
+
+void addClearance(const Model& model, int contact, const Ground& ground, double ramp, double least, StageSpec& stage) {
+  const ContactFrame& foot = model.contacts()[contact];
+  std::shared_ptr<const Residual> residual =
+      makeSoleClearance(getFrame(foot), foot.half_length, foot.half_width, ground, ramp);
+  const int n = residual->size();
+  stage.path_constraints.push_back({"clearance of " + foot.name, residual, VectorXd::Constant(n, least),
+                                    VectorXd::Constant(n, kFree), VectorXd::Constant(n, kPosition)});
+  getTask(contact, FootRole::Swing, stage).clearance = residual;
+}
+
+void lowerFoot(const Model& model, int contact, double speed, StageSpec& stage) {
+  Vector6d down = Vector6d::Zero();
+  down[2] = -speed;
+  for (FootTask& foot : stage.feet) {
+    if (foot.contact != contact) continue;
+    for (PathConstraint& constraint : stage.path_constraints) {
+      if (constraint.residual == foot.clearance) constraint.lower.setConstant(-kFree);
+      if (constraint.residual == foot.place) {
+        constraint.lower[2] = -kFree;
+        constraint.upper[2] = kFree;
+      }
+      if (constraint.residual == foot.velocity) constraint.lower[2] = constraint.upper[2] = -speed;
+    }
+    for (Cost& cost : stage.costs) {
+      if (cost.residual == foot.place) cost.activation.weights[2] = 0;
+      if (cost.residual == foot.velocity)
+        cost.residual = foot.velocity = makeFrameVelocity(getFrame(model.contacts()[contact]), down);
+    }
+  }
+}
+
+double chooseRamp(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles) {
+  constexpr double kWidest = 0.02, kLeast = 1e-3;  // m
+  double room = kWidest;
+  for (const ContactTarget& sole : soles) {
+    const ContactFrame& contact = model.contacts()[sole.contact];
+    for (double x : {-contact.half_length, contact.half_length})
+      for (double y : {-contact.half_width, contact.half_width}) {
+        const Vector3d corner = sole.X_WT.act(Vector3d(x, y, 0));
+        for (const GroundStep& step : ground.steps)
+          if (step.top.z() > corner.z() + kLeast) room = std::min(room, step.calcDistance(corner.x(), corner.y()));
+      }
+  }
+  return std::max(kLeast, room);
+}
+
+void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing, const SE3& X_standing,
+                 double least, StageSpec& stage) {
+  constexpr double kTracking = 0.01;  // m
+  for (const ContactFrame* contact : {&swinging, &standing})
+    if (contact->half_length == 0 || contact->half_width == 0) return;
+  const Shape a = makeSoleCapsule(swinging), b = makeSoleCapsule(standing);
+  const double of_path =
+      calcDistance(a, X_path * swinging.X_BF.inverse(), b, X_standing * standing.X_BF.inverse()).distance;
+  stage.path_constraints.push_back({"distance of " + swinging.name + " and " + standing.name, makeShapeDistance(a, b),
+                                    VectorXd::Constant(1, std::min(least, of_path - kTracking)),
+                                    VectorXd::Constant(1, kFree), VectorXd::Constant(1, kPosition)});
+}
+
+void addRest(const Model& model, StageSpec& terminal) {
+  std::vector<PathConstraint>& constraints = terminal.path_constraints;
+  const bool flies = model.hasFreeFlyer();
+  const Vector3d bound(flies ? 0 : kFree, flies ? 0 : kFree, 0);
+  constraints.push_back({"rest of the centre of mass at the end", makeComVelocity(Vector3d::Zero()), -bound, bound,
+                         Vector3d::Constant(kVelocity)});
+  if (flies)
+    constraints.push_back(
+        makeEquation("rest of the torso at the end", makeJointVelocity({3, 4, 5}), 3, Vector3d::Constant(kVelocity)));
+}
+
+}  // namespace bielle
