@@ -6,6 +6,7 @@
 #include "bielle/io/result.h"
 #include "bielle/io/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/motion/solve.h"
 #include "paper/commands.h"
 #include "paper/jump.h"
 #include "paper/walk.h"
@@ -37,13 +38,13 @@ int solve(const MotionArguments& arguments, const CommandLine& command, const Ma
   std::optional<SerialModel> serial;
   if (arguments.serial) serial = makeSerial(robot.model);
   const Model& model = serial ? serial->model : robot.model;
-  Motion motion = make(model, makeStandingPosture(model));
+  const Motion motion = make(model, makeStandingPosture(model));
   makeOutputDirectory(arguments.directory);
-  const FddpSummary summary = solveFromGuess(motion);
+  const Solution solution = bielle::solve(motion);
   const RunInfo run{arguments.robot, robot.file, command, serial ? "serial" : "closed", serial ? kArmature : ""};
-  const MotionResult result = makeResult(run, motion, motion.guess, summary);
-  std::cout << motion.name << " of " << arguments.robot << ": " << getName(summary.termination) << ", "
-            << summary.iterations << " iterations, cost " << summary.cost << "\n";
+  const MotionResult result = makeResult(run, solution);
+  std::cout << motion.name << " of " << arguments.robot << ": " << getName(solution.summary.termination) << ", "
+            << solution.summary.iterations << " iterations, cost " << solution.summary.cost << "\n";
   print(writeResult(arguments.directory, result));
   return result.converged() ? 0 : 1;
 }

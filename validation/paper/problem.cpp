@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/math/se3.h"
@@ -95,6 +96,7 @@ StageSpec makeRegularizedStage(const Model& model, const VectorXd& q, double sta
   stage.dt = kTimeStep;
   stage.state = {state_weight, q, VectorXd::Zero(model.nv()), weights};
   stage.control = {control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
+  stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
   return stage;
 }
 
@@ -104,12 +106,6 @@ void addPhase(const Model& model, const std::string& name, int nodes, const std:
   const VectorXd u = contacts.empty() ? VectorXd::Zero(model.nu()).eval()
                                       : calcStaticTorques(model, makeConstraintSet(model, contacts), q).u;
   motion.guess.us.insert(motion.guess.us.end(), nodes, u);
-}
-
-FddpSummary solveFromGuess(Motion& motion) {
-  FddpOptions options = makeMotionSolverOptions();
-  options.initial_regularization = kGuessRegularization;
-  return solveMotion(motion, options);
 }
 
 }  // namespace bielle::paper

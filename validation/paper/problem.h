@@ -30,7 +30,4 @@ StageSpec makeRegularizedStage(const Model& model, const VectorXd& q, double sta
 void addPhase(const Model& model, const std::string& name, int nodes, const std::vector<ContactTarget>& contacts,
               const VectorXd& q, Motion& motion);
 
-// Solved as `bielle solve` does a motion, from its guess.
-FddpSummary solveFromGuess(Motion& motion);
-
 }  // namespace bielle::paper

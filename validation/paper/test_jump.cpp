@@ -2,6 +2,7 @@
 #include "measure_jump.h"
 #include "own_robots.h"
 #include "paper/jump.h"
+#include "solve_in_place.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -15,7 +16,7 @@ TEST_CASE("the paper's jump has a solution, which flies as a stone") {
   Motion motion = paper::makeJump(model, options, q0);
   FddpOptions solver;
   solver.max_iterations = 100;
-  const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+  const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess, solver);
   const JumpOutcome out = measureJump(motion);
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);

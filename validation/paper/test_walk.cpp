@@ -14,6 +14,7 @@
 #include "measure_steps.h"
 #include "own_robots.h"
 #include "paper/walk.h"
+#include "solve_in_place.h"
 #include "problem_probe.h"
 #include "published_robots.h"
 #include "solve_in_place.h"
@@ -252,7 +253,7 @@ TEST_CASE("the paper's walk: on Bipetto the feet land where they like") {
   FddpOptions solver;
   solver.initial_regularization = kGuessRegularization;
   solver.max_iterations = 100;
-  const FddpSummary summary = Fddp(solver).solve(*walk.problem, walk.guess);
+  const FddpSummary summary = test::solveInPlace(*walk.problem, walk.guess, solver);
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   CHECK(calcSteadySpeed(walk, walk.guess) == Approx(0.3).margin(0.05));  // the velocity is one cost among others
