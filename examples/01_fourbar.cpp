@@ -20,7 +20,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 
 using namespace bielle;
 

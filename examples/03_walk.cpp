@@ -19,8 +19,8 @@
 #include <iostream>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/walk.h"
 
 using namespace bielle;

@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/stairs.h"
 
 using namespace bielle;

@@ -15,8 +15,8 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/jump.h"
 

@@ -17,8 +17,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
 
 using namespace bielle;

@@ -13,8 +13,8 @@
 #include <cstdio>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/motion.h"
 
 using namespace bielle;

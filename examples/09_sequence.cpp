@@ -13,8 +13,8 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/stairs.h"

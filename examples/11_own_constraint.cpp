@@ -11,7 +11,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
 
 using namespace bielle;

@@ -10,9 +10,9 @@
 #include <cstdio>
 
 #include "bielle/control/predictive_controller.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/walk.h"
-#include "simulation/make_world.h"
+#include "include/bielle/worlds/make_world.h"
 
 using namespace bielle;
 
@@ -49,7 +49,7 @@ class MotorFeedback : public Controller {
 
 // Height of the trunk over the ground at the end, or when it fell below 0.2 m.
 double run(const Model& model, const Policy& plan, Controller& controller) {
-  const auto world = simulation::makeWorld("bielle", model, {});
+  const auto world = worlds::makeWorld("bielle", model, {});
   Measurement measured{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
   plan.getReference(0, measured.q, measured.v);
   world->reset(measured.q, measured.v);

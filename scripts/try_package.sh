@@ -32,7 +32,7 @@ inside sh -ec '
 # The library, used by a program that knows pkg-config alone.
 inside sh -ec 'apt-get install -qq -y --no-install-recommends /tmp/libbielle-dev_*.deb g++ pkg-config'
 cat > "$bare/tmp/main.cpp" <<'PROGRAM'
-#include <bielle/model/reader.h>
+#include <bielle/formats/reader.h>
 #include <cstdio>
 int main() { std::printf("%d motors\n", bielle::loadRobot("bipetto").model.nu()); }
 PROGRAM

@@ -8,7 +8,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "bielle/io/record_files.h"
+#include "bielle/results/record_files.h"
 #include "run_bielle.h"
 
 namespace bielle::testing {

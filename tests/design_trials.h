@@ -1,6 +1,6 @@
 #pragma once
 // Robots and motions that tests of designs share.
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
 #include "design/design_motions.h"
 

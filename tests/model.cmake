@@ -4,5 +4,5 @@ bielle_test(reader SOURCES test_reader.cpp test_reader_shapes.cpp LIBS bielle_dy
 bielle_test(reader_errors SOURCES test_reader_errors.cpp LIBS bielle_model)
 bielle_test(robots SOURCES test_robots.cpp LIBS bielle_model)
 # Labelled `system`: tests/fuzz covers more under sanitizers.
-bielle_test(mutated_robots SOURCES test_mutated_robots.cpp LIBS bielle_io)
+bielle_test(mutated_robots SOURCES test_mutated_robots.cpp LIBS bielle_results)
 set_tests_properties(mutated_robots PROPERTIES LABELS system)

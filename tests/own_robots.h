@@ -2,7 +2,7 @@
 // The robots of this project, whatever $BIELLE_ROBOTS names.
 #include <string>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace bielle::testing {
 

@@ -19,8 +19,8 @@ if(BIELLE_BUILD_SIMULATION)
   endif()
   # What runs `bielle simulate` belongs to the command.
   set(area command)
-  bielle_command_test(simulate SOURCES test_simulate.cpp LIBS bielle_io)
-  bielle_command_test(campaign SOURCES test_campaign.cpp LIBS bielle_study)
+  bielle_command_test(simulate SOURCES test_simulate.cpp LIBS bielle_results)
+  bielle_command_test(campaign SOURCES test_campaign.cpp LIBS bielle_tasks)
   add_dependencies(test_command bielle-simulate)
   set(area control)
   # Without Work Queue it says that it is skipped. Workers mostly nap.

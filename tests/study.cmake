@@ -1,1 +1,1 @@
-bielle_command_test(compare SOURCES test_compare.cpp LIBS bielle_io)
+bielle_command_test(compare SOURCES test_compare.cpp LIBS bielle_results)

@@ -9,8 +9,8 @@
 #include "bielle/motion/motion.h"
 #include "count_allocations.h"
 #include "own_robots.h"
-#include "simulation/bielle_world.h"
-#include "simulation/make_world.h"
+#include "include/bielle/worlds/bielle_world.h"
+#include "include/bielle/worlds/make_world.h"
 #include "world_trials.h"
 
 namespace bielle::simulation {

@@ -14,8 +14,8 @@
 
 #include "robot_directory.h"
 #include "run_command.h"
-#include "study/campaign_command.h"
-#include "study/campaign_report.h"
+#include "tasks/campaign_command.h"
+#include "tasks/campaign_report.h"
 
 namespace fs = std::filesystem;
 using namespace bielle;

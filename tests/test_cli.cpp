@@ -8,7 +8,7 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/motion/squat.h"

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/record.h"
 #include "bielle/motion/refinement.h"
 #include "bielle/motion/squat.h"

@@ -7,8 +7,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "bielle/io/record_files.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/record_files.h"
+#include "bielle/robots/robot_loader.h"
 #include "read_table.h"
 #include "robot_directory.h"
 #include "run_command.h"

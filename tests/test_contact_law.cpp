@@ -2,8 +2,8 @@
 #include <catch2/catch.hpp>
 #include <random>
 
-#include "bielle/io/robot_loader.h"
-#include "simulation/contact_law.h"
+#include "bielle/robots/robot_loader.h"
+#include "include/bielle/worlds/contact_law.h"
 
 namespace bielle::simulation {
 namespace {

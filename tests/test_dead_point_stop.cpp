@@ -2,12 +2,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/motion.h"
 #include "control/dead_point_stop.h"
 #include "control/passive_joints.h"
 #include "own_robots.h"
-#include "simulation/bielle_world.h"
+#include "include/bielle/worlds/bielle_world.h"
 
 namespace bielle {
 namespace {
@@ -34,7 +34,7 @@ double driveCrank(double torque, double stop, double delay) {
   const VectorXd q0 = makeStandingPosture(model);
   const Linkage linkage = listLinkages(model, q0).at(0);
   DeadPointStop dead_point_stop(model, q0, stop);
-  const auto world = simulation::makeBielleWorld(model);
+  const auto world = worlds::makeBielleWorld(model);
   world->reset(q0, VectorXd::Zero(model.nv()));
   VectorXd u(model.nu());
   std::vector<VectorXd> sent(static_cast<size_t>(std::lround(delay / kControlPeriod)), VectorXd::Zero(model.nu()));

@@ -8,8 +8,8 @@
 #include <fstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/robot_loader.h"
-#include "bielle/io/robot_writer.h"
+#include "bielle/robots/robot_loader.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"

@@ -4,8 +4,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "bielle/io/robot_loader.h"
-#include "bielle/io/robot_writer.h"
+#include "bielle/robots/robot_loader.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/walk.h"

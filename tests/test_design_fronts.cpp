@@ -7,7 +7,7 @@
 #include <set>
 #include <sstream>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "design/front_search.h"
 #include "design/run.h"

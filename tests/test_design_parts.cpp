@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <set>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "design/draft.h"
 #include "design/front_search.h"

@@ -3,7 +3,7 @@
 #include "bielle/dynamics/distance.h"
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 #include "moved_model.h"
 

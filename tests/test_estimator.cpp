@@ -6,7 +6,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
+#include "bielle/formats/reader.h"
 #include "bielle/motion/motion.h"
 #include "control/foot_model.h"
 #include "count_allocations.h"

@@ -7,7 +7,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
 #include "solve_in_place.h"
 

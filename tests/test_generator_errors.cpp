@@ -1,7 +1,7 @@
 // What is wrong with a file that names a generator.
 #include <catch2/catch.hpp>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "robot_directory.h"
 
 using namespace bielle;

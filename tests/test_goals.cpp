@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/squat.h"

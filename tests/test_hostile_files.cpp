@@ -9,10 +9,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bielle/io/record_files.h"
+#include "bielle/results/record_files.h"
 #include "bielle/model/error.h"
 #include "get_error_of_reading.h"
-#include "io/text_file.h"
+#include "formats/text_file.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;

@@ -8,7 +8,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/impact.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/record.h"

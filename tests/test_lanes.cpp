@@ -4,7 +4,7 @@
 #include <numeric>
 #include <random>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/math/se3.h"
 #include "bielle/motion/motion.h"
 #include "dynamics/reduction.h"

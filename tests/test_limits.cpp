@@ -5,7 +5,7 @@
 #include <functional>
 #include <regex>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"

@@ -4,7 +4,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/loop_conflict.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "dynamics/loop_problem.h"
 #include "math/so3.h"
 #include "mechanisms.h"

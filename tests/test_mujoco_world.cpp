@@ -4,14 +4,14 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
 #include "count_allocations.h"
-#include "engines/mujoco_model.h"
-#include "simulation/bielle_world.h"
-#include "simulation/mujoco_world.h"
-#include "simulation/terrain.h"
+#include "src/worlds/mujoco_model.h"
+#include "include/bielle/worlds/bielle_world.h"
+#include "src/worlds/mujoco_world.h"
+#include "include/bielle/worlds/terrain.h"
 #include "world_trials.h"
 
 namespace bielle::simulation {

@@ -8,8 +8,8 @@
 #include <regex>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/robot_loader.h"
-#include "io/mjcf.h"
+#include "bielle/robots/robot_loader.h"
+#include "formats/mjcf.h"
 #include "robot_directory.h"
 #include "robot_trial.h"
 

@@ -2,8 +2,8 @@
 // results say of them, against sums over the trajectory.
 #include <catch2/catch.hpp>
 
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
 
 using namespace bielle;

@@ -1,5 +1,5 @@
 // What solvers rely on in a shooting problem: linearizations without memory, no allocation, requests that do not fit refused.
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
 #include "check_derivative.h"
 #include "count_allocations.h"

@@ -5,7 +5,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/ocp/cost.h"
 #include "bielle/dynamics/ground.h"
 #include "check_residual.h"

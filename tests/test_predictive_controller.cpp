@@ -11,9 +11,9 @@
 #include "count_allocations.h"
 #include "own_robots.h"
 #include "predictive_trials.h"
-#include "simulation/bielle_world.h"
-#include "simulation/execution.h"
-#include "simulation/make_world.h"
+#include "include/bielle/worlds/bielle_world.h"
+#include "src/worlds/execution.h"
+#include "include/bielle/worlds/make_world.h"
 
 namespace bielle::simulation {
 namespace {

@@ -6,11 +6,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
-#include "io/adopt.h"
+#include "formats/adopt.h"
 #include "measure_steps.h"
 #include "published_robots.h"
 #include "robot_directory.h"

@@ -7,16 +7,16 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/ocp/residual.h"
 #include "bielle/robots/fourbar_chain.h"
-#include "bielle/transmission/ratio.h"
+#include "bielle/dynamics/ratio.h"
 #include "check_derivative.h"
 #include "math/constants.h"
 #include "robot_directory.h"
-#include "transmission/linkage_ratio.h"
+#include "dynamics/linkage_ratio.h"
 
 using namespace bielle;
 using namespace bielle::testing;

@@ -3,7 +3,7 @@
 #include <iostream>
 #include <sstream>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "get_error.h"
 #include "robot_directory.h"

@@ -6,7 +6,7 @@
 #include <random>
 #include <sstream>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "robot_directory.h"
 

@@ -4,7 +4,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/robots/generators.h"

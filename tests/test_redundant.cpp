@@ -5,7 +5,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 #include "dynamics/saddle_point.h"
 #include "math/constants.h"

@@ -4,10 +4,10 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
+#include "bielle/formats/reader.h"
 #include "bielle/motion/motion.h"
 #include "own_robots.h"
-#include "simulation/robot_errors.h"
+#include "src/worlds/robot_errors.h"
 
 namespace bielle::simulation {
 using bielle::testing::loadOwn;

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <map>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "model/joint.h"
 #include "own_robots.h"
 #include "published_robots.h"

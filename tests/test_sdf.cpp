@@ -5,11 +5,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
-#include "bielle/io/robot_writer.h"
+#include "bielle/robots/robot_loader.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "get_error.h"
-#include "io/sdf.h"
+#include "formats/sdf.h"
 
 using namespace bielle;
 using namespace bielle::testing;

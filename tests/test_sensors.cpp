@@ -3,8 +3,8 @@
 
 #include "bielle/motion/motion.h"
 #include "own_robots.h"
-#include "simulation/bielle_world.h"
-#include "simulation/sensors.h"
+#include "include/bielle/worlds/bielle_world.h"
+#include "include/bielle/worlds/sensors.h"
 
 namespace bielle::simulation {
 namespace {

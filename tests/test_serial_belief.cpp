@@ -3,11 +3,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/reader.h"
+#include "bielle/formats/reader.h"
 #include "bielle/motion/motion.h"
 #include "own_robots.h"
-#include "simulation/serial_belief.h"
-#include "transmission/posture_lift.h"
+#include "src/worlds/serial_belief.h"
+#include "motion/posture_lift.h"
 
 namespace bielle::simulation {
 namespace {

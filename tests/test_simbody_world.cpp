@@ -4,8 +4,8 @@
 #include "bielle/control/policy.h"
 #include "bielle/motion/walk.h"
 #include "own_robots.h"
-#include "simulation/bielle_world.h"
-#include "simulation/simbody_world.h"
+#include "include/bielle/worlds/bielle_world.h"
+#include "src/worlds/simbody_world.h"
 #include "world_trials.h"
 
 namespace bielle::simulation {

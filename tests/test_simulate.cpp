@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "bielle/io/record_files.h"
+#include "bielle/results/record_files.h"
 #include "robot_directory.h"
 #include "run_command.h"
 

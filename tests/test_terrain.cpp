@@ -3,7 +3,7 @@
 #include <random>
 
 #include "bielle/model/error.h"
-#include "simulation/terrain.h"
+#include "include/bielle/worlds/terrain.h"
 
 namespace bielle::simulation {
 namespace {

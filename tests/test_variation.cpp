@@ -7,7 +7,7 @@
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 #include "dynamics/saddle_point.h"
 #include "moved_model.h"

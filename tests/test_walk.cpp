@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/impact.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/walk.h"
 #include "change_option.h"

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/walk.h"
 #include "own_robots.h"

@@ -9,11 +9,11 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
 
-namespace bielle::simulation::testing {
+namespace bielle::worlds::testing {
 namespace {
 
 constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad
@@ -235,4 +235,4 @@ double checkSprung(World& world, const Model& model, double balance) {
   return error;
 }
 
-}  // namespace bielle::simulation::testing
+}  // namespace bielle::worlds::testing

@@ -3,10 +3,10 @@
 #include <functional>
 #include <memory>
 
-#include "bielle/model/reader.h"
-#include "simulation/world.h"
+#include "bielle/formats/reader.h"
+#include "include/bielle/worlds/world.h"
 
-namespace bielle::simulation::testing {
+namespace bielle::worlds::testing {
 
 // Keeps a posture by springs and dampers on the motors about the torques that hold it.
 class PostureHold {
@@ -45,4 +45,4 @@ Model makeSprungFivebar();
 // \returns the largest error of the coordinates at the end, rad
 double checkSprung(World& world, const Model& model, double balance);
 
-}  // namespace bielle::simulation::testing
+}  // namespace bielle::worlds::testing

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <set>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
-#include "bielle/transmission/serial_model.h"
+#include "bielle/motion/serial_model.h"
 
 namespace bielle::validation {
 namespace {

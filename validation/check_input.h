@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/model.h"
 
 namespace bielle::validation {

@@ -4,11 +4,11 @@
 #include <nlohmann/json.hpp>
 
 #include "bielle/model/error.h"
-#include "io/number_option.h"
-#include "io/standard_output.h"
+#include "results/number_option.h"
+#include "results/standard_output.h"
 #include "validate.h"
 #ifdef BIELLE_WITH_MUJOCO
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "validate_mujoco.h"
 #endif
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file A Model as a Simbody multibody system: the independent oracle of Bielle's dynamics.
 ///
-/// engines/simbody_tree.h says how joints and closures become mobilizers and constraints; kinematics, forces and
+/// src/worlds/simbody_tree.h says how joints and closures become mobilizers and constraints; kinematics, forces and
 /// accelerations are Simbody's.
 ///
 /// With u = T(q) v, in the order of our dofs, Simbody's quantities are returned in our coordinates:

@@ -2,7 +2,7 @@
 // The Simbody objects behind a SimbodyBridge.
 #include <optional>
 
-#include "engines/simbody_tree.h"
+#include "src/worlds/simbody_tree.h"
 #include "math/decompositions.h"
 #include "simbody_bridge.h"
 

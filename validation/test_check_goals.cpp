@@ -3,7 +3,7 @@
 #include <set>
 #include <sstream>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"

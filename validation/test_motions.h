@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/squat.h"

@@ -6,7 +6,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "math/so3.h"
 #include "mechanisms.h"
 #include "model/joint.h"

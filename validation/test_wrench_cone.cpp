@@ -5,7 +5,7 @@
 #include <random>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/residual.h"
 #include "wrench_cone.h"

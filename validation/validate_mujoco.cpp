@@ -7,7 +7,7 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "engines/mujoco_model.h"
+#include "src/worlds/mujoco_model.h"
 #include "samples.h"
 
 namespace bielle::validation {

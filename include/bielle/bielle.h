@@ -1,7 +1,7 @@
 #pragma once
 /// \file Everything a program needs to read a robot, make a motion, solve it and write the result.
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/run.h"
 #include "bielle/motion/sequence.h"

@@ -3,13 +3,13 @@
 /// points to one function, so that the package works without them.
 #include <memory>
 
-#include "simulation/world.h"
+#include "include/bielle/worlds/world.h"
 
 namespace bielle::python {
 
-/// As simulation::makeWorld.
-using MakeWorld = std::unique_ptr<simulation::World> (*)(const std::string& name, const Model& model,
-                                                         const simulation::WorldOptions& options);
+/// As worlds::makeWorld.
+using MakeWorld = std::unique_ptr<worlds::World> (*)(const std::string& name, const Model& model,
+                                                         const worlds::WorldOptions& options);
 
 /// The name of the capsule, which changes when its type does.
 inline constexpr char kEnginesCapsule[] = "bielle.make_world.1";

@@ -1,8 +1,8 @@
-#include "bielle/transmission/lift.h"
+#include "bielle/motion/lift.h"
 
 #include <pybind11/stl.h>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bind.h"
 #include "motion.h"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bind.h"

@@ -1,4 +1,4 @@
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/motion/motion.h"
 #include "bind.h"
 #include "residual.h"

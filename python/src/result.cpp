@@ -1,4 +1,4 @@
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 
 #include <pybind11/stl.h>
 

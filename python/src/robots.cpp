@@ -1,8 +1,8 @@
 #include <pybind11/stl.h>
 
-#include "bielle/io/robot_info.h"
-#include "bielle/io/robot_loader.h"
-#include "bielle/io/robot_writer.h"
+#include "bielle/results/robot_info.h"
+#include "bielle/robots/robot_loader.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "bielle/report/view.h"
 #include "bielle/robots/generators.h"

@@ -1,6 +1,6 @@
 #include <pybind11/stl.h>
 
-#include "bielle/transmission/ratio.h"
+#include "bielle/dynamics/ratio.h"
 #include "bind.h"
 #include "model_access.h"
 

@@ -8,19 +8,19 @@
 #include "busy.h"
 #include "engines.h"
 #include "model_access.h"
-#include "simulation/bielle_world.h"
-#include "simulation/sensors.h"
+#include "include/bielle/worlds/bielle_world.h"
+#include "include/bielle/worlds/sensors.h"
 
 namespace bielle::python {
 namespace {
 
-using simulation::BielleWorldOptions;
-using simulation::World;
+using worlds::BielleWorldOptions;
+using worlds::World;
 
-std::unique_ptr<World> makeOwnWorld(const std::string&, const Model& model, const simulation::WorldOptions& options) {
+std::unique_ptr<World> makeOwnWorld(const std::string&, const Model& model, const worlds::WorldOptions& options) {
   BielleWorldOptions own;
   own.world = options;
-  return simulation::makeBielleWorld(model, own);
+  return worlds::makeBielleWorld(model, own);
 }
 
 // Of the module that links the engines, which is there where Bielle was built with them.
@@ -166,7 +166,7 @@ class HeldWorlds {
 // The sensors of a robot in one world.
 struct HeldSensors {
   std::shared_ptr<HeldWorlds> world;
-  std::unique_ptr<simulation::Sensors> sensors;
+  std::unique_ptr<worlds::Sensors> sensors;
   bool is_reset = false;
 };
 
@@ -175,11 +175,11 @@ std::unique_ptr<HeldSensors> makeSensors(const std::shared_ptr<HeldWorlds>& worl
   world->requireSingle();
   auto held = std::make_unique<HeldSensors>();
   held->world = world;
-  simulation::SensorOptions options;
+  worlds::SensorOptions options;
   options.noise = noise;
   options.seed = seed;
   options.imu = imu;
-  held->sensors = std::make_unique<simulation::Sensors>(*world->getModel(), options);
+  held->sensors = std::make_unique<worlds::Sensors>(*world->getModel(), options);
   return held;
 }
 

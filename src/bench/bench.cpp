@@ -7,7 +7,7 @@
 
 #include "bench/receding_horizon.h"
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/motion/locomotion.h"
 #include "bielle/motion/squat.h"
 #include "bielle/robots/fourbar_chain.h"

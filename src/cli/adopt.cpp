@@ -1,5 +1,5 @@
 // bielle adopt: a file that completes a robot of others.
-#include "io/adopt.h"
+#include "formats/adopt.h"
 
 #include <filesystem>
 #include <iostream>
@@ -7,8 +7,8 @@
 
 #include "bielle/model/error.h"
 #include "cli/commands.h"
-#include "io/text_file.h"
-#include "model/robot_files.h"
+#include "formats/text_file.h"
+#include "formats/robot_files.h"
 
 namespace fs = std::filesystem;
 

@@ -6,8 +6,8 @@
 #include "cli/case_run.h"
 #include "cli/commands.h"
 #include "cli/task_options.h"
-#include "io/output_place.h"
-#include "study/campaign_report.h"
+#include "results/output_place.h"
+#include "tasks/campaign_report.h"
 
 namespace bielle::cli {
 namespace {

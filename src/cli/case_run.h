@@ -1,12 +1,12 @@
 #pragma once
-// Shared by the commands that run cases (study/cases.h).
+// Shared by the commands that run cases (tasks/cases.h).
 #include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "cli/task_options.h"
-#include "study/cases.h"
+#include "tasks/cases.h"
 
 namespace bielle::cli {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bielle/model/options.h"
-#include "bielle/model/reader.h"
+#include "bielle/formats/reader.h"
 #include "bielle/motion/motion.h"
 
 namespace bielle::cli {

@@ -3,8 +3,8 @@
 #include <iostream>
 
 #include "bielle/dynamics/loop_conflict.h"
-#include "bielle/io/robot_info.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/robot_info.h"
+#include "bielle/robots/robot_loader.h"
 #include "cli/commands.h"
 
 namespace bielle::cli {

@@ -5,7 +5,7 @@
 #include <iostream>
 
 #include "cli/commands.h"
-#include "io/process.h"
+#include "results/process.h"
 
 namespace bielle::cli {
 

@@ -1,8 +1,8 @@
 // bielle compare: robots on the same motions, side by side.
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "cli/case_run.h"
 #include "cli/commands.h"
-#include "study/architecture_report.h"
+#include "tasks/architecture_report.h"
 
 namespace bielle::cli {
 namespace {

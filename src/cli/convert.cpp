@@ -4,14 +4,14 @@
 #include <memory>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/robot_writer.h"
+#include "bielle/formats/robot_writer.h"
 #include "cli/commands.h"
-#include "io/drake.h"
-#include "io/mjcf.h"
-#include "io/number_option.h"
-#include "io/output_place.h"
-#include "io/sdf.h"
-#include "io/text_file.h"
+#include "formats/drake.h"
+#include "formats/mjcf.h"
+#include "results/number_option.h"
+#include "results/output_place.h"
+#include "formats/sdf.h"
+#include "formats/text_file.h"
 #include "model/payload.h"
 
 namespace bielle::cli {

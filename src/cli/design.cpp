@@ -11,9 +11,9 @@
 #include "cli/task_options.h"
 #include "design/run.h"
 #include "design/spec_parts.h"
-#include "io/output_place.h"
-#include "io/text_file.h"
-#include "study/design_tasks.h"
+#include "results/output_place.h"
+#include "formats/text_file.h"
+#include "tasks/design_tasks.h"
 
 namespace bielle::cli {
 namespace {

@@ -8,7 +8,7 @@
 #include "bielle/motion/motion.h"
 #include "cli/commands.h"
 #include "cli/eval_state.h"
-#include "io/json_text.h"
+#include "results/json_text.h"
 
 namespace bielle::cli {
 namespace {

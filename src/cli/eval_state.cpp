@@ -9,9 +9,9 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
-#include "io/json_text.h"
+#include "results/json_text.h"
 #include "model/listing.h"
-#include "model/text_file.h"
+#include "formats/text_file.h"
 
 namespace bielle::cli {
 

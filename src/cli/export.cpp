@@ -3,12 +3,12 @@
 #include <iostream>
 #include <memory>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "cli/commands.h"
-#include "io/opensim.h"
-#include "io/output_place.h"
-#include "io/result_files.h"
-#include "io/text_file.h"
+#include "results/opensim.h"
+#include "results/output_place.h"
+#include "results/result_files.h"
+#include "formats/text_file.h"
 
 namespace fs = std::filesystem;
 

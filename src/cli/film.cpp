@@ -8,8 +8,8 @@
 
 #include "bielle/model/error.h"
 #include "cli/table.h"
-#include "io/aside_file.h"
-#include "io/process.h"
+#include "results/aside_file.h"
+#include "results/process.h"
 
 namespace fs = std::filesystem;
 

@@ -5,7 +5,7 @@
 #include "bielle/motion/motion.h"
 #include "cli/commands.h"
 #include "cli/table.h"
-#include "io/setting.h"
+#include "results/setting.h"
 
 namespace bielle::cli {
 namespace {

@@ -3,12 +3,12 @@
 #include <iostream>
 #include <sstream>
 
-#include "bielle/io/robot_writer.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
 #include "cli/commands.h"
 #include "cli/table.h"
-#include "io/setting.h"
+#include "results/setting.h"
 
 namespace bielle::cli {
 namespace {

@@ -1,7 +1,7 @@
 // bielle info: the elements of a robot, and whether its loops close.
 #include <iostream>
 
-#include "bielle/io/robot_info.h"
+#include "bielle/results/robot_info.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 

@@ -5,14 +5,14 @@
 #include <iostream>
 #include <optional>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/registry.h"
 #include "cli/commands.h"
 #include "cli/table.h"
-#include "io/number_option.h"
-#include "io/output_place.h"
+#include "results/number_option.h"
+#include "results/output_place.h"
 
 namespace fs = std::filesystem;
 

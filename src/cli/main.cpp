@@ -3,11 +3,11 @@
 #include <exception>
 #include <iostream>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
-#include "io/number_option.h"
-#include "io/standard_output.h"
+#include "results/number_option.h"
+#include "results/standard_output.h"
 
 namespace {
 

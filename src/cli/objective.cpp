@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "cli/table.h"
-#include "io/number_option.h"
+#include "results/number_option.h"
 
 namespace bielle::cli {
 

@@ -2,7 +2,7 @@
 // What a motion minimizes, on the command line.
 #include <CLI/CLI.hpp>
 
-#include "bielle/io/electrical_energy.h"
+#include "bielle/results/electrical_energy.h"
 #include "bielle/motion/objective.h"
 
 namespace bielle::cli {

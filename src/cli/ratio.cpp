@@ -5,11 +5,11 @@
 #include <iostream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/ratio_report.h"
-#include "io/number_option.h"
+#include "results/number_option.h"
 
 namespace fs = std::filesystem;
 

@@ -1,7 +1,7 @@
 #pragma once
 // The figure of the reduction ratio.
 #include "cli/ratio_report.h"
-#include "io/plot.h"
+#include "results/plot.h"
 
 namespace bielle::cli {
 

@@ -8,9 +8,9 @@
 
 #include "cli/ratio_figure.h"
 #include "cli/table.h"
-#include "io/aside_file.h"
-#include "io/plot.h"
-#include "io/text_file.h"
+#include "results/aside_file.h"
+#include "results/plot.h"
+#include "formats/text_file.h"
 #include "model/listing.h"
 
 namespace fs = std::filesystem;

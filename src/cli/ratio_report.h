@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/transmission/ratio.h"
-#include "io/json_text.h"
+#include "bielle/dynamics/ratio.h"
+#include "results/json_text.h"
 
 namespace bielle::cli {
 

@@ -6,13 +6,13 @@
 #include <iostream>
 #include <memory>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/film.h"
-#include "io/number_option.h"
-#include "io/output_place.h"
-#include "io/result_files.h"
+#include "results/number_option.h"
+#include "results/output_place.h"
+#include "results/result_files.h"
 
 namespace fs = std::filesystem;
 

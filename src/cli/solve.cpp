@@ -7,17 +7,17 @@
 #include <sstream>
 #include <utility>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
-#include "bielle/transmission/serial_model.h"
+#include "bielle/motion/serial_model.h"
 #include "cli/commands.h"
 #include "cli/free_timings.h"
 #include "cli/objective.h"
 #include "cli/table.h"
-#include "io/interrupt.h"
-#include "io/output_place.h"
-#include "io/setting.h"
+#include "results/interrupt.h"
+#include "results/output_place.h"
+#include "results/setting.h"
 #include "solve/fddp_checks.h"
 
 namespace bielle::cli {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "io/json_text.h"
+#include "results/json_text.h"
 #include "model/number_text.h"
 
 namespace bielle::cli {

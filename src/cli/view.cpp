@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "cli/commands.h"
-#include "io/output_place.h"
+#include "results/output_place.h"
 
 namespace bielle::cli {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bielle/motion/solve.h"
-#include "bielle/transmission/lift.h"
+#include "bielle/motion/lift.h"
 #include "design/measures.h"
 #include "model/payload.h"
 

@@ -39,7 +39,7 @@ namespace bielle {
 
 enum class MotionMode {
   Reoptimized,  ///< solved for the design, from the solution of the start design
-  Kept          ///< postures and accelerations of the start design; motors recomputed (transmission/lift.h)
+  Kept          ///< postures and accelerations of the start design; motors recomputed (motion/lift.h)
 };
 const char* getName(MotionMode mode);
 

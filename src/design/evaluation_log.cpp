@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "bielle/model/error.h"
-#include "io/json_text.h"
+#include "results/json_text.h"
 
 namespace bielle {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "design/run.h"
-#include "io/line_log.h"
+#include "results/line_log.h"
 
 namespace bielle {
 

@@ -8,7 +8,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
 #include "design/motor_change.h"
-#include "io/fastenings.h"
+#include "formats/fastenings.h"
 
 namespace bielle {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "design/run.h"
-#include "io/plot.h"
+#include "results/plot.h"
 
 namespace bielle {
 

@@ -9,7 +9,7 @@
 #include <set>
 #include <thread>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "design/evaluation_log.h"
 
 namespace bielle {

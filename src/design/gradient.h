@@ -29,7 +29,7 @@
 #include "bielle/design/search.h"
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/motion/goal.h"
-#include "bielle/transmission/lift.h"
+#include "bielle/motion/lift.h"
 #include "design/measures.h"
 #include "design/robot_slopes.h"
 

@@ -5,15 +5,15 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/result.h"
-#include "bielle/io/robot_info.h"
-#include "bielle/io/robot_writer.h"
+#include "bielle/results/result.h"
+#include "bielle/results/robot_info.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "design/figures.h"
 #include "design/motor_change.h"
 #include "design/run.h"
-#include "io/text_file.h"
+#include "formats/text_file.h"
 #include "model/number_text.h"
 
 namespace fs = std::filesystem;

@@ -10,10 +10,10 @@
 #include <mutex>
 #include <thread>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "design/evaluation_log.h"
 #include "design/front_run.h"
-#include "io/json_text.h"
+#include "results/json_text.h"
 
 namespace bielle {
 namespace {

@@ -8,9 +8,9 @@
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
 #include "design/spec_parts.h"
-#include "model/motor_catalogue.h"
+#include "formats/motor_catalogue.h"
 #include "model/number_text.h"
-#include "model/text_file.h"
+#include "formats/text_file.h"
 
 namespace bielle {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
 

@@ -5,7 +5,7 @@
 
 #include "bielle/model/model.h"
 #include "design/spec.h"
-#include "model/yaml_entry.h"
+#include "formats/yaml_entry.h"
 
 namespace bielle {
 

@@ -5,8 +5,8 @@
 
 #include "bielle/model/error.h"
 #include "math/constants.h"
-#include "model/text_file.h"
-#include "model/yaml_entry.h"
+#include "formats/text_file.h"
+#include "formats/yaml_entry.h"
 #include "motion/locomotion_stages.h"
 
 namespace bielle {

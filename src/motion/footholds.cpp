@@ -7,8 +7,8 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/stairs.h"
 #include "math/so3.h"
-#include "model/text_file.h"
-#include "model/yaml_entry.h"
+#include "formats/text_file.h"
+#include "formats/yaml_entry.h"
 #include "motion/course.h"
 
 namespace bielle {

@@ -7,8 +7,8 @@
 #include <iterator>
 
 #include "bielle/dynamics/kinematics.h"
-#include "io/fastenings.h"
-#include "model/mesh.h"
+#include "formats/fastenings.h"
+#include "formats/mesh.h"
 #include "report/pack.h"
 
 namespace fs = std::filesystem;

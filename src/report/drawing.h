@@ -1,7 +1,7 @@
 #pragma once
 // The drawing of a robot: the shapes of its file; for bodies without shapes, rods between their joints and frames.
-#include "bielle/model/reader.h"
-#include "io/json_text.h"
+#include "bielle/formats/reader.h"
+#include "results/json_text.h"
 
 namespace bielle {
 

@@ -4,7 +4,7 @@
 
 #include "bielle/math/se3.h"
 #include "bielle/motion/record.h"
-#include "io/json_text.h"
+#include "results/json_text.h"
 
 namespace bielle {
 

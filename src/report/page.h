@@ -1,6 +1,6 @@
 #pragma once
 // The page around the data that its scripts draw.
-#include "io/json_text.h"
+#include "results/json_text.h"
 
 namespace bielle {
 

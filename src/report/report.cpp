@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <map>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
-#include "io/text_file.h"
+#include "formats/text_file.h"
 #include "report/page.h"
 #include "report/run.h"
 

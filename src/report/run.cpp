@@ -2,11 +2,11 @@
 
 #include <filesystem>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
-#include "bielle/transmission/serial_model.h"
+#include "bielle/motion/serial_model.h"
 
 namespace fs = std::filesystem;
 

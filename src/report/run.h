@@ -3,9 +3,9 @@
 #include <optional>
 #include <string>
 
-#include "bielle/model/reader.h"
+#include "bielle/formats/reader.h"
 #include "bielle/motion/record.h"
-#include "io/json_text.h"
+#include "results/json_text.h"
 
 namespace bielle {
 

@@ -6,8 +6,8 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/loop_conflict.h"
-#include "bielle/io/result.h"
-#include "io/text_file.h"
+#include "bielle/results/result.h"
+#include "formats/text_file.h"
 #include "report/pack.h"
 #include "report/page.h"
 #include "report/run.h"

@@ -1,7 +1,7 @@
 #pragma once
 /// \file The generated robot that a YAML file names, with the parameters that it sets.
 #include "bielle/robots/generators.h"
-#include "model/yaml_entry.h"
+#include "formats/yaml_entry.h"
 
 namespace bielle {
 

@@ -10,7 +10,7 @@
 #include <cstring>
 
 #include "bielle/model/error.h"
-#include "io/process.h"
+#include "results/process.h"
 
 namespace bielle::tasks {
 namespace {

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "bielle/model/error.h"
-#include "model/text_file.h"
+#include "formats/text_file.h"
 
 namespace fs = std::filesystem;
 

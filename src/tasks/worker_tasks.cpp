@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
-#include "io/json_text.h"
+#include "results/json_text.h"
 
 namespace fs = std::filesystem;
 

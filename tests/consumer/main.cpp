@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 
 int main(int argc, char** argv) {
   setenv("BIELLE_ROBOTS", ROBOTS, 1);

@@ -1,6 +1,6 @@
 // A URDF for Drake: a model that is one again after it is written for Drake, or one clear error.
-#include "bielle/io/robot_loader.h"
-#include "io/drake.h"
+#include "bielle/robots/robot_loader.h"
+#include "formats/drake.h"
 #include "robot_trial.h"
 #include "scratch.h"
 

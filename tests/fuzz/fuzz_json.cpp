@@ -1,5 +1,5 @@
 // summary.json of a result, and the state that `bielle eval` is given: numbers, or one clear error.
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "cli/eval_state.h"

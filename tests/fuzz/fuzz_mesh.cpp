@@ -1,5 +1,5 @@
 // An STL, OBJ or COLLADA file: a shape of finite size, or none.
-#include "model/mesh.h"
+#include "formats/mesh.h"
 #include "scratch.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -1,7 +1,7 @@
 // A trajectory as a NumPy archive: what is read is written and read again as the same, or there is one clear error.
 #include <cmath>
 
-#include "bielle/io/record_files.h"
+#include "bielle/results/record_files.h"
 #include "bielle/model/error.h"
 #include "scratch.h"
 

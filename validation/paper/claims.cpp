@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "io/json_text.h"
+#include "results/json_text.h"
 
 namespace bielle::paper {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "io/plot.h"
+#include "results/plot.h"
 #include "paper/claims.h"
 
 namespace bielle::paper {

@@ -5,7 +5,7 @@
 #include <iostream>
 
 #include "bielle/model/error.h"
-#include "io/number_option.h"
+#include "results/number_option.h"
 #include "paper/commands.h"
 
 namespace {

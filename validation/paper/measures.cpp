@@ -6,12 +6,12 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
-#include "bielle/transmission/lift.h"
-#include "io/json_text.h"
-#include "transmission/linkage_ratio.h"
+#include "bielle/motion/lift.h"
+#include "results/json_text.h"
+#include "dynamics/linkage_ratio.h"
 
 namespace fs = std::filesystem;
 

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "bielle/io/result.h"
-#include "bielle/model/reader.h"
+#include "bielle/results/result.h"
+#include "bielle/formats/reader.h"
 #include "paper/studies.h"
-#include "study/cells.h"
+#include "tasks/cells.h"
 
 namespace bielle::paper {
 

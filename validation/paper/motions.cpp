@@ -3,8 +3,8 @@
 #include <iostream>
 #include <optional>
 
-#include "bielle/io/result.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/solve.h"
 #include "paper/commands.h"

@@ -4,9 +4,9 @@
 #include <functional>
 #include <sstream>
 
-#include "io/text_file.h"
+#include "formats/text_file.h"
 #include "paper/figures.h"
-#include "study/cells.h"
+#include "tasks/cells.h"
 
 namespace bielle::paper {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "study/cases.h"
+#include "tasks/cases.h"
 
 namespace bielle::paper {
 

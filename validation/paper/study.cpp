@@ -5,7 +5,7 @@
 #include <map>
 #include <thread>
 
-#include "bielle/io/result.h"
+#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "model/number_text.h"
 #include "paper/commands.h"

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/robot_loader.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/solve/fddp.h"
 #include "measure_steps.h"
 #include "own_robots.h"

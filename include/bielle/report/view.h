@@ -8,7 +8,7 @@
 /// slider.
 #include <string>
 
-#include "bielle/model/reader.h"
+#include "bielle/formats/reader.h"
 
 namespace bielle {
 

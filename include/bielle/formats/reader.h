@@ -1,0 +1,108 @@
+#pragma once
+/// \file
+/// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that URDF cannot
+/// express; or one MuJoCo file.
+///
+/// ## The URDF
+/// Links and joints of one tree. Bodies are added depth first, the children of a link in the order of their joints in
+/// the file. A link without <inertial> has no mass. A root named "world" is the ground; any other root is carried by a
+/// free-flyer named "root_joint", or merged into the ground when the base is fixed.
+/// - <limit>: `effort` and `velocity` apply to the motor and to the joint (published files often have placeholders
+///   there: override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints
+///   whose number of coordinates is changed by the YAML have no limits.
+/// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> its damping and friction, unless
+///   `joint_forces` names it; meshes need not exist. Files for Drake (formats/drake.h) can also define loops,
+///   springs, motors and other joints.
+/// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
+///   of rounding.
+///
+/// ## The YAML, published keys (example-parallel-robots)
+/// - `closed_loop: [[A, B], ...]` frames 1 and 2 of each closure: links, or joints, which stand for the frame of their
+///   child (a link wins); `type: [6d, ...]`, one per pair, 6d | 5d | 3d in any case. `closure_name: [...]` (ours)
+///   names them; otherwise `knee_A`, `knee_B` make `knee`, and other pairs `A--B`.
+/// - `name_mot: [joint, ...]` lists the motors, in the order of u.
+/// - `joint_name: [...]`, `joint_type: [...]` replace kinds of joints of the URDF, in any case: SPHERICAL, UJOINT_ and
+///   two different axes of the joint's own frame in their order (UJOINT_XY), FIXED, REVOLUTE, CONTINUOUS, PRISMATIC,
+///   PLANAR, FLOATING. An absent joint gives a warning.
+///
+/// ## The YAML, our keys (all optional; an unknown key is an error)
+/// - `base: free | fixed`
+/// - `closures: [{name, frames: [A, B], type, axis, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge,
+///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0). A coupler: `{name, type: coupler, joints: {joint:
+///   coefficient, ...}, offset, kp, kd}`, sum of coefficient times coordinate = offset (default 0)
+/// - `motors: {joint: {armature, effort, velocity, torque_loss}, ...}` instead of `name_mot`; its limits (.inf for none)
+///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h). Winding and gear, as in MotorDrive (model.h): `ratio`,
+///   `rotor_inertia`, `torque_constant`, `resistance`, `voltage`, `current`, `continuous_current`, `efficiency`,
+///   `back_efficiency`, `mass`; quantities that are not given follow from them, and the smaller of two limits applies.
+///   `continuous_effort` is the thermal limit, N m. `type: NAME` takes all of this from a catalogue, and keys next to it
+///   replace its entries; with another `ratio`, effort and velocity are converted to that gear
+/// - `motor_catalogue: FILE`, or a list of them, relative to this file; then comes the file motors.yaml in each directory of
+///   robots. A catalogue is `motors: {NAME: {source: where its figures are from, ...}, ...}` with the keys of winding and gear, and
+///   `effort` and `velocity` at the shaft of its gear
+/// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
+/// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed}, ...}` as in model.h; `{}` for none
+/// - `point_springs: {name: {frames: [A, B], points: [[x, y, z], [x, y, z]], stiffness, rest, preload, damping}, ...}`
+///   between a point of A and one of B (m, default their origins), links or joints as in `closed_loop`; PointSpring in
+///   model.h
+/// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length
+///   along x, m
+/// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`
+/// - `cross_inertia: kg m^2` splits every universal joint into two revolute ones, named after it and their axes (`_Z`,
+///   `_Y`), with a cross of this inertia about any axis between them
+/// - `importance: {joint: [position, velocity], ...}` weighs joints in the state regularization of motions (default 1,
+///   1)
+/// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
+/// - `model: NAME or path relative to this file`, or a list of them: this file, with no URDF beside it, completes the
+///   first of these published robots that exists; names are looked up in the directories of robots. Its keys take
+///   precedence over those of that robot's YAML file. It may be one in MuJoCo's format, or a generated one.
+/// - `generator: NAME, set: {parameter: number or name of a choice, ...}`: this file, with no URDF beside it, is the robot that
+///   `bielle generate NAME` writes with these parameters, the others at their defaults. Further keys complete it likewise.
+///
+/// ## MuJoCo files (MJCF, .xml), of version 2.2.2 and later
+/// The reader supports bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with
+/// range, ref, armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon
+/// (of fixed tendons) with polynomials of degree 1; springs and dampers of spatial tendons between two sites; motors
+/// with gear and limits (servos become motors); classes of defaults; gravity; keyframes as references; sites as frames;
+/// geoms as shapes. Ranges hold unless `limited` is false.
+/// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
+///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the
+///   force of the joint. Without keyframes, the reference `qpos0` is the posture of the file, where MuJoCo closes loops.
+/// - What formats/mjcf.h writes is put together again: connects NAME.1 and NAME.2 to a hinge, the elements of a universal, planar
+///   or free joint, the spheres of a sole at their site.
+/// - Elements that are left out are listed in `warnings` with their lines. Elements without which the mechanism
+///   would be another one are errors:
+///   <include>, <attach>, <replicate> and <composite>, other equalities, polynomials of higher degree, masses of meshes.
+///   At most 16 MB and 3000 bodies and sites.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+enum class BaseKind { Free, Fixed };
+
+struct LoadOptions {
+  std::optional<BaseKind> base;  ///< overrides the file's `base` key; without both: free
+};
+
+struct LoadedRobot {
+  Model model;
+  std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
+  std::string directory;              ///< where the files were found
+  std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
+};
+
+/// The file of a robot by name or path, as loadRobot (robots/robot_loader.h) finds it. \throws ModelError listing the places searched
+std::string findRobotFile(const std::string& name_or_path);
+
+/// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),
+/// share/bielle/robots of the installation that the running program belongs to, robots/ beside the module that this library is
+/// part of (the Python package), robots/ of the source tree, and the configured installation.
+std::vector<std::string> getRobotDirectories();
+
+/// Names of the robots found there, sorted.
+std::vector<std::string> listRobots();
+
+}  // namespace bielle

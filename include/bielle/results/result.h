@@ -1,0 +1,124 @@
+#pragma once
+/// \file The result of a solve, as three files in a directory.
+#include <string>
+#include <vector>
+
+#include "bielle/dynamics/linkage.h"
+#include "bielle/results/electrical_energy.h"
+#include "bielle/results/record_files.h"
+#include "bielle/motion/solve.h"
+#include "bielle/motion/lift.h"
+
+namespace bielle {
+
+/// The request that led to a motion.
+struct RunInfo {
+  std::string robot;                 ///< name or path, as given
+  std::string robot_file;            ///< its .urdf, absolute
+  std::vector<std::string> command;  ///< the command line, or empty
+  std::string model = "closed";      ///< or "serial": the robot's linkages were frozen (motion/serial_model.h)
+  std::string serial_armature{};     ///< of the serial model, as requested (parseSerialArmature)
+};
+
+struct MotionResult {
+  RunInfo run;
+  std::string motion;
+  Formulation formulation = Formulation::Full;
+  StepRule step = StepRule::Euler;
+  OptionValues options;              ///< every option of the motion by name
+  std::vector<GoalOutcome> goals;    ///< requested and achieved values
+  ContactSchedule schedule;          ///< with the final time steps
+  std::vector<PhaseTiming> timings;  ///< of the phases of free duration
+  Ground ground;
+  FddpSummary solver;
+  MotionRecord record;
+
+  std::vector<std::pair<std::string, double>> peak_torques;        ///< largest |u| by motor, largest first, N m or N
+  std::vector<std::pair<std::string, double>> rms_torques;         ///< calcRmsEfforts() by motor, N m or N
+  std::vector<std::pair<std::string, double>> continuous_torques;  ///< thermal limits, where known, N m or N
+  ObjectiveOptions objective;
+  ElectricalEnergy energy;
+  double gap_position = 0, gap_angle = 0;    ///< largest closing error of the motion, m and rad
+  double slip_position = 0, slip_angle = 0;  ///< largest displacement of a foot from its touchdown, m and rad
+  double com_start = 0, com_lowest = 0;      ///< height of the centre of mass, m
+  std::vector<DeadPointTrace> dead_points;   ///< how near each linkage comes to one
+
+  bool converged() const { return solver.termination == FddpTermination::Converged; }
+  bool interrupted() const { return solver.termination == FddpTermination::Interrupted; }
+};
+
+/// Sets what follows from the record and the objective: torques, electrical energy, gaps, heights of the centre of mass,
+/// distances of linkages from dead points.
+void setFigures(const Model& model, MotionResult& result);
+
+MotionResult makeResult(const RunInfo& run, const Solution& solution);
+
+/// The motion as the summary.json of a result describes it.
+struct MotionSummary {
+  struct Stance {
+    std::string contact;
+    SE3 X_WT;  ///< desired placement of its frame
+  };
+  struct Phase {
+    std::string name;
+    int start_node = 0, nodes = 0;
+    double time_step = 0;  ///< s; 0: a rigid impact
+    std::vector<Stance> stances;
+  };
+  std::string file;  ///< the file that was read
+  std::string motion, robot, robot_file;
+  std::string model = "closed";  ///< or "serial"
+  std::string serial_armature;   ///< of the serial model (parseSerialArmature)
+  Formulation formulation = Formulation::Full;
+  StepRule step = StepRule::Euler;
+  ObjectiveOptions objective;
+  bool converged = false;
+  OptionValues options;
+  std::vector<GoalOutcome> goals;
+  std::vector<Phase> phases;
+  std::vector<PhaseTiming> timings;  ///< of the phases of free duration
+  Ground ground;
+};
+
+/// \throws ModelError naming the file, the entry and what is wrong with it: a motion carried out is no plan
+MotionSummary readSummary(const std::string& directory);
+
+/// The request recorded in a result, without limits, which are part of the problem and not of the motion.
+/// \throws ModelError when there is no such motion or option
+MotionRequest remakeRequest(const MotionSummary& summary);
+
+/// Creates the directory with its parents and verifies that files can be written there.
+/// \throws ModelError naming the directory and the reason
+void makeOutputDirectory(const std::string& directory);
+
+/// Writes trajectory.csv, trajectory.npz and summary.json to temporary files, which are renamed when all are complete,
+/// summary.json last. Returns their paths. \throws ModelError naming the file and the reason
+std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result);
+/// Writes summary.json alone.
+void writeSummary(const std::string& directory, const MotionResult& result);
+
+/// Versions of this library, of Eigen and of the compiler.
+struct BuildInfo {
+  std::string bielle, eigen, compiler;
+};
+BuildInfo getBuildInfo();
+
+// Lifting: reads a serial motion and writes its lift to the closed model.
+
+/// The input of lift() from a record of a motion of the serial model.
+/// \param motion  the same request made again, for the active contacts of every stage
+/// \throws ModelError when the record does not belong to that motion
+SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& record);
+
+/// The lifted part of the motion in the form of a solved one: converged if it was lifted entirely; its cost is the mean
+/// per node of the cost of (1) of lift.h. At least one stage must have been lifted.
+MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Motion& serial, const LiftResult& lifted,
+                              double seconds);
+
+/// Writes lift.json: the outcome, and per node status, errors, margin and evaluations; given a result, also
+/// trajectory.csv, trajectory.npz and summary.json. Returns the paths. \throws ModelError naming the file and the
+/// reason
+std::vector<std::string> writeLift(const std::string& directory, LiftMethod method, const LiftResult& lifted,
+                                   const MotionResult* result);
+
+}  // namespace bielle

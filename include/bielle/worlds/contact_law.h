@@ -1,0 +1,88 @@
+#pragma once
+/// \file Compliant contact with friction that sticks, for worlds that have no contact of their own.
+///
+/// A sole touches with the corners of its rectangle or, where the ground has steps, whose edges may lie anywhere under it, with a
+/// grid of points; a point contact with its origin. A point at x with velocity x' is by
+/// d deep in the ground, whose normal there is n (Terrain::touch); T = 1 - n n^T. With the stiffness k of the point,
+///
+///     f_n = k d max(0, 1 + c d'),   d' = -n . x'          while d > 0, else no force                              (1)
+///
+/// a linear spring with the damping of Hunt and Crossley ("Coefficient of restitution interpreted as damping in
+/// vibroimpact", 1975): continuous at touchdown, and it never pulls. Friction is a spring between the point and its anchor a
+/// (a bristle), with a damper; P_F shortens a vector to the length F = mu f_n:
+///
+///     s = P_F(-k_t T (x - a)),   f_t = P_F(s - c_t T x')                                                            (2)
+///
+/// Inside the cone nothing slides: the force is that of the spring, at rest without any creep. At the cone the anchor is
+/// dragged along, once per step,
+///
+///     a <- x + s / k_t    (and a <- x, while the point is in the air)                                                (3)
+///
+/// which leaves (2) as it is. Forces between two updates of (3) are thus functions of the state. The springs hold
+///
+///     e = 1/2 k d^2 + |s|^2 / (2 k_t)                                                                              (4)
+///
+/// and what the ground takes, -f . x', less what the springs hold, is dissipated: with t = s - c_t T x', the damper and the
+/// slider take |s - f_t|^2 / c_t + (s - f_t) . (f_t - t) / c_t >= 0 in (2), and (3) lowers e.
+#include <vector>
+
+#include "bielle/model/model.h"
+#include "include/bielle/worlds/terrain.h"
+
+namespace bielle::simulation {
+
+/// Scaled by the weight of the robot, so that one choice suits robots of all sizes: soles of hard rubber. A sole that lands
+/// at v rebounds with e v, where by (1) c v - ln(1 + c v) = -c e v - ln(1 - c e v): e = 0.8 at 0.02 m/s, 0.4 at 0.1 m/s.
+struct ContactOptions {
+  double sinkage = 1e-4;       ///< of one sole under the robot's weight, m; gives k
+  double damping = 20;         ///< c, s/m
+  double shear_ratio = 1;      ///< k_t / k
+  int grid = 5;                ///< points along each side of a sole on ground with steps
+  double shear_damping = 0.3;  ///< c_t over that which damps the robot's mass on one sole's bristles critically
+};
+
+/// One point of a contact, with its coefficients.
+struct ContactPoint {
+  int contact = 0;                                ///< index into Model::contacts()
+  int body = 0;                                   ///< that carries it
+  Vector3d p = Vector3d::Zero();                  ///< in the frame of the body, m
+  double stiffness = 0, damping = 0;              ///< k, N/m; c, s/m
+  double shear_stiffness = 0, shear_damping = 0;  ///< k_t, N/m; c_t, N s/m
+  Vector3d anchor = Vector3d::Zero();             ///< a, m (world)
+  bool touches = false;                           ///< as of the last update of the anchor
+};
+
+/// The points of all contacts of a model on a ground, contact by contact; those of a sole share its stiffness.
+std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& ground,
+                                            const ContactOptions& options = {});
+
+struct ContactForce {
+  Vector3d force = Vector3d::Zero();    ///< on the point, N (world)
+  Vector3d spring = Vector3d::Zero();   ///< s, N (world)
+  double elastic = 0;                   ///< e, J
+  Matrix3d damping = Matrix3d::Zero();  ///< symmetric part of -df/dx', positive semidefinite, N s/m
+};
+/// Eqs. (1), (2) and (4) at a position and a velocity (world).
+/// \param with_damping  whether to fill the derivative
+ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
+                              const Vector3d& velocity, bool with_damping = false);
+/// Eq. (3), for the force at x.
+void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point);
+
+/// A stop of a joint: (1) in one coordinate.
+struct JointStop {
+  int dof = 0, coordinate = 0;        ///< indices into v and q
+  double lower = 0, upper = 0;        ///< rad or m
+  double stiffness = 0, damping = 0;  ///< N m/rad or N/m; s/rad or s/m
+};
+/// Stops of all joints that have limits and one degree of freedom.
+std::vector<JointStop> makeJointStops(const Model& model);
+
+struct StopForce {
+  double force = 0;    ///< on the coordinate, N m or N
+  double elastic = 0;  ///< J
+  double damping = 0;  ///< -d force/dv, not negative
+};
+StopForce calcStopForce(const JointStop& stop, double q, double v);
+
+}  // namespace bielle::simulation

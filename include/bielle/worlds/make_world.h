@@ -1,0 +1,15 @@
+#pragma once
+/// \file The worlds by name.
+#include <memory>
+
+#include "include/bielle/worlds/world.h"
+
+namespace bielle::simulation {
+
+/// Names for makeWorld(): those that were built.
+std::vector<std::string> listWorlds();
+
+/// \throws ModelError when there is no world of this name, or it cannot carry the robot
+std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options = {});
+
+}  // namespace bielle::simulation

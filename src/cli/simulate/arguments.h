@@ -1,0 +1,43 @@
+#pragma once
+// The options of bielle-simulate.
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "src/worlds/execution.h"
+#include "src/worlds/plan.h"
+#include "src/worlds/robot_errors.h"
+
+namespace bielle::simulation {
+
+struct SimulateArguments {
+  std::string directory, output, world = "bielle", control = "gains", terrain = "planned";
+  std::string robot;     // of a motion that is to be solved; empty: `directory` holds one
+  std::string commands;  // file; empty: none
+  std::optional<double> speed;
+  std::string model;                  // that the controller believes in; empty: that of the motion
+  std::vector<std::string> settings;  // name=value
+  std::vector<std::string> pushes;
+  double friction = 0;  // 0: that of the plan
+  double time_step = 0;
+  std::string sensors = "ideal";
+  double noise = 1;
+  std::optional<double> look_ahead;  // ms
+  double delay = 0, jitter = 0;      // ms
+  RobotErrors errors;
+  unsigned seed = 1;
+  bool live = false, no_report = false, summary_only = false, dry_run = false;
+  ExecutionOptions execution;
+  PredictiveOptions predictive;
+};
+
+void addOptions(CLI::App& app, SimulateArguments& arguments);
+
+/// Reads pushes and delays, and checks what can be checked without the motion. \throws ModelError
+void parseOptions(SimulateArguments& arguments);
+
+/// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01". \throws ModelError
+Ground makeGround(const SimulateArguments& arguments, const Ground& planned);
+
+}  // namespace bielle::simulation

@@ -1,0 +1,259 @@
+#include "src/cli/simulate/output.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "bielle/report/report.h"
+#include "control/clock.h"
+#include "results/npz.h"
+#include "results/result_files.h"
+#include "model/number_text.h"
+#include "src/worlds/planned_record.h"
+
+namespace bielle::simulation {
+namespace {
+
+// A motion that happened, in the form of a solved one.
+MotionResult makeResult(const SimulateArguments& arguments, const Plan& plan, const Ground& ground,
+                        const Execution& execution, const std::vector<std::string>& command) {
+  MotionResult result;
+  result.run = {plan.summary.robot, plan.robot.file, command};
+  result.motion = plan.summary.motion;
+  result.formulation = plan.summary.formulation;
+  result.options = plan.summary.options;
+  const int stages = static_cast<int>(execution.record.u.rows());
+  result.schedule.phases.push_back({"simulated", stages, arguments.execution.record_period, {}});
+  result.ground = ground;
+  result.record = execution.record;
+  result.objective = plan.summary.objective;
+  setFigures(plan.robot.model, result);
+  result.gap_position = execution.largest_gap;  // also between the rows of the record
+  result.slip_position = execution.largest_slip;
+  return result;
+}
+
+Json listBooks(const Execution& e) {
+  return {{"energy_start_J", e.start.getEnergy()}, {"energy_end_J", e.end.getEnergy()},
+          {"motor_work_J", e.end.motor_work},      {"push_work_J", e.end.push_work},
+          {"contact_loss_J", e.end.contact_loss},  {"stop_loss_J", e.end.stop_loss},
+          {"other_loss_J", e.end.other_loss},      {"imbalance_J", e.imbalance}};
+}
+
+// The drift of a robot that went nowhere is no share of its way.
+Json listEstimation(const EstimationErrors& e) {
+  constexpr double kShortestWay = 0.1;  // m
+  const Json share = e.way > kShortestWay ? Json(e.drift / e.way) : nullptr;
+  return {{"position_error", {{"rms", e.position_rms}, {"max", e.position_max}}},
+          {"velocity_error", {{"rms", e.velocity_rms}, {"max", e.velocity_max}}},
+          {"tilt_error", {{"rms", e.tilt_rms}, {"max", e.tilt_max}}},
+          {"drift", e.drift},
+          {"drift_share", share},
+          {"contact_errors", e.contact_errors}};
+}
+
+Json listSolves(const PredictiveCounts& counts) {
+  return {{"count", counts.solves},
+          {"missed", counts.missed},
+          {"failed", counts.failed},
+          {"early_landings", counts.early},
+          {"late_landings", counts.late},
+          {"median_ms", 1e3 * counts.calcQuantile(0.5)},
+          {"p99_ms", 1e3 * counts.calcQuantile(0.99)},
+          {"worst_ms", 1e3 * counts.calcQuantile(1)}};
+}
+
+Json listCommands(const std::vector<TimedCommand>& commands) {
+  auto list = Json::array();
+  for (const auto& [time, velocity] : commands)
+    list.push_back({{"time_s", time},
+                    {"forward", velocity.forward},
+                    {"sideways", velocity.sideways},
+                    {"turning", velocity.turning}});
+  return list;
+}
+
+Json listPushes(const std::vector<Push>& pushes) {
+  auto list = Json::array();
+  for (const Push& push : pushes)
+    list.push_back({{"time_s", push.time},
+                    {"impulse_Ns", push.impulse},
+                    {"direction_deg", push.direction},
+                    {"duration_s", push.duration}});
+  return list;
+}
+
+// The mean speed in the steps in which the plan's own counts: without the time that the robot stands, starts and stops. Empty
+// where a plan has none, or the motion did not come that far.
+std::optional<double> calcSteadySpeed(const Plan& plan, const Execution& e) {
+  const VectorXd& time = e.record.time;
+  const auto findRow = [&time](double at) {
+    return static_cast<Eigen::Index>(std::lower_bound(time.begin(), time.end(), at - kClockTolerance) - time.begin());
+  };
+  for (const Goal& goal : plan.goals) {
+    if (goal.kind != GoalKind::Speed) continue;
+    const double start = plan.getTime(goal.first), end = plan.getTime(goal.last);
+    if (time[0] > start + kClockTolerance || time[time.size() - 1] < end - kClockTolerance) return {};
+    const Eigen::Index first = findRow(start), last = findRow(end);
+    const Vector3d way = (e.record.com.row(last) - e.record.com.row(first)).transpose();
+    return goal.direction.dot(way) / (time[last] - time[first]);
+  }
+  return {};
+}
+
+std::string describeSteadySpeed(const Plan& plan, const Execution& e) {
+  const std::optional<double> speed = calcSteadySpeed(plan, e);
+  return speed ? " with the time that it stands, " + formatNumber(*speed, "%.3f") + " m/s in its steady steps" : "";
+}
+
+// The summary of a result, with what happened in place of how it was solved.
+Json makeSummary(const MotionResult& result, const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
+  Json summary = bielle::makeSummary(result);
+  for (const char* of_solving :
+       {"formulation", "step", "goals", "converged", "interrupted", "termination", "message", "acceptable", "cost",
+        "iterations", "seconds", "solver_gap", "constraints", "free_timings", "log_columns", "log"})
+    summary.erase(of_solving);
+  summary["world"] = arguments.world;
+  summary["control"] = arguments.control;
+  summary["believed_model"] = getName(plan.belief);
+  if (plan.belief != Belief::Closed)
+    summary["plan_reachable_until"] = plan.reference.first_missed < 0 ? nullptr : Json(plan.reference.first_missed);
+  if (plan.predictive) summary["solves"] = listSolves(plan.predictive->getCounts());
+  for (const auto& [name, value] : plan.summary.options)
+    if (const double* speed = std::get_if<double>(&value); name == "speed" && speed)
+      summary["commanded_speed"] = *speed;
+  if (!plan.commands.empty()) {
+    summary["commanded_speed"] = calcMeanSpeed(plan.commands, e.duration);
+    summary["commands"] = listCommands(plan.commands);
+  }
+  summary["terrain"] = arguments.terrain;
+  summary["sensors"] = arguments.sensors;
+  if (arguments.sensors == "real") {
+    summary["noise"] = arguments.noise;
+    summary["estimator"] = listEstimation(e.estimation);
+  }
+  summary["robot_errors"] = {{"mass", arguments.errors.mass}, {"rod_m", arguments.errors.rod}};
+  summary["delay"] = {{"mean_ms", arguments.delay}, {"jitter_ms", arguments.jitter}};
+  summary["seed"] = arguments.seed;
+  summary["pushes"] = listPushes(arguments.execution.pushes);
+  summary["gain_iterations"] = plan.iterations;
+  summary["outcome"] = getName(e.outcome);
+  summary["outcome_message"] = e.message;
+  summary["fell"] = e.outcome == Outcome::Fell;
+  summary["fall_time"] = e.outcome == Outcome::Fell ? Json(e.duration) : nullptr;
+  summary["duration"] = e.duration;
+  summary["distance"] = e.distance;
+  summary["mean_speed"] = e.getMeanSpeed();
+  const std::optional<double> steady = calcSteadySpeed(plan, e);
+  summary["steady_speed"] = steady ? Json(*steady) : Json();
+  summary["largest_deviation"] = e.largest_deviation;
+  summary["largest_gap"] = e.largest_gap;
+  summary["largest_joint_deviation"] = e.largest_joint_deviation;
+  summary["largest_slip"] = e.largest_slip;
+  summary["energy_balance"] = e.energy_balance;
+  summary["books"] = listBooks(e);
+  summary["saturated_share"] = e.saturated_share;
+  summary["real_time_factor"] = e.getRealTimeFactor();
+  summary["seconds"] = {{"whole", e.whole_seconds}, {"world", e.world_seconds}, {"control", e.control_seconds}};
+  if (arguments.execution.real_time) summary["largest_lag_ms"] = 1e3 * e.largest_lag;
+  return summary;
+}
+
+// Files that cannot be written leave those of before, which still say that the motion is running. The word is changed where it
+// is, which a full disk permits.
+void markAsFailed(const std::filesystem::path& directory) {
+  const std::string failed = "\"failed\" ";
+  for (const char* name : {"summary.json", "report.html"}) {
+    std::fstream file(directory / name, std::ios::binary | std::ios::in | std::ios::out);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    for (const std::string running : {"\"outcome\": \"running\"", "\"outcome\":\"running\""}) {
+      const size_t at = text.find(running);
+      if (at == std::string::npos) continue;
+      file.clear();
+      file.seekp(static_cast<std::streamoff>(at + running.size() - failed.size()));
+      file << failed << std::flush;
+    }
+  }
+}
+
+std::vector<std::string> writeFiles(const SimulateArguments& arguments, const Plan& plan, const MotionResult& result,
+                                    const Json& summary) {
+  const std::filesystem::path output = arguments.output;
+  if (arguments.summary_only) {
+    writeSummary(arguments.output, summary);
+    return {(output / "summary.json").string()};
+  }
+  std::vector<std::string> paths = writeResult(arguments.output, result.record, summary);
+  paths.push_back((output / "plan.npz").string());
+  writeNpz(paths.back(), makePlannedRecord(plan.robot.model, plan.getReference(), result.record));
+  if (!arguments.no_report) {
+    paths.push_back((output / "report.html").string());
+    writeReport(paths.back(), {arguments.output});
+  }
+  return paths;
+}
+
+}  // namespace
+
+void print(const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
+  std::cout << plan.summary.motion << " of " << plan.summary.robot << " in world " << arguments.world << ", control "
+            << arguments.control;
+  if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
+  std::cout << ": it " << getName(e.outcome);
+  if (!e.message.empty()) std::cout << " (" << e.message << ")";
+  char text[1000];
+  std::snprintf(text, sizeof text,
+                "\n"
+                "  duration            %.3f s\n"
+                "  distance            %.3f m, %.3f m/s%s\n"
+                "  trunk deviation     %.4f m at most\n"
+                "  closures            gap %.1e m at most\n"
+                "  soles               slip %.1e m at most\n"
+                "  energy balance      %.1e J, %.1e of the energy exchanged\n"
+                "  torques             %.2f %% saturated\n"
+                "  computing time      %.2f s, %.2g times real time; world %.2f s, control %.2f s\n",
+                e.duration, e.distance, e.getMeanSpeed(), describeSteadySpeed(plan, e).c_str(), e.largest_deviation,
+                e.largest_gap, e.largest_slip, e.imbalance, e.energy_balance, 100 * e.saturated_share, e.whole_seconds,
+                e.getRealTimeFactor(), e.world_seconds, e.control_seconds);
+  std::cout << text;
+  for (const Push& push : arguments.execution.pushes)
+    std::cout << "  push                " << formatNumber(push.impulse) << " N s at " << formatNumber(push.time)
+              << " s, for " << formatNumber(push.duration) << " s, direction " << formatNumber(push.direction)
+              << " degrees\n";
+  if (plan.reference.first_missed >= 0)
+    std::cout << "  the linkages cannot follow the plan from " << plan.reference.first_missed
+              << " s on: " << plan.reference.message << "\n";
+  if (plan.predictive) {
+    const PredictiveCounts& c = plan.predictive->getCounts();
+    std::snprintf(text, sizeof text,
+                  "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
+                  "                      %d stages began without a new policy%s\n",
+                  c.solves, c.failed, 1e3 * c.calcQuantile(0.5), 1e3 * c.calcQuantile(0.99), 1e3 * c.calcQuantile(1),
+                  c.missed, arguments.execution.real_time ? "" : " (if run in real time)");
+    std::cout << text;
+  }
+  if (arguments.sensors != "real") return;
+  const EstimationErrors& s = e.estimation;
+  std::snprintf(text, sizeof text,
+                "  estimated trunk     rms error %.4f m, %.4f m/s, tilt %.4f rad\n"
+                "  drift               %.4f m of %.3f m\n"
+                "  contacts            wrong for %.2f %% of the time\n",
+                s.position_rms, s.velocity_rms, s.tilt_rms, s.drift, s.way, 100 * s.contact_errors);
+  std::cout << text;
+}
+
+std::vector<std::string> write(const SimulateArguments& arguments, const Plan& plan, const Ground& ground,
+                               const Execution& execution, const std::vector<std::string>& command) {
+  try {
+    const MotionResult result = makeResult(arguments, plan, ground, execution, command);
+    return writeFiles(arguments, plan, result, makeSummary(result, arguments, plan, execution));
+  } catch (...) {
+    markAsFailed(arguments.output);
+    throw;
+  }
+}
+
+}  // namespace bielle::simulation

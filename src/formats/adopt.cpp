@@ -1,0 +1,315 @@
+#include "formats/adopt.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/formats/robot_writer.h"
+#include "bielle/model/builder.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+using YAML::BeginMap, YAML::BeginSeq, YAML::EndMap, YAML::EndSeq, YAML::Flow, YAML::Key, YAML::Value;
+
+constexpr double kUpright = 0.9;                      // least cosine between the z axis of a sole and up
+constexpr double kMirror = 0.06, kSameHeight = 0.02;  // of a pair of feet, m: published models are not quite symmetric
+constexpr double kHighest = 0.94, kLowest = 0.5, kStep = 0.04;  // shares of the height of the base
+constexpr double kOver = 0.005;                                 // from the centre of mass to the middle of the feet, m
+constexpr int kShifts = 20;
+constexpr double kRotor = 1e-3, kLever = 0.02, kSole = 0.1;
+
+struct Foot {
+  int frame = 0;
+  SE3 X_WF;
+  bool is_named = false;
+};
+
+std::string format(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", std::abs(value) < 1e-9 ? 0.0 : value);
+  return text;
+}
+
+bool isNamedFoot(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name.find("foot") != std::string::npos || name.find("sole") != std::string::npos;
+}
+
+double round(double length) { return std::round(length * 1e4) / 1e4; }
+
+class Adopter {
+ public:
+  Adopter(const LoadedRobot& robot, const std::string& path) : model_(robot.model), path_(path), ws_(robot.model) {
+    if (!model_.hasFreeFlyer())
+      fail("it has a fixed base",
+           "only robots that stand on feet can be adopted; complete others by hand, with a YAML file that has the key "
+           "`model`, motors and a reference");
+    const AssemblyResult closed = findClosedConfiguration(model_);
+    if (closed.status != AssemblyStatus::Closed) fail("its loops do not close: " + closed.message, "correct the robot");
+    updatePositions(model_, ws_, closed.q);
+  }
+
+  Adoption write() {
+    findFeet();
+    out_ << YAML::Comment("A first guess by `bielle adopt`: correct each entry, then delete the comment above it.")
+         << BeginMap << Key << "model" << Value << path_;
+    writeMotors();
+    writeContacts();
+    writePosture();
+    writeSerialJoints();
+    out_ << EndMap;
+    return {out_.c_str() + std::string("\n"), guesses_};
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
+    throw ModelError(path_, "robot '" + model_.name() + "'", problem, remedy);
+  }
+
+  // A guess as a comment, before what it explains.
+  void guess(const std::string& text) {
+    guesses_.push_back(text);
+    out_ << YAML::Newline << YAML::Newline << YAML::Comment(text);
+  }
+
+  void findFeet() {
+    std::vector<Foot> candidates;
+    for (size_t i = 0; i < model_.frames().size(); ++i) {
+      const Frame& frame = model_.frames()[i];
+      const SE3 X = getPlacement(ws_, frame.body, frame.X_BF);
+      if (frame.body > 1 && X.R(2, 2) > kUpright)
+        candidates.push_back({static_cast<int>(i), X, isNamedFoot(frame.name)});
+    }
+    if (candidates.empty())
+      fail("no frame on a leg has its z axis up in the closed neutral configuration",
+           "add a link without mass under each foot, z up and x forward");
+    std::sort(candidates.begin(), candidates.end(), [](const Foot& a, const Foot& b) {
+      return std::make_tuple(!a.is_named, a.X_WF.p.z()) < std::make_tuple(!b.is_named, b.X_WF.p.z());
+    });
+    feet_ = {candidates.front()};
+    double nearest = kMirror;
+    const Foot& first = candidates.front();
+    const Vector3d image(first.X_WF.p.x(), -first.X_WF.p.y(), first.X_WF.p.z());
+    for (const Foot& other : candidates) {
+      const Vector3d apart = other.X_WF.p - image;
+      if (model_.frames()[other.frame].body == model_.frames()[first.frame].body || other.is_named != first.is_named ||
+          std::abs(apart.z()) > kSameHeight || std::abs(first.X_WF.p.y()) < kSameHeight || apart.norm() >= nearest)
+        continue;
+      nearest = apart.norm();
+      feet_.resize(1);
+      feet_.push_back(other);
+    }
+    // Left is where y is positive.
+    if (feet_.size() == 2 && feet_[0].X_WF.p.y() < 0) std::swap(feet_[0], feet_[1]);
+  }
+
+  std::string getContactName(size_t i) const {
+    return feet_.size() == 1 ? "foot" : i == 0 ? "foot_left" : "foot_right";
+  }
+
+  void writeMotors() {
+    if (model_.motors().empty())
+      return guess("Motors: none are given, and none are guessed. Name joints under `motors`.");
+    const double least = model_.mass() * 9.81 * kLever;
+    bool unlimited = false, guessed = false;
+    for (const Motor& motor : model_.motors()) {
+      unlimited |= motor.effort_limit < least;
+      guessed |= motor.armature == 0;
+    }
+    guess("Motors: those of the robot." +
+          std::string(
+              guessed
+                  ? " Rotors of 1e-3 kg m^2 where none are given, so that light linkages do not accelerate too fast."
+                  : "") +
+          (unlimited ? " Limits below " + format(least) +
+                           " N m, which could not hold the weight on 20 mm, are taken for "
+                           "placeholders."
+                     : ""));
+    out_ << Key << "motors" << Value << BeginMap;
+    for (const Motor& motor : model_.motors()) {
+      const bool is_weak = motor.effort_limit < least;
+      const auto limit = [&](double value) { return is_weak || std::isinf(value) ? ".inf" : format(value); };
+      out_ << Key << motor.name << Value << Flow << BeginMap;
+      out_ << Key << "armature" << Value << format(motor.armature > 0 ? motor.armature : kRotor);
+      out_ << Key << "effort" << Value << limit(motor.effort_limit);
+      out_ << Key << "velocity" << Value << limit(motor.velocity_limit);
+      for (const auto& [key, value] : getMotorData(motor)) out_ << Key << key << Value << value;
+      out_ << EndMap;
+    }
+    out_ << EndMap;
+  }
+
+  // Length and width of the shapes of a foot along x and y of its frame; empty without shapes.
+  std::vector<double> measureSole(const Foot& foot) const {
+    const Frame& frame = model_.frames()[foot.frame];
+    Eigen::Vector2d half = Eigen::Vector2d::Zero();
+    for (const Shape& shape : model_.shapes()) {
+      if (shape.body != frame.body) continue;
+      const SE3 X = frame.X_BF.inverse() * shape.X_BS;
+      for (int corner = 0; corner < 8; ++corner) {
+        const Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+        const Vector3d place = X.act(sign.cwiseProduct(shape.half)).cwiseAbs();
+        half = half.cwiseMax(place.head<2>() + Eigen::Vector2d::Constant(shape.radius));
+      }
+    }
+    if (half.isZero()) return {};
+    return {2 * half.x(), 2 * half.y()};
+  }
+
+  void writeContacts() {
+    bool is_measured = true;
+    ModelParts parts = takeParts(model_);
+    parts.contacts.clear();
+    parts.references.clear();
+    for (size_t i = 0; i < feet_.size(); ++i) {
+      const Frame& frame = model_.frames()[feet_[i].frame];
+      std::vector<double> sole = measureSole(feet_[i]);
+      is_measured &= !sole.empty();
+      if (sole.empty()) sole = {kSole, kSole};
+      parts.contacts.push_back(
+          {getContactName(i), frame.body, frame.X_BF, ContactKind::Surface6D, sole[0] / 2, sole[1] / 2});
+    }
+    guess("Feet: the lowest frames with z up" +
+          std::string(feet_[0].is_named ? " that are named like feet" : ", although not named like feet") +
+          (feet_.size() == 2 ? ", mirror images of each other; left is where y is positive."
+                             : ": only one, without a mirror image."));
+    guesses_.push_back(is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
+                                   : "Soles: 0.1 m square, because the feet have no readable shapes.");
+    with_feet_ = ModelBuilder::restore(std::move(parts));
+    out_ << YAML::Newline << YAML::Comment(guesses_.back()) << Key << "contacts" << Value << BeginMap;
+    for (size_t i = 0; i < feet_.size(); ++i) {
+      const ContactFrame& contact = with_feet_->contacts()[i];
+      out_ << Key << contact.name << Value << Flow << BeginMap;
+      out_ << Key << "frame" << Value << model_.frames()[feet_[i].frame].name << Key << "type" << Value << "6d";
+      out_ << Key << "sole" << Value << BeginSeq << format(2 * contact.half_length) << format(2 * contact.half_width)
+           << EndSeq << EndMap;
+    }
+    out_ << EndMap;
+  }
+
+  // The posture at this share of the height of the base over the feet.
+  Reference makePosture(double share) const {
+    const SE3& base = ws_.X_WB[1];
+    Vector3d middle = Vector3d::Zero();
+    for (const Foot& foot : feet_) middle += foot.X_WF.p / static_cast<double>(feet_.size());
+    Reference reference;
+    reference.name = "half_sitting";
+    reference.height_frame = model_.bodies()[1].name;
+    double apart = 0;  // from the middle
+    for (size_t i = 0; i < feet_.size() && feet_.size() == 2; ++i)
+      apart = std::max({apart, std::abs(feet_[i].X_WF.p.y() - middle.y()), 2 * with_feet_->contacts()[i].half_width});
+    reference.height = round(share * (base.p.z() - middle.z()));
+    for (size_t i = 0; i < feet_.size(); ++i)
+      reference.feet[getContactName(i)] = {0, (i == 0 ? 1 : -1) * round(apart), 0};
+    reference.joints[model_.joints()[1].name] = {round(base.p.x() - middle.x()), 0, reference.height, 0, 0, 0, 1};
+    return reference;
+  }
+
+  // Legs bend within the ranges of their joints, if these say which way.
+  void preferRanges(Reference& reference) const {
+    for (const Joint& joint : model_.joints())
+      if (joint.nv == 1 && std::isfinite(model_.upperLimits()[joint.idx_v] - model_.lowerLimits()[joint.idx_v]))
+        reference.joints[joint.name] = {(model_.lowerLimits()[joint.idx_v] + model_.upperLimits()[joint.idx_v]) / 2};
+  }
+
+  // Whether it closes within the ranges of the joints; moves the base so that the centre of mass is over the feet. The base weighs
+  // more than other joints that are given; if there are any, all get the values that they have there.
+  bool stand(Reference& reference) const {
+    constexpr double kJointWeight = 0.01;
+    Workspace ws(*with_feet_);
+    std::vector<double>& base = reference.joints.at(model_.joints()[1].name);
+    double off = 0;
+    for (int i = 0; i < kShifts; ++i) {
+      AssemblyProblem problem = makeReferenceProblem(*with_feet_, reference);
+      problem.weights.tail(model_.nv() - 6) = problem.weights.tail(model_.nv() - 6).cwiseMin(kJointWeight);
+      const AssemblyResult result = assemble(*with_feet_, problem);
+      if (result.status != AssemblyStatus::Closed) return false;
+      for (const Joint& joint : model_.joints())
+        if (joint.nv == 1 && (result.q[joint.idx_q] < model_.lowerLimits()[joint.idx_v] ||
+                              result.q[joint.idx_q] > model_.upperLimits()[joint.idx_v]))
+          return false;
+      updatePositions(*with_feet_, ws, result.q);
+      off = calcCom(*with_feet_, ws).x();
+      if (std::abs(off) < kOver) {
+        for (auto& [name, values] : reference.joints) {
+          const Joint& joint = model_.joints()[model_.findJoint(name)];
+          for (int k = 0; k < joint.nq && reference.joints.size() > 1; ++k)
+            values[k] = round(result.q[joint.idx_q + k]);
+        }
+        return true;
+      }
+      base[0] = round(base[0] - off);
+    }
+    return false;
+  }
+
+  void writePosture() {
+    for (bool within_ranges : {false, true})
+      for (double share = kHighest; share > kLowest; share -= kStep) {
+        Reference r = makePosture(share);
+        if (within_ranges) preferRanges(r);
+        if (stand(r)) return writePosture(r, share);
+      }
+    guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
+  }
+
+  void writePosture(const Reference& r, double share) {
+    guess(
+        "Posture: feet flat below the centre of mass, as far apart as in the neutral configuration but at least two "
+        "soles;");
+    const std::string more =
+        "the base at " + format(100 * share) +
+        " % of its height there. Its loops close; angles under `joints` determine how the legs bend.";
+    guesses_.back() += " " + more;
+    out_ << YAML::Newline << YAML::Comment(more) << Key << "references" << Value << BeginMap;
+    out_ << Key << r.name << Value << BeginMap << Key << "joints" << Value << BeginMap;
+    for (const auto& [name, values] : r.joints) {
+      out_ << Key << name << Value;
+      if (values.size() != 1) out_ << Flow << BeginSeq;
+      for (double value : values) out_ << format(value);
+      if (values.size() != 1) out_ << EndSeq;
+    }
+    out_ << EndMap << Key << "height" << Value << Flow << BeginMap << Key << "frame" << Value << r.height_frame;
+    out_ << Key << "value" << Value << format(r.height) << EndMap << Key << "feet" << Value << BeginMap;
+    for (const auto& [name, place] : r.feet)
+      out_ << Key << name << Value << Flow << BeginSeq << "0" << format(place.y()) << "0" << EndSeq;
+    out_ << EndMap << EndMap << EndMap;
+  }
+
+  void writeSerialJoints() {
+    std::vector<std::string> all;
+    for (const Foot& foot : feet_) {
+      std::vector<std::string> joints;
+      bool is_simple = true;
+      for (int i = model_.frames()[foot.frame].body; i > 1; i = model_.joints()[i].parent) {
+        is_simple &= model_.joints()[i].nv == 1;
+        joints.insert(joints.begin(), model_.joints()[i].name);
+      }
+      if (!is_simple || joints.size() != 6)
+        return guess("Serial joints: none guessed, because " + std::to_string(joints.size()) +
+                     " joints lead from the base to a foot. Name six per leg under `serial_joints`.");
+      all.insert(all.end(), joints.begin(), joints.end());
+    }
+    guess("Serial joints: all from the base to the feet.");
+    out_ << Key << "serial_joints" << Value << all;
+  }
+
+  const Model& model_;
+  const std::string path_;
+  Workspace ws_;
+  std::vector<Foot> feet_;
+  std::optional<Model> with_feet_;
+  YAML::Emitter out_;
+  std::vector<std::string> guesses_;
+};
+
+}  // namespace
+
+Adoption adoptRobot(const LoadedRobot& robot, const std::string& model) { return Adopter(robot, model).write(); }
+
+}  // namespace bielle

@@ -1,0 +1,28 @@
+#pragma once
+/// \file A first file that completes a robot of others: feet, soles, a standing posture, motors and serial joints, guessed.
+#include <string>
+#include <vector>
+
+#include "bielle/formats/reader.h"
+
+namespace bielle {
+
+struct Adoption {
+  std::string yaml;                  ///< as formats/reader.h reads it; comments explain every guess
+  std::vector<std::string> guesses;  ///< the same, one line each
+};
+
+/// Guesses from the closed configuration nearest to neutral, x forward and z up:
+/// - feet: the lowest frames whose z axis is up, those named foot or sole before others; two of them, if one is the mirror
+///   image of the other;
+/// - soles: the extent of the shapes of the foot; without shapes (meshes are not read), 0.1 m square;
+/// - the posture `half_sitting`: feet flat, as far apart as there and two soles at least, the centre of mass over their middle,
+///   the base at the greatest of 94, 90, .. 50 % of its height there that can be assembled within the ranges of the joints;
+/// - motors: those of the robot; rotors of 1e-3 kg m^2 where it has none, and no limits where they could not hold its weight
+///   on a lever of 20 mm;
+/// - serial joints: those from base to foot, if they are six of one coordinate each.
+/// \param model  value of the key `model`: the path of the robot, as the file will name it
+/// \throws ModelError when the robot has no free base, no loop that closes or no such foot
+Adoption adoptRobot(const LoadedRobot& robot, const std::string& model);
+
+}  // namespace bielle

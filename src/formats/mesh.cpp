@@ -1,0 +1,164 @@
+#include "formats/mesh.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include "math/decompositions.h"
+#include "formats/collada.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+constexpr std::uintmax_t kLargest = 100'000'000;  // bytes
+using Points = Eigen::Matrix3Xd;
+
+// Binary STL: a header of 80 bytes, the number of triangles, and for each of them 12 floats, of which the first three are
+// its normal, and two bytes.
+constexpr size_t kHeader = 84, kTriangle = 50;
+
+size_t countTriangles(const std::string& stl) {
+  std::uint32_t count = 0;
+  if (stl.size() >= kHeader) std::memcpy(&count, stl.data() + kHeader - sizeof count, sizeof count);
+  return count;
+}
+
+bool isBinaryStl(const std::string& stl) {
+  return stl.size() >= kHeader && stl.size() == kHeader + kTriangle * countTriangles(stl);
+}
+
+Points readBinaryStl(const std::string& stl) {
+  const size_t count = countTriangles(stl);
+  Points points(3, 3 * count);
+  for (size_t i = 0; i < count; ++i) {
+    float corners[9];
+    std::memcpy(corners, stl.data() + kHeader + kTriangle * i + 3 * sizeof(float), sizeof corners);
+    for (int k = 0; k < 9; ++k) points(k % 3, static_cast<Eigen::Index>(3 * i) + k / 3) = corners[k];
+  }
+  return points;
+}
+
+// The three numbers after each `keyword` that a line begins with.
+Points readVertices(const std::string& text, const std::string& keyword) {
+  std::vector<double> numbers;
+  std::istringstream lines(text);
+  for (std::string line, word; std::getline(lines, line);) {
+    std::istringstream words(line);
+    words.imbue(std::locale::classic());
+    Vector3d p;
+    if (!(words >> word) || word != keyword) continue;
+    if (!(words >> p[0] >> p[1] >> p[2])) return {};
+    numbers.insert(numbers.end(), p.begin(), p.end());
+  }
+  return Eigen::Map<const Points>(numbers.data(), 3, static_cast<Eigen::Index>(numbers.size() / 3));
+}
+
+std::string getExtension(const std::string& mesh) {
+  std::string extension = fs::path(mesh).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+Points readMesh(const std::string& mesh, const std::string& directory) {
+  const std::string extension = getExtension(mesh);
+  const fs::path place = findMesh(mesh, directory);
+  std::error_code error;
+  if ((extension != ".stl" && extension != ".obj" && extension != ".dae") || place.empty() || fs::file_size(place, error) > kLargest || error)
+    return {};
+  std::ifstream file(place, std::ios::binary);
+  const std::string content{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (extension == ".dae") return readCollada(content);
+  if (extension == ".obj") return readVertices(content, "v");
+  return isBinaryStl(content) ? readBinaryStl(content) : readVertices(content, "vertex");
+}
+
+// The box around points p along the columns of R.
+Shape fitBox(const Points& p, const Matrix3d& R) {
+  const Points local = R.transpose() * p;
+  const Vector3d low = local.rowwise().minCoeff(), high = local.rowwise().maxCoeff();
+  Shape shape;
+  shape.X_BS = {R, R * (low + high) / 2};
+  shape.half = (high - low) / 2;
+  return shape;
+}
+
+// The capsule around points p whose segment is in the middle of the box around them, along an axis of that.
+Shape fitCapsule(const Points& p, const Shape& box, int axis) {
+  Shape shape;
+  const Matrix3d& R = box.X_BS.R;
+  shape.X_BS.R << R.col((axis + 1) % 3), R.col((axis + 2) % 3), R.col(axis);
+  const Points local = shape.X_BS.R.transpose() * (p.colwise() - box.X_BS.p);
+  const Eigen::ArrayXd across = local.topRows<2>().colwise().norm();
+  shape.radius = across.maxCoeff();
+  // A point is inside if the segment reaches as far as the sphere around its end must.
+  const Eigen::ArrayXd depth = (shape.radius * shape.radius - across.square()).max(0).sqrt();
+  const Eigen::ArrayXd along = local.row(2).transpose();
+  double low = (along + depth).minCoeff(), high = (along - depth).maxCoeff();
+  if (low > high) low = high = (low + high) / 2;  // a sphere holds all
+  shape.X_BS.p = box.X_BS.p + (low + high) / 2 * shape.X_BS.R.col(2);
+  shape.half.z() = (high - low) / 2;
+  return shape;
+}
+
+double calcVolume(const Shape& shape) {
+  const double r = shape.radius;
+  return r > 0 ? EIGEN_PI * r * r * (2 * shape.half.z() + 4. / 3 * r) : 8 * shape.half.prod();
+}
+
+}  // namespace
+
+fs::path findMesh(const std::string& mesh, const std::string& directory) {
+  const std::string package = "package://", file = "file://";
+  std::vector<fs::path> places;
+  if (mesh.rfind(file, 0) == 0) {
+    places.emplace_back(mesh.substr(file.size()));
+  } else if (mesh.rfind(package, 0) != 0) {
+    places.push_back(directory / fs::path(mesh));
+  } else {
+    const std::string named = mesh.substr(package.size());
+    places.push_back(directory / fs::path(named.substr(std::min(named.size(), named.find('/') + 1))));
+    std::error_code error;
+    for (fs::path up = fs::absolute(directory, error); !up.empty(); up = up.parent_path()) {
+      places.push_back(up / named);
+      if (up == up.root_path()) break;
+    }
+    const char* variable = std::getenv("ROS_PACKAGE_PATH");
+    std::istringstream packages(variable ? variable : "");
+    for (std::string place; std::getline(packages, place, ':');) places.push_back(fs::path(place) / named);
+  }
+  for (const fs::path& place : places) {
+    std::error_code error;
+    if (fs::is_regular_file(place, error)) return place;
+  }
+  return {};
+}
+
+std::optional<Shape> fitMesh(const std::string& mesh, const std::string& directory, const Vector3d& scale) {
+  const Points points = scale.asDiagonal() * readMesh(mesh, directory);
+  if (points.cols() == 0 || !points.allFinite()) return {};
+  const Points from_mean = points.colwise() - points.rowwise().mean();
+  const Matrix3d spread = from_mean * from_mean.transpose();
+  Matrix3d principal = Eigen::SelfAdjointEigenSolver<Matrix3d>(spread).eigenvectors();
+  principal.col(2) = principal.col(0).cross(principal.col(1));
+  std::optional<Shape> best;
+  const auto consider = [&](const Shape& shape) {
+    if (!best || calcVolume(shape) < calcVolume(*best)) best = shape;
+  };
+  for (const Matrix3d& R : {Matrix3d(Matrix3d::Identity()), principal}) {
+    const Shape box = fitBox(points, R);
+    consider(box);
+    for (int axis = 0; axis < 3; ++axis) consider(fitCapsule(points, box, axis));
+  }
+  if (!best->half.allFinite() || !best->X_BS.p.allFinite() || !best->X_BS.R.allFinite()) return {};
+  return best;
+}
+
+}  // namespace bielle

@@ -1,0 +1,213 @@
+#include "formats/mjcf_element.h"
+
+#include <cmath>
+
+#include "bielle/model/error.h"
+#include "math/so3.h"
+#include "model/number_text.h"
+
+namespace bielle {
+namespace {
+
+constexpr int kListedLines = 8;
+constexpr size_t kMostAttributes = 200, kMostDefaults = 100000;  // per element; copied from class to class
+
+// Actuators of all kinds share their defaults.
+std::string getDefaultTag(const std::string& tag) {
+  static const std::set<std::string> actuators = {"general", "motor",    "position", "velocity", "intvelocity",
+                                                  "damper",  "cylinder", "muscle",   "adhesion"};
+  return actuators.count(tag) ? "general" : tag;
+}
+
+void merge(const XMLElement& element, const std::string& path, MjcfAttributes& attributes) {
+  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next())
+    attributes[a->Name()] = {a->Value(), element.GetLineNum()};
+  if (attributes.size() > kMostAttributes)
+    throw ModelError(path, describe(element), "it has more than " + std::to_string(kMostAttributes) + " attributes",
+                     "remove the unused ones");
+}
+
+std::string formatLines(const std::set<int>& lines) {
+  std::string list;
+  int count = 0;
+  for (int line : lines) {
+    if (count == kListedLines) {
+      list += " and " + std::to_string(lines.size() - kListedLines) + " more";
+      break;
+    }
+    list += (count++ ? ", " : "") + std::to_string(line);
+  }
+  return (lines.size() > 1 ? " (lines " : " (line ") + list + ")";
+}
+
+}  // namespace
+
+void MjcfNotes::add(const std::string& element, int line, const std::string& problem) {
+  const std::pair key(element, problem);
+  if (!lines_.count(key)) order_.push_back(key);
+  lines_[key].insert(line);
+}
+
+void MjcfNotes::addAttribute(const std::string& element, int line, const std::string& attribute) {
+  attributes_[element].first.insert(attribute);
+  attributes_[element].second.insert(line);
+}
+
+std::vector<std::string> MjcfNotes::format(const std::string& path) const {
+  std::vector<std::string> out;
+  for (const auto& key : order_)
+    out.push_back(path + ": " + key.first + formatLines(lines_.at(key)) + ": " + key.second);
+  for (const auto& [element, found] : attributes_) {
+    std::string names;
+    for (const std::string& name : found.first) names += (names.empty() ? "'" : ", '") + name + "'";
+    out.push_back(path + ": " + element + formatLines(found.second) + ": left out: " + names);
+  }
+  return out;
+}
+
+void readMjcfDefaults(const XMLElement& element, const std::string& parent, MjcfSettings& settings) {
+  const char* text = element.Attribute("class");
+  const std::string name = text ? text : parent.empty() ? "main" : "";
+  if (name.empty()) throw ModelError(settings.path, describe(element), "it has no class", "name it");
+  if (!settings.defaults.count(name))
+    settings.defaults[name] = parent.empty() ? std::map<std::string, MjcfAttributes>() : settings.defaults.at(parent);
+  auto& defaults = settings.defaults[name];
+  for (const auto& [tag, attributes] : defaults) settings.num_defaults += 1 + attributes.size();
+  if (settings.num_defaults > kMostDefaults)
+    throw ModelError(settings.path, describe(element), "there are more defaults than any robot needs",
+                     "remove classes");
+  for (const XMLElement* e : getChildren(element))
+    if (getTag(*e) != "default") merge(*e, settings.path, defaults[getDefaultTag(getTag(*e))]);
+  for (const XMLElement* e : getChildren(element, "default")) readMjcfDefaults(*e, name, settings);
+}
+
+MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings)
+    : MjcfElement(element, childclass, settings, getDefaultTag(getTag(element))) {}
+
+MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings,
+                         const std::string& kind)
+    : settings_(settings), tag_(getTag(element)), line_(element.GetLineNum()) {
+  if (const char* name = element.Attribute("name")) name_ = name;
+  const char* text = element.Attribute("class");
+  const std::string own = text ? text : childclass.empty() ? "main" : childclass;
+  const auto defaults = settings.defaults.find(own);
+  if (defaults == settings.defaults.end()) {
+    if (own != "main") fail("there is no default class '" + own + "'", "correct the name");
+  } else if (const auto it = defaults->second.find(kind); it != defaults->second.end()) {
+    attributes_ = it->second;
+  }
+  merge(element, settings.path, attributes_);
+  asked_ = {"name", "class", "user", "group"};  // they say nothing of the mechanism
+}
+
+MjcfElement::~MjcfElement() {
+  for (const auto& [name, attribute] : attributes_)
+    if (!asked_.count(name)) settings_.notes.addAttribute("<" + tag_ + ">", attribute.line, name);
+}
+
+std::string MjcfElement::describe() const {
+  return tag_ + (name_.empty() ? "" : " '" + name_ + "'") + " (line " + std::to_string(line_) + ")";
+}
+
+void MjcfElement::fail(const std::string& problem, const std::string& remedy) const {
+  throw ModelError(settings_.path, describe(), problem, remedy);
+}
+
+void MjcfElement::note(const std::string& problem) const { settings_.notes.add("<" + tag_ + ">", line_, problem); }
+
+void MjcfElement::leaveOut(const std::string& problem) {
+  note(problem);
+  for (const auto& [name, attribute] : attributes_) asked_.insert(name);
+}
+
+const std::string* MjcfElement::find(const std::string& attribute) {
+  asked_.insert(attribute);
+  const auto it = attributes_.find(attribute);
+  return it == attributes_.end() ? nullptr : &it->second.value;
+}
+
+std::string MjcfElement::getText(const std::string& attribute, const std::string& otherwise) {
+  const std::string* text = find(attribute);
+  return text ? *text : otherwise;
+}
+
+bool MjcfElement::getFlag(const std::string& attribute, bool otherwise) {
+  const std::string* text = find(attribute);
+  if (!text) return otherwise;
+  if (*text != "true" && *text != "false")
+    fail("its attribute '" + attribute + "' is '" + *text + "'", "use true or false");
+  return *text == "true";
+}
+
+double MjcfElement::getNumber(const std::string& attribute, double otherwise) {
+  const std::vector<double> numbers = getNumbers(attribute, 1, 1);
+  return numbers.empty() ? otherwise : numbers[0];
+}
+
+std::vector<double> MjcfElement::getNumbers(const std::string& attribute, size_t least, size_t most) {
+  std::vector<double> numbers;
+  const std::string* text = find(attribute);
+  if (!text) return numbers;
+  if (!parseNumbers(*text, numbers) || numbers.size() < least || numbers.size() > most)
+    fail("its attribute '" + attribute + "' is not made of " + std::to_string(least) +
+             (most > least ? " to " + std::to_string(most) : "") + " finite number(s): " + *text,
+         "correct it");
+  return numbers;
+}
+
+Vector3d MjcfElement::getVector(const std::string& attribute, const Vector3d& otherwise) {
+  const std::vector<double> v = getNumbers(attribute, 3, 3);
+  return v.empty() ? otherwise : Vector3d(v[0], v[1], v[2]);
+}
+
+Matrix3d MjcfElement::getRotation() {
+  const std::vector<double> quat = getNumbers("quat", 4, 4), turn = getNumbers("axisangle", 4, 4),
+                            axes = getNumbers("xyaxes", 6, 6), z = getNumbers("zaxis", 3, 3),
+                            euler = getNumbers("euler", 3, 3);
+  if (!quat.empty() + !turn.empty() + !axes.empty() + !z.empty() + !euler.empty() > 1)
+    fail("it has several orientations", "keep one of quat, axisangle, xyaxes, zaxis and euler");
+  const auto normalize = [this](const Vector3d& v) -> Vector3d {
+    const double norm = v.stableNorm();
+    if (!(norm > 1e-12) || !std::isfinite(norm)) fail("its orientation has an axis without a direction", "correct it");
+    return v / norm;
+  };
+  if (!quat.empty()) {
+    const Eigen::Vector4d q(quat[1], quat[2], quat[3], quat[0]);
+    const double norm = q.stableNorm();
+    if (!(norm > 1e-12) || !std::isfinite(norm)) fail("its quat has zero length", "give a unit quaternion w x y z");
+    return Eigen::Quaterniond(q / norm).toRotationMatrix();
+  }
+  if (!turn.empty()) return makeAxisRotation(normalize({turn[0], turn[1], turn[2]}), getAngle(turn[3]));
+  if (!z.empty())
+    return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normalize({z[0], z[1], z[2]})).toRotationMatrix();
+  Matrix3d R = Matrix3d::Identity();
+  if (!axes.empty()) {
+    R.col(0) = normalize({axes[0], axes[1], axes[2]});
+    const Vector3d y = normalize({axes[3], axes[4], axes[5]});
+    R.col(1) = normalize(y - R.col(0) * R.col(0).dot(y));
+    R.col(2) = R.col(0).cross(R.col(1));
+  }
+  for (size_t i = 0; i < euler.size(); ++i) {
+    const bool turns_with_body = std::islower(static_cast<unsigned char>(settings_.euler[i]));
+    const Vector3d axis = Vector3d::Unit(std::tolower(settings_.euler[i]) - 'x');
+    const Matrix3d step = makeAxisRotation(axis, getAngle(euler[i]));
+    R = turns_with_body ? R * step : step * R;
+  }
+  return R;
+}
+
+SE3 MjcfElement::getPose() { return {getRotation(), getVector("pos", Vector3d::Zero())}; }
+
+bool MjcfElement::isLimited(const std::string& limited, const std::string& range) {
+  const std::string said = getText(limited, "auto");
+  const bool has_range = find(range) != nullptr;
+  if (said == "auto") {
+    if (has_range && !settings_.auto_limits) note("its " + range + " is left out: " + limited + " is not set");
+    return has_range && settings_.auto_limits;
+  }
+  if (said != "true" && said != "false") fail("its '" + limited + "' is '" + said + "'", "use true, false or auto");
+  if (said == "true" && !has_range) fail("it is limited but has no " + range, "give one");
+  return said == "true";
+}
+
+}  // namespace bielle

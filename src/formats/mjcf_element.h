@@ -1,0 +1,95 @@
+#pragma once
+/// \file Access to the elements of a file of MuJoCo (MJCF): attributes with the defaults of their classes, numbers, and
+/// notes of all that nobody asked for.
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bielle/math/se3.h"
+#include "formats/xml_document.h"
+
+namespace bielle {
+
+struct MjcfAttribute {
+  std::string value;
+  int line = 0;
+};
+using MjcfAttributes = std::map<std::string, MjcfAttribute>;
+
+/// What the reader leaves out, one warning per kind with all its lines.
+class MjcfNotes {
+ public:
+  void add(const std::string& element, int line, const std::string& problem);
+  void addAttribute(const std::string& element, int line, const std::string& attribute);
+  /// "path: element (lines ...): problem", in the order in which they were first added.
+  std::vector<std::string> format(const std::string& path) const;
+
+ private:
+  std::vector<std::pair<std::string, std::string>> order_;
+  std::map<std::pair<std::string, std::string>, std::set<int>> lines_;
+  std::map<std::string, std::pair<std::set<std::string>, std::set<int>>> attributes_;  // and their lines, by element
+};
+
+/// What holds for the whole file.
+struct MjcfSettings {
+  std::string path;
+  double angle = EIGEN_PI / 180;  ///< unit of angles, rad
+  std::string euler = "xyz";
+  bool auto_limits = true;                                                ///< as today
+  std::map<std::string, std::map<std::string, MjcfAttributes>> defaults;  ///< by class and tag
+  size_t num_defaults = 0;
+  MjcfNotes notes;
+};
+
+/// Reads <default>, which nest.
+void readMjcfDefaults(const XMLElement& element, const std::string& parent, MjcfSettings& settings);
+
+/// An element with the defaults of its class. Attributes that were not asked for until the end are noted.
+class MjcfElement {
+ public:
+  /// \param childclass  class of elements that name none
+  MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings);
+  /// \param kind  whose defaults hold for it, in place of its tag
+  MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings,
+              const std::string& kind);
+  ~MjcfElement();
+  MjcfElement(const MjcfElement&) = delete;
+  MjcfElement& operator=(const MjcfElement&) = delete;
+
+  [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const;
+  void note(const std::string& problem) const;
+  /// The same of an element that is not read: its attributes are not noted.
+  void leaveOut(const std::string& problem = "left out");
+  /// "joint 'knee' (line 3)"
+  std::string describe() const;
+  const std::string& tag() const { return tag_; }
+  int line() const { return line_; }
+
+  /// Null without it.
+  const std::string* find(const std::string& attribute);
+  std::string getText(const std::string& attribute, const std::string& otherwise = "");
+  bool getFlag(const std::string& attribute, bool otherwise);
+  double getNumber(const std::string& attribute, double otherwise);
+  /// Empty without it; `least` to `most` finite numbers.
+  std::vector<double> getNumbers(const std::string& attribute, size_t least, size_t most);
+  Vector3d getVector(const std::string& attribute, const Vector3d& otherwise);
+  /// By quat, axisangle, xyaxes, zaxis or euler.
+  Matrix3d getRotation();
+  /// pos, and getRotation().
+  SE3 getPose();
+  /// Whether limits hold; `limited` may be true, false or auto.
+  bool isLimited(const std::string& limited, const std::string& range);
+
+ private:
+  double getAngle(double value) const { return value * settings_.angle; }
+
+  MjcfSettings& settings_;
+  std::string tag_, name_;
+  int line_;
+  MjcfAttributes attributes_;
+  std::set<std::string> asked_;
+};
+
+}  // namespace bielle

@@ -1,0 +1,313 @@
+// Combines the two files of a robot, or the contents of one of MuJoCo.
+#include "bielle/formats/reader.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "bielle/model/builder.h"
+#include "bielle/model/error.h"
+#include "formats/robot_files.h"
+
+namespace bielle {
+namespace {
+
+template <typename Joints>
+auto findJoint(Joints& joints, const std::string& name) {
+  return std::find_if(joints.begin(), joints.end(), [&name](const UrdfJoint& j) { return j.joint.name == name; });
+}
+
+// Joint kinds that the YAML file assigns to joints of the URDF.
+void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
+  for (const auto& [name, type] : yaml.joint_types) {
+    const auto it = findJoint(urdf.joints, name);
+    if (it == urdf.joints.end()) {
+      urdf.warnings.push_back(yaml.path + ": key 'joint_name': joint '" + name +
+                              "' is not in the URDF and is skipped; correct its name or remove it");
+      continue;
+    }
+    // The limits and the friction of the file belong to its own coordinate.
+    if (getNv(type.kind) != getNv(it->joint.kind)) {
+      it->lower = it->upper = VectorXd();
+      it->effort = it->velocity = std::nullopt;
+      if (it->damping != 0 || it->friction != 0)
+        urdf.warnings.push_back(urdf.path + ": joint '" + name +
+                                "': its <dynamics> is left out, since the YAML file makes it " + getName(type.kind));
+      it->damping = it->friction = 0;
+    }
+    it->joint.kind = type.kind;
+    if (type.kind != JointKind::Universal) continue;
+    it->joint.axis = type.axis;
+    it->joint.axis2 = type.axis2;
+  }
+}
+
+// Two revolute joints, with a cross in between, for every universal one.
+void splitUniversalJoints(double cross_inertia, UrdfFile& urdf) {
+  constexpr double kMass = 1e-9;  // kg: nothing without mass has inertia
+  const auto getSuffix = [](const Vector3d& axis) {
+    Eigen::Index largest = 0;
+    axis.cwiseAbs().maxCoeff(&largest);
+    return std::string("_") + "XYZ"[largest];
+  };
+  std::vector<UrdfJoint> joints;
+  for (const UrdfJoint& j : urdf.joints) {
+    joints.push_back(j);
+    if (j.joint.kind != JointKind::Universal) continue;
+    UrdfJoint &first = joints.back(), second = j;
+    first.child = second.parent = j.joint.name + "_cross";
+    first.joint.kind = second.joint.kind = JointKind::Revolute;
+    first.joint.name += getSuffix(j.joint.axis);
+    second.joint.name += getSuffix(j.joint.axis2);
+    second.joint.axis = j.joint.axis2;
+    second.joint.X_PJ = SE3();
+    urdf.links[first.child] = {first.child, {kMass, Vector3d::Zero(), cross_inertia * Matrix3d::Identity()}, {}, {}};
+    joints.push_back(second);
+  }
+  urdf.joints = std::move(joints);
+}
+
+void setImportance(const YamlFile& yaml, UrdfFile& urdf) {
+  for (const auto& [name, values] : yaml.importance) {
+    const auto it = findJoint(urdf.joints, name);
+    if (it == urdf.joints.end() || it->joint.kind == JointKind::Fixed)
+      throw ModelError(yaml.path, "importance of '" + name + "'", "there is no moving joint of this name",
+                       "name a joint of the robot that is not fixed");
+    it->joint.position_importance = values[0];
+    it->joint.velocity_importance = values[1];
+  }
+}
+
+// Keys of the file that completes a robot take precedence over what the robot's own files say.
+void complete(const YamlFile& own, YamlFile& yaml) {
+  const auto replace = [](const auto& from, auto& to) {
+    if (!from.empty()) to = from;
+  };
+  yaml.path = own.path;
+  replace(own.joint_types, yaml.joint_types);
+  replace(own.closures, yaml.closures);
+  replace(own.motors, yaml.motors);
+  for (const MotorSpec& motor : own.motors)
+    if (motor.armature) yaml.armature.erase(motor.joint);
+  replace(own.armature, yaml.armature);
+  for (const JointForceSpec& spec : own.joint_forces) {  // by joint
+    const auto is_same = [&spec](const JointForceSpec& other) { return other.joint == spec.joint; };
+    yaml.joint_forces.erase(std::remove_if(yaml.joint_forces.begin(), yaml.joint_forces.end(), is_same),
+                            yaml.joint_forces.end());
+    yaml.joint_forces.push_back(spec);
+  }
+  replace(own.point_springs, yaml.point_springs);
+  replace(own.contacts, yaml.contacts);
+  replace(own.references, yaml.references);
+  replace(own.serial_joints, yaml.serial_joints);
+  replace(own.importance, yaml.importance);
+  if (own.cross_inertia) yaml.cross_inertia = own.cross_inertia;
+  if (own.base) yaml.base = own.base;
+  if (own.motor_armature) yaml.motor_armature = own.motor_armature;
+  if (own.gravity) yaml.gravity = own.gravity;
+  yaml.warnings.insert(yaml.warnings.end(), own.warnings.begin(), own.warnings.end());
+}
+
+RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
+  if (path.extension() == ".xml") {
+    MjcfFile file = readMjcf(path.string());
+    return {std::move(file.tree), std::move(file.settings)};
+  }
+  RobotFiles files;
+  files.urdf = parseUrdf(readRobotText(path.string()), path.string(), files.yaml);
+  std::filesystem::path settings = path;
+  settings.replace_extension(".yaml");
+  if (!std::filesystem::exists(settings)) return files;
+  const YamlFile own = readYaml(settings.string());
+  if (!own.models.empty() || own.generator)
+    throw ModelError(own.path, own.generator ? "key 'generator'" : "key 'model'",
+                     "there is a URDF beside this file, " + path.string(),
+                     "remove the key, or move the file to another directory");
+  complete(own, files.yaml);
+  return files;
+}
+
+using Generate = std::function<RobotFiles(const YamlFile&)>;
+
+RobotFiles readRobotFiles(const std::filesystem::path& path, const Generate& generate);
+
+RobotFiles readCompleted(const YamlFile& own, const Generate& generate) {
+  const std::string model = findModel(own);
+  if (model.empty()) {
+    std::string models;
+    for (const std::string& name : own.models) models += (models.empty() ? "" : ", ") + name;
+    throw ModelError(own.path, "key 'model'",
+                     models.empty() ? "it is missing, as is `generator`, and there is no URDF beside this file"
+                                    : "the robot that this file completes was not found: " + models,
+                     "put its directory into one of those in BIELLE_ROBOTS, or correct the key");
+  }
+  return readRobotFiles(model, generate);
+}
+
+RobotFiles readRobotFiles(const std::filesystem::path& path, const Generate& generate) {
+  if (path.extension() != ".yaml") return readUrdfAndYaml(path);
+  const YamlFile own = readYaml(path.string());
+  RobotFiles files = own.generator ? generate(own) : readCompleted(own, generate);
+  complete(own, files.yaml);
+  return files;
+}
+
+// Free bodies of a file that has its own base, fixed to the ground.
+void fixBase(UrdfFile& tree, YamlFile& yaml) {
+  for (UrdfJoint& j : tree.joints) {
+    if (j.joint.kind != JointKind::FreeFlyer || j.parent != tree.root) continue;
+    j.joint.kind = JointKind::Fixed;
+    yaml.armature.erase(j.joint.name);
+    for (Reference& reference : yaml.references) reference.joints.erase(j.joint.name);
+  }
+}
+
+// The root link: carried by a free-flyer, or part of the ground. A root named "world" is the ground itself.
+void addRoot(const UrdfFile& urdf, BaseKind base, ModelBuilder& builder) {
+  if (urdf.root == "world") return;
+  Joint joint;
+  joint.name = "root_joint";
+  joint.kind = base == BaseKind::Free ? JointKind::FreeFlyer : JointKind::Fixed;
+  builder.addLink(urdf.root, "world", joint, urdf.links.at(urdf.root).inertia);
+}
+
+void addJoints(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
+  for (const UrdfJoint& j : urdf.joints) {
+    JointLimits limits = {j.lower, j.upper, {}};
+    std::optional<double> velocity = j.velocity;
+    for (const MotorSpec& motor : yaml.motors)
+      if (motor.joint == j.joint.name && motor.velocity) velocity = motor.velocity;
+    if (velocity && getNv(j.joint.kind) == 1) limits.velocity = VectorXd::Constant(1, *velocity);
+    builder.addLink(j.child, j.parent, j.joint, urdf.links.at(j.child).inertia, limits);
+  }
+  for (const auto& [name, link] : urdf.links)
+    for (const Visual& visual : link.visuals) builder.addVisual(name, visual);
+  for (const auto& [name, link] : urdf.links)
+    for (const Shape& shape : link.shapes) builder.addShape(name, shape);
+}
+
+void addMotors(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  std::map<std::string, double> armature = yaml.armature;
+  for (const MotorSpec& motor : yaml.motors) {
+    const auto joint = findJoint(urdf.joints, motor.joint);
+    const bool found = joint != urdf.joints.end();
+    if (motor.armature && armature.count(motor.joint))
+      throw ModelError(yaml.path, "motor '" + motor.joint + "'", "'motors' and 'armature' both give its armature",
+                       "keep one of them");
+    const bool armature_of_joint = armature.count(motor.joint) > 0;
+    const double from_map = armature_of_joint ? armature[motor.joint] : yaml.motor_armature.value_or(0);
+    armature.erase(motor.joint);
+    const MotorDrive& drive = motor.drive;
+    const bool has_rotor = drive.rotor_inertia != 0 && !armature_of_joint;
+    builder.addMotor({motor.joint, 0, 0,
+                      motor.armature.value_or(has_rotor ? drive.ratio * drive.ratio * drive.rotor_inertia : from_map),
+                      motor.effort.value_or(found ? joint->effort.value_or(inf) : inf),
+                      motor.velocity.value_or(found ? joint->velocity.value_or(inf) : inf), motor.torque_loss,
+                      motor.continuous_effort.value_or(inf), drive});
+  }
+  for (const auto& [joint, value] : armature) builder.setArmature(joint, value);
+}
+
+class FrameResolver {
+ public:
+  FrameResolver(const UrdfFile& urdf, const YamlFile& yaml) : urdf_(urdf), yaml_(yaml) {}
+
+  /// A link, or the child of a joint when no link has this name.
+  std::string find(const std::string& name, const std::string& element) const {
+    if (name == "world" || urdf_.links.count(name)) return name;
+    const auto joint = findJoint(urdf_.joints, name);
+    if (joint == urdf_.joints.end())
+      throw ModelError(yaml_.path, element, "there is no link or joint '" + name + "' in the URDF", "correct the name");
+    return joint->child;
+  }
+
+ private:
+  const UrdfFile& urdf_;
+  const YamlFile& yaml_;
+};
+
+// A coupler named as the joint for every joint that mimics another.
+void addMimics(const UrdfFile& urdf, ModelBuilder& builder) {
+  for (const UrdfJoint& j : urdf.joints) {
+    if (j.mimicked.empty()) continue;
+    if (j.mimicked == j.joint.name)
+      throw ModelError(urdf.path, "joint '" + j.joint.name + "'", "it mimics itself", "name another joint");
+    builder.addCoupler(j.joint.name, {{j.joint.name, 1}, {j.mimicked, -j.multiplier}}, j.offset);
+  }
+}
+
+// Those of the YAML file, and <dynamics> of joints that it does not name.
+void addJointForces(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
+  std::set<std::string> named;
+  for (const JointForceSpec& spec : yaml.joint_forces) {
+    named.insert(spec.joint);
+    builder.addJointForce(spec.joint, spec.force);
+  }
+  for (const UrdfJoint& j : urdf.joints) {
+    if ((j.damping == 0 && j.friction == 0) || named.count(j.joint.name)) continue;
+    JointForce force;
+    force.damping = j.damping;
+    force.friction = j.friction;
+    builder.addJointForce(j.joint.name, force);
+  }
+}
+
+// Closures, motors and contacts refer to the tree by name.
+void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
+  const FrameResolver frames(urdf, yaml);
+  for (const ClosureSpec& c : yaml.closures) {
+    const std::string element = "closure '" + c.name + "'";
+    if (c.kind == ClosureKind::Coupler) {
+      builder.addCoupler(c.name, c.coefficients, c.offset, c.kp, c.kd);
+      continue;
+    }
+    builder.addClosure(c.name, c.kind, frames.find(c.frame1, element), frames.find(c.frame2, element), c.axis, c.kp,
+                       c.kd);
+  }
+  addJointForces(urdf, yaml, builder);
+  for (const PointSpringSpec& s : yaml.point_springs) {
+    const std::string element = "point spring '" + s.spring.name + "'";
+    builder.addPointSpring(frames.find(s.frame1, element), frames.find(s.frame2, element), s.spring);
+  }
+  for (const ContactSpec& c : yaml.contacts)
+    builder.addContact(c.name, frames.find(c.frame, "contact '" + c.name + "'"), c.kind, c.half_length, c.half_width);
+  for (const std::string& joint : yaml.serial_joints) builder.addSerialJoint(joint);
+  for (Reference reference : yaml.references) {
+    if (!reference.height_frame.empty())
+      reference.height_frame = frames.find(reference.height_frame, "reference '" + reference.name + "'");
+    builder.addReference(reference);
+  }
+  if (yaml.gravity) builder.setGravity(*yaml.gravity);
+}
+
+}  // namespace
+
+LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options, const Generate& generate) {
+  const std::filesystem::path path = findRobotFile(name_or_path);
+  auto [urdf, yaml] = readRobotFiles(path, generate);
+  retypeJoints(yaml, urdf);
+  if (yaml.cross_inertia) splitUniversalJoints(*yaml.cross_inertia, urdf);
+  setImportance(yaml, urdf);
+
+  const BaseKind base = options.base.value_or(yaml.base.value_or(BaseKind::Free));
+  if (urdf.has_own_base && base == BaseKind::Fixed) fixBase(urdf, yaml);
+  ModelBuilder builder(urdf.name, urdf.path);
+  addRoot(urdf, base, builder);
+  addJoints(urdf, yaml, builder);
+  builder.setSource(yaml.path);
+  addMotors(urdf, yaml, builder);
+  addNamed(urdf, yaml, builder);
+  builder.setSource(urdf.path);
+  addMimics(urdf, builder);
+
+  LoadedRobot robot;
+  robot.warnings = urdf.warnings;
+  robot.warnings.insert(robot.warnings.end(), yaml.warnings.begin(), yaml.warnings.end());
+  robot.model = builder.build(&robot.warnings);
+  robot.file = std::filesystem::absolute(path).lexically_normal().string();
+  robot.directory = path.has_parent_path() ? path.parent_path().string() : ".";
+  return robot;
+}
+
+}  // namespace bielle

@@ -1,0 +1,236 @@
+#include "formats/reader_drake.h"
+
+#include <algorithm>
+#include <cmath>
+#include <locale>
+#include <set>
+#include <sstream>
+
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool isOfDrake(const std::string& name) { return name.rfind("drake:", 0) == 0; }
+
+bool hasDrakeElement(const XMLElement& element) {
+  for (const XMLElement* e : getChildren(element))
+    if (isOfDrake(getTag(*e)) || hasDrakeElement(*e)) return true;
+  return false;
+}
+
+class DrakeReader {
+ public:
+  DrakeReader(const XMLElement& robot, UrdfFile& file, YamlFile& settings)
+      : robot_(robot), file_(file), settings_(settings) {}
+
+  void read() {
+    for (const XMLElement* e : getChildren(robot_))
+      if (isJoint(*e)) readJoint(*e);
+    for (const XMLElement* e : getChildren(robot_)) {
+      const std::string& tag = getTag(*e);
+      if (tag == "transmission")
+        readTransmission(*e);
+      else if (tag == "drake:ball_constraint")
+        readBallConstraint(*e);
+      else if (tag == "drake:linear_spring_damper")
+        readSpringDamper(*e);
+      // What may collide is of no meaning here.
+      else if (isOfDrake(tag) && tag != "drake:joint" && tag != "drake:collision_filter_group")
+        warn(*e, "it is left out");
+    }
+  }
+
+ private:
+  [[noreturn]] void fail(const XMLElement& e, const std::string& problem, const std::string& remedy) const {
+    throw ModelError(file_.path, describe(e), problem, remedy);
+  }
+
+  void warn(const XMLElement& e, const std::string& problem) {
+    file_.warnings.push_back(file_.path + ": " + describe(e) + ": " + problem);
+  }
+
+  static std::string getText(const XMLElement& e) { return e.GetText() ? e.GetText() : ""; }
+
+  const XMLElement& getChild(const XMLElement& e, const std::string& tag) const {
+    const XMLElement* child = e.FirstChildElement(tag.c_str());
+    if (!child) fail(e, "it has no <" + tag + ">", "give one");
+    return *child;
+  }
+
+  // Finite numbers of an attribute.
+  std::vector<double> getNumbers(const XMLElement& e, const char* attribute, size_t count) const {
+    const std::string text = getAttribute(&e, attribute);
+    std::istringstream stream(text);
+    stream.imbue(std::locale::classic());
+    std::vector<double> values;
+    for (double value; values.size() <= count && stream >> value;)
+      if (std::isfinite(value)) values.push_back(value);
+    if (!stream.eof() || values.size() != count)
+      fail(e,
+           std::string("its attribute '") + attribute + "', \"" + text + "\", is not made of " + std::to_string(count) +
+               " finite number(s)",
+           "correct it");
+    return values;
+  }
+
+  double getNumber(const XMLElement& e) const { return getNumbers(e, "value", 1)[0]; }
+
+  double getChildNumber(const XMLElement& e, const std::string& tag, bool may_be_zero) const {
+    const XMLElement& child = getChild(e, tag);
+    const double value = getNumber(child);
+    if (value < 0 || (value == 0 && !may_be_zero))
+      fail(child, "its value is not " + std::string(may_be_zero ? "zero or more" : "positive"), "correct it");
+    return value;
+  }
+
+  Vector3d getChildVector(const XMLElement& e, const std::string& tag) const {
+    const std::vector<double> values = getNumbers(getChild(e, tag), "value", 3);
+    return {values[0], values[1], values[2]};
+  }
+
+  std::string getLink(const XMLElement& e, const std::string& tag) const {
+    const XMLElement& child = getChild(e, tag);
+    const std::string name = getAttribute(&child, "name");
+    if (!file_.links.count(name))
+      fail(child, "there is no link '" + name + "'", "declare the link or correct the name");
+    return name;
+  }
+
+  UrdfJoint* findJoint(const std::string& name) {
+    const auto it = std::find_if(file_.joints.begin(), file_.joints.end(),
+                                 [&name](const UrdfJoint& joint) { return joint.joint.name == name; });
+    return it == file_.joints.end() ? nullptr : &*it;
+  }
+
+  void readJoint(const XMLElement& e) {
+    UrdfJoint& joint = *findJoint(getAttribute(&e, "name"));
+    const XMLElement* limit = e.FirstChildElement("limit");
+    if (!limit || getNv(joint.joint.kind) != 1) return;
+    const bool lower = limit->Attribute("lower"), upper = limit->Attribute("upper");
+    if (lower != upper && joint.joint.kind != JointKind::Continuous) {
+      joint.lower = VectorXd::Constant(1, lower ? getNumbers(*limit, "lower", 1)[0] : -kInfinity);
+      joint.upper = VectorXd::Constant(1, upper ? getNumbers(*limit, "upper", 1)[0] : kInfinity);
+    }
+    if (limit->Attribute("effort") && !joint.effort) effortless_.insert(joint.joint.name);
+  }
+
+  void readTransmission(const XMLElement& e) {
+    const XMLElement* kind = e.FirstChildElement("type");
+    const std::string type = kind ? getText(*kind) : getAttribute(&e, "type");
+    if (type.empty()) fail(e, "it has no <type>", "give transmission_interface/SimpleTransmission");
+    if (type.find("SimpleTransmission") == std::string::npos)
+      return warn(e, "it is left out: it is not a SimpleTransmission");
+    const XMLElement &driven = getChild(e, "joint"), &actuator = getChild(e, "actuator");
+    const std::string name = getAttribute(&driven, "name");
+    const UrdfJoint* joint = findJoint(name);
+    if (!joint) fail(driven, "there is no joint '" + name + "'", "correct the name");
+    if (getNv(joint->joint.kind) != 1)
+      return warn(e, "it is left out: joint '" + name + "' does not have exactly one coordinate");
+    if (effortless_.count(name)) return warn(e, "it is left out: the effort limit of joint '" + name + "' is 0");
+    for (const MotorSpec& other : settings_.motors)
+      if (other.joint == name) return warn(e, "it is left out: joint '" + name + "' already has a motor");
+    MotorSpec motor;
+    motor.joint = name;
+    const double inertia =
+        actuator.FirstChildElement("drake:rotor_inertia") ? getChildNumber(actuator, "drake:rotor_inertia", true) : 0;
+    const double ratio =
+        actuator.FirstChildElement("drake:gear_ratio") ? getChildNumber(actuator, "drake:gear_ratio", false) : 1;
+    if (ratio == 1) {
+      motor.armature = inertia;
+    } else {
+      motor.drive.ratio = ratio;  // the armature is that of the drive
+      motor.drive.rotor_inertia = inertia;
+    }
+    if (const XMLElement* gains = actuator.FirstChildElement("drake:controller_gains")) warn(*gains, "it is left out");
+    for (const XMLElement* owner : {&e, &actuator})
+      if (const XMLElement* reduction = owner->FirstChildElement("mechanicalReduction");
+          reduction && getText(*reduction) != "1")
+        warn(*reduction, "it is left out, as by Drake; <drake:gear_ratio> gives the gear");
+    settings_.motors.push_back(motor);
+  }
+
+  // A frame of the tree with this name, or with underscores behind it if that is taken.
+  std::string addFrame(std::string name, const std::string& link, const Vector3d& point) {
+    if (point.isZero(0)) return link;
+    while (file_.links.count(name) || findJoint(name)) name += "_";
+    UrdfJoint joint;
+    joint.parent = link;
+    joint.child = name;
+    joint.joint.name = name + "_frame";
+    joint.joint.kind = JointKind::Fixed;
+    joint.joint.X_PJ.p = point;
+    while (findJoint(joint.joint.name)) joint.joint.name += "_";
+    UrdfLink frame;
+    frame.name = name;
+    file_.links[name] = frame;
+    file_.joints.push_back(joint);
+    return name;
+  }
+
+  // Drake gives them no names; ours are in an attribute that it does not look at.
+  static std::string getName(const XMLElement& e, const std::string& prefix) {
+    const std::string name = getAttribute(&e, "name");
+    return name.empty() ? prefix + std::to_string(e.GetLineNum()) : name;
+  }
+
+  void readBallConstraint(const XMLElement& e) {
+    const std::string tag = getTag(e);
+    ClosureSpec closure;
+    closure.name = getName(e, "ball_");
+    closure.kind = ClosureKind::Ball3D;
+    const std::string a = getLink(e, tag + "_body_A"), b = getLink(e, tag + "_body_B");
+    const Vector3d p_AP = getChildVector(e, tag + "_p_AP"), p_BQ = getChildVector(e, tag + "_p_BQ");
+    closure.frame1 = addFrame(closure.name + "_frame1", a, p_AP);
+    closure.frame2 = addFrame(closure.name + "_frame2", b, p_BQ);
+    settings_.closures.push_back(closure);
+  }
+
+  void readSpringDamper(const XMLElement& e) {
+    const std::string tag = getTag(e);
+    PointSpringSpec spec{getLink(e, tag + "_body_A"), getLink(e, tag + "_body_B"), {}};
+    spec.spring.name = getName(e, "spring_");
+    spec.spring.point1 = getChildVector(e, tag + "_p_AP");
+    spec.spring.point2 = getChildVector(e, tag + "_p_BQ");
+    spec.spring.rest = getChildNumber(e, tag + "_free_length", false);
+    spec.spring.stiffness = getChildNumber(e, tag + "_stiffness", true);
+    spec.spring.damping = getChildNumber(e, tag + "_damping", true);
+    if (spec.spring.stiffness == 0 && spec.spring.damping == 0)
+      return warn(e, "it is left out: it has neither stiffness nor damping");
+    settings_.point_springs.push_back(spec);
+  }
+
+  const XMLElement& robot_;
+  UrdfFile& file_;
+  YamlFile& settings_;
+  std::set<std::string> effortless_;  // joints with a limit of effort of zero, which Drake does not drive
+};
+
+}  // namespace
+
+bool isForDrake(const XMLElement& robot) { return robot.Attribute("xmlns:drake") || hasDrakeElement(robot); }
+
+bool isJoint(const XMLElement& element) { return getTag(element) == "joint" || getTag(element) == "drake:joint"; }
+
+void removeDrake(XMLElement& robot) {
+  for (XMLElement* e = robot.FirstChildElement(); e; e = e->NextSiblingElement()) {
+    if (!isJoint(*e)) continue;
+    if (getTag(*e) == "drake:joint" && getAttribute(e, "type") != "planar") e->SetAttribute("type", "floating");
+    if (XMLElement* dynamics = e->FirstChildElement("dynamics"); dynamics && getTag(*e) == "drake:joint")
+      e->DeleteChild(dynamics);  // of several numbers
+    e->SetName("joint");
+    XMLElement* limit = e->FirstChildElement("limit");
+    if (!limit) limit = &addElement(*e, "limit");
+    for (const char* attribute : {"effort", "velocity"})
+      if (!limit->Attribute(attribute)) limit->SetAttribute(attribute, "0");
+  }
+}
+
+void readDrakeElements(const XMLElement& robot, UrdfFile& file, YamlFile& settings) {
+  settings.path = file.path;
+  DrakeReader(robot, file, settings).read();
+}
+
+}  // namespace bielle

@@ -1,0 +1,343 @@
+// What relates bodies beside their joints: loops, couplers, springs; motors; and postures.
+#include <algorithm>
+#include <cmath>
+
+#include "bielle/model/error.h"
+#include "formats/motor_catalogue.h"
+#include "formats/reader_mjcf.h"
+
+namespace bielle {
+
+const MjcfReader::BodyPlace& MjcfReader::findBody(MjcfElement& e, const char* attribute) {
+  const std::string name = e.getText(attribute, "world");
+  const auto it = places_.find(name);
+  if (it == places_.end()) e.fail("there is no body '" + name + "'", "correct the name");
+  return it->second;
+}
+
+const MjcfReader::BodyPlace& MjcfReader::findSite(MjcfElement& e, const char* attribute) {
+  const std::string name = e.getText(attribute);
+  const auto it = sites_.find(name);
+  if (it == sites_.end()) e.fail("there is no site '" + name + "'", "correct the name");
+  return it->second;
+}
+
+void MjcfReader::readEquality(const XMLElement& element) {
+  MjcfElement e(element, "", settings_, "equality");
+  if (!e.getFlag("active", true)) return e.leaveOut("it is not active, and left out");
+  std::string name = getAttribute(&element, "name");
+  if (name.empty()) name = e.tag() + "_" + std::to_string(e.line());
+  if (e.tag() == "connect" || e.tag() == "weld") return readTie(e, name);
+  if (e.tag() == "joint") return readJointEquality(e, name);
+  if (e.tag() == "tendon") return readTendonEquality(e, name);
+  e.fail("such equalities are not supported", "use connect, weld, joint or a tendon of joints, or remove it");
+}
+
+void MjcfReader::readTie(MjcfElement& e, const std::string& name) {
+  Tie tie;
+  tie.name = name;
+  tie.line = e.line();
+  tie.kind = e.tag() == "weld" ? ClosureKind::Weld6D : ClosureKind::Ball3D;
+  if (e.find("site1") || e.find("site2")) {
+    // Two sites are brought together, wherever the bodies stand.
+    const BodyPlace &one = findSite(e, "site1"), &two = findSite(e, "site2");
+    tie.body1 = one.link, tie.body2 = two.link;
+    tie.X_L1 = one.X_LB, tie.X_L2 = two.X_LB;
+  } else {
+    if (!e.find("body1")) e.fail("it has no body1", "name the first body");
+    const BodyPlace &one = findBody(e, "body1"), &two = findBody(e, "body2");
+    const SE3 X_12 = one.X_WB.inverse() * two.X_WB;
+    const Vector3d anchor = e.getVector("anchor", Vector3d::Zero());
+    tie.body1 = one.link, tie.body2 = two.link;
+    if (tie.kind == ClosureKind::Weld6D) {
+      e.find("torquescale");
+      tie.X_L1 = one.X_LB * X_12 * translate(anchor);
+      tie.X_L2 = two.X_LB * translate(anchor);
+      const std::vector<double> relative = e.getNumbers("relpose", 7, 7);
+      if (!relative.empty()) {
+        const Eigen::Vector4d q(relative[4], relative[5], relative[6], relative[3]);
+        const double norm = q.stableNorm();
+        // The anchor belongs to body 2 alone. A quaternion of zeros: as the bodies stand.
+        if (norm > 1e-12 && std::isfinite(norm))
+          tie.X_L1 =
+              one.X_LB * SE3(Eigen::Quaterniond(q / norm).toRotationMatrix(), {relative[0], relative[1], relative[2]});
+      }
+    } else {
+      if (!e.find("anchor")) e.fail("it has no anchor", "give the point that the bodies share, in the frame of body1");
+      tie.X_L1 = one.X_LB * translate(anchor);
+      tie.X_L2 = two.X_LB * X_12.inverse() * translate(anchor);
+    }
+  }
+  ties_.push_back(tie);
+}
+
+// Two points NAME.1 and NAME.2 that tie the same bodies make the hinge that the writer wrote.
+void MjcfReader::joinHinges() {
+  for (size_t i = 0; i + 1 < ties_.size(); ++i) {
+    Tie &a = ties_[i], &b = ties_[i + 1];
+    if (a.kind != ClosureKind::Ball3D || b.kind != ClosureKind::Ball3D || a.body1 != b.body1 || a.body2 != b.body2 ||
+        a.name.size() < 3)
+      continue;
+    const std::string stem = a.name.substr(0, a.name.size() - 2);
+    const Vector3d along = a.X_L1.p - b.X_L1.p, along2 = a.X_L1.R * a.X_L2.R.transpose() * (a.X_L2.p - b.X_L2.p);
+    if (a.name != stem + ".1" || b.name != stem + ".2" || !(along.norm() > 1e-6) || !along.isApprox(along2, 1e-6))
+      continue;
+    a.kind = ClosureKind::Hinge5D;
+    a.name = stem;
+    a.axis = a.X_L1.R.transpose() * along.normalized();
+    a.X_L1.p = (a.X_L1.p + b.X_L1.p) / 2;
+    a.X_L2.p = (a.X_L2.p + b.X_L2.p) / 2;
+    ties_.erase(ties_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+  }
+}
+
+void MjcfReader::addClosures() {
+  for (const Tie& tie : ties_) {
+    ClosureSpec closure;
+    closure.name = tie.name;
+    closure.kind = tie.kind;
+    if (!tie.coupler.empty()) {
+      closure = couplers_.at(tie.coupler);
+    } else {
+      const bool is_ball = tie.kind == ClosureKind::Ball3D;
+      closure.axis = tie.axis;
+      closure.frame1 = findFrame(tie.body1, tie.X_L1, is_ball, tie.name + "_frame1");
+      closure.frame2 = findFrame(tie.body2, tie.X_L2, is_ball, tie.name + "_frame2");
+    }
+    yaml_.closures.push_back(closure);
+  }
+}
+
+void MjcfReader::addCoupler(const std::string& name, ClosureSpec coupler, const MjcfElement& e) {
+  coupler.name = name;
+  coupler.kind = ClosureKind::Coupler;
+  if (!couplers_.emplace(name, coupler).second) e.fail("two equalities have this name", "rename one of them");
+  Tie tie;
+  tie.kind = ClosureKind::Coupler;
+  tie.name = tie.coupler = name;
+  ties_.push_back(tie);
+}
+
+const MjcfReader::Slot& MjcfReader::findSlot(const MjcfElement& e, const std::string& joint) const {
+  for (const Slot& slot : slots_)
+    if (slot.joint == joint) {
+      if (slot.q_ref.size() != 1) e.fail("joint '" + joint + "' has several coordinates", "name a hinge or a slide");
+      return slot;
+    }
+  e.fail("there is no joint '" + joint + "'", "correct the name");
+}
+
+// Coefficients 0 and 1 of a polynomial without others.
+std::array<double, 2> MjcfReader::readLine(MjcfElement& e) {
+  std::vector<double> p = e.getNumbers("polycoef", 1, 5);
+  if (p.empty()) p = {0, 1};
+  p.resize(5);
+  if (p[2] != 0 || p[3] != 0 || p[4] != 0)
+    e.fail("its polycoef is of degree 2 or more", "only y = a + b x is supported: linearise it, or remove it");
+  return {p[0], p[1]};
+}
+
+// y - y_ref = a + b (x - x_ref)
+void MjcfReader::readJointEquality(MjcfElement& e, const std::string& name) {
+  const std::string y = e.getText("joint1"), x = e.getText("joint2");
+  const auto [a, b] = readLine(e);
+  if (y.empty()) e.fail("it has no joint1", "name one");
+  const double y_ref = findSlot(e, y).q_ref[0];
+  if (x.empty() || b == 0) e.fail("it constrains a single joint", "remove the joint to fix the body");
+  const double x_ref = findSlot(e, x).q_ref[0];
+  if (x == y) e.fail("it couples a joint with itself", "name two joints");
+  ClosureSpec coupler;
+  coupler.coefficients = {{y, 1}, {x, -b}};
+  coupler.offset = y_ref + a - b * x_ref;
+  addCoupler(name, coupler, e);
+}
+
+void MjcfReader::readTendon(const XMLElement& element) {
+  if (getTag(element) == "spatial") return readSpatialTendon(element);
+  if (getTag(element) != "fixed") return noteElement(element, "the tendon is left out");
+  MjcfElement e(element, "", settings_, "tendon");
+  FixedTendon tendon;
+  tendon.line = e.line();
+  for (const XMLElement* j : getChildren(element, "joint")) {
+    MjcfElement term(*j, "", settings_, "");
+    const std::string joint = term.getText("joint");
+    findSlot(term, joint);
+    if (!term.find("coef")) term.fail("it has no coef", "give one");
+    if (!tendon.coefficients.emplace(joint, term.getNumber("coef", 0)).second)
+      term.fail("the tendon lists this joint twice", "add the coefficients up");
+  }
+  const std::string name = getAttribute(&element, "name");
+  if (name.empty()) return noteElement(element, "the tendon is left out");
+  if (!tendons_.emplace(name, tendon).second) e.fail("two tendons have this name", "rename one of them");
+}
+
+// A spring or damper between two sites; a tendon that bends or carries only load of its own has no like here.
+void MjcfReader::readSpatialTendon(const XMLElement& element) {
+  MjcfElement e(element, "", settings_, "tendon");
+  std::vector<const XMLElement*> sites;
+  for (const XMLElement* s : getChildren(element)) {
+    if (getTag(*s) != "site") return e.leaveOut("it bends about a <" + getTag(*s) + ">, and is left out");
+    sites.push_back(s);
+  }
+  if (sites.size() != 2) return e.leaveOut("it does not run between two sites, and is left out");
+  const auto find = [&](const XMLElement& site) {
+    MjcfElement end(site, "", settings_, "");
+    return findSite(end, "site");
+  };
+  const BodyPlace one = find(*sites[0]), two = find(*sites[1]);
+  PointSpringSpec spec{one.link, two.link, {}};
+  PointSpring& spring = spec.spring;
+  spring.point1 = one.X_LB.p;
+  spring.point2 = two.X_LB.p;
+  spring.stiffness = e.getNumber("stiffness", 0);
+  spring.damping = e.getNumber("damping", 0);
+  const std::vector<double> lengths = e.getNumbers("springlength", 1, 2);
+  // Without one, or with -1, as long as the file stands.
+  spring.rest = lengths.empty() || lengths[0] < 0 ? (two.X_WB.p - one.X_WB.p).norm() : lengths[0];
+  for (const char* without_meaning : {"width", "material", "rgba", "group", "user"}) e.find(without_meaning);
+  if (lengths.size() == 2 && lengths[1] != lengths[0])
+    return e.leaveOut("its spring is slack between two lengths; it is left out");
+  if (spring.stiffness == 0 && spring.damping == 0) return e.leaveOut("it has no spring or damper, and is left out");
+  if (e.isLimited("limited", "range")) e.note("the limits of its length are left out"), e.find("range");
+  if (e.getNumber("frictionloss", 0) != 0) e.note("its frictionloss is left out");
+  spring.name = getAttribute(&element, "name");
+  if (spring.name.empty()) spring.name = "tendon_" + std::to_string(e.line());
+  yaml_.point_springs.push_back(spec);
+}
+
+// L1 - L1_ref = a + b (L2 - L2_ref) of sums of coordinates
+void MjcfReader::readTendonEquality(MjcfElement& e, const std::string& name) {
+  const std::string first = e.getText("tendon1"), second = e.getText("tendon2");
+  const auto [a, b] = readLine(e);
+  ClosureSpec coupler;
+  coupler.offset = a;
+  const auto add = [&](const std::string& tendon, double factor) {
+    const auto it = tendons_.find(tendon);
+    if (it == tendons_.end()) e.fail("there is no tendon of joints '" + tendon + "'", "name a <fixed> tendon");
+    it->second.is_used = true;
+    for (const auto& [joint, coefficient] : it->second.coefficients) {
+      coupler.coefficients[joint] += factor * coefficient;
+      coupler.offset += factor * coefficient * findSlot(e, joint).q_ref[0];
+    }
+  };
+  add(first, 1);
+  if (!second.empty()) add(second, -b);
+  for (auto it = coupler.coefficients.begin(); it != coupler.coefficients.end();)
+    it = it->second == 0 ? coupler.coefficients.erase(it) : std::next(it);
+  addCoupler(name, coupler, e);
+}
+
+void MjcfReader::listDriven(const XMLElement& section) {
+  for (const XMLElement* e : getChildren(section))
+    driven_.insert(getAttribute(e, "joint")), driven_.insert(getAttribute(e, "jointinparent"));
+  driven_.erase("");
+}
+
+void MjcfReader::readActuator(const XMLElement& element) {
+  static const std::set<std::string> servos = {"position", "velocity", "intvelocity", "damper", "general"};
+  MjcfElement e(element, "", settings_);
+  const std::string joint = e.getText("joint", e.getText("jointinparent"));
+  if (joint.empty() || (e.tag() != "motor" && !servos.count(e.tag())))
+    return e.leaveOut("the actuator is left out: motors can only drive joints");
+  const auto slot = std::find_if(slots_.begin(), slots_.end(), [&](const Slot& s) { return s.joint == joint; });
+  if (slot == slots_.end()) e.fail("there is no joint '" + joint + "'", "correct the name");
+  if (slot->q_ref.size() != 1) return e.leaveOut("the actuator is left out: its joint has several coordinates");
+  for (const MotorSpec& other : yaml_.motors)
+    if (other.joint == joint) return e.leaveOut("a second actuator of a joint is left out");
+  const std::vector<double> gears = e.getNumbers("gear", 1, 6);
+  const double gear = gears.empty() ? 1 : gears[0];
+  if (gear == 0) return e.leaveOut("an actuator of gear 0 is left out");
+  if (gear != 1) e.note("its input becomes the torque or force at its joint, not that before the gear");
+  const bool is_general = e.tag() == "general";
+  const bool is_ideal =
+      e.tag() == "motor" || (is_general && e.getText("dyntype", "none") == "none" &&
+                             e.getText("biastype", "none") == "none" && e.getText("gaintype", "fixed") == "fixed");
+  if (!is_ideal) e.note("its servo is left out: it becomes an ideal torque motor");
+  const std::vector<double> gains = is_general ? e.getNumbers("gainprm", 1, 10) : std::vector<double>();
+  const double gain = gains.empty() ? 1 : std::abs(gains[0]);
+
+  MotorSpec motor;
+  motor.joint = joint;
+  double effort = std::numeric_limits<double>::infinity();
+  const auto limit = [&](const char* range, double factor) {
+    const std::vector<double> values = e.getNumbers(range, 2, 2);
+    if (values[0] != -values[1]) e.note(std::string("its ") + range + " is not symmetric: the smaller side is used");
+    effort = std::min(effort, factor * std::min(std::abs(values[0]), std::abs(values[1])));
+  };
+  if (e.isLimited("forcelimited", "forcerange")) limit("forcerange", std::abs(gear));
+  if (e.isLimited("ctrllimited", "ctrlrange")) {
+    if (is_ideal)
+      limit("ctrlrange", std::abs(gear) * gain);
+    else
+      e.find("ctrlrange");
+  }
+  if (const auto clamp = clamps_.find(joint); clamp != clamps_.end()) effort = std::min(effort, clamp->second);
+  if (!(effort > 0)) {
+    e.note("its limits allow no torque on one side; they are left out");
+  } else if (std::isfinite(effort)) {
+    motor.effort = effort;
+  }
+  yaml_.motors.push_back(motor);
+  const std::string name = getAttribute(&element, "name");
+  if (!name.empty() && name != joint) e.note("it is renamed after its joint");
+}
+
+void MjcfReader::readCustom(const XMLElement& element) {
+  const std::string name = getAttribute(&element, "name"),
+                    joint = name.substr(std::min(name.size(), kMjcfMotorData.size()));
+  const auto motor =
+      std::find_if(yaml_.motors.begin(), yaml_.motors.end(), [&joint](const MotorSpec& m) { return m.joint == joint; });
+  if (getTag(element) != "text" || name != kMjcfMotorData + joint || motor == yaml_.motors.end())
+    return settings_.notes.add("<custom> <" + getTag(element) + ">", element.GetLineNum(), "left out");
+  const std::string lines_above(std::max(0, element.GetLineNum() - 1),
+                                '\n');  // so that errors name the line of the file
+  readYamlDocument(settings_.path, lines_above + "{'" + kMjcfMotorData + "': {" + getAttribute(&element, "data") + "}}",
+                   [&](const YamlEntry& root) {
+                     const std::optional<double> effort = motor->effort;
+                     *motor = readMotorSpecs(root, settings_.path, nullptr).front();
+                     motor->joint = joint;
+                     motor->effort = effort;
+                   });
+}
+
+void MjcfReader::readKey(const XMLElement& element) {
+  if (getTag(element) != "key") return noteElement(element);
+  MjcfElement e(element, "", settings_);
+  std::string name = getAttribute(&element, "name");
+  if (name.empty()) name = "key_" + std::to_string(yaml_.references.size() + 1);
+  Eigen::Index nq = 0;
+  for (const Slot& slot : slots_) nq += slot.q_ref.size();
+  if (!e.find("qpos")) return e.leaveOut("a key without qpos is left out");
+  const std::vector<double> qpos = e.getNumbers("qpos", nq, nq);
+  Reference reference;
+  reference.name = name;
+  const double* at = qpos.data();
+  for (const Slot& slot : slots_) {
+    std::vector<double> q(at, at + slot.q_ref.size());
+    at += slot.q_ref.size();
+    if (slot.kind == JointKind::Spherical || slot.kind == JointKind::FreeFlyer) {
+      const size_t k = q.size() - 4;
+      const Eigen::Vector4d xyzw(q[k + 1], q[k + 2], q[k + 3], q[k]);
+      const double norm = xyzw.stableNorm();
+      if (!(norm > 1e-12) || !std::isfinite(norm))
+        e.fail("the quaternion of joint '" + slot.joint + "' has zero length", "correct it");
+      const Eigen::Vector4d turned =
+          (Eigen::Quaterniond(slot.R_ref) * Eigen::Quaterniond(Eigen::Vector4d(xyzw / norm))).normalized().coeffs();
+      std::copy(turned.data(), turned.data() + 4, q.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    reference.joints[slot.joint] = q;
+  }
+  yaml_.references.push_back(reference);
+}
+
+// MuJoCo closes loops where the bodies stand in the file: without a keyframe, this is the posture to start from.
+void MjcfReader::addStart() {
+  if (!yaml_.references.empty() || yaml_.closures.empty()) return;
+  Reference reference;
+  reference.name = "qpos0";
+  for (const Slot& slot : slots_)
+    reference.joints[slot.joint] = std::vector<double>(slot.q_ref.data(), slot.q_ref.data() + slot.q_ref.size());
+  yaml_.references.push_back(reference);
+}
+
+}  // namespace bielle

@@ -1,0 +1,300 @@
+// The YAML file of a robot. Unknown keys of any map are rejected.
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <set>
+
+#include "bielle/model/error.h"
+#include "formats/motor_catalogue.h"
+#include "formats/robot_files.h"
+#include "formats/yaml_entry.h"
+
+namespace bielle {
+namespace {
+
+using Entry = YamlEntry;
+using Fields = YamlFields;
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+ClosureKind readClosureKind(const Entry& entry) {
+  for (ClosureKind kind : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D, ClosureKind::Coupler})
+    if (lower(entry.getText()) == getName(kind)) return kind;
+  entry.fail("closure type '" + entry.getText() + "' is unknown", "use 6d (weld), 5d (hinge), 3d (ball) or coupler");
+}
+
+JointRetyping readJointType(const Entry& entry) {
+  static const std::map<std::string, JointKind> kinds = {
+      {"spherical", JointKind::Spherical},   {"fixed", JointKind::Fixed},         {"revolute", JointKind::Revolute},
+      {"continuous", JointKind::Continuous}, {"prismatic", JointKind::Prismatic}, {"planar", JointKind::Planar},
+      {"floating", JointKind::FreeFlyer}};
+  const std::string type = lower(entry.getText());
+  if (const auto it = kinds.find(type); it != kinds.end()) return {it->second, Vector3d::UnitZ(), Vector3d::UnitY()};
+  const auto isAxis = [](char c) { return c >= 'x' && c <= 'z'; };
+  if (type.size() == 9 && type.compare(0, 7, "ujoint_") == 0 && isAxis(type[7]) && isAxis(type[8]) &&
+      type[7] != type[8])
+    return {JointKind::Universal, Vector3d::Unit(type[7] - 'x'), Vector3d::Unit(type[8] - 'x')};
+  entry.fail(
+      "joint type '" + entry.getText() + "' is unknown",
+      "use SPHERICAL, UJOINT_ and two different axes (UJOINT_XY), FIXED, REVOLUTE, CONTINUOUS, PRISMATIC, PLANAR "
+      "or FLOATING");
+}
+
+// "knee_A" and "knee_B" are the ends of "knee"; other pairs get both names.
+std::string makeClosureName(const std::string& a, const std::string& b) {
+  const std::string stem = a.substr(0, a.size() - 1);
+  const char end_a = std::toupper(static_cast<unsigned char>(a.back())),
+             end_b = std::toupper(static_cast<unsigned char>(b.back()));
+  const bool ends = (end_a == 'A' && end_b == 'B') || (end_a == 'B' && end_b == 'A');
+  if (!ends || a.size() != b.size() || b.compare(0, stem.size(), stem) != 0) return a + "--" + b;
+  const size_t last = stem.find_last_not_of("_-. ");
+  return last == std::string::npos ? a + "--" + b : stem.substr(0, last + 1);
+}
+
+// closed_loop, type, closure_name: the published lists.
+void readPublishedClosures(const Fields& fields, const Entry& root, YamlFile& file) {
+  const Entry *loops = find(fields, "closed_loop"), *types = find(fields, "type"),
+              *names = find(fields, "closure_name");
+  if (!loops) {
+    if (types || names)
+      (types ? types : names)->fail("there is no closed_loop", "list the frames of each closure there");
+    return;
+  }
+  const std::vector<Entry> pairs = loops->getList();
+  const int n = static_cast<int>(pairs.size());
+  const std::vector<Entry> kinds = require(fields, "type", root).getList(n);
+  const std::vector<std::string> given = names ? names->getTexts(n) : std::vector<std::string>();
+  for (int i = 0; i < n; ++i) {
+    const std::vector<std::string> frames = pairs[i].getTexts(2);
+    ClosureSpec closure;
+    closure.name = names ? given[i] : makeClosureName(frames[0], frames[1]);
+    closure.frame1 = frames[0];
+    closure.frame2 = frames[1];
+    closure.kind = readClosureKind(kinds[i]);
+    if (closure.kind == ClosureKind::Coupler)
+      kinds[i].fail("a coupler does not connect frames", "list it under `closures` with its joints");
+    file.closures.push_back(closure);
+  }
+}
+
+void readCoupler(const Fields& fields, const Entry& entry, ClosureSpec& closure) {
+  if (const Entry* frames = find(fields, "frames"))
+    frames->fail("a coupler connects coordinates, not frames", "give its joints with their coefficients");
+  closure.name = require(fields, "name", entry).getText();
+  for (const auto& [joint, coefficient] : require(fields, "joints", entry).getMap())
+    if (!closure.coefficients.emplace(joint, coefficient.getNumber()).second)
+      coefficient.fail("the joint is listed twice", "add up its coefficients");
+  if (const Entry* offset = find(fields, "offset")) closure.offset = offset->getNumber();
+}
+
+void readTiedFrames(const Fields& fields, const Entry& entry, ClosureSpec& closure) {
+  for (const char* key : {"joints", "offset"})
+    if (const Entry* found = find(fields, key)) found->fail("only a coupler has it", "use type coupler or remove it");
+  const std::vector<std::string> frames = require(fields, "frames", entry).getTexts(2);
+  const Entry* name = find(fields, "name");
+  closure.name = name ? name->getText() : makeClosureName(frames[0], frames[1]);
+  closure.frame1 = frames[0];
+  closure.frame2 = frames[1];
+}
+
+void readClosures(const Entry& list, YamlFile& file) {
+  for (const Entry& entry : list.getList()) {
+    const Fields fields = entry.getFields({"name", "frames", "type", "axis", "joints", "offset", "kp", "kd"});
+    ClosureSpec closure;
+    closure.kind = readClosureKind(require(fields, "type", entry));
+    if (closure.kind == ClosureKind::Coupler)
+      readCoupler(fields, entry, closure);
+    else
+      readTiedFrames(fields, entry, closure);
+    if (const Entry* axis = find(fields, "axis")) {
+      if (closure.kind != ClosureKind::Hinge5D) axis->fail("only a hinge has an axis", "use type 5d or remove it");
+      closure.axis = axis->getVector3();
+    }
+    if (const Entry* kp = find(fields, "kp")) closure.kp = kp->getNumber();
+    if (const Entry* kd = find(fields, "kd")) closure.kd = kd->getNumber();
+    file.closures.push_back(closure);
+  }
+}
+
+void readJointTypes(const Fields& fields, YamlFile& file) {
+  const Entry *names = find(fields, "joint_name"), *types = find(fields, "joint_type");
+  if (!names && !types) return;
+  if (!names || !types)
+    (names ? names : types)->fail(names ? "there is no joint_type" : "there is no joint_name", "give both lists");
+  const std::vector<std::string> joints = names->getTexts();
+  const std::vector<Entry> kinds = types->getList(static_cast<int>(joints.size()));
+  std::set<std::string> seen;
+  for (size_t i = 0; i < joints.size(); ++i) {
+    if (!seen.insert(joints[i]).second) names->fail("joint '" + joints[i] + "' is listed twice", "list it once");
+    file.joint_types.emplace_back(joints[i], readJointType(kinds[i]));
+  }
+}
+
+double readCrossInertia(const Entry& entry) {
+  const double inertia = entry.getNumber();
+  if (!(inertia > 0)) entry.fail("it is not positive", "give kg m^2, or leave it out for a cross without inertia");
+  return inertia;
+}
+
+void readMotors(const Fields& fields, YamlFile& file) {
+  const Entry *names = find(fields, "name_mot"), *motors = find(fields, "motors");
+  if (motors) {
+    if (names) file.warnings.push_back(file.path + ": key 'name_mot': it is ignored, 'motors' lists the motors");
+    file.motors = readMotorSpecs(*motors, file.path, find(fields, "motor_catalogue"));
+  } else if (names) {
+    for (const std::string& joint : names->getTexts()) file.motors.push_back({joint, {}, {}, {}, {}, {}, {}});
+  }
+  if (const Entry* armature = find(fields, "armature")) {
+    if (!armature->isMap()) {
+      file.motor_armature = armature->getNumber();
+    } else {
+      for (const auto& [joint, entry] : armature->getMap()) file.armature[joint] = entry.getNumber();
+    }
+  }
+}
+
+void readJointForces(const Entry& map, YamlFile& file) {
+  for (const auto& [joint, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"stiffness", "rest", "preload", "damping", "friction", "friction_speed"});
+    JointForceSpec spec{joint, {}};
+    const auto read = [&fields](const char* key, double& value) {
+      if (const Entry* found = find(fields, key)) value = found->getNumber();
+    };
+    read("stiffness", spec.force.stiffness);
+    read("rest", spec.force.rest);
+    read("preload", spec.force.preload);
+    read("damping", spec.force.damping);
+    read("friction", spec.force.friction);
+    read("friction_speed", spec.force.friction_speed);
+    file.joint_forces.push_back(spec);
+  }
+}
+
+void readPointSprings(const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"frames", "points", "stiffness", "rest", "preload", "damping"});
+    const std::vector<std::string> frames = require(fields, "frames", entry).getTexts(2);
+    PointSpringSpec spec{frames[0], frames[1], {}};
+    PointSpring& spring = spec.spring;
+    spring.name = name;
+    if (const Entry* points = find(fields, "points")) {
+      const std::vector<Entry> list = points->getList(2);
+      spring.point1 = list[0].getVector3();
+      spring.point2 = list[1].getVector3();
+    }
+    const auto read = [&fields](const char* key, double& value) {
+      if (const Entry* found = find(fields, key)) value = found->getNumber();
+    };
+    read("stiffness", spring.stiffness);
+    read("rest", spring.rest);
+    read("preload", spring.preload);
+    read("damping", spring.damping);
+    if (spring.stiffness != 0 && !find(fields, "rest"))
+      entry.fail("it has a stiffness but no rest", "give its length [m] without load, or at its preload");
+    file.point_springs.push_back(std::move(spec));
+  }
+}
+
+void readContacts(const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"frame", "type", "sole"});
+    ContactSpec contact;
+    contact.name = name;
+    contact.frame = require(fields, "frame", entry).getText();
+    const Entry& type = require(fields, "type", entry);
+    const std::string kind = lower(type.getText());
+    if (kind != "6d" && kind != "3d")
+      type.fail("contact type '" + kind + "' is unknown", "use 6d (sole) or 3d (point)");
+    contact.kind = kind == "6d" ? ContactKind::Surface6D : ContactKind::Point3D;
+    if (const Entry* sole = find(fields, "sole")) {
+      if (contact.kind == ContactKind::Point3D) sole->fail("a point has no sole", "use type 6d or remove it");
+      const std::vector<double> size = sole->getNumbers(2);
+      contact.half_length = size[0] / 2;
+      contact.half_width = size[1] / 2;
+    }
+    file.contacts.push_back(contact);
+  }
+}
+
+void readReferences(const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"joints", "height", "feet"});
+    Reference reference;
+    reference.name = name;
+    if (const Entry* joints = find(fields, "joints"))
+      for (const auto& [joint, value] : joints->getMap())
+        reference.joints[joint] = value.isList() ? value.getNumbers() : std::vector<double>{value.getNumber()};
+    if (const Entry* height = find(fields, "height")) {
+      const Fields f = height->getFields({"frame", "value"});
+      reference.height_frame = require(f, "frame", *height).getText();
+      reference.height = require(f, "value", *height).getNumber();
+    }
+    if (const Entry* feet = find(fields, "feet"))
+      for (const auto& [contact, value] : feet->getMap()) reference.feet[contact] = value.getVector3();
+    file.references.push_back(reference);
+  }
+}
+
+void readImportance(const Entry& map, YamlFile& file) {
+  for (const auto& [joint, entry] : map.getMap()) {
+    const std::vector<double> values = entry.getNumbers(2);
+    if (values[0] < 0 || values[1] < 0) entry.fail("a number is negative", "give [position, velocity], 0 or more");
+    file.importance.push_back({joint, {values[0], values[1]}});
+  }
+}
+
+BaseKind readBase(const Entry& entry) {
+  const std::string base = entry.getText();
+  if (base != "free" && base != "fixed") entry.fail("base '" + base + "' is unknown", "use free or fixed");
+  return base == "free" ? BaseKind::Free : BaseKind::Fixed;
+}
+
+void readGenerator(const Fields& fields, YamlFile& file) {
+  const Entry *generator = find(fields, "generator"), *settings = find(fields, "set");
+  if (settings && !generator) settings->fail("there is no generator", "name it under `generator`, or remove the key");
+  if (!generator) return;
+  if (!file.models.empty()) generator->fail("there is a key 'model' as well", "keep one of them");
+  generator->getText();
+  file.generator = *generator;
+  if (settings) file.settings = *settings;
+}
+
+void readRoot(const Entry& root, YamlFile& file) {
+  const Fields fields = root.getFields(
+      {"closed_loop", "type",         "closure_name",  "closures",   "name_mot",   "motors",        "motor_catalogue",
+       "armature",    "joint_forces", "point_springs", "joint_name", "joint_type", "cross_inertia", "base",
+       "contacts",    "references",   "serial_joints", "importance", "gravity",    "model",         "generator",
+       "set"});
+  readPublishedClosures(fields, root, file);
+  readJointTypes(fields, file);
+  if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
+  readMotors(fields, file);
+  if (const Entry* entry = find(fields, "closures")) readClosures(*entry, file);
+  if (const Entry* entry = find(fields, "joint_forces")) readJointForces(*entry, file);
+  if (const Entry* entry = find(fields, "point_springs")) readPointSprings(*entry, file);
+  if (const Entry* entry = find(fields, "contacts")) readContacts(*entry, file);
+  if (const Entry* entry = find(fields, "references")) readReferences(*entry, file);
+  if (const Entry* entry = find(fields, "serial_joints")) file.serial_joints = entry->getTexts();
+  if (const Entry* entry = find(fields, "importance")) readImportance(*entry, file);
+  if (const Entry* entry = find(fields, "gravity")) file.gravity = entry->getVector3();
+  if (const Entry* entry = find(fields, "base")) file.base = readBase(*entry);
+  if (const Entry* entry = find(fields, "model"))
+    file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};
+  readGenerator(fields, file);
+}
+
+}  // namespace
+
+YamlFile parseYaml(const std::string& text, const std::string& path) {
+  YamlFile file;
+  file.path = path;
+  readYamlDocument(path, text, [&](const Entry& root) { readRoot(root, file); });
+  return file;
+}
+
+YamlFile readYaml(const std::string& path) { return parseYaml(readRobotText(path), path); }
+
+}  // namespace bielle

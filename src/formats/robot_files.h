@@ -1,0 +1,139 @@
+#pragma once
+/// \file The contents of the two files of a robot before they are combined (for the readers).
+#include <array>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+#include "bielle/formats/reader.h"
+#include "formats/yaml_entry.h"
+
+namespace bielle {
+
+struct UrdfLink {
+  std::string name;
+  Inertia inertia;  ///< in the link frame; zero without an <inertial> element
+  std::vector<Visual> visuals;
+  std::vector<Shape> shapes;
+};
+
+struct UrdfJoint {
+  std::string parent, child;               ///< links
+  Joint joint;                             ///< name, kind, X_PJ, axis
+  VectorXd lower, upper;                   ///< per coordinate of its velocity, or empty for none
+  std::optional<double> effort, velocity;  ///< of joints with one coordinate
+  double damping = 0, friction = 0;        ///< of <dynamics>
+  std::string mimicked;  ///< joint whose coordinate times `multiplier`, plus `offset`, is that of this one; or empty
+  double multiplier = 1, offset = 0;
+};
+
+/// A URDF file, or the tree of another one, checked to be one tree. Joints are depth first, the children of a link in the order
+/// of the file.
+struct UrdfFile {
+  std::string path, name, root;
+  std::map<std::string, UrdfLink> links;
+  std::vector<UrdfJoint> joints;
+  std::vector<std::string> warnings;
+  bool has_own_base = false;  ///< it says itself what is free: the option of a free base has no effect
+};
+
+/// Joint kind that replaces that of the URDF, with the axes of a universal joint in the joint's frame.
+struct JointRetyping {
+  JointKind kind = JointKind::Fixed;
+  Vector3d axis = Vector3d::UnitZ(), axis2 = Vector3d::UnitY();
+};
+
+struct ClosureSpec {
+  std::string name, frame1, frame2;
+  ClosureKind kind = ClosureKind::Weld6D;
+  Vector3d axis = Vector3d::UnitZ();
+  std::map<std::string, double> coefficients;  ///< of a coupler, by joint
+  double offset = 0;
+  double kp = 0, kd = 0;
+};
+
+struct MotorSpec {
+  std::string joint;
+  std::optional<double> armature, effort, velocity, torque_loss, continuous_effort;
+  MotorDrive drive;
+};
+
+struct JointForceSpec {
+  std::string joint;
+  JointForce force;
+};
+
+struct PointSpringSpec {
+  std::string frame1, frame2;
+  PointSpring spring;  ///< its points in these frames
+};
+
+struct ContactSpec {
+  std::string name, frame;
+  ContactKind kind = ContactKind::Surface6D;
+  double half_length = 0, half_width = 0;
+};
+
+/// A robot's YAML file. Names are not resolved yet.
+struct YamlFile {
+  std::string path;
+  std::vector<std::string> models;  ///< of the robot that this file completes, in the order in which they are tried
+  std::optional<YamlEntry> generator,
+      settings;  ///< of the robot that this file is, or completes; names and values as given
+  std::optional<BaseKind> base;
+  std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file
+  std::optional<double> cross_inertia;                             ///< of universal joints, kg m^2
+  std::vector<ClosureSpec> closures;
+  std::vector<MotorSpec> motors;
+  std::map<std::string, double> armature;  ///< joint -> kg m^2
+  std::optional<double> motor_armature;    ///< of every motor
+  std::vector<JointForceSpec> joint_forces;
+  std::vector<PointSpringSpec> point_springs;
+  std::vector<ContactSpec> contacts;
+  std::vector<Reference> references;
+  std::vector<std::string> serial_joints;
+  std::vector<std::pair<std::string, std::array<double, 2>>> importance;  ///< joint -> of its position, of its velocity
+  std::optional<Vector3d> gravity;
+  std::vector<std::string> warnings;
+};
+
+/// \param path  named in errors, and the place of meshes
+/// \param settings  gets what elements of Drake say
+/// \throws ModelError for anything but one tree of named links with finite numbers
+UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& settings);
+
+/// \throws ModelError for unknown keys, wrong types, lists that do not match
+YamlFile parseYaml(const std::string& text, const std::string& path);
+YamlFile readYaml(const std::string& path);
+
+/// A file of MuJoCo as the contents of both files.
+struct MjcfFile {
+  UrdfFile tree;
+  YamlFile settings;
+};
+
+/// \throws ModelError for what is not MJCF, or cannot be read as a robot
+MjcfFile readMjcf(const std::string& path);
+
+/// The whole content of a file. \throws ModelError when it cannot be read, or is too large
+std::string readRobotText(const std::string& path);
+
+/// The URDF, the MJCF or the YAML file with a generator of the robot that a file with the key `model` completes; empty if none of
+/// them exists.
+std::string findModel(const YamlFile& yaml);
+
+/// A URDF with its YAML file, or what stands for them, and possibly a file that completes them.
+struct RobotFiles {
+  UrdfFile urdf;
+  YamlFile yaml;
+};
+
+/// A robot as loadRobot (robots/robot_loader.h) describes.
+/// \param generate  the files of the robot that a YAML file with the key `generator` describes
+LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options,
+                      const std::function<RobotFiles(const YamlFile&)>& generate);
+
+}  // namespace bielle

@@ -1,0 +1,116 @@
+#include "formats/yaml_entry.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "bielle/model/error.h"
+#include "formats/text_file.h"
+
+namespace bielle {
+
+YamlEntry::YamlEntry(std::string path, std::string element, const YAML::Node& node)
+    : path_(std::move(path)), element_(std::move(element)), node_(std::make_shared<const YAML::Node>(node)) {}
+
+void YamlEntry::fail(const std::string& problem, const std::string& remedy) const {
+  const int line = node_->IsDefined() ? node_->Mark().line : -1;
+  throw ModelError(
+      path_, (element_.empty() ? "document" : element_) + (line >= 0 ? " (line " + std::to_string(line + 1) + ")" : ""),
+      problem, remedy);
+}
+
+bool YamlEntry::isMap() const { return node_->IsMap(); }
+bool YamlEntry::isList() const { return node_->IsSequence(); }
+
+bool YamlEntry::isWord(const std::string& word) const { return node_->IsScalar() && node_->Scalar() == word; }
+
+std::string YamlEntry::getText() const {
+  if (!node_->IsScalar() || node_->Scalar().empty()) fail("it is not a name", "give one word");
+  return node_->Scalar();
+}
+
+double YamlEntry::getNumber(bool may_be_infinite) const {
+  double value = 0;
+  if (!node_->IsScalar() || !YAML::convert<double>::decode(*node_, value))
+    fail("it is not a number", "give one number");
+  if (std::isnan(value) || (std::isinf(value) && !may_be_infinite)) fail("it is not finite", "give a finite number");
+  return value;
+}
+
+std::vector<YamlEntry> YamlEntry::getList(int count) const {
+  if (!isList()) fail("it is not a list", "write it as [a, b, ...]");
+  if (count >= 0 && static_cast<int>(node_->size()) != count)
+    fail("it has " + std::to_string(node_->size()) + " element(s)", "give " + std::to_string(count));
+  std::vector<YamlEntry> entries;
+  for (const YAML::Node& item : *node_)
+    entries.emplace_back(path_, element_ + "[" + std::to_string(entries.size()) + "]", item);
+  return entries;
+}
+
+std::vector<std::string> YamlEntry::getTexts(int count) const {
+  std::vector<std::string> out;
+  for (const YamlEntry& entry : getList(count)) out.push_back(entry.getText());
+  return out;
+}
+
+std::vector<double> YamlEntry::getNumbers(int count) const {
+  std::vector<double> out;
+  for (const YamlEntry& entry : getList(count)) out.push_back(entry.getNumber());
+  return out;
+}
+
+Vector3d YamlEntry::getVector3() const { return Eigen::Map<const Vector3d>(getNumbers(3).data()); }
+
+std::vector<std::pair<std::string, YamlEntry>> YamlEntry::getMap() const {
+  std::vector<std::pair<std::string, YamlEntry>> pairs;
+  if (node_->IsNull()) return pairs;
+  if (!isMap()) fail("it is not a map", "write it as {name: value, ...}");
+  std::set<std::string> seen;
+  for (const auto& pair : *node_) {
+    if (!pair.first.IsScalar()) fail("one of its keys is not a name", "use plain words as keys");
+    const std::string key = pair.first.Scalar();
+    if (!seen.insert(key).second) fail("key '" + key + "' is given twice", "keep one");
+    pairs.emplace_back(
+        key, YamlEntry(path_, element_.empty() ? "key '" + key + "'" : element_ + ": key '" + key + "'", pair.second));
+  }
+  return pairs;
+}
+
+std::map<std::string, YamlEntry> YamlEntry::getFields(const std::vector<std::string>& known) const {
+  std::map<std::string, YamlEntry> fields;
+  for (const auto& [key, entry] : getMap()) {
+    if (std::find(known.begin(), known.end(), key) == known.end()) {
+      std::string names;
+      for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+      entry.fail("it is unknown", "known keys are " + names);
+    }
+    fields.emplace(key, entry);
+  }
+  return fields;
+}
+
+const YamlEntry* find(const YamlFields& fields, const std::string& key) {
+  const auto it = fields.find(key);
+  return it == fields.end() ? nullptr : &it->second;
+}
+
+const YamlEntry& require(const YamlFields& fields, const std::string& key, const YamlEntry& owner) {
+  const YamlEntry* entry = find(fields, key);
+  if (!entry) owner.fail("it has no '" + key + "'", "add it");
+  return *entry;
+}
+
+void readYamlDocument(const std::string& path, const std::string& text,
+                      const std::function<void(const YamlEntry&)>& read) {
+  requireUtf8(text, path);
+  try {
+    read(YamlEntry(path, "", YAML::Load(text)));
+  } catch (const YAML::Exception& error) {
+    throw ModelError(path, "line " + std::to_string(error.mark.line + 1), "it is not well-formed YAML: " + error.msg,
+                     "correct the syntax");
+  }
+}
+
+}  // namespace bielle

@@ -1,0 +1,317 @@
+#include "bielle/results/robot_info.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/ground.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/linkage.h"
+#include "bielle/model/error.h"
+#include "bielle/model/names.h"
+#include "dynamics/point_spring.h"
+#include "results/json_text.h"
+#include "model/frame_name.h"
+#include "model/number_text.h"
+
+namespace bielle {
+namespace {
+
+struct Posture {
+  std::string name;
+  VectorXd q;
+  bool closed;
+  std::string message;
+};
+
+// The unchanged neutral configuration, and every reference, closed as far as possible.
+std::vector<Posture> makePostures(const Model& model) {
+  std::vector<Posture> postures = {{"neutral", model.makeNeutral(), true, ""}};
+  for (const Reference& reference : model.references()) {
+    const AssemblyResult result = assembleReference(model, reference.name);
+    postures.push_back({reference.name, result.q, result.status == AssemblyStatus::Closed, result.message});
+  }
+  return postures;
+}
+
+Json orNull(double limit) { return std::isfinite(limit) ? Json(limit) : Json(nullptr); }
+
+// A number for a joint of one coordinate, else a list.
+Json toJson(const VectorXd& q) { return q.size() == 1 ? Json(q[0]) : Json(std::vector<double>(q.begin(), q.end())); }
+
+// "motor - 2 knee"
+std::string describeTerms(const Model& model, const Closure& coupler) {
+  std::string text;
+  for (const CouplerTerm& term : coupler.terms) {
+    const double size = std::abs(term.coefficient);
+    text += term.coefficient < 0 ? (text.empty() ? "-" : " - ") : (text.empty() ? "" : " + ");
+    if (size != 1) text += formatNumber(size) + " ";
+    text += model.joints()[term.joint].name;
+  }
+  return text;
+}
+
+Json describeClosures(const Model& model, const std::vector<Posture>& postures) {
+  Json closures = Json::array();
+  for (const Closure& closure : model.closures()) {
+    const bool coupler = closure.kind == ClosureKind::Coupler;
+    closures.push_back(
+        {{"name", closure.name},
+         {"kind", getName(closure.kind)},
+         {"frame1", coupler ? describeTerms(model, closure) : findFrameName(model, closure.body1, closure.X_B1)},
+         {"frame2", coupler ? "= " + formatNumber(closure.offset) : findFrameName(model, closure.body2, closure.X_B2)},
+         {"rows", getRows(closure.kind)},
+         {"loop_dofs", closure.dofs.size()}});
+  }
+  Workspace ws(model);
+  for (const Posture& posture : postures) {
+    updatePositions(model, ws, posture.q);
+    for (size_t c = 0; c < closures.size(); ++c) {
+      const ClosureGap gap = calcClosureGap(ws, model.closures()[c]);
+      closures[c]["gap " + posture.name] = {gap.position, gap.angle};
+    }
+  }
+  return closures;
+}
+
+Json describeJointForces(const Model& model) {
+  Json forces = Json::array();
+  for (const JointForce& force : model.jointForces())
+    forces.push_back({{"name", model.joints()[force.joint].name},
+                      {"stiffness", force.stiffness},
+                      {"rest", force.rest},
+                      {"preload", force.preload},
+                      {"damping", force.damping},
+                      {"friction", force.friction},
+                      {"friction_speed", force.friction_speed}});
+  return forces;
+}
+
+Json describePointSprings(const Model& model, const std::vector<Posture>& postures) {
+  Json springs = Json::array();
+  for (const PointSpring& spring : model.pointSprings())
+    springs.push_back({{"name", spring.name},
+                       {"body1", model.bodies()[spring.body1].name},
+                       {"body2", model.bodies()[spring.body2].name},
+                       {"stiffness", spring.stiffness},
+                       {"rest", spring.rest},
+                       {"preload", spring.preload},
+                       {"damping", spring.damping}});
+  Workspace ws(model);
+  for (const Posture& posture : postures) {
+    updatePositions(model, ws, posture.q);
+    for (size_t s = 0; s < springs.size(); ++s)
+      springs[s]["length " + posture.name] = calcPointSpringLength(model.pointSprings()[s], ws);
+  }
+  return springs;
+}
+
+// At the first reference that closes, else at a closed configuration near neutral.
+Json describeMobility(const Model& model, const std::vector<Posture>& postures) {
+  std::string place = "closed neutral";
+  const AssemblyResult found = findClosedConfiguration(model);
+  VectorXd q = found.q;
+  bool closed = found.status == AssemblyStatus::Closed;
+  for (size_t i = postures.size(); i-- > 1;)
+    if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
+  const Mobility mobility = calcMobility(model, q);
+  return {{"posture", place},
+          {"closed", closed},
+          {"rows", mobility.rows},
+          {"rank", mobility.rank},
+          {"mobility", mobility.mobility}};
+}
+
+// Of every linkage.
+void addDeadPoints(const Model& model, const Posture& posture, Json& out) {
+  for (const DeadPointTrace& linkage : traceDeadPoints(model, posture.q.transpose())) {
+    const DeadPoint& nearest = linkage.getNearest();
+    const bool far = nearest.kind == DeadPointKind::None;
+    out.push_back({{"reference", posture.name},
+                   {"linkage", linkage.output},
+                   {"distance", orNull(nearest.distance)},
+                   {"of", far ? "none within " + formatNumber(kFarthestDeadPoint) : getName(nearest.kind)}});
+  }
+}
+
+// Least distances of shapes between two legs, within legs and trunk, and to the ground under the feet, which are left out.
+Json describeDistances(const Model& model, const Posture& posture) {
+  Workspace ws(model);
+  updatePlacements(model, ws, posture.q);
+  Json distances = Json::array();
+  const auto add = [&](const char* between, double distance, const std::string& body1, const std::string& body2) {
+    distances.push_back(
+        {{"between", between}, {"distance", distance}, {"body1", body1}, {"body2", body2}, {"posture", posture.name}});
+  };
+  const auto getBody = [&](int shape) { return model.bodies()[model.shapes()[shape].body].name; };
+  std::vector<ShapePair> legs, others;
+  for (const ShapePair& pair : listShapePairs(model)) (pair.of_two_legs ? legs : others).push_back(pair);
+  for (const auto& [between, pairs] : {std::pair{"legs", legs}, {"other bodies", others}})
+    if (const NearestPair nearest = findNearestPair(model, ws.X_WB, pairs); nearest.pair >= 0)
+      add(between, nearest.distance.distance, getBody(pairs[nearest.pair].b), getBody(pairs[nearest.pair].a));
+  std::set<int> feet = {0};
+  Ground ground;
+  ground.height = std::numeric_limits<double>::infinity();
+  for (const ContactFrame& contact : model.contacts()) {
+    feet.insert(contact.body);
+    ground.height = std::min(ground.height, getPlacement(ws, contact.body, contact.X_BF).p.z());
+  }
+  int lowest = -1;
+  double least = 0;
+  for (int s = 0; s < static_cast<int>(model.shapes().size()) && feet.size() > 1; ++s) {
+    const Shape& shape = model.shapes()[s];
+    if (feet.count(shape.body)) continue;
+    const double distance = calcGroundDistance(ground, shape, ws.X_WB[shape.body]).distance;
+    if (lowest < 0 || distance < least) least = distance, lowest = s;
+  }
+  if (lowest >= 0) add("ground", least, getBody(lowest), "ground");
+  return distances;
+}
+
+// Of the first reference that closes, else of the neutral configuration.
+const Posture& chooseStanding(const std::vector<Posture>& postures) {
+  for (size_t i = 1; i < postures.size(); ++i)
+    if (postures[i].closed) return postures[i];
+  return postures.front();
+}
+
+Json describeDrive(const Motor& motor) {
+  const MotorDrive& drive = motor.drive;
+  return {{"name", motor.name},
+          {"type", drive.type},
+          {"ratio", drive.ratio},
+          {"rotor_inertia", drive.rotor_inertia},
+          {"torque_constant", drive.torque_constant},
+          {"resistance", drive.resistance},
+          {"voltage", orNull(drive.voltage)},
+          {"current", orNull(drive.current)},
+          {"continuous_current", orNull(drive.continuous_current)},
+          {"continuous_effort", orNull(motor.continuous_effort)},
+          {"efficiency", drive.efficiency},
+          {"back_efficiency", drive.back_efficiency},
+          {"mass", drive.mass}};
+}
+
+std::string format(const VectorXd& q) {
+  std::string text;
+  for (double value : q) text += (text.empty() ? "" : " ") + formatNumber(value, "%.4g");
+  return text;
+}
+
+// "its range of -1 to 0.98", if a given value is outside; else empty.
+std::string describeMissedRange(const Model& model, const ReferenceJoint& of) {
+  constexpr double kRounding = 1e-3;  // rad or m: 1.571 for a quarter turn
+  const Joint& joint = model.joints()[of.joint];
+  if (joint.nq != joint.nv) return "";
+  const VectorXd lower = model.lowerLimits().segment(joint.idx_v, joint.nv),
+                 upper = model.upperLimits().segment(joint.idx_v, joint.nv);
+  if ((of.given - lower).minCoeff() >= -kRounding && (upper - of.given).minCoeff() >= -kRounding) return "";
+  return "its range of " + format(lower) + " to " + format(upper);
+}
+
+}  // namespace
+
+std::vector<std::string> checkReferences(const LoadedRobot& robot) {
+  const Model& model = robot.model;
+  std::filesystem::path file = robot.file;
+  if (file.extension() == ".urdf") file.replace_extension(".yaml");
+  std::vector<std::string> warnings;
+  for (const Reference& reference : model.references()) {
+    const AssemblyResult result = assembleReference(model, reference.name);
+    const bool closed = result.status == AssemblyStatus::Closed;
+    const std::string element = "reference '" + reference.name + "'";
+    std::string moved, outside;
+    for (const ReferenceJoint& of : listReferenceJoints(model, reference, result.q)) {
+      const std::string joint = "'" + model.joints()[of.joint].name + "'", range = describeMissedRange(model, of);
+      const bool is_met = closed && of.moved <= kReferenceTolerance;
+      if (!range.empty() && !is_met)
+        throw ModelError(file.string(), element,
+                         "joint " + joint + " cannot be at " + format(of.given) + ", outside " + range,
+                         "give a value that it can have, or correct the range");
+      if (!range.empty()) outside += (outside.empty() ? "" : ", ") + joint + " is outside " + range;
+      if (closed && !is_met)
+        moved +=
+            (moved.empty() ? "" : ", ") + joint + " at " + format(of.assembled) + " instead of " + format(of.given);
+    }
+    if (!outside.empty())
+      warnings.push_back(file.string() + ": " + element + ": " + outside +
+                         "; motions that start there need --no-limits");
+    if (!moved.empty())
+      warnings.push_back(file.string() + ": " + element + ": it is assembled with " + moved +
+                         ", because loops, height and feet come before given angles; give angles that the robot can "
+                         "have together, or omit them");
+  }
+  return warnings;
+}
+
+std::string makeRobotInfo(const LoadedRobot& robot) {
+  const Model& model = robot.model;
+  const std::vector<Posture> postures = makePostures(model);
+  const size_t given = std::count_if(model.shapes().begin(), model.shapes().end(), [](auto& s) { return !s.fitted; });
+  Json json = {{"name", model.name()},
+               {"directory", robot.directory},
+               {"base", model.hasFreeFlyer() ? "free" : "fixed"},
+               {"mass", model.mass()},
+               {"nq", model.nq()},
+               {"nv", model.nv()},
+               {"nu", model.nu()},
+               {"closure_rows", model.numClosureRows()},
+               {"mobility", describeMobility(model, postures)},
+               {"joints", Json::array()},
+               {"closures", describeClosures(model, postures)},
+               {"clusters", Json::array()},
+               {"motors", Json::array()},
+               {"drives", Json::array()},
+               {"joint_forces", describeJointForces(model)},
+               {"point_springs", describePointSprings(model, postures)},
+               {"shapes", {{"given", given}, {"fitted", model.shapes().size() - given}}},
+               {"distances", describeDistances(model, chooseStanding(postures))},
+               {"contacts", Json::array()},
+               {"references", Json::array()},
+               {"reference_joints", Json::array()},
+               {"dead_points", Json::array()},
+               {"warnings", robot.warnings}};
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    json["joints"].push_back({{"name", joint.name},
+                              {"kind", getName(joint.kind)},
+                              {"parent", model.bodies()[joint.parent].name},
+                              {"child", model.bodies()[i].name},
+                              {"nq", joint.nq},
+                              {"nv", joint.nv}});
+  }
+  for (const LoopCluster& cluster : model.clusters()) {
+    Json names = Json::array();
+    for (int c : cluster.closures) names.push_back(model.closures()[c].name);
+    json["clusters"].push_back({{"closures", names}, {"rows", cluster.rows}, {"dofs", cluster.dofs.size()}});
+  }
+  for (const Motor& motor : model.motors())
+    json["motors"].push_back({{"name", motor.name},
+                              {"armature", motor.armature},
+                              {"effort_limit", orNull(motor.effort_limit)},
+                              {"velocity_limit", orNull(motor.velocity_limit)},
+                              {"torque_loss", motor.torque_loss ? Json(*motor.torque_loss) : Json()}});
+  for (const Motor& motor : model.motors())
+    if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort)) json["drives"].push_back(describeDrive(motor));
+  for (const ContactFrame& contact : model.contacts())
+    json["contacts"].push_back({{"name", contact.name},
+                                {"kind", contact.kind == ContactKind::Surface6D ? "6d" : "3d"},
+                                {"body", model.bodies()[contact.body].name},
+                                {"sole", {2 * contact.half_length, 2 * contact.half_width}}});
+  for (size_t i = 1; i < postures.size(); ++i) {
+    json["references"].push_back(
+        {{"name", postures[i].name}, {"closed", postures[i].closed}, {"message", postures[i].message}});
+    if (postures[i].closed) addDeadPoints(model, postures[i], json["dead_points"]);
+    for (const ReferenceJoint& joint : listReferenceJoints(model, model.references()[i - 1], postures[i].q))
+      json["reference_joints"].push_back({{"reference", postures[i].name},
+                                          {"joint", model.joints()[joint.joint].name},
+                                          {"given", toJson(joint.given)},
+                                          {"assembled", toJson(joint.assembled)}});
+  }
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace bielle

@@ -1,0 +1,155 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "bielle/results/result.h"
+#include "bielle/model/error.h"
+#include "results/json_text.h"
+#include "formats/text_file.h"
+
+namespace bielle {
+namespace {
+
+OptionValue readOption(const Json& json) {
+  if (json.is_boolean()) return json.get<bool>();
+  if (json.is_string()) return json.get<std::string>();
+  if (json.is_number_integer() && std::abs(json.get<double>()) <= std::numeric_limits<int>::max())
+    return json.get<int>();
+  return json.get<double>();
+}
+
+// A number of nodes, or the index of one.
+int readCount(const Json& json) {
+  if (!json.is_number_integer() || json < 0 || json > std::numeric_limits<int>::max())
+    throw std::runtime_error(json.dump(-1, ' ', true, Json::error_handler_t::replace) + " is not a number of nodes");
+  return json;
+}
+
+Vector3d readVector(const Json& json) {
+  return Vector3d(json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>());
+}
+
+SE3 readPlacement(const Json& json) {
+  const Json& r = json.at("quaternion");
+  const Eigen::Quaterniond quaternion(r.at(3), r.at(0), r.at(1), r.at(2));
+  if (!(std::abs(quaternion.norm() - 1) < 1e-6)) throw std::runtime_error("a quaternion is not of unit length");
+  return {quaternion.normalized().toRotationMatrix(), readVector(json.at("position"))};
+}
+
+Ground readGround(const Json& json) {
+  Ground ground;
+  ground.height = json.at("height");
+  ground.friction = json.at("friction");
+  for (const Json& step : json.at("steps"))
+    ground.steps.push_back({readVector(step.at("top")), step.at("length"), step.at("width"), step.at("yaw"),
+                            step.at("pitch"), step.at("roll")});
+  return ground;
+}
+
+GoalOutcome readGoal(const Json& json) {
+  GoalOutcome outcome;
+  Goal& goal = outcome.goal;
+  goal.name = json.at("name");
+  goal.kind = parseGoalKind(json.at("kind"));
+  goal.requested = json.at("requested");
+  goal.tolerance = json.at("tolerance");
+  // JSON has no infinity or NaN.
+  outcome.achieved =
+      json.at("achieved").is_null() ? std::numeric_limits<double>::quiet_NaN() : json.at("achieved").get<double>();
+  goal.first = readCount(json.at("first_node"));
+  goal.last = readCount(json.at("last_node"));
+  if (json.contains("direction")) goal.direction = readVector(json.at("direction"));
+  if (json.contains("contacts")) goal.contacts = json.at("contacts").get<std::vector<std::string>>();
+  if (json.contains("footholds"))
+    for (const Json& entry : json.at("footholds"))
+      goal.footholds.push_back({entry.at("contact"), readCount(entry.at("node")), readVector(entry.at("position"))});
+  return outcome;
+}
+
+ObjectiveOptions readObjective(const Json& json) {
+  ObjectiveOptions options;
+  const std::string kind = json.at("kind");
+  for (Objective objective : {Objective::Energy, Objective::PeakTorque})
+    if (kind == getName(objective)) options.objective = objective;
+  options.regularization = json.at("regularization").get<double>();
+  options.scale = json.at("scale").get<double>();
+  return options;
+}
+
+MotionSummary read(const Json& json) {
+  MotionSummary summary;
+  summary.motion = json.at("motion");
+  summary.robot = json.at("robot");
+  summary.robot_file = json.at("robot_file");
+  summary.model = json.at("model");
+  summary.serial_armature = json.at("serial_armature");
+  const std::string formulation = json.at("formulation");
+  summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
+  const std::string step = json.at("step");
+  summary.step = step == getName(StepRule::Midpoint) ? StepRule::Midpoint : StepRule::Euler;
+  summary.objective = readObjective(json.at("objective"));
+  summary.objective.regeneration = json.at("electrical_energy").at("regeneration");
+  summary.converged = json.at("converged");
+  for (const auto& [name, value] : json.at("options").items()) summary.options.emplace_back(name, readOption(value));
+  for (const Json& entry : json.at("goals")) summary.goals.push_back(readGoal(entry));
+  for (const Json& entry : json.at("phases")) {
+    MotionSummary::Phase phase{
+        entry.at("name"), readCount(entry.at("start_node")), readCount(entry.at("nodes")), entry.at("time_step_s"), {}};
+    for (const Json& contact : entry.at("contacts"))
+      phase.stances.push_back({contact.at("name"), readPlacement(contact)});
+    summary.phases.push_back(phase);
+  }
+  for (const Json& entry : json.at("free_timings"))
+    summary.timings.push_back({entry.at("phase"), readCount(entry.at("start_node")), entry.at("nominal_s"),
+                               entry.at("chosen_s"), entry.at("lower_s"), entry.at("upper_s")});
+  summary.ground = readGround(json.at("ground"));
+  return summary;
+}
+
+// The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
+std::vector<std::string> listPartMotions(const OptionValues& options) {
+  std::vector<std::string> labels, motions;
+  for (const auto& [name, value] : options) {
+    const size_t dot = name.find('.');
+    if (dot == std::string::npos) continue;
+    const std::string label = name.substr(0, dot);
+    if (std::find(labels.begin(), labels.end(), label) != labels.end()) continue;
+    labels.push_back(label);
+    motions.push_back(label.substr(0, label.find_last_not_of("0123456789") + 1));
+  }
+  return motions;
+}
+
+}  // namespace
+
+MotionSummary readSummary(const std::string& directory) {
+  const std::string path = (std::filesystem::path(directory) / "summary.json").string();
+  const std::string text = readTextFile(path, "give a directory that `bielle solve` wrote");
+  try {
+    const Json json = parseJson(text);
+    if (!json.contains("outcome")) {
+      MotionSummary summary = read(json);
+      summary.file = path;
+      return summary;
+    }
+  } catch (const std::exception& error) {
+    throw ModelError(path, "file", describeJsonError(error), "recreate it with `bielle solve`");
+  }
+  throw ModelError(path, "motion", "it is a motion carried out, not a plan", "give the directory of `bielle solve`");
+}
+
+MotionRequest remakeRequest(const MotionSummary& summary) {
+  MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listPartMotions(summary.options))
+                                                      : findMotion(summary.file, summary.motion).request;
+  const auto isLimit = [](const std::string& name) {
+    for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit, kDeadPointMargin})
+      if (name.rfind(prefix, 0) == 0) return true;
+    return false;
+  };
+  for (const auto& [name, value] : summary.options)
+    if (!isLimit(name)) request.options.set(name, value);
+  return request;
+}
+
+}  // namespace bielle

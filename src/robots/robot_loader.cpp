@@ -1,0 +1,34 @@
+// The generators are above the reader, which gets them from here.
+#include "bielle/robots/robot_loader.h"
+
+#include "bielle/formats/robot_writer.h"
+#include "bielle/model/error.h"
+#include "formats/robot_files.h"
+#include "robots/generator_entry.h"
+
+namespace bielle {
+namespace {
+
+// As if they had been written and read again: a generated robot is the same by its generator and from its files, and
+// whatever completes a robot, or fixes its base, has the same meaning for it.
+RobotFiles generate(const YamlFile& yaml) {
+  const GeneratorEntry entry = readGeneratorEntry(*yaml.generator, yaml.settings ? &*yaml.settings : nullptr);
+  RobotText text;
+  try {
+    text = formatRobot(entry.generator->make(entry.parameters));
+  } catch (const ModelError& error) {  // parameters that are possible one by one, but not together
+    yaml.generator->fail(error.element() + ": " + error.problem(), error.remedy());
+  }
+  RobotFiles files;
+  files.urdf = parseUrdf(text.urdf, yaml.path, files.yaml);
+  files.yaml = parseYaml(text.yaml, yaml.path);
+  return files;
+}
+
+}  // namespace
+
+LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {
+  return readRobot(name_or_path, options, &generate);
+}
+
+}  // namespace bielle

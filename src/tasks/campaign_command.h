@@ -1,0 +1,34 @@
+#pragma once
+// The command lines of a campaign's runs.
+#include <string>
+#include <vector>
+
+#include "tasks/campaign_spec.h"
+
+namespace bielle::study {
+
+// A value of each axis, by its index.
+using CampaignCell = std::vector<size_t>;
+
+std::string formatImpulse(const ImpulseSearch& search, int multiple);
+
+class CampaignCommands {
+ public:
+  // \param directories  of the motions; empty: phases count as time 0
+  // \throws ModelError when a plan has no such phase
+  CampaignCommands(const CampaignSpec& spec, const std::vector<std::string>& directories);
+
+  // Arguments of `bielle simulate` after the motion. `impulse`: of a search, N s.
+  std::vector<std::string> make(const CampaignCell& cell, const std::string& impulse) const;
+
+ private:
+  const CampaignSpec& spec_;
+  std::vector<std::vector<std::string>> phase_times_;  // per motion, per value of the axis of phases, s
+};
+
+// Dry runs of one cell and of those that differ from it in one value, equal ones once. `log`: a file for the outputs.
+// False if the user asks for the end before they are done.
+// \throws ModelError naming the file and the key that is refused
+bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log);
+
+}  // namespace bielle::study

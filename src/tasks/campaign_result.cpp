@@ -1,0 +1,69 @@
+#include "tasks/campaign_result.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "results/process.h"
+#include "tasks/campaign.h"
+#include "tasks/cases.h"
+
+namespace bielle::study {
+namespace {
+
+constexpr std::size_t kLongestSummary = 4'000'000;
+// Times of the processor, which differ from run to run, are not among them.
+constexpr const char *kTexts[] = {"outcome", "outcome_message"},
+                     *kNumbers[] = {"duration",     "distance",    "mean_speed",     "largest_deviation",
+                                    "largest_slip", "largest_gap", "energy_balance", "saturated_share"};
+constexpr const char* kBrokeOff = "failed";
+
+// JSON has no NaN: a number that is none is null, which is right only where the world broke off.
+bool isNumber(const Json& value, bool broke_off) {
+  return value.is_number() ? std::isfinite(value.get<double>()) : value.is_null() && broke_off;
+}
+
+Json readRunSummary(const std::string& text, int status) {
+  const Json summary = parseJson(text);
+  const Json result = pickCampaignResult(summary);
+  const std::string outcome = result["outcome"];
+  if ((status == 0) != (outcome == kStood))
+    throw std::runtime_error("it " + outcome + ", and the exit status was " + std::to_string(status));
+  return result;
+}
+
+}  // namespace
+
+Json pickCampaignResult(const Json& summary) {
+  if (!summary.is_object()) throw std::runtime_error("it is not an object");
+  Json result = Json::object();
+  for (const char* field : kTexts) {
+    if (!summary.contains(field) || !summary[field].is_string())
+      throw std::runtime_error(std::string(field) + " is not text");
+    result[field] = summary[field];
+  }
+  const std::string outcome = result["outcome"];
+  if (outcome != kStood && outcome != kFell && outcome != kBrokeOff)
+    throw std::runtime_error("there is no outcome '" + outcome + "'");
+  for (const char* field : kNumbers) {
+    if (!summary.contains(field) || !isNumber(summary[field], outcome == kBrokeOff))
+      throw std::runtime_error(std::string(field) + " is not a number");
+    result[field] = summary[field];
+  }
+  return result;
+}
+
+Json readCampaignResult(const tasks::Task& task, int status) {
+  const std::string log = tasks::getOutput(task, task.log), error = findError(log);
+  if (status == 2 && !error.empty()) return {{"outcome", kRefused}, {"outcome_message", error}};
+  if (status == kNotStarted) throw std::runtime_error("it could not be started" + describeLog(log));
+  if (status >= 128)
+    throw std::runtime_error("terminated by signal " + std::to_string(status - 128) + describeLog(log));
+  if (status >= 2 || status < 0) throw std::runtime_error("exit status " + std::to_string(status) + describeLog(log));
+  try {
+    return readRunSummary(tasks::readOutput(tasks::getOutput(task, "out/summary.json"), kLongestSummary), status);
+  } catch (const std::exception& problem) {
+    throw std::runtime_error("it returned an invalid result: " + describeJsonError(problem));
+  }
+}
+
+}  // namespace bielle::study

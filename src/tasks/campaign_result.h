@@ -1,0 +1,16 @@
+#pragma once
+// What a run of a campaign returns, checked like any input: it may come from a machine that nobody here knows.
+#include "results/json_text.h"
+#include "tasks/engine.h"
+
+namespace bielle::study {
+
+// The fields of a summary that are kept, in it or in a line of the log.
+// \throws std::runtime_error saying which of them is not what it should be
+Json pickCampaignResult(const Json& summary);
+
+// Those of the summary of a task, or the reason for which the program refused it.
+// \throws std::exception saying what is wrong, when the task failed, or its outputs are not a result of the program
+Json readCampaignResult(const tasks::Task& task, int status);
+
+}  // namespace bielle::study

@@ -1,0 +1,114 @@
+#include "include/bielle/worlds/contact_law.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bielle::simulation {
+namespace {
+
+// A stop gives way by this under a torque of the robot's weight times one metre, or under its weight, rad or m.
+constexpr double kTurn = 0.02, kShift = 1e-3;
+constexpr double kStopDamping = 0.5;  // s/rad; s/m of sliding joints is longer by their ratio of speeds, about 10
+
+// Eq. (1)
+struct NormalForce {
+  double force = 0, rate = 0;  // rate: d force / d d'
+};
+NormalForce calcNormalForce(double stiffness, double damping, double depth, double depth_rate) {
+  const double factor = 1 + damping * depth_rate;
+  if (factor <= 0) return {};
+  return {stiffness * depth * factor, stiffness * depth * damping};
+}
+
+Vector3d shorten(const Vector3d& vector, double length) {
+  const double norm = vector.norm();
+  return norm > length ? Vector3d(vector * (length / norm)) : vector;
+}
+
+}  // namespace
+
+std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& ground, const ContactOptions& options) {
+  const int grid = ground.steps.empty() ? 2 : options.grid;
+  const double sole = model.mass() * model.gravity().norm() / options.sinkage;
+  std::vector<ContactPoint> points;
+  for (size_t c = 0; c < model.contacts().size(); ++c) {
+    const ContactFrame& contact = model.contacts()[c];
+    const bool is_surface = contact.kind == ContactKind::Surface6D;
+    const int count = is_surface ? grid * grid : 1;
+    for (int i = 0; i < count; ++i) {
+      ContactPoint point;
+      point.contact = static_cast<int>(c);
+      point.body = contact.body;
+      const auto place = [&](int along) { return is_surface ? 1 - 2.0 * along / (grid - 1) : 0; };  // from 1 to -1
+      const double x = place(i % grid) * contact.half_length, y = place(i / grid) * contact.half_width;
+      point.p = contact.X_BF.act(Vector3d(x, y, 0));
+      point.stiffness = sole / count;
+      point.damping = options.damping;
+      point.shear_stiffness = options.shear_ratio * point.stiffness;
+      point.shear_damping = options.shear_damping * 2 * std::sqrt(options.shear_ratio * sole * model.mass()) / count;
+      points.push_back(point);
+    }
+  }
+  return points;
+}
+
+ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
+                              const Vector3d& velocity, bool with_damping) {
+  ContactForce out;
+  const Terrain::Touch touch = terrain.touch(x);
+  if (!(touch.depth > 0)) return out;
+  const Vector3d& n = touch.normal;
+  const double approach = -n.dot(velocity);
+  const NormalForce normal = calcNormalForce(point.stiffness, point.damping, touch.depth, approach);
+  const double limit = terrain.getGround().friction * normal.force;
+  const Vector3d anchor = point.touches ? point.anchor : x;
+  const Vector3d shift = x - anchor, sliding = velocity + approach * n;
+  out.spring = shorten(-point.shear_stiffness * (shift - n.dot(shift) * n), limit);
+  const Vector3d wanted = out.spring - point.shear_damping * sliding, friction = shorten(wanted, limit);
+  out.force = normal.force * n + friction;
+  out.elastic =
+      0.5 * point.stiffness * touch.depth * touch.depth + 0.5 * out.spring.squaredNorm() / point.shear_stiffness;
+  if (!with_damping) return out;
+  const Matrix3d along = n * n.transpose();
+  out.damping = normal.rate * along;
+  const double size = wanted.norm();
+  if (size <= limit) {
+    out.damping += point.shear_damping * (Matrix3d::Identity() - along);
+  } else {
+    const Vector3d direction = wanted / size;
+    out.damping +=
+        point.shear_damping * limit / size * (Matrix3d::Identity() - along - direction * direction.transpose());
+  }
+  return out;
+}
+
+void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point) {
+  point.touches = terrain.touch(x).depth > 0;
+  point.anchor = x;
+  if (point.touches) point.anchor += force.spring / point.shear_stiffness;
+}
+
+std::vector<JointStop> makeJointStops(const Model& model) {
+  const double weight = model.mass() * model.gravity().norm();
+  std::vector<JointStop> stops;
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    if (joint.nv != 1) continue;
+    const double lower = model.lowerLimits()[joint.idx_v], upper = model.upperLimits()[joint.idx_v];
+    if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
+    const bool slides = joint.kind == JointKind::Prismatic;
+    stops.push_back({joint.idx_v, joint.idx_q, lower, upper, weight / (slides ? kShift : kTurn),
+                     slides ? 10 * kStopDamping : kStopDamping});
+  }
+  return stops;
+}
+
+StopForce calcStopForce(const JointStop& stop, double q, double v) {
+  const double above = q - stop.upper, below = stop.lower - q;
+  const double sign = above > 0 ? 1 : -1, depth = std::max(above, below);
+  if (!(depth > 0)) return {};
+  const NormalForce normal = calcNormalForce(stop.stiffness, stop.damping, depth, sign * v);
+  return {-sign * normal.force, 0.5 * stop.stiffness * depth * depth, normal.rate};
+}
+
+}  // namespace bielle::simulation

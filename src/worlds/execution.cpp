@@ -1,0 +1,244 @@
+#include "src/worlds/execution.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/names.h"
+#include "control/clock.h"
+#include "math/constants.h"
+#include "motion/record_tables.h"
+#include "src/worlds/robot_errors.h"
+
+namespace bielle::simulation {
+namespace {
+
+Vector3d calcPush(const std::vector<Push>& pushes, double time) {
+  Vector3d force = Vector3d::Zero();
+  for (const Push& push : pushes) {
+    if (time < push.time || time >= push.time + push.duration) continue;
+    const double angle = push.direction * kDegree;
+    force += push.impulse / push.duration * Vector3d(std::cos(angle), std::sin(angle), 0);
+  }
+  return force;
+}
+
+// Writes the rows of a record as the motion happens.
+class Recorder {
+ public:
+  Recorder(const Model& model, int stages) : model_(model), ws_(model) {
+    record_.q_names = makePositionNames(model);
+    record_.v_names = makeVelocityNames(model);
+    record_.u_names = getNames(model.motors());
+    record_.closure_names = getNames(model.closures());
+    record_.contact_names = getNames(model.contacts());
+    resizeRecord(stages, record_);
+  }
+
+  // The state of the next node; forces and torques that acted on the way to it are added by addStage().
+  void addNode(const World& world, const std::vector<PredictedFoothold>& footholds) {
+    const VectorXd &q = world.getConfiguration(), &v = world.getVelocity();
+    record_.time[node_] = world.getTime();
+    record_.q.row(node_) = q;
+    record_.v.row(node_) = v;
+    updatePositions(model_, ws_, q);
+    record_.com.row(node_) = calcCom(model_, ws_);
+    record_.gap.row(node_).setZero();
+    for (const Closure& closure : model_.closures()) {
+      const ClosureGap gap = calcClosureGap(ws_, closure);
+      record_.gap(node_, 0) = std::max(record_.gap(node_, 0), gap.position);
+      record_.gap(node_, 1) = std::max(record_.gap(node_, 1), gap.angle);
+    }
+    if (node_ > 0)
+      record_.a.row(node_ - 1) =
+          (record_.v.row(node_) - record_.v.row(node_ - 1)) / (record_.time[node_] - record_.time[node_ - 1]);
+    addFootholds(footholds);
+    ++node_;
+  }
+  void addStage(const World& world) {
+    const int stage = node_ - 1;
+    record_.u.row(stage) = world.getTorques();
+    record_.closure_wrenches.row(stage).setConstant(std::numeric_limits<double>::quiet_NaN());
+    for (size_t c = 0; c < world.getFeet().size(); ++c)
+      record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world.getFeet()[c].wrench;
+  }
+  Vector3d getCom() const { return record_.com.row(node_ - 1); }
+  // What was recorded from an instant on, a stage at least.
+  MotionRecord getRecord(double since) const {
+    int first = 0;
+    while (first + 2 < node_ && record_.time[first] < since) ++first;
+    MotionRecord record = record_;
+    if (record.footholds.rows() > 0) record.footholds = record_.footholds.middleRows(first, node_ - first);
+    record.time = record_.time.segment(first, node_ - first);
+    for (const RecordTable& table : listTables(record))
+      record.*table.data =
+          (record_.*table.data).middleRows(first, node_ - first - (table.per == RecordTable::Per::Node ? 0 : 1));
+    return record;
+  }
+
+ private:
+  void addFootholds(const std::vector<PredictedFoothold>& footholds) {
+    constexpr int kEntries = MotionRecord::kFootholdEntries;
+    RowMatrixXd& table = record_.footholds;
+    if (table.rows() == 0 && !footholds.empty())
+      table.setConstant(record_.time.size(), kEntries * static_cast<int>(model_.contacts().size()),
+                        std::numeric_limits<double>::quiet_NaN());
+    for (const PredictedFoothold& foothold : footholds)
+      table.row(node_).segment<kEntries>(kEntries * foothold.contact) << foothold.time, foothold.X_WF.p.transpose(),
+          Eigen::Quaterniond(foothold.X_WF.R).coeffs().transpose();
+  }
+
+  Model model_;
+  Workspace ws_;
+  MotionRecord record_;
+  int node_ = 0;
+};
+
+// The clock beside a world.
+class Pace {
+ public:
+  // s since the start
+  double getElapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+  // Keeps the world from running ahead. \returns how far it is behind, s
+  double await(double time) const {
+    const Clock::time_point due =
+        start_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(time));
+    std::this_thread::sleep_until(due);
+    return std::chrono::duration<double>(Clock::now() - due).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start_ = Clock::now();
+};
+
+// Advances by a control period, through all changes of the torques that fall into it.
+bool advance(World& world, TorqueDelay& delay, double time, double period) {
+  double elapsed = 0;
+  for (;;) {
+    world.setTorques(delay.getTorques(time + elapsed));
+    const double next = delay.getNextChange() - time;
+    const bool ends = next >= period - kClockTolerance;
+    if (!world.advance((ends ? period : next) - elapsed)) return false;
+    if (ends) return true;
+    elapsed = next;
+  }
+}
+
+// Left less right side of Books' Eq. (1), J.
+double calcImbalance(const Books& start, const Books& end) {
+  return end.getEnergy() - start.getEnergy() - end.motor_work - end.push_work + end.contact_loss + end.stop_loss +
+         end.other_loss;
+}
+
+// Energy that motors, pushes and losses have moved between two instants, J.
+double calcExchange(const Books& before, const Books& now) {
+  return std::abs(now.motor_work - before.motor_work) + std::abs(now.push_work - before.push_work) +
+         std::abs(now.contact_loss - before.contact_loss) + std::abs(now.stop_loss - before.stop_loss) +
+         std::abs(now.other_loss - before.other_loss);
+}
+
+}  // namespace
+
+const char* getName(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::Running:
+      return "running";
+    case Outcome::Stood:
+      return "stood";
+    case Outcome::Fell:
+      return "fell";
+    case Outcome::BrokeOff:
+      return "failed";
+    case Outcome::Stopped:
+      return "was stopped";
+  }
+  return "?";
+}
+
+Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
+                  const ExecutionOptions& o, const ExecutionObserver& observer) {
+  const double duration = o.duration > 0 ? o.duration : plan.getDuration() + o.hold;
+  const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
+  const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
+  Recorder recorder(model, (ticks + ticks_per_row - 1) / ticks_per_row);
+
+  Execution out;
+  Perception perception(plan.getModel(), o.perception);
+  TorqueDelay delay(model.nu(), o.control_period, o.delay);
+  VectorXd u = VectorXd::Zero(model.nu());
+  Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  plan.getReference(0, measurement.q, measurement.v);
+  if (model.isCopyOf(plan.getModel())) {
+    world.reset(measurement.q, measurement.v);
+  } else {
+    const VectorXd q = assembleMachine(plan.getModel(), model, measurement.q);
+    Workspace ws(model);
+    world.reset(q, projectVelocity(model, ws, makeConstraintSet(model), q, measurement.v));
+  }
+  FallDetector detector(model, plan, world.getConfiguration(), o.fall, o.ground, o.planned_ground);
+  perception.reset(world, measurement.q, measurement.v);
+  out.start = out.end = world.getBooks();
+  recorder.addNode(world, controller.getFootholds());
+  const Vector3d com_start = recorder.getCom();
+  int cut = 0, tick = 0;
+  double exchanged = 0;
+  bool advances = true, is_stopped = false;
+  std::string fall;
+  const Pace pace;
+  const auto describe = [&](double since) {
+    Execution so_far = out;
+    so_far.outcome = Outcome::Running;
+    so_far.duration = world.getTime();
+    so_far.distance = (recorder.getCom() - com_start).head<2>().norm();
+    so_far.imbalance = calcImbalance(so_far.start, so_far.end);
+    so_far.energy_balance = exchanged > 0 ? so_far.imbalance / exchanged : 0;
+    so_far.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
+    so_far.whole_seconds = pace.getElapsed();
+    so_far.estimation = perception.getErrors();
+    so_far.record = recorder.getRecord(since);
+    return so_far;
+  };
+  for (; tick < ticks && !is_stopped && fall.empty(); ++tick) {
+    if (o.real_time) out.largest_lag = std::max(out.largest_lag, pace.await(world.getTime()));
+    const double start = pace.getElapsed();
+    measurement = perception.update(world, controller.getPlanTime(world.getTime()));
+    measurement.delay = o.delay.delay;
+    controller.update(measurement, u);
+    delay.send(measurement.time, u);
+    world.setPush(calcPush(o.pushes, measurement.time));
+    const double controlled = pace.getElapsed();
+    advances = advance(world, delay, measurement.time, o.control_period);
+    out.control_seconds += controlled - start;
+    out.world_seconds += pace.getElapsed() - controlled;
+    is_stopped = o.interrupt && *o.interrupt;
+    for (int m = 0; m < model.nu(); ++m) cut += delay.getActing()[m] != world.getTorques()[m];
+    for (const FootReport& foot : world.getFeet()) out.largest_slip = std::max(out.largest_slip, foot.slip);
+    out.largest_gap = std::max(out.largest_gap, world.getGap());
+    if (!world.getMessage().empty()) break;
+    if (tick % ticks_per_row == 0) recorder.addStage(world);
+    fall = detector.find(world.getTime(), controller.getPlanTime(world.getTime()), world.getConfiguration());
+    out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
+    out.largest_joint_deviation = std::max(out.largest_joint_deviation, detector.getJointDeviation());
+    if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && !is_stopped && fall.empty()) continue;
+    recorder.addNode(world, controller.getFootholds());
+    const Books books = world.getBooks();
+    exchanged += calcExchange(out.end, books);
+    out.end = books;
+    if (observer && !is_stopped && fall.empty() && tick + 1 < ticks) observer(world.getTime(), duration, describe);
+  }
+  out = describe(0);
+  const bool breaks = !world.getMessage().empty();
+  out.outcome = breaks                      ? Outcome::BrokeOff
+                : !fall.empty()             ? Outcome::Fell
+                : advances && tick == ticks ? Outcome::Stood
+                                            : Outcome::Stopped;
+  out.message = breaks ? world.getMessage() : fall;
+  return out;
+}
+
+}  // namespace bielle::simulation

@@ -1,0 +1,79 @@
+#pragma once
+/// \file Carrying a plan out: a controller and a world, instant by instant, and what came of it.
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bielle/control/policy.h"
+#include "bielle/motion/record.h"
+#include "src/worlds/fall_detector.h"
+#include "src/worlds/perception.h"
+#include "src/worlds/torque_delay.h"
+#include "include/bielle/worlds/world.h"
+
+namespace bielle::simulation {
+
+/// A constant force on the trunk for a while.
+struct Push {
+  double time = 0;        ///< when it begins, s
+  double impulse = 0;     ///< N s
+  double direction = 0;   ///< about the vertical, from the x axis of the world; 90: to the left, degrees
+  double duration = 0.1;  ///< s
+};
+
+struct ExecutionOptions {
+  double duration = 0;           ///< s; 0: that of the plan and `hold`
+  double hold = 1;               ///< s
+  double control_period = 1e-3;  ///< s
+  double record_period = 5e-3;   ///< s
+  /// Each instant of control awaits its time on the clock: for controllers that work beside the world.
+  bool real_time = false;
+  PerceptionOptions perception;  ///< what the controller is told
+  DelayOptions delay;
+  std::vector<Push> pushes;
+  FallCriterion fall;
+  Ground ground, planned_ground;  ///< of the world; that the plan was made for
+  /// Ends the motion where it is, as WorldOptions::interrupt does within a period of control.
+  const std::atomic<bool>* interrupt = nullptr;
+};
+
+enum class Outcome { Running, Stood, Fell, BrokeOff, Stopped };
+const char* getName(Outcome outcome);
+
+struct Execution {
+  Outcome outcome = Outcome::BrokeOff;
+  std::string message;                 ///< what made it count as fallen, or why the world broke off
+  double duration = 0;                 ///< until the end, the fall or the break, s
+  double distance = 0;                 ///< of the centre of mass over the ground, from the start to the end, m
+  double largest_gap = 0;              ///< of closures, m
+  double largest_slip = 0;             ///< of a sole since its touchdown, m
+  double largest_deviation = 0;        ///< of the trunk from its planned place, m
+  double largest_joint_deviation = 0;  ///< of a revolute joint from its planned angle, rad
+  double imbalance = 0;                ///< Books' Eq. (1), left less right side, J
+  /// The imbalance over the energy that motors, pushes and losses moved, row by row of the record.
+  double energy_balance = 0;
+  double saturated_share = 0;  ///< of motors and time: torques that were cut at their limits
+  /// Time on the clock, s: all in all, of which in the world, and in the controller with its sensors.
+  double whole_seconds = 0, world_seconds = 0, control_seconds = 0;
+  double largest_lag = 0;  ///< with `real_time`: of an instant of control behind the clock, s
+  EstimationErrors estimation;
+  Books start, end;
+  MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means
+
+  double getMeanSpeed() const { return duration > 0 ? distance / duration : 0; }  ///< m/s
+  /// Simulated time over time on the clock.
+  double getRealTimeFactor() const { return whole_seconds > 0 ? duration / whole_seconds : 0; }
+};
+
+/// What has happened up to now, with the rows of its record from an instant [s] on.
+using ExecutionSoFar = std::function<Execution(double since)>;
+/// Looks on: is called after every row of the record, at `time` of `duration`, s.
+using ExecutionObserver = std::function<void(double time, double duration, const ExecutionSoFar& so_far)>;
+
+/// From the state in which the policy starts.
+/// \param model  of the world's robot; that of the policy may differ from it in its dimensions (robot_errors.h)
+Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
+                  const ExecutionOptions& options = {}, const ExecutionObserver& observer = {});
+
+}  // namespace bielle::simulation

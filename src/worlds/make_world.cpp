@@ -1,0 +1,54 @@
+#include "include/bielle/worlds/make_world.h"
+
+#include "bielle/model/error.h"
+#include "include/bielle/worlds/bielle_world.h"
+#ifdef BIELLE_WITH_MUJOCO
+#include "src/worlds/mujoco_world.h"
+#endif
+#include "src/worlds/simbody_world.h"
+
+namespace bielle::simulation {
+namespace {
+
+struct Entry {
+  const char* name;
+  std::unique_ptr<World> (*make)(const Model& model, const WorldOptions& options);
+};
+
+const Entry kWorlds[] = {
+    {"bielle",
+     [](const Model& model, const WorldOptions& options) {
+       return makeBielleWorld(model, {options, {}});
+     }},
+#ifdef BIELLE_WITH_MUJOCO
+    {"mujoco",
+     [](const Model& model, const WorldOptions& options) {
+       return makeMujocoWorld(model, {options, {}});
+     }},
+#endif
+    {"simbody",
+     [](const Model& model, const WorldOptions& options) {
+       SimbodyWorldOptions simbody;
+       simbody.world = options;
+       return makeSimbodyWorld(model, simbody);
+     }},
+};
+
+}  // namespace
+
+std::vector<std::string> listWorlds() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kWorlds) names.push_back(entry.name);
+  return names;
+}
+
+std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options) {
+  std::string known;
+  for (const Entry& entry : kWorlds) {
+    if (entry.name == name) return entry.make(model, options);
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  throw ModelError("", "world '" + name + "'", "there is no such world", "choose one of: " + known);
+}
+
+}  // namespace bielle::simulation

@@ -1,0 +1,67 @@
+#include "src/worlds/mujoco_ground.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace bielle::simulation {
+namespace {
+
+constexpr size_t kMostBoxes = 32;  // of MuJoCo at once
+constexpr double kDepth = 1;       // boxes reach this far below their tops, m
+
+}  // namespace
+
+MujocoGround::MujocoGround(const Model& model, const Ground& ground) : model_(model), height_(ground.height) {
+  for (const GroundStep& step : ground.steps) {
+    Box box{step, {}, {}, {}};
+    box.attitude = Eigen::AngleAxisd(step.yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(step.pitch, Vector3d::UnitY()) *
+                   Eigen::AngleAxisd(step.roll, Vector3d::UnitX());
+    box.centre = step.top - box.attitude * Vector3d(0, 0, kDepth / 2);
+    // Lengths are given as seen from above.
+    box.half_size = {step.length / 2 / std::cos(step.pitch), step.width / 2 / std::cos(step.roll), kDepth / 2};
+    boxes_.push_back(box);
+  }
+}
+
+void MujocoGround::addTo(MjcfOptions& robot) const {
+  robot.ground_height = height_;
+  robot.num_boxes = static_cast<int>(std::min(boxes_.size(), kMostBoxes));
+}
+
+void MujocoGround::bind(const mjModel& mj) {
+  for (size_t i = 1; i <= std::min(boxes_.size(), kMostBoxes); ++i)
+    if (const int geom = mj_name2id(&mj, mjOBJ_GEOM, ("box." + std::to_string(i)).c_str()); geom >= 0)
+      geoms_.push_back(geom);
+  for (const ContactFrame& contact : model_.contacts())
+    soles_.push_back(
+        {mj_name2id(&mj, mjOBJ_SITE, contact.name.c_str()), std::hypot(contact.half_length, contact.half_width)});
+}
+
+bool MujocoGround::update(mjModel& mj, const mjData& data) const {
+  size_t used = 0;
+  for (const Box& box : boxes_) {
+    const bool is_near = std::any_of(soles_.begin(), soles_.end(), [&](const Sole& sole) {
+      const mjtNum* centre = data.site_xpos + 3 * sole.site;
+      return box.step.calcDistance(centre[0], centre[1]) < sole.reach + kReach;
+    });
+    if (!is_near) continue;
+    if (used == geoms_.size()) return false;
+    show(mj, geoms_[used++], box);
+  }
+  for (; used < geoms_.size(); ++used) mj.geom_conaffinity[geoms_[used]] = 0;
+  return true;
+}
+
+void MujocoGround::show(mjModel& mj, int geom, const Box& box) const {
+  const Eigen::Quaterniond& q = box.attitude;
+  Eigen::Map<Vector3d>(mj.geom_pos + 3 * geom) = box.centre;
+  Eigen::Map<Eigen::Vector4d>(mj.geom_quat + 4 * geom) << q.w(), q.x(), q.y(), q.z();
+  Eigen::Map<Vector3d>(mj.geom_size + 3 * geom) = box.half_size;
+  mj.geom_sameframe[geom] = 0;  // it was compiled at the origin, whose frame MuJoCo would take
+  mj.geom_rbound[geom] = box.half_size.norm();
+  mj.geom_conaffinity[geom] = 1;
+}
+
+}  // namespace bielle::simulation

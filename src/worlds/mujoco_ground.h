@@ -1,0 +1,49 @@
+#pragma once
+/// \file A Ground in MuJoCo: its plane, and as many boxes as can be under the soles at once.
+///
+/// MuJoCo's steps take longer with every shape of its model, touched or not. The model therefore has a few boxes only,
+/// which are moved to those of the ground that are near the soles.
+#include <mujoco/mujoco.h>
+
+#include <vector>
+
+#include "bielle/dynamics/ground.h"
+#include "bielle/model/model.h"
+#include "formats/mjcf.h"
+
+namespace bielle::simulation {
+
+class MujocoGround {
+ public:
+  explicit MujocoGround(const Model& model, const Ground& ground);
+
+  /// Its plane and boxes.
+  void addTo(MjcfOptions& robot) const;
+  /// Finds them in the compiled model.
+  void bind(const mjModel& mj);
+  /// Moves boxes under the soles as they stand in `data`. To be called whenever these may have moved by kReach.
+  /// \returns false if there are too many boxes under the soles
+  bool update(mjModel& mj, const mjData& data) const;
+
+  static constexpr double kReach = 0.02;  ///< m
+
+ private:
+  struct Box {
+    GroundStep step;
+    Vector3d centre, half_size;
+    Eigen::Quaterniond attitude;
+  };
+  struct Sole {
+    int site;      // at its centre
+    double reach;  // of the sole from there, m
+  };
+  void show(mjModel& mj, int geom, const Box& box) const;
+
+  Model model_;
+  double height_;
+  std::vector<Box> boxes_;
+  std::vector<int> geoms_;  // of the boxes that MuJoCo has
+  std::vector<Sole> soles_;
+};
+
+}  // namespace bielle::simulation

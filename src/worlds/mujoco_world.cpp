@@ -1,0 +1,239 @@
+#include "src/worlds/mujoco_world.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bielle/dynamics/closure.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/loop_conflict.h"
+#include "bielle/model/error.h"
+#include "src/worlds/mujoco_model.h"
+#include "src/worlds/mujoco_ground.h"
+#include "src/worlds/sole_track.h"
+
+namespace bielle::simulation {
+namespace {
+
+// Soles that move by less than 10 m/s stay within reach of the boxes shown, s.
+constexpr double kBoxPeriod = MujocoGround::kReach / 10;
+
+MjcfOptions makeRobotOptions(const MujocoWorldOptions& options, const MujocoGround& ground) {
+  MjcfOptions robot = options.robot;
+  if (options.world.time_step > 0) robot.time_step = options.world.time_step;
+  robot.friction = options.world.ground.friction;
+  ground.addTo(robot);
+  return robot;
+}
+
+VectorXd findPosture(const Model& model) {
+  const AssemblyResult closed = findClosedConfiguration(model);
+  if (closed.status != AssemblyStatus::Closed) throw makeClosingError(model, model.name(), closed);
+  return closed.q;
+}
+
+class MujocoWorld : public World {
+ public:
+  MujocoWorld(const Model& model, const MujocoWorldOptions& options)
+      : model_(model),
+        ground_(model, options.world.ground),
+        options_(makeRobotOptions(options, ground_)),
+        interrupt_(options.world.interrupt),
+        mujoco_(model, findPosture(model), options_),
+        data_(mujoco_.makeData()),
+        contact_of_geom_(mujoco_.get()->ngeom, -1),
+        ws_(model),
+        soles_(model) {
+    const mjModel& mj = *mujoco_.get();
+    ground_.bind(mj);
+    for (size_t c = 0; c < model.contacts().size(); ++c)
+      for (int corner = 1; corner <= 4; ++corner) {
+        const std::string name = model.contacts()[c].name + "." + std::to_string(corner);
+        const int geom = mj_name2id(&mj, mjOBJ_GEOM, name.c_str());
+        if (geom >= 0) contact_of_geom_[geom] = static_cast<int>(c);
+      }
+    q_.setZero(model.nq());
+    u_.setZero(model.nu());
+    for (VectorXd* x : {&v_, &v_before_, &v_mean_, &push_force_}) x->setZero(model.nv());
+    q_before_.setZero(mj.nq);
+    row_velocity_.setZero(mj.njmax);
+  }
+
+  void reset(ConstVectorRef q, ConstVectorRef v) override;
+  void setTorques(ConstVectorRef u) override;
+  void setPush(const Vector3d& force) override;
+  bool advance(double duration) override;
+  const std::string& getMessage() const override { return message_; }
+  double getTime() const override { return time_; }
+  const VectorXd& getConfiguration() const override { return q_; }
+  const VectorXd& getVelocity() const override { return v_; }
+  const VectorXd& getTorques() const override { return u_; }
+  const std::vector<FootReport>& getFeet() const override { return soles_.getReports(); }
+  Books getBooks() const override;
+  double getGap() const override;
+
+ private:
+  bool step();
+  void book(double h);
+  void addSoleForces(double share);
+
+  Model model_;
+  MujocoGround ground_;
+  const MjcfOptions options_;
+  const std::atomic<bool>* const interrupt_;
+  MujocoModel mujoco_;
+  std::unique_ptr<mjData, void (*)(mjData*)> data_;
+  std::vector<int> contact_of_geom_;  // of the model, -1 if the geom is not one of a sole
+  mutable Workspace ws_;
+  SoleTrack soles_;
+  VectorXd q_, v_, u_;
+  VectorXd q_before_, v_before_, v_mean_, push_force_, row_velocity_;  // MuJoCo's
+  double time_ = 0;
+  double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0, other_work_ = 0;  // on the robot, J
+  std::string message_;
+};
+
+void MujocoWorld::reset(ConstVectorRef q, ConstVectorRef v) {
+  requireFinite(q, v);
+  mj_resetData(mujoco_.get(), data_.get());
+  mujoco_.setState(q, v, *data_);
+  mj_kinematics(mujoco_.get(), data_.get());
+  q_ = q;
+  v_ = v;
+  u_.setZero();
+  time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = other_work_ = 0;
+  soles_.reset();
+  message_.clear();
+}
+
+void MujocoWorld::setTorques(ConstVectorRef u) {
+  for (int m = 0; m < model_.nu(); ++m) {
+    const Motor& motor = model_.motors()[m];
+    u_[m] = data_->ctrl[m] = motor.clampEffort(u[m], v_[motor.dof]);
+  }
+}
+
+void MujocoWorld::setPush(const Vector3d& force) {
+  Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * mujoco_.getBody(1)) = force;
+}
+
+bool MujocoWorld::advance(double duration) {
+  if (!message_.empty()) return false;
+  if (!(duration > 0)) return true;
+  const double steps =
+      std::max(1.0, std::ceil(duration / options_.time_step - 1e-9));  // maybe more than an integer holds
+  const double h = duration / steps;
+  mujoco_.get()->opt.timestep = h;
+  soles_.clearForces();
+  const double box_steps = std::max(1.0, std::floor(kBoxPeriod / h));
+  double taken = 0;
+  for (; taken < steps && !(taken > 0 && interrupt_ && *interrupt_); ++taken) {
+    if (std::fmod(taken, box_steps) == 0 && !ground_.update(*mujoco_.get(), *data_))
+      message_ = "there are too many boxes under the soles";
+    if (!message_.empty() || !step()) break;
+    book(h);
+    addSoleForces(1.0 / steps);
+    time_ += h;
+  }
+  mujoco_.getState(*data_, q_, v_);
+  updatePositions(model_, ws_, q_);
+  soles_.update([this](int body) { return ws_.X_WB[body]; });
+  return taken == steps;
+}
+
+bool MujocoWorld::step() {
+  const mjModel& mj = *mujoco_.get();
+  q_before_ = Eigen::Map<const VectorXd>(data_->qpos, mj.nq);
+  v_before_ = Eigen::Map<const VectorXd>(data_->qvel, mj.nv);
+  try {
+    mj_step(&mj, data_.get());
+  } catch (const std::exception& error) {
+    message_ = std::string("MuJoCo: ") + error.what();
+  }
+  const auto warned = [this](int warning) { return data_->warning[warning].number > 0; };
+  if (warned(mjWARN_CONTACTFULL) || warned(mjWARN_CNSTRFULL))
+    message_ = "MuJoCo's memory is too small for all contacts";
+  if (warned(mjWARN_BADQPOS) || warned(mjWARN_BADQVEL) || warned(mjWARN_BADQACC))
+    message_ = "MuJoCo's accelerations are no longer finite";
+  if (warned(mjWARN_BADCTRL)) message_ = "the torques are not finite";
+  if (message_.empty()) return true;
+  // From bad numbers MuJoCo goes back to its start.
+  Eigen::Map<VectorXd>(data_->qpos, mj.nq) = q_before_;
+  Eigen::Map<VectorXd>(data_->qvel, mj.nv) = v_before_;
+  return false;
+}
+
+// Eq. (1)
+void MujocoWorld::book(double h) {
+  const mjModel& mj = *mujoco_.get();
+  v_mean_ = 0.5 * (v_before_ + Eigen::Map<const VectorXd>(data_->qvel, mj.nv));
+  motor_work_ += h * v_mean_.dot(Eigen::Map<const VectorXd>(data_->qfrc_actuator, mj.nv));
+  const int trunk = mujoco_.getBody(1);
+  const Eigen::Map<const Vector3d> push(data_->xfrc_applied + 6 * trunk);
+  if (!push.isZero(0)) {
+    push_force_.setZero();
+    mj_applyFT(&mj, data_.get(), push.data(), nullptr, data_->xipos + 3 * trunk, trunk, push_force_.data());
+    push_work_ += h * v_mean_.dot(push_force_);
+  }
+  // MuJoCo takes dampers at the end of a step.
+  for (int k = 0; k < mj.nv; ++k) other_work_ -= h * mj.dof_damping[k] * data_->qvel[k] * v_mean_[k];
+  // Those of tendons at its start. The robot is written with sparse matrices.
+  for (int t = 0; t < mj.ntendon; ++t) {
+    double rate = 0;
+    for (int i = data_->ten_J_rowadr[t]; i < data_->ten_J_rowadr[t] + data_->ten_J_rownnz[t]; ++i)
+      rate += data_->ten_J[i] * v_mean_[data_->ten_J_colind[i]];
+    other_work_ -= h * mj.tendon_damping[t] * data_->ten_velocity[t] * rate;
+  }
+  mj_mulJacVec(&mj, data_.get(), row_velocity_.data(), v_mean_.data());
+  for (int i = 0; i < data_->nefc; ++i) {
+    const double work = h * data_->efc_force[i] * row_velocity_[i];
+    if (data_->efc_type[i] == mjCNSTR_EQUALITY || data_->efc_type[i] == mjCNSTR_FRICTION_DOF)
+      other_work_ += work;
+    else if (data_->efc_type[i] == mjCNSTR_LIMIT_JOINT)
+      stop_work_ += work;
+    else
+      contact_work_ += work;
+  }
+}
+
+void MujocoWorld::addSoleForces(double share) {
+  for (int i = 0; i < data_->ncon; ++i) {
+    const mjContact& contact = data_->contact[i];
+    const int second = contact_of_geom_[contact.geom2], first = contact_of_geom_[contact.geom1];
+    mjtNum wrench[6];  // on geom 2, in the axes of the contact
+    mj_contactForce(mujoco_.get(), data_.get(), i, wrench);
+    if (wrench[0] == 0) continue;
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R_CW(contact.frame);
+    Vector3d force = share * (R_CW.transpose() * Vector3d(wrench[0], wrench[1], wrench[2]));
+    if (second < 0) force = -force;
+    soles_.addForce(second >= 0 ? second : first, Eigen::Map<const Vector3d>(contact.pos), force);
+  }
+}
+
+Books MujocoWorld::getBooks() const {
+  updatePositions(model_, ws_, q_);
+  updateVelocities(model_, ws_, v_);
+  Books books;
+  books.kinetic = calcKineticEnergy(model_, ws_);
+  books.potential = calcPotentialEnergy(model_, ws_);
+  books.motor_work = motor_work_;
+  books.push_work = push_work_;
+  books.contact_loss = -contact_work_;
+  books.stop_loss = -stop_work_;
+  books.other_loss = -other_work_;
+  return books;
+}
+
+double MujocoWorld::getGap() const {
+  updatePositions(model_, ws_, q_);
+  double gap = 0;
+  for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureGap(ws_, closure).position);
+  return gap;
+}
+
+}  // namespace
+
+std::unique_ptr<World> makeMujocoWorld(const Model& model, const MujocoWorldOptions& options) {
+  return std::make_unique<MujocoWorld>(model, options);
+}
+
+}  // namespace bielle::simulation

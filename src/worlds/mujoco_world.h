@@ -1,0 +1,33 @@
+#pragma once
+/// \file The world of MuJoCo: all joints of the tree, with closures, contacts and stops as its soft constraints.
+///
+/// MuJoCo (here 2.2.2) finds the acceleration by a convex problem over all constraints at once and takes semi-implicit
+/// Euler steps; friction cones are elliptic. Its constraints are springs and dampers of a time constant T. A closure
+/// opens by T^2 times the acceleration that its force does not cancel: dJ/dt v, which version 2.2.2 leaves out, and a
+/// share 1 - impedance of the rest. Soles creep by the same share.
+///
+/// The ground consists of its plane and boxes; those with inclined tops have sides normal to the top.
+#include <memory>
+
+#include "formats/mjcf.h"
+#include "include/bielle/worlds/world.h"
+
+namespace bielle::simulation {
+
+struct MujocoWorldOptions {
+  WorldOptions world;  ///< time_step 0: that of MjcfOptions
+  MjcfOptions robot;   ///< stiffnesses; friction and ground are those of `world`
+};
+
+/// Books: within a step MuJoCo's forces are constant and the velocity changes by M^-1 h f, so that a force f does the
+/// work
+///     h f . (v + v+) / 2                                                                                           (1)
+/// and the sum of all is the change of the kinetic energy at a fixed configuration. By (1) contacts, stops and closures
+/// are booked apart. The energy that their springs hold is among the losses, which it can make negative; `elastic` is
+/// zero. Eq. (1) of world.h then misses the error of the steps, which is of first order in their length.
+///
+/// Wrenches of soles are means over the last advance(). Steps are those of the options, or a little shorter.
+/// \throws ModelError when the robot has no closed configuration, or MuJoCo refuses it
+std::unique_ptr<World> makeMujocoWorld(const Model& model, const MujocoWorldOptions& options = {});
+
+}  // namespace bielle::simulation

@@ -1,0 +1,57 @@
+#pragma once
+/// \file A controller that takes a closed robot for its serial model, as most do.
+///
+/// It is told the joints that the serial model has, and asks for torques tau of those joints. With R the ratio of the motors to
+/// the joints (bielle/dynamics/ratio.h) the motors of the closed robot are given
+///
+///     u = R^{-T} tau                                                                                                (1)
+///
+/// Belief::Serial takes R of the posture that is measured: the linkages pass torques on as they do, but weigh nothing and have
+/// no rotors, as in the paper. Belief::Ratio takes R where the robot stands, as if linkages were gears, and the rotors as they
+/// appear at the joints there.
+#include <memory>
+#include <string>
+
+#include "bielle/control/controller.h"
+#include "bielle/control/policy.h"
+#include "bielle/motion/serial_model.h"
+
+namespace bielle {
+class PostureLift;
+}
+
+namespace bielle::simulation {
+
+/// What a controller takes the robot for.
+enum class Belief { Closed, Serial, Ratio };
+const char* getName(Belief belief);
+
+class SerialController : public Controller {
+ public:
+  /// \param serial, inner  must outlive it. `inner` controls the serial model.
+  SerialController(const Model& closed, const SerialModel& serial, Controller& inner, Belief belief);
+  ~SerialController() override;
+
+  /// Allocates. At a dead point, where Eq. (1) has no solution, R is that of the last posture away from one.
+  void update(const Measurement& measurement, VectorRef u) override;
+  double getPlanTime(double time) const override { return inner_.getPlanTime(time); }
+  const std::vector<PredictedFoothold>& getFootholds() const override { return inner_.getFootholds(); }
+
+ private:
+  const Model &closed_, &serial_;
+  Controller& inner_;
+  const Belief belief_;
+  std::unique_ptr<PostureLift> posture_;
+  MatrixXd R_;  // nu x nu
+};
+
+/// What a plan of the serial model means to the closed robot.
+struct SerialReference {
+  std::unique_ptr<Policy> policy;  ///< without gains: states and torques by Eq. (1)
+  double first_missed = -1;        ///< when linkages first cannot follow, s; negative: they can
+  std::string message;             ///< why not
+};
+/// Where linkages cannot follow, they stay as they last could. \param plan  of the serial model
+SerialReference makeReference(const Model& closed, const SerialModel& serial, const Policy& plan, Belief belief);
+
+}  // namespace bielle::simulation

@@ -1,0 +1,377 @@
+#include "src/worlds/simbody_world.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/joint_force.h"
+#include "src/worlds/simbody_tree.h"
+#include "src/worlds/sole_track.h"
+
+namespace bielle::simulation {
+namespace {
+
+using SimTK::MobilizedBody;
+using SimTK::SpatialVec;
+using SimTK::Stage;
+using SimTK::State;
+using SimTK::Vec3;
+
+// What the forces of a world do at one instant: power given to the robot, W.
+struct Powers {
+  double motor = 0, push = 0, contact = 0, stop = 0, joint = 0;
+};
+
+// Contacts, stops, motors and push: everything but gravity and the forces of joints.
+class WorldForces : public SimTK::Force::Custom::Implementation {
+ public:
+  WorldForces(const SimbodyTree& tree, const SimbodyWorldOptions& options)
+      : tree_(tree),
+        terrain(options.world.ground),
+        points(makeContactPoints(tree.model, options.world.ground, options.contact)),
+        stops(makeJointStops(tree.model)),
+        u(VectorXd::Zero(tree.model.nu())) {}
+
+  void calcForce(const State& state, SimTK::Vector_<SpatialVec>& body_forces, SimTK::Vector_<Vec3>&,
+                 SimTK::Vector& mobility_forces) const override {
+    for (const ContactPoint& point : points) {
+      const MobilizedBody& body = tree_.bodies[point.body];
+      const ContactForce force = calcForce(state, point);
+      if (force.elastic > 0) body.applyForceToBodyPoint(state, toSimTK(point.p), toSimTK(force.force), body_forces);
+    }
+    for (const JointStop& stop : stops) {
+      const double force = calcForce(state, stop).force;
+      if (force != 0) mobility_forces[tree_.u_index[stop.dof]] += force;
+    }
+    for (int m = 0; m < tree_.model.nu(); ++m) mobility_forces[tree_.u_index[tree_.model.motors()[m].dof]] += u[m];
+    tree_.bodies[1].applyForceToBodyPoint(state, toSimTK(getPushPoint()), toSimTK(push), body_forces);
+  }
+  double calcPotentialEnergy(const State&) const override { return 0; }  // Books keeps it apart
+
+  ContactForce calcForce(const State& state, const ContactPoint& point) const {
+    return calcContactForce(terrain, point, findPlace(state, point), findVelocity(state, point));
+  }
+  StopForce calcForce(const State& state, const JointStop& stop) const {
+    const MobilizedBody& body = tree_.bodies[tree_.model.dofs()[stop.dof].joint];
+    return calcStopForce(stop, body.getOneQ(state, 0), state.getU()[tree_.u_index[stop.dof]]);
+  }
+  Vector3d findPlace(const State& state, int body, const Vector3d& p) const {
+    return toEigen(tree_.bodies[body].findStationLocationInGround(state, toSimTK(p)));
+  }
+  Vector3d findVelocity(const State& state, int body, const Vector3d& p) const {
+    return toEigen(tree_.bodies[body].findStationVelocityInGround(state, toSimTK(p)));
+  }
+  Vector3d findPlace(const State& state, const ContactPoint& point) const {
+    return findPlace(state, point.body, point.p);
+  }
+  Vector3d findVelocity(const State& state, const ContactPoint& point) const {
+    return findVelocity(state, point.body, point.p);
+  }
+
+  Powers calcPowers(const State& state) const {
+    Powers powers;
+    for (const ContactPoint& point : points)
+      powers.contact += calcForce(state, point).force.dot(findVelocity(state, point));
+    for (const JointStop& stop : stops) powers.stop += calcForce(state, stop).force * getRate(state, stop.dof);
+    for (int m = 0; m < tree_.model.nu(); ++m) powers.motor += u[m] * getRate(state, tree_.model.motors()[m].dof);
+    for (const JointForce& force : tree_.model.jointForces()) {
+      const double rate = getRate(state, force.dof);
+      powers.joint += calcDissipativeForce(force, rate) * rate;
+    }
+    for (const PointSpring& spring : tree_.model.pointSprings()) {
+      const Vector3d direction =
+          findPlace(state, spring.body2, spring.point2) - findPlace(state, spring.body1, spring.point1);
+      const double rate = direction.normalized().dot(findVelocity(state, spring.body2, spring.point2) -
+                                                     findVelocity(state, spring.body1, spring.point1));
+      powers.joint -= spring.damping * rate * rate;
+    }
+    powers.push = push.dot(toEigen(tree_.bodies[1].findStationVelocityInGround(state, toSimTK(getPushPoint()))));
+    return powers;
+  }
+  double calcElasticEnergy(const State& state, double& of_stops) const {
+    double contacts = 0;
+    for (const ContactPoint& point : points)
+      contacts += calcContactForce(terrain, point, findPlace(state, point), Vector3d::Zero()).elastic;
+    of_stops = 0;
+    for (const JointStop& stop : stops) of_stops += calcForce(state, stop).elastic;
+    return contacts + of_stops;
+  }
+
+ private:
+  double getRate(const State& state, int dof) const { return state.getU()[tree_.u_index[dof]]; }
+  Vector3d getPushPoint() const { return tree_.model.bodies()[1].inertia.com; }
+
+  const SimbodyTree& tree_;
+
+ public:
+  const Terrain terrain;
+  std::vector<ContactPoint> points;
+  const std::vector<JointStop> stops;
+  VectorXd u;
+  Vector3d push = Vector3d::Zero();
+};
+
+// The speeds of rotors are those of their motors: one constraint for all, much quicker than Simbody's SpeedCouplers.
+class RotorCoupling : public SimTK::Constraint::Custom::Implementation {
+ public:
+  explicit RotorCoupling(SimTK::SimbodyMatterSubsystem& matter, int rotors)
+      : SimTK::Constraint::Custom::Implementation(matter, 0, rotors, 0) {}
+
+  // \param speed  of the motor among those of its mobilizer   \param speeds  how many that one has
+  void add(const MobilizedBody& motor, int speed, int speeds, const MobilizedBody& rotor) {
+    addConstrainedMobilizer(motor);
+    addConstrainedMobilizer(rotor);
+    motors_.push_back(SimTK::ConstrainedUIndex(next_ + speed));
+    rotors_.push_back(SimTK::ConstrainedUIndex(next_ + speeds));
+    next_ += speeds + 1;
+  }
+
+ private:
+  using Speeds = SimTK::Array_<SimTK::Real, SimTK::ConstrainedUIndex>;
+  using Twists = SimTK::Array_<SpatialVec, SimTK::ConstrainedBodyIndex>;
+
+  Implementation* clone() const override { return new RotorCoupling(*this); }
+  void calcVelocityErrors(const State&, const Twists&, const Speeds& u,
+                          SimTK::Array_<SimTK::Real>& errors) const override {
+    for (size_t i = 0; i < motors_.size(); ++i) errors[int(i)] = u[motors_[i]] - u[rotors_[i]];
+  }
+  void calcVelocityDotErrors(const State&, const Twists&, const Speeds& udot,
+                             SimTK::Array_<SimTK::Real>& errors) const override {
+    for (size_t i = 0; i < motors_.size(); ++i) errors[int(i)] = udot[motors_[i]] - udot[rotors_[i]];
+  }
+  void addInVelocityConstraintForces(const State&, const SimTK::Array_<SimTK::Real>& multipliers, Twists&,
+                                     Speeds& forces) const override {
+    for (size_t i = 0; i < motors_.size(); ++i) {
+      forces[motors_[i]] += multipliers[int(i)];
+      forces[rotors_[i]] -= multipliers[int(i)];
+    }
+  }
+
+  std::vector<SimTK::ConstrainedUIndex> motors_, rotors_;
+  int next_ = 0;
+};
+
+class SimbodyWorld : public World {
+ public:
+  SimbodyWorld(const Model& model, const SimbodyWorldOptions& options);
+
+  void reset(ConstVectorRef q, ConstVectorRef v) override;
+  void setTorques(ConstVectorRef u) override;
+  void setPush(const Vector3d& force) override;
+  bool advance(double duration) override;
+  const std::string& getMessage() const override { return message_; }
+  double getTime() const override { return time_; }
+  const VectorXd& getConfiguration() const override { return q_; }
+  const VectorXd& getVelocity() const override { return v_; }
+  const VectorXd& getTorques() const override { return forces_->u; }
+  const std::vector<FootReport>& getFeet() const override { return soles_.getReports(); }
+  Books getBooks() const override;
+  double getGap() const override;
+
+ private:
+  void addRotors();
+  void finishStep(double duration);
+  void readState();
+  void noteChange();
+
+  Model model_;
+  SimbodyTree tree_;
+  WorldForces* forces_;                                // owned by the tree's system
+  std::vector<std::pair<MobilizedBody, int>> rotors_;  // with the dof of their motor
+  SimTK::RungeKutta3Integrator integrator_;
+  SoleTrack soles_;
+  VectorXd q_, v_;
+  const std::atomic<bool>* const interrupt_;
+  double time_ = 0;
+  Powers last_, work_;  // at the end of the last step; J
+  double elastic_start_ = 0, stops_start_ = 0;
+  bool changed_ = false;  // torques or push since the last step
+  std::string message_;
+};
+
+SimbodyWorld::SimbodyWorld(const Model& model, const SimbodyWorldOptions& options)
+    : model_(model),
+      tree_(model, model.closures(), options.as_modelled ? LoopCut::AsModelled : LoopCut::FewestRows),
+      forces_(new WorldForces(tree_, options)),
+      integrator_(tree_.system),
+      soles_(model),
+      interrupt_(options.world.interrupt) {
+  SimTK::Force::Custom(tree_.forces, forces_);
+  addRotors();
+  tree_.finish();
+  integrator_.setAccuracy(options.accuracy);
+  integrator_.setConstraintTolerance(options.gap);
+  integrator_.setReturnEveryInternalStep(true);
+  integrator_.setAllowInterpolation(false);
+}
+
+void SimbodyWorld::addRotors() {
+  std::vector<Motor> motors;
+  for (const Motor& motor : model_.motors())
+    if (motor.armature > 0) motors.push_back(motor);
+  if (motors.empty()) return;
+  auto* coupling = new RotorCoupling(tree_.matter, static_cast<int>(motors.size()));
+  for (const Motor& motor : motors) {
+    // The mass of a rotor that turns stays at the origin; one that slides does so horizontally, along x.
+    const SimTK::MassProperties mass(motor.armature, Vec3(0), SimTK::Inertia(motor.armature));
+    const Joint& joint = model_.joints()[motor.joint];
+    MobilizedBody rotor;
+    if (joint.kind == JointKind::Prismatic)
+      rotor = MobilizedBody::Slider(tree_.matter.updGround(), SimTK::Body::Rigid(mass));
+    else
+      rotor = MobilizedBody::Pin(tree_.matter.updGround(), SimTK::Body::Rigid(mass));
+    rotors_.emplace_back(rotor, motor.dof);
+    const int dof = motor.dof - joint.idx_v;
+    const bool is_chain = !tree_.first_pins[motor.joint].isEmptyHandle();
+    coupling->add(is_chain && dof == 0 ? tree_.first_pins[motor.joint] : tree_.bodies[motor.joint], is_chain ? 0 : dof,
+                  is_chain ? 1 : joint.nv, rotor);
+  }
+  SimTK::Constraint::Custom constraint(coupling);
+}
+
+void SimbodyWorld::reset(ConstVectorRef q, ConstVectorRef v) {
+  requireFinite(q, v);
+  message_.clear();
+  time_ = 0;
+  work_ = {};
+  forces_->u.setZero();
+  forces_->push.setZero();
+  soles_.reset();
+  SimTK::State& state = tree_.state;
+  state.setTime(0);
+  tree_.setCoordinates(q);
+  tree_.updateVelocityMap(q, v);
+  SimTK::Vector& u = state.updU();
+  u = 0;
+  tree_.scatter(tree_.T * v, u);
+  for (const auto& [rotor, dof] : rotors_) u[int(rotor.getFirstUIndex(state))] = u[tree_.u_index[dof]];
+  tree_.system.realize(state, Stage::Velocity);
+  for (ContactPoint& point : forces_->points) {
+    point.touches = false;
+    updateAnchor(forces_->terrain, forces_->findPlace(state, point), ContactForce(), point);
+  }
+  elastic_start_ = forces_->calcElasticEnergy(state, stops_start_);
+  try {
+    tree_.system.project(state, 1e-9);
+    integrator_.initialize(state);
+  } catch (const std::exception& error) {
+    message_ = error.what();
+  }
+  tree_.system.realize(integrator_.updAdvancedState(), Stage::Velocity);
+  last_ = forces_->calcPowers(integrator_.getAdvancedState());
+  readState();
+}
+
+void SimbodyWorld::setTorques(ConstVectorRef u) {
+  for (int m = 0; m < model_.nu(); ++m) {
+    const Motor& motor = model_.motors()[m];
+    forces_->u[m] = motor.clampEffort(u[m], v_[motor.dof]);
+  }
+  changed_ = true;
+}
+
+void SimbodyWorld::setPush(const Vector3d& force) {
+  if (force == forces_->push) return;
+  forces_->push = force;
+  changed_ = true;
+}
+
+// Forces that do not depend on the state alone have changed: what was computed of them is stale.
+void SimbodyWorld::noteChange() {
+  if (!changed_) return;
+  integrator_.updAdvancedState().invalidateAllCacheAtOrAbove(Stage::Dynamics);
+  integrator_.reinitialize(Stage::Dynamics, false);
+  tree_.system.realize(integrator_.updAdvancedState(), Stage::Velocity);
+  last_ = forces_->calcPowers(integrator_.getAdvancedState());
+  changed_ = false;
+}
+
+bool SimbodyWorld::advance(double duration) {
+  if (!message_.empty()) return false;
+  const double start = integrator_.getTime(), end = time_ + duration;
+  try {
+    noteChange();
+    for (double before = integrator_.getTime(); before < end - 1e-12; before = integrator_.getTime()) {
+      integrator_.stepTo(end, end);
+      finishStep(integrator_.getTime() - before);
+      if (integrator_.getTime() > start && interrupt_ && *interrupt_) break;  // the first return may be before any step
+    }
+  } catch (const std::exception& error) {
+    message_ = error.what();
+    std::replace(message_.begin(), message_.end(), '\n', ' ');
+    return false;
+  }
+  const bool is_done = integrator_.getTime() >= end - 1e-12;
+  time_ = is_done ? end : integrator_.getTime();
+  readState();
+  return is_done;
+}
+
+void SimbodyWorld::finishStep(double duration) {
+  const SimTK::State& state = integrator_.getState();
+  tree_.system.realize(state, Stage::Velocity);
+  const Powers now = forces_->calcPowers(state);
+  work_.motor += 0.5 * duration * (last_.motor + now.motor);
+  work_.push += 0.5 * duration * (last_.push + now.push);
+  work_.contact += 0.5 * duration * (last_.contact + now.contact);
+  work_.stop += 0.5 * duration * (last_.stop + now.stop);
+  work_.joint += 0.5 * duration * (last_.joint + now.joint);
+  last_ = now;
+  soles_.clearForces();
+  for (ContactPoint& point : forces_->points) {
+    const Vector3d x = forces_->findPlace(state, point);
+    const ContactForce force = forces_->calcForce(state, point);
+    if (force.elastic > 0) soles_.addForce(point.contact, x, force.force);
+    updateAnchor(forces_->terrain, x, force, point);
+  }
+}
+
+void SimbodyWorld::readState() {
+  const SimTK::State& state = integrator_.getState();
+  tree_.system.realize(state, Stage::Velocity);
+  tree_.readState(state, q_, v_);
+  soles_.update([&](int body) {
+    const SimTK::Transform& X = tree_.bodies[body].getBodyTransform(state);
+    return SE3(toEigen(X.R()), toEigen(X.p()));
+  });
+}
+
+Books SimbodyWorld::getBooks() const {
+  const SimTK::State& state = integrator_.getState();
+  tree_.system.realize(state, Stage::Dynamics);
+  Books books;
+  books.kinetic = tree_.system.calcKineticEnergy(state);
+  books.potential = tree_.system.calcPotentialEnergy(state);
+  double stops = 0;
+  books.elastic = forces_->calcElasticEnergy(state, stops);
+  books.motor_work = work_.motor;
+  books.push_work = work_.push;
+  books.contact_loss = -work_.contact - (books.elastic - stops - (elastic_start_ - stops_start_));
+  books.stop_loss = stops_start_ - stops - work_.stop;
+  books.other_loss = -work_.joint;
+  return books;
+}
+
+double SimbodyWorld::getGap() const {
+  const SimTK::State& state = integrator_.getState();
+  double gap = 0;
+  const auto locate = [&](int body, const Vector3d& point) {
+    return tree_.bodies[body].findStationLocationInGround(state, toSimTK(point));
+  };
+  for (size_t i = 0; i < model_.closures().size(); ++i) {
+    const Closure& closure = model_.closures()[i];
+    const int joint = tree_.cut_joints[i];
+    const SimTK::Vec3 opening =
+        joint < 0 ? locate(closure.body1, closure.X_B1.p) - locate(closure.body2, closure.X_B2.p)
+                  : locate(model_.joints()[joint].parent, model_.joints()[joint].X_PJ.p) - locate(joint, {0, 0, 0});
+    gap = std::max(gap, opening.norm());
+  }
+  return gap;
+}
+
+}  // namespace
+
+std::unique_ptr<World> makeSimbodyWorld(const Model& model, const SimbodyWorldOptions& options) {
+  return std::make_unique<SimbodyWorld>(model, options);
+}
+
+}  // namespace bielle::simulation

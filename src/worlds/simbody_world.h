@@ -1,0 +1,27 @@
+#pragma once
+/// \file The world of Simbody, the reference: other kinematics, other dynamics, steps of controlled error.
+///
+/// Simbody has the tree, the closures as constraints, cut so that there are few of them, and gravity
+/// (src/worlds/simbody_tree.h). Contacts, stops, torques and the
+/// push are forces over its kinematics. A rotor is a body pinned to the ground whose speed is constrained to that of its
+/// motor: it weighs the armature and nothing else. The anchors of the contacts (contact_law.h) move after every step that
+/// the integrator has accepted, so that forces are functions of the state during a step. Work is integrated by the
+/// trapezoidal rule over these steps.
+#include <memory>
+
+#include "include/bielle/worlds/contact_law.h"
+#include "include/bielle/worlds/world.h"
+
+namespace bielle::simulation {
+
+struct SimbodyWorldOptions {
+  WorldOptions world;      ///< time_step is not used
+  double accuracy = 1e-3;  ///< relative local error of the integrator, of third order
+  double gap = 1e-7;       ///< tolerance of the constraints, m
+  ContactOptions contact;
+  bool as_modelled = false;  ///< loops cut where the model cuts them: the same motion, with more rows of constraints
+};
+
+std::unique_ptr<World> makeSimbodyWorld(const Model& model, const SimbodyWorldOptions& options = {});
+
+}  // namespace bielle::simulation
