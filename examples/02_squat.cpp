@@ -13,10 +13,10 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/squat.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 
 using namespace bielle;
 

@@ -19,9 +19,9 @@
 #include <iostream>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/motion/walk.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
-#include "bielle/motion/walk.h"
 
 using namespace bielle;
 

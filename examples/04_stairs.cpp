@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/motion/stairs.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
-#include "bielle/motion/stairs.h"
 
 using namespace bielle;
 

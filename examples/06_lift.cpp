@@ -17,9 +17,9 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "bielle/motion/squat.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
-#include "bielle/motion/squat.h"
 
 using namespace bielle;
 

@@ -13,9 +13,9 @@
 #include <cstdio>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/motion/motion.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
-#include "bielle/motion/motion.h"
 
 using namespace bielle;
 

@@ -15,10 +15,10 @@
 #include <iostream>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/footsteps.h"
 #include "bielle/motion/walk.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 
 using namespace bielle;
 

@@ -13,12 +13,12 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 
 using namespace bielle;
 

@@ -11,8 +11,8 @@
 #include <cstdio>
 #include <limits>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 
 using namespace bielle;
 

@@ -10,9 +10,9 @@
 #include <cstdio>
 
 #include "bielle/control/predictive_controller.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/walk.h"
-#include "include/bielle/worlds/make_world.h"
+#include "bielle/robots/robot_loader.h"
+#include "worlds/make_world.h"
 
 using namespace bielle;
 

@@ -1,7 +1,7 @@
 #pragma once
 // Robots and motions that tests of designs share.
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/design_motions.h"
 
 namespace bielle::testing {

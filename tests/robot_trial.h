@@ -6,8 +6,8 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace bielle::testing {
 

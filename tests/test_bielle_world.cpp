@@ -7,11 +7,11 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
+#include "bielle/worlds/bielle_world.h"
 #include "count_allocations.h"
 #include "own_robots.h"
-#include "include/bielle/worlds/bielle_world.h"
-#include "include/bielle/worlds/make_world.h"
 #include "world_trials.h"
+#include "worlds/make_world.h"
 
 namespace bielle::simulation {
 namespace {

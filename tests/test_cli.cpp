@@ -8,10 +8,10 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 #include "cli_command.h"
 #include "robot_directory.h"
 

@@ -7,10 +7,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/record.h"
 #include "bielle/motion/refinement.h"
 #include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 #include "cli_command.h"
 #include "robot_directory.h"
 

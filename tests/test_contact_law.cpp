@@ -3,7 +3,7 @@
 #include <random>
 
 #include "bielle/robots/robot_loader.h"
-#include "include/bielle/worlds/contact_law.h"
+#include "bielle/worlds/contact_law.h"
 
 namespace bielle::simulation {
 namespace {

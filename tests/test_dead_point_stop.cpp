@@ -2,12 +2,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/motion.h"
+#include "bielle/robots/robot_loader.h"
+#include "bielle/worlds/bielle_world.h"
 #include "control/dead_point_stop.h"
 #include "control/passive_joints.h"
 #include "own_robots.h"
-#include "include/bielle/worlds/bielle_world.h"
 
 namespace bielle {
 namespace {

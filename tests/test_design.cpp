@@ -8,12 +8,12 @@
 #include <fstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/draft.h"
 #include "design/run.h"
 #include "design_trials.h"

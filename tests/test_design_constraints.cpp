@@ -4,11 +4,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/walk.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/run.h"
 #include "design_trials.h"
 #include "robot_directory.h"

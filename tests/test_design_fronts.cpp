@@ -7,8 +7,8 @@
 #include <set>
 #include <sstream>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/front_search.h"
 #include "design/run.h"
 #include "robot_directory.h"

@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/robots/robot_loader.h"
+#include "bielle/dynamics/ratio.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
-#include "bielle/dynamics/ratio.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/evaluation.h"
 #include "design/spec.h"
 #include "robot_directory.h"

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <set>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/draft.h"
 #include "design/front_search.h"
 #include "design/motor_change.h"

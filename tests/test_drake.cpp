@@ -6,11 +6,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/robots/generators.h"
-#include "get_error.h"
+#include "bielle/robots/robot_loader.h"
 #include "formats/drake.h"
+#include "get_error.h"
 #include "mechanisms.h"
 #include "model/number_text.h"
 #include "published_robots.h"

@@ -3,10 +3,10 @@
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/motion.h"
-#include "src/worlds/fall_detector.h"
-#include "src/worlds/robot_errors.h"
+#include "bielle/robots/robot_loader.h"
+#include "worlds/fall_detector.h"
+#include "worlds/robot_errors.h"
 
 namespace bielle::simulation {
 namespace {

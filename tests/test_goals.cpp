@@ -4,12 +4,12 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "bielle/results/result.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "bielle/results/result.h"
 #include "math/constants.h"
 #include "own_robots.h"
 #include "solve_in_place.h"

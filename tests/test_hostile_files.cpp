@@ -9,10 +9,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bielle/results/record_files.h"
 #include "bielle/model/error.h"
-#include "get_error_of_reading.h"
+#include "bielle/results/record_files.h"
 #include "formats/text_file.h"
+#include "get_error_of_reading.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;

@@ -14,18 +14,18 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/squat.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
+#include "formats/text_file.h"
 #include "get_error.h"
 #include "get_error_of_reading.h"
+#include "problem_probe.h"
 #include "results/npz.h"
 #include "results/opensim.h"
 #include "results/plot.h"
-#include "formats/text_file.h"
-#include "problem_probe.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;

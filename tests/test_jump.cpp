@@ -2,9 +2,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
+#include "bielle/robots/robot_loader.h"
 #include "change_option.h"
 #include "measure_jump.h"
 #include "own_robots.h"

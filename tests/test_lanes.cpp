@@ -4,9 +4,9 @@
 #include <numeric>
 #include <random>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/math/se3.h"
 #include "bielle/motion/motion.h"
+#include "bielle/robots/robot_loader.h"
 #include "dynamics/reduction.h"
 #include "math/small_dense.h"
 #include "math/so3.h"

@@ -5,12 +5,12 @@
 #include <functional>
 #include <regex>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
+#include "bielle/robots/robot_loader.h"
 #include "own_robots.h"
 #include "robot_directory.h"
 #include "solve_in_place.h"

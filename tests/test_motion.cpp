@@ -5,11 +5,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
+#include "bielle/robots/robot_loader.h"
 #include "change_option.h"
 #include "motion/benchmark_walk.h"
 #include "own_robots.h"

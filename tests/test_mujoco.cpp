@@ -6,10 +6,10 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/robots/robot_loader.h"
-#include "src/worlds/mujoco_model.h"
 #include "mechanisms.h"
 #include "published_robots.h"
 #include "robot_directory.h"
+#include "worlds/mujoco_model.h"
 
 using namespace bielle;
 using namespace bielle::testing;

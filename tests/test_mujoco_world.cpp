@@ -4,15 +4,15 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
+#include "bielle/robots/robot_loader.h"
+#include "bielle/worlds/bielle_world.h"
+#include "bielle/worlds/terrain.h"
 #include "count_allocations.h"
-#include "src/worlds/mujoco_model.h"
-#include "include/bielle/worlds/bielle_world.h"
-#include "src/worlds/mujoco_world.h"
-#include "include/bielle/worlds/terrain.h"
 #include "world_trials.h"
+#include "worlds/mujoco_model.h"
+#include "worlds/mujoco_world.h"
 
 namespace bielle::simulation {
 namespace {

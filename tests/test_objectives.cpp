@@ -2,9 +2,9 @@
 // results say of them, against sums over the trajectory.
 #include <catch2/catch.hpp>
 
+#include "bielle/motion/squat.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
-#include "bielle/motion/squat.h"
 
 using namespace bielle;
 

@@ -1,6 +1,6 @@
 // What solvers rely on in a shooting problem: linearizations without memory, no allocation, requests that do not fit refused.
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 #include "count_allocations.h"
 #include "get_error.h"

@@ -3,11 +3,11 @@
 #include <memory>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/ground.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/ocp/cost.h"
-#include "bielle/dynamics/ground.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_residual.h"
 #include "math/so3.h"
 #include "published_robots.h"

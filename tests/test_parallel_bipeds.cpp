@@ -5,12 +5,12 @@
 #include <filesystem>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/motion/walk.h"
 #include "bielle/results/record_files.h"
 #include "bielle/robots/robot_loader.h"
-#include "bielle/motion/walk.h"
 #include "design/conditioning.h"
-#include "measure_steps.h"
 #include "formats/text_file.h"
+#include "measure_steps.h"
 #include "robot_directory.h"
 #include "run_bielle.h"
 #include "solve_in_place.h"

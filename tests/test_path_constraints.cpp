@@ -1,9 +1,9 @@
 // Path constraints of a robot's problem: their rows by central differences in tangent space, in both formulations, at steps,
 // impacts and the end; what their weights add to a quadratic model; and what does not fit.
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 
 using namespace bielle;

@@ -3,8 +3,8 @@
 
 #include "bielle/control/policy.h"
 #include "bielle/dynamics/constrained.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 #include "bielle/solve/node_evaluator.h"
 #include "count_allocations.h"
 

@@ -8,12 +8,12 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/squat.h"
+#include "bielle/worlds/bielle_world.h"
 #include "count_allocations.h"
 #include "own_robots.h"
 #include "predictive_trials.h"
-#include "include/bielle/worlds/bielle_world.h"
-#include "src/worlds/execution.h"
-#include "include/bielle/worlds/make_world.h"
+#include "worlds/execution.h"
+#include "worlds/make_world.h"
 
 namespace bielle::simulation {
 namespace {

@@ -6,10 +6,10 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "bielle/robots/robot_loader.h"
 #include "formats/adopt.h"
 #include "measure_steps.h"
 #include "published_robots.h"

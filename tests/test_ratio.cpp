@@ -7,16 +7,16 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
+#include "bielle/dynamics/ratio.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/ocp/residual.h"
 #include "bielle/robots/fourbar_chain.h"
-#include "bielle/dynamics/ratio.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
+#include "dynamics/linkage_ratio.h"
 #include "math/constants.h"
 #include "robot_directory.h"
-#include "dynamics/linkage_ratio.h"
 
 using namespace bielle;
 using namespace bielle::testing;

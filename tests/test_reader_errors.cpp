@@ -3,8 +3,8 @@
 #include <iostream>
 #include <sstream>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/robots/robot_loader.h"
 #include "get_error.h"
 #include "robot_directory.h"
 

@@ -6,8 +6,8 @@
 #include <random>
 #include <sstream>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
+#include "bielle/robots/robot_loader.h"
 #include "robot_directory.h"
 
 using namespace bielle;

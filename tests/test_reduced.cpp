@@ -4,10 +4,10 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 #include "dynamics/reduction.h"
 #include "mechanisms.h"

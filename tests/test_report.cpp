@@ -5,11 +5,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/squat.h"
 #include "bielle/report/report.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;

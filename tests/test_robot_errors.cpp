@@ -3,11 +3,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/error.h"
 #include "bielle/formats/reader.h"
+#include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
 #include "own_robots.h"
-#include "src/worlds/robot_errors.h"
+#include "worlds/robot_errors.h"
 
 namespace bielle::simulation {
 using bielle::testing::loadOwn;

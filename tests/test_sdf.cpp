@@ -5,11 +5,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
-#include "get_error.h"
+#include "bielle/robots/robot_loader.h"
 #include "formats/sdf.h"
+#include "get_error.h"
 
 using namespace bielle;
 using namespace bielle::testing;

@@ -2,9 +2,9 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/motion/motion.h"
+#include "bielle/worlds/bielle_world.h"
+#include "bielle/worlds/sensors.h"
 #include "own_robots.h"
-#include "include/bielle/worlds/bielle_world.h"
-#include "include/bielle/worlds/sensors.h"
 
 namespace bielle::simulation {
 namespace {

@@ -7,11 +7,11 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/motion/squat.h"
 #include "bielle/motion/lift.h"
+#include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 #include "solve_in_place.h"
 
 using namespace bielle;

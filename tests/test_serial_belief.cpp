@@ -5,9 +5,9 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/reader.h"
 #include "bielle/motion/motion.h"
-#include "own_robots.h"
-#include "src/worlds/serial_belief.h"
 #include "motion/posture_lift.h"
+#include "own_robots.h"
+#include "worlds/serial_belief.h"
 
 namespace bielle::simulation {
 namespace {

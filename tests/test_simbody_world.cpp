@@ -3,10 +3,10 @@
 
 #include "bielle/control/policy.h"
 #include "bielle/motion/walk.h"
+#include "bielle/worlds/bielle_world.h"
 #include "own_robots.h"
-#include "include/bielle/worlds/bielle_world.h"
-#include "src/worlds/simbody_world.h"
 #include "world_trials.h"
+#include "worlds/simbody_world.h"
 
 namespace bielle::simulation {
 namespace {

@@ -3,7 +3,7 @@
 #include <random>
 
 #include "bielle/model/error.h"
-#include "include/bielle/worlds/terrain.h"
+#include "bielle/worlds/terrain.h"
 
 namespace bielle::simulation {
 namespace {

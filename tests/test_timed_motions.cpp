@@ -2,11 +2,11 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 
-#include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/walk.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "solve_in_place.h"
 
 using namespace bielle;

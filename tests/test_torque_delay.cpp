@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <limits>
 
-#include "src/worlds/torque_delay.h"
+#include "worlds/torque_delay.h"
 
 namespace bielle::simulation {
 namespace {

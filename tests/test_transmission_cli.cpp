@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/dynamics/ratio.h"
+#include "bielle/robots/robot_loader.h"
 #include "robot_directory.h"
 #include "run_bielle.h"
 

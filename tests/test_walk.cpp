@@ -3,9 +3,9 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/impact.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/walk.h"
+#include "bielle/robots/robot_loader.h"
 #include "change_option.h"
 #include "measure_steps.h"
 #include "motion/gait.h"

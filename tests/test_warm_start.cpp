@@ -2,9 +2,9 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/walk.h"
+#include "bielle/results/result.h"
 #include "own_robots.h"
 #include "solve_in_place.h"
 

@@ -9,9 +9,9 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace bielle::worlds::testing {
 namespace {

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "bielle/formats/reader.h"
-#include "include/bielle/worlds/world.h"
+#include "bielle/worlds/world.h"
 
 namespace bielle::worlds::testing {
 

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <set>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/serial_model.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace bielle::validation {
 namespace {

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/results/result.h"
 #include "bielle/model/model.h"
+#include "bielle/results/result.h"
 
 namespace bielle::validation {
 

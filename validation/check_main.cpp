@@ -5,8 +5,8 @@
 
 #include "bielle/model/error.h"
 #include "check.h"
-#include "results/standard_output.h"
 #include "formats/text_file.h"
+#include "results/standard_output.h"
 
 using namespace bielle;
 using namespace bielle::validation;

@@ -2,9 +2,9 @@
 // The Simbody objects behind a SimbodyBridge.
 #include <optional>
 
-#include "src/worlds/simbody_tree.h"
 #include "math/decompositions.h"
 #include "simbody_bridge.h"
+#include "worlds/simbody_tree.h"
 
 namespace bielle::validation {
 

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/robots/robot_loader.h"
 #include "check_trace.h"
 #include "run_command.h"
 #include "test_motions.h"

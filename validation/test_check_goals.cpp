@@ -3,11 +3,11 @@
 #include <set>
 #include <sstream>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "bielle/robots/robot_loader.h"
 #include "check.h"
 #include "get_error.h"
 #include "robot_directory.h"

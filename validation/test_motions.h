@@ -8,10 +8,10 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 #include "check.h"
 #include "robot_directory.h"
 #include "solve_in_place.h"

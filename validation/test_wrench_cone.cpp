@@ -5,9 +5,9 @@
 #include <random>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/residual.h"
+#include "bielle/robots/robot_loader.h"
 #include "wrench_cone.h"
 
 using namespace bielle;

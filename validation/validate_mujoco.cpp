@@ -7,8 +7,8 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "src/worlds/mujoco_model.h"
 #include "samples.h"
+#include "worlds/mujoco_model.h"
 
 namespace bielle::validation {
 namespace {

@@ -3,7 +3,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include "include/bielle/worlds/make_world.h"
+#include "worlds/make_world.h"
 
 namespace py = pybind11;
 

@@ -3,7 +3,7 @@
 /// points to one function, so that the package works without them.
 #include <memory>
 
-#include "include/bielle/worlds/world.h"
+#include "bielle/worlds/world.h"
 
 namespace bielle::python {
 

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
+#include "bielle/results/result.h"
 #include "bind.h"
 
 namespace bielle::python {

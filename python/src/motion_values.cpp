@@ -1,5 +1,5 @@
-#include "bielle/results/result.h"
 #include "bielle/motion/motion.h"
+#include "bielle/results/result.h"
 #include "bind.h"
 #include "residual.h"
 

@@ -4,12 +4,12 @@
 #include <optional>
 
 #include "bielle/model/error.h"
+#include "bielle/worlds/bielle_world.h"
+#include "bielle/worlds/sensors.h"
 #include "bind.h"
 #include "busy.h"
 #include "engines.h"
 #include "model_access.h"
-#include "include/bielle/worlds/bielle_world.h"
-#include "include/bielle/worlds/sensors.h"
 
 namespace bielle::python {
 namespace {

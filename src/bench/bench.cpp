@@ -7,9 +7,9 @@
 
 #include "bench/receding_horizon.h"
 #include "bielle/dynamics/assembly.h"
-#include "bielle/results/result.h"
 #include "bielle/motion/locomotion.h"
 #include "bielle/motion/squat.h"
+#include "bielle/results/result.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "motion/benchmark_walk.h"
 #include "solve/fddp_solve.h"

@@ -7,8 +7,8 @@
 
 #include "bielle/model/error.h"
 #include "cli/commands.h"
-#include "formats/text_file.h"
 #include "formats/robot_files.h"
+#include "formats/text_file.h"
 
 namespace fs = std::filesystem;
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "bielle/model/options.h"
 #include "bielle/formats/reader.h"
+#include "bielle/model/options.h"
 #include "bielle/motion/motion.h"
 
 namespace bielle::cli {

@@ -8,11 +8,11 @@
 #include "cli/commands.h"
 #include "formats/drake.h"
 #include "formats/mjcf.h"
-#include "results/number_option.h"
-#include "results/output_place.h"
 #include "formats/sdf.h"
 #include "formats/text_file.h"
 #include "model/payload.h"
+#include "results/number_option.h"
+#include "results/output_place.h"
 
 namespace bielle::cli {
 namespace {

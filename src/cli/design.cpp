@@ -11,8 +11,8 @@
 #include "cli/task_options.h"
 #include "design/run.h"
 #include "design/spec_parts.h"
-#include "results/output_place.h"
 #include "formats/text_file.h"
+#include "results/output_place.h"
 #include "tasks/design_tasks.h"
 
 namespace bielle::cli {

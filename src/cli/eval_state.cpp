@@ -9,9 +9,9 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
-#include "results/json_text.h"
-#include "model/listing.h"
 #include "formats/text_file.h"
+#include "model/listing.h"
+#include "results/json_text.h"
 
 namespace bielle::cli {
 

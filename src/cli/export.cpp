@@ -5,10 +5,10 @@
 
 #include "bielle/results/result.h"
 #include "cli/commands.h"
+#include "formats/text_file.h"
 #include "results/opensim.h"
 #include "results/output_place.h"
 #include "results/result_files.h"
-#include "formats/text_file.h"
 
 namespace fs = std::filesystem;
 

@@ -5,10 +5,10 @@
 #include <iostream>
 #include <optional>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/registry.h"
+#include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "results/number_option.h"

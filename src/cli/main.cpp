@@ -3,8 +3,8 @@
 #include <exception>
 #include <iostream>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "results/number_option.h"
 #include "results/standard_output.h"

@@ -5,8 +5,8 @@
 #include <iostream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/ratio_report.h"
 #include "results/number_option.h"

@@ -6,8 +6,8 @@
 #include <iostream>
 #include <memory>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/film.h"
 #include "results/number_option.h"

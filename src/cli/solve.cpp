@@ -7,10 +7,10 @@
 #include <sstream>
 #include <utility>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
-#include "bielle/report/report.h"
 #include "bielle/motion/serial_model.h"
+#include "bielle/report/report.h"
+#include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/free_timings.h"
 #include "cli/objective.h"

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "results/json_text.h"
 #include "model/number_text.h"
+#include "results/json_text.h"
 
 namespace bielle::cli {
 

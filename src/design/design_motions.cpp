@@ -4,10 +4,10 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/footsteps.h"
 #include "bielle/motion/serial_model.h"
+#include "bielle/results/result.h"
 #include "model/number_text.h"
 
 namespace bielle {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/motion/solve.h"
 #include "bielle/motion/lift.h"
+#include "bielle/motion/solve.h"
 #include "design/measures.h"
 #include "model/payload.h"
 

@@ -5,11 +5,11 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/results/result.h"
-#include "bielle/results/robot_info.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
+#include "bielle/results/robot_info.h"
 #include "design/figures.h"
 #include "design/motor_change.h"
 #include "design/run.h"

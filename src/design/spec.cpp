@@ -9,8 +9,8 @@
 #include "bielle/robots/generators.h"
 #include "design/spec_parts.h"
 #include "formats/motor_catalogue.h"
-#include "model/number_text.h"
 #include "formats/text_file.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace fs = std::filesystem;
 

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bielle/model/error.h"
 #include "bielle/dynamics/ratio.h"
-#include "math/constants.h"
+#include "bielle/model/error.h"
 #include "dynamics/linkage_curve.h"
+#include "math/constants.h"
 
 namespace bielle {
 namespace {

@@ -4,8 +4,8 @@
 #include <map>
 
 #include "bielle/model/error.h"
-#include "model/number_text.h"
 #include "formats/xml_document.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {

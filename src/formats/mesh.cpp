@@ -9,8 +9,8 @@
 #include <iterator>
 #include <sstream>
 
-#include "math/decompositions.h"
 #include "formats/collada.h"
+#include "math/decompositions.h"
 
 namespace fs = std::filesystem;
 

@@ -11,11 +11,11 @@
 #include "bielle/formats/robot_writer.h"
 #include "formats/format_warnings.h"
 #include "formats/mjcf_coordinates.h"
+#include "formats/reader_mjcf.h"
+#include "formats/xml_document.h"
 #include "math/decompositions.h"
 #include "math/so3.h"
 #include "model/joint.h"
-#include "formats/reader_mjcf.h"
-#include "formats/xml_document.h"
 
 namespace bielle {
 namespace {

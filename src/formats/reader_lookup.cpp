@@ -7,9 +7,9 @@
 #include <set>
 
 #include "bielle/model/error.h"
-#include "model/listing.h"
 #include "formats/robot_files.h"
 #include "formats/text_file.h"
+#include "model/listing.h"
 
 namespace fs = std::filesystem;
 

@@ -5,8 +5,8 @@
 #include <filesystem>
 
 #include "bielle/model/error.h"
-#include "model/joint.h"
 #include "formats/xml_document.h"
+#include "model/joint.h"
 
 namespace bielle {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/model/model.h"
 #include "bielle/formats/reader.h"
+#include "bielle/model/model.h"
 #include "formats/yaml_entry.h"
 
 namespace bielle {

@@ -6,10 +6,10 @@
 #include "bielle/model/error.h"
 #include "formats/format_warnings.h"
 #include "formats/robot_text.h"
+#include "formats/xml_document.h"
 #include "math/so3.h"
 #include "model/joint.h"
 #include "model/number_text.h"
-#include "formats/xml_document.h"
 
 namespace bielle {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
-#include "math/constants.h"
 #include "formats/text_file.h"
 #include "formats/yaml_entry.h"
+#include "math/constants.h"
 #include "motion/locomotion_stages.h"
 
 namespace bielle {

@@ -6,9 +6,9 @@
 
 #include "bielle/model/error.h"
 #include "bielle/motion/stairs.h"
-#include "math/so3.h"
 #include "formats/text_file.h"
 #include "formats/yaml_entry.h"
+#include "math/so3.h"
 #include "motion/course.h"
 
 namespace bielle {

@@ -7,10 +7,10 @@
 #include <set>
 
 #include "bielle/model/builder.h"
+#include "dynamics/linkage_ratio.h"
 #include "math/decompositions.h"
 #include "model/joint.h"
 #include "model/listing.h"
-#include "dynamics/linkage_ratio.h"
 
 namespace bielle {
 namespace {

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <map>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "formats/text_file.h"
 #include "report/page.h"
 #include "report/run.h"

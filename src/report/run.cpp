@@ -2,11 +2,11 @@
 
 #include <filesystem>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/motion/serial_model.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace fs = std::filesystem;
 

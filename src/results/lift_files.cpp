@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
+#include "bielle/results/result.h"
 #include "results/aside_file.h"
 #include "results/json_text.h"
 

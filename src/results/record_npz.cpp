@@ -2,11 +2,11 @@
 #include <cmath>
 #include <filesystem>
 
-#include "bielle/results/record_files.h"
 #include "bielle/model/error.h"
+#include "bielle/results/record_files.h"
+#include "motion/record_tables.h"
 #include "results/aside_file.h"
 #include "results/npz.h"
-#include "motion/record_tables.h"
 
 namespace bielle {
 namespace {

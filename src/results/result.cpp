@@ -9,10 +9,10 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "formats/text_file.h"
 #include "results/aside_file.h"
 #include "results/json_text.h"
 #include "results/result_files.h"
-#include "formats/text_file.h"
 
 namespace fs = std::filesystem;
 

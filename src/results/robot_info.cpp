@@ -13,9 +13,9 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "dynamics/point_spring.h"
-#include "results/json_text.h"
 #include "model/frame_name.h"
 #include "model/number_text.h"
+#include "results/json_text.h"
 
 namespace bielle {
 namespace {

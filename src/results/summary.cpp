@@ -3,10 +3,10 @@
 #include <filesystem>
 #include <limits>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
-#include "results/json_text.h"
+#include "bielle/results/result.h"
 #include "formats/text_file.h"
+#include "results/json_text.h"
 
 namespace bielle {
 namespace {

@@ -6,8 +6,8 @@
 #include <functional>
 #include <sstream>
 
-#include "results/plot.h"
 #include "formats/text_file.h"
+#include "results/plot.h"
 #include "tasks/cells.h"
 
 namespace bielle::study {

@@ -2,14 +2,14 @@
 
 #include <cmath>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/draft.h"
 #include "design/spec_parts.h"
-#include "results/output_place.h"
-#include "model/number_text.h"
 #include "formats/text_file.h"
+#include "model/number_text.h"
+#include "results/output_place.h"
 
 namespace bielle::study {
 namespace {

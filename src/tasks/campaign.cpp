@@ -8,16 +8,16 @@
 #include <optional>
 #include <set>
 
+#include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
-#include "bielle/model/error.h"
-#include "results/line_log.h"
 #include "formats/text_file.h"
+#include "results/line_log.h"
 #include "tasks/campaign_command.h"
 #include "tasks/campaign_result.h"
 #include "tasks/cases.h"
-#include "tasks/shipping.h"
 #include "tasks/child.h"
+#include "tasks/shipping.h"
 
 namespace fs = std::filesystem;
 

@@ -4,8 +4,8 @@
 #include <fstream>
 #include <set>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "tasks/cases.h"
 #include "tasks/cells.h"
 #include "tasks/child.h"

@@ -6,8 +6,8 @@
 #include <optional>
 #include <sstream>
 
-#include "results/plot.h"
 #include "formats/text_file.h"
+#include "results/plot.h"
 #include "tasks/cells.h"
 
 namespace fs = std::filesystem;

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bielle/results/result.h"
 #include "bielle/formats/reader.h"
-#include "results/json_text.h"
+#include "bielle/results/result.h"
 #include "formats/text_file.h"
+#include "results/json_text.h"
 #include "tasks/shipping.h"
 
 namespace fs = std::filesystem;

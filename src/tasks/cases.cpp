@@ -13,13 +13,12 @@
 #include <map>
 #include <optional>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
+#include "formats/text_file.h"
 #include "results/aside_file.h"
 #include "results/json_text.h"
 #include "results/process.h"
-#include "formats/text_file.h"
-#include "formats/text_file.h"
 #include "tasks/case_task.h"
 
 namespace fs = std::filesystem;

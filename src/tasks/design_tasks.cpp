@@ -5,8 +5,8 @@
 
 #include "bielle/results/result.h"
 #include "design/spec_parts.h"
-#include "results/json_text.h"
 #include "formats/text_file.h"
+#include "results/json_text.h"
 #include "tasks/cases.h"
 #include "tasks/shipping.h"
 

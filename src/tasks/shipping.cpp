@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bielle/results/result.h"
 #include "bielle/formats/reader.h"
-#include "results/json_text.h"
-#include "formats/text_file.h"
+#include "bielle/results/result.h"
 #include "formats/robot_files.h"
+#include "formats/text_file.h"
+#include "results/json_text.h"
 
 namespace fs = std::filesystem;
 

@@ -1,4 +1,4 @@
-#include "include/bielle/worlds/bielle_world.h"
+#include "bielle/worlds/bielle_world.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include "dynamics/joint_force.h"
 #include "dynamics/point_spring.h"
 #include "math/decompositions.h"
-#include "src/worlds/closed_tree.h"
-#include "src/worlds/sole_track.h"
+#include "worlds/closed_tree.h"
+#include "worlds/sole_track.h"
 
 namespace bielle::simulation {
 namespace {

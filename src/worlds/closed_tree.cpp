@@ -1,4 +1,4 @@
-#include "src/worlds/closed_tree.h"
+#include "worlds/closed_tree.h"
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"

@@ -1,9 +1,9 @@
-#include "src/worlds/commanded_plan.h"
+#include "worlds/commanded_plan.h"
 
 #include <cmath>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace bielle::simulation {
 namespace {

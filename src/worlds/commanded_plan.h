@@ -1,6 +1,6 @@
 #pragma once
 /// \file A walk that follows a file of commands, made while it is carried out.
-#include "src/worlds/plan.h"
+#include "worlds/plan.h"
 
 namespace bielle::simulation {
 

@@ -1,4 +1,4 @@
-#include "include/bielle/worlds/contact_law.h"
+#include "bielle/worlds/contact_law.h"
 
 #include <algorithm>
 #include <cmath>

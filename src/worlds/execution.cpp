@@ -1,4 +1,4 @@
-#include "src/worlds/execution.h"
+#include "worlds/execution.h"
 
 #include <algorithm>
 #include <chrono>
@@ -12,7 +12,7 @@
 #include "control/clock.h"
 #include "math/constants.h"
 #include "motion/record_tables.h"
-#include "src/worlds/robot_errors.h"
+#include "worlds/robot_errors.h"
 
 namespace bielle::simulation {
 namespace {

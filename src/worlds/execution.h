@@ -7,10 +7,10 @@
 
 #include "bielle/control/policy.h"
 #include "bielle/motion/record.h"
-#include "src/worlds/fall_detector.h"
-#include "src/worlds/perception.h"
-#include "src/worlds/torque_delay.h"
-#include "include/bielle/worlds/world.h"
+#include "bielle/worlds/world.h"
+#include "worlds/fall_detector.h"
+#include "worlds/perception.h"
+#include "worlds/torque_delay.h"
 
 namespace bielle::simulation {
 

@@ -1,4 +1,4 @@
-#include "src/worlds/fall_detector.h"
+#include "worlds/fall_detector.h"
 
 #include <algorithm>
 #include <cmath>

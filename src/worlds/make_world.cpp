@@ -1,11 +1,11 @@
-#include "include/bielle/worlds/make_world.h"
+#include "worlds/make_world.h"
 
 #include "bielle/model/error.h"
-#include "include/bielle/worlds/bielle_world.h"
+#include "bielle/worlds/bielle_world.h"
 #ifdef BIELLE_WITH_MUJOCO
-#include "src/worlds/mujoco_world.h"
+#include "worlds/mujoco_world.h"
 #endif
-#include "src/worlds/simbody_world.h"
+#include "worlds/simbody_world.h"
 
 namespace bielle::simulation {
 namespace {

@@ -1,4 +1,4 @@
-#include "src/worlds/mujoco_ground.h"
+#include "worlds/mujoco_ground.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

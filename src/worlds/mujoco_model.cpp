@@ -1,4 +1,4 @@
-#include "src/worlds/mujoco_model.h"
+#include "worlds/mujoco_model.h"
 
 #include <cstring>
 #include <stdexcept>

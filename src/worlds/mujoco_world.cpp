@@ -1,4 +1,4 @@
-#include "src/worlds/mujoco_world.h"
+#include "worlds/mujoco_world.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/loop_conflict.h"
 #include "bielle/model/error.h"
-#include "src/worlds/mujoco_model.h"
-#include "src/worlds/mujoco_ground.h"
-#include "src/worlds/sole_track.h"
+#include "worlds/mujoco_ground.h"
+#include "worlds/mujoco_model.h"
+#include "worlds/sole_track.h"
 
 namespace bielle::simulation {
 namespace {

@@ -9,8 +9,8 @@
 /// The ground consists of its plane and boxes; those with inclined tops have sides normal to the top.
 #include <memory>
 
+#include "bielle/worlds/world.h"
 #include "formats/mjcf.h"
-#include "include/bielle/worlds/world.h"
 
 namespace bielle::simulation {
 

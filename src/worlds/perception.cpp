@@ -1,4 +1,4 @@
-#include "src/worlds/perception.h"
+#include "worlds/perception.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "bielle/ocp/contact_schedule.h"
-#include "include/bielle/worlds/sensors.h"
+#include "bielle/worlds/sensors.h"
 
 namespace bielle::simulation {
 

@@ -1,12 +1,12 @@
-#include "src/worlds/plan.h"
+#include "worlds/plan.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/solve.h"
+#include "bielle/robots/robot_loader.h"
 #include "results/interrupt.h"
 
 namespace bielle::simulation {

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "bielle/control/predictive_controller.h"
-#include "bielle/results/result.h"
 #include "bielle/formats/reader.h"
-#include "src/worlds/serial_belief.h"
+#include "bielle/results/result.h"
+#include "worlds/serial_belief.h"
 
 namespace bielle::simulation {
 

@@ -1,4 +1,4 @@
-#include "src/worlds/planned_record.h"
+#include "worlds/planned_record.h"
 
 #include <limits>
 

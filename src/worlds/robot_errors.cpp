@@ -1,4 +1,4 @@
-#include "src/worlds/robot_errors.h"
+#include "worlds/robot_errors.h"
 
 #include <algorithm>
 #include <limits>

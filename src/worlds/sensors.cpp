@@ -1,4 +1,4 @@
-#include "include/bielle/worlds/sensors.h"
+#include "bielle/worlds/sensors.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "src/worlds/serial_belief.h"
+#include "worlds/serial_belief.h"
 
 #include "math/decompositions.h"
 #include "motion/posture_lift.h"

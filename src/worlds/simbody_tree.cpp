@@ -1,4 +1,4 @@
-#include "src/worlds/simbody_tree.h"
+#include "worlds/simbody_tree.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
-#include "src/worlds/simbody_world.h"
+#include "worlds/simbody_world.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "dynamics/joint_force.h"
-#include "src/worlds/simbody_tree.h"
-#include "src/worlds/sole_track.h"
+#include "worlds/simbody_tree.h"
+#include "worlds/sole_track.h"
 
 namespace bielle::simulation {
 namespace {

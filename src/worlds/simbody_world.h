@@ -9,8 +9,8 @@
 /// trapezoidal rule over these steps.
 #include <memory>
 
-#include "include/bielle/worlds/contact_law.h"
-#include "include/bielle/worlds/world.h"
+#include "bielle/worlds/contact_law.h"
+#include "bielle/worlds/world.h"
 
 namespace bielle::simulation {
 

@@ -1,4 +1,4 @@
-#include "src/worlds/sole_track.h"
+#include "worlds/sole_track.h"
 
 namespace bielle::simulation {
 

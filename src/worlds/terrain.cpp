@@ -1,4 +1,4 @@
-#include "include/bielle/worlds/terrain.h"
+#include "bielle/worlds/terrain.h"
 
 #include <algorithm>
 #include <cmath>

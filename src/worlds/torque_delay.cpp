@@ -1,4 +1,4 @@
-#include "src/worlds/torque_delay.h"
+#include "worlds/torque_delay.h"
 
 #include <algorithm>
 #include <cmath>

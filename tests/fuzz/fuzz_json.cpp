@@ -1,6 +1,6 @@
 // summary.json of a result, and the state that `bielle eval` is given: numbers, or one clear error.
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "cli/eval_state.h"
 #include "scratch.h"

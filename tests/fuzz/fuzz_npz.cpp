@@ -1,8 +1,8 @@
 // A trajectory as a NumPy archive: what is read is written and read again as the same, or there is one clear error.
 #include <cmath>
 
-#include "bielle/results/record_files.h"
 #include "bielle/model/error.h"
+#include "bielle/results/record_files.h"
 #include "scratch.h"
 
 namespace bielle::fuzz {

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "results/plot.h"
 #include "paper/claims.h"
+#include "results/plot.h"
 
 namespace bielle::paper {
 

@@ -5,8 +5,8 @@
 #include <iostream>
 
 #include "bielle/model/error.h"
-#include "results/number_option.h"
 #include "paper/commands.h"
+#include "results/number_option.h"
 
 namespace {
 

@@ -6,12 +6,12 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/lift.h"
-#include "results/json_text.h"
+#include "bielle/robots/robot_loader.h"
 #include "dynamics/linkage_ratio.h"
+#include "results/json_text.h"
 
 namespace fs = std::filesystem;
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/results/result.h"
 #include "bielle/formats/reader.h"
+#include "bielle/results/result.h"
 #include "paper/studies.h"
 #include "tasks/cells.h"
 

@@ -3,10 +3,10 @@
 #include <iostream>
 #include <optional>
 
-#include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/solve.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "paper/commands.h"
 #include "paper/jump.h"
 #include "paper/walk.h"

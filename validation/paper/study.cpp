@@ -5,8 +5,8 @@
 #include <map>
 #include <thread>
 
-#include "bielle/results/result.h"
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "model/number_text.h"
 #include "paper/commands.h"
 #include "paper/report.h"

@@ -14,7 +14,6 @@
 #include "measure_steps.h"
 #include "own_robots.h"
 #include "paper/walk.h"
-#include "solve_in_place.h"
 #include "problem_probe.h"
 #include "published_robots.h"
 #include "solve_in_place.h"

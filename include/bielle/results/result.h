@@ -4,10 +4,10 @@
 #include <vector>
 
 #include "bielle/dynamics/linkage.h"
+#include "bielle/motion/lift.h"
+#include "bielle/motion/solve.h"
 #include "bielle/results/electrical_energy.h"
 #include "bielle/results/record_files.h"
-#include "bielle/motion/solve.h"
-#include "bielle/motion/lift.h"
 
 namespace bielle {
 

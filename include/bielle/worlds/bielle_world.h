@@ -16,8 +16,8 @@
 /// forces act at the middle with the mean velocity, (1) changes the kinetic energy by exactly the work that the books take.
 #include <memory>
 
-#include "include/bielle/worlds/contact_law.h"
-#include "include/bielle/worlds/world.h"
+#include "bielle/worlds/contact_law.h"
+#include "bielle/worlds/world.h"
 
 namespace bielle::simulation {
 

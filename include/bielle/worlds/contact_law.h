@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "bielle/model/model.h"
-#include "include/bielle/worlds/terrain.h"
+#include "bielle/worlds/terrain.h"
 
 namespace bielle::simulation {
 

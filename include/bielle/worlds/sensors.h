@@ -3,7 +3,7 @@
 #include <random>
 
 #include "bielle/control/estimator.h"
-#include "include/bielle/worlds/world.h"
+#include "bielle/worlds/world.h"
 
 namespace bielle::simulation {
 

@@ -1,4 +1,4 @@
-#include "src/cli/simulate/arguments.h"
+#include "cli/simulate/arguments.h"
 
 #include <cmath>
 #include <map>
@@ -6,12 +6,12 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "bielle/worlds/terrain.h"
+#include "model/number_text.h"
 #include "results/number_option.h"
 #include "results/setting.h"
-#include "model/number_text.h"
-#include "include/bielle/worlds/make_world.h"
-#include "include/bielle/worlds/terrain.h"
 #include "solve/fddp_checks.h"
+#include "worlds/make_world.h"
 
 namespace bielle::simulation {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "src/worlds/execution.h"
-#include "src/worlds/plan.h"
-#include "src/worlds/robot_errors.h"
+#include "worlds/execution.h"
+#include "worlds/plan.h"
+#include "worlds/robot_errors.h"
 
 namespace bielle::simulation {
 

@@ -4,15 +4,15 @@
 #include <memory>
 
 #include "bielle/model/error.h"
+#include "cli/simulate/output.h"
+#include "cli/simulate/watch.h"
+#include "model/number_text.h"
 #include "results/interrupt.h"
 #include "results/output_place.h"
 #include "results/setting.h"
 #include "results/standard_output.h"
-#include "model/number_text.h"
-#include "src/worlds/commanded_plan.h"
-#include "include/bielle/worlds/make_world.h"
-#include "src/cli/simulate/output.h"
-#include "src/cli/simulate/watch.h"
+#include "worlds/commanded_plan.h"
+#include "worlds/make_world.h"
 
 using namespace bielle;
 using namespace bielle::simulation;

@@ -1,4 +1,4 @@
-#include "src/cli/simulate/output.h"
+#include "cli/simulate/output.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -9,10 +9,10 @@
 
 #include "bielle/report/report.h"
 #include "control/clock.h"
+#include "model/number_text.h"
 #include "results/npz.h"
 #include "results/result_files.h"
-#include "model/number_text.h"
-#include "src/worlds/planned_record.h"
+#include "worlds/planned_record.h"
 
 namespace bielle::simulation {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 // What bielle-simulate prints and writes.
-#include "src/cli/simulate/arguments.h"
+#include "cli/simulate/arguments.h"
 
 namespace bielle::simulation {
 

@@ -1,4 +1,4 @@
-#include "src/cli/simulate/watch.h"
+#include "cli/simulate/watch.h"
 
 #include <iostream>
 

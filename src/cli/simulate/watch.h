@@ -3,7 +3,7 @@
 #include <chrono>
 #include <functional>
 
-#include "src/worlds/execution.h"
+#include "worlds/execution.h"
 
 namespace bielle::simulation {
 

@@ -2,7 +2,7 @@
 /// \file The worlds by name.
 #include <memory>
 
-#include "include/bielle/worlds/world.h"
+#include "bielle/worlds/world.h"
 
 namespace bielle::simulation {
 
