@@ -49,7 +49,7 @@ def build_package(target: Path) -> None:
     configure = ["cmake", "-S", str(ROOT), "-B", str(build), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release"]
     python = [f"-DPython3_EXECUTABLE={sys.executable}", "-DBIELLE_PYTHON_DIR=."]
     subprocess.run(configure + options + python, check=True)
-    subprocess.run(["cmake", "--build", str(build), "--target", "bielle_python"], check=True)
+    subprocess.run(["cmake", "--build", str(build), "--target", "bielle_stubs"], check=True)
     install = ["cmake", "--install", str(build), "--component", "python", "--strip"]
     subprocess.run(install + ["--prefix", str(target)], check=True)
 

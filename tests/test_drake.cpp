@@ -275,7 +275,7 @@ TEST_CASE("Drake's URDF in its words, and what they lose") {
   const Model model = ModelBuilder::restore(parts);
   const UrdfText text = formatDrake(model);
   for (const char* part :
-       {"<robot name=\"toy &lt;1>\" xmlns:drake=\"http://drake.mit.edu\">",
+       {"<robot name=\"toy &lt;1&gt;\" xmlns:drake=\"http://drake.mit.edu\">",
         "<drake:joint name=\"cross\" type=\"universal\">", "<drake:joint name=\"knob\" type=\"ball\">",
         "<limit lower=\"-1\" effort=\"7\" velocity=\"3\"/>", "<dynamics damping=\"0.5\" friction=\"0.25\"/>",
         "<drake:ball_constraint_body_A name=\"ground_\"/>", "<drake:ball_constraint_p_AP value=\"3 0 0\"/>",
