@@ -20,69 +20,54 @@ Inertia readInertia(const Matrix6d& Y) {
   return out;
 }
 
-std::string getLink(const Model& model, int body) { return body == 0 ? "world" : model.bodies()[body].name; }
-
-ModelBuilder makeBuilder(const Model& m, const ModelVariation& direction, double step) {
-  const auto move = [step](const SE3& X, const Vector6d& twist) { return X * exp6(step * twist); };
-  ModelBuilder builder(m.name());
-  builder.setGravity(m.gravity());
-  for (int i = 1; i < m.numBodies(); ++i) {
-    Joint joint = m.joints()[i];
-    joint.X_PJ = move(joint.X_PJ, direction.joints[i]);
-    const Matrix6d Y = m.bodies()[i].inertia.toMatrix() + step * direction.inertias[i];
-    builder.addLink(getLink(m, i), getLink(m, joint.parent), joint, readInertia(Y));
+ModelParts moveParts(const Model& model, const ModelVariation& direction, double step) {
+  const auto move = [step](SE3& X, const Vector6d& twist) { X = X * exp6(step * twist); };
+  ModelParts parts = takeParts(model);
+  for (size_t i = 1; i < parts.bodies.size(); ++i) {
+    move(parts.joints[i].X_PJ, direction.joints[i]);
+    Inertia& inertia = parts.bodies[i].inertia;
+    inertia = readInertia(inertia.toMatrix() + step * direction.inertias[i]);
   }
-  for (size_t c = 0; c < m.closures().size(); ++c) {
-    Closure closure = m.closures()[c];
-    closure.X_B1 = move(closure.X_B1, direction.frames1[c]);
-    closure.X_B2 = move(closure.X_B2, direction.frames2[c]);
+  for (size_t c = 0; c < parts.closures.size(); ++c) {
+    Closure& closure = parts.closures[c];
+    move(closure.X_B1, direction.frames1[c]);
+    move(closure.X_B2, direction.frames2[c]);
     closure.offset += step * direction.offsets[c];
     for (size_t i = 0; i < closure.terms.size(); ++i)
       closure.terms[i].coefficient += step * direction.coefficients[c][static_cast<Eigen::Index>(i)];
-    builder.copyClosure(m, closure);
   }
-  for (const Motor& motor : m.motors())
-    builder.addMotor(motor.name, motor.armature + step * direction.armature[motor.dof]);
-  for (const Joint& joint : m.joints())
-    if (joint.nv == 1 && m.findMotor(joint.name) < 0)
-      builder.setArmature(joint.name, m.armature()[joint.idx_v] + step * direction.armature[joint.idx_v]);
-  for (const JointForce& force : m.jointForces()) builder.addJointForce(m.joints()[force.joint].name, force);
-  for (size_t s = 0; s < m.pointSprings().size(); ++s) {
-    PointSpring spring = m.pointSprings()[s];
+  parts.armature += step * direction.armature;
+  for (size_t s = 0; s < parts.point_springs.size(); ++s) {
+    PointSpring& spring = parts.point_springs[s];
     spring.point1 += step * direction.points1[s];
     spring.point2 += step * direction.points2[s];
     spring.stiffness += step * direction.springs[s][0];
     spring.rest += step * direction.springs[s][1];
     spring.preload += step * direction.springs[s][2];
     spring.damping += step * direction.springs[s][3];
-    builder.copyPointSpring(m, spring);
   }
-  for (size_t c = 0; c < m.contacts().size(); ++c) {
-    const ContactFrame& contact = m.contacts()[c];
-    builder.addFrame(contact.name + "/f", getLink(m, contact.body), move(contact.X_BF, direction.contacts[c]));
-    builder.addContact(contact.name, contact.name + "/f", contact.kind, contact.half_length, contact.half_width);
-  }
-  for (size_t s = 0; s < m.shapes().size(); ++s) {
-    Shape shape = m.shapes()[s];
-    shape.X_BS = move(shape.X_BS, direction.shapes[s].frame);
+  for (size_t c = 0; c < parts.contacts.size(); ++c) move(parts.contacts[c].X_BF, direction.contacts[c]);
+  for (size_t s = 0; s < parts.shapes.size(); ++s) {
+    Shape& shape = parts.shapes[s];
+    shape.fitted = false;  // or else it would be fitted again
+    move(shape.X_BS, direction.shapes[s].frame);
     shape.half += step * direction.shapes[s].half;
     shape.radius += step * direction.shapes[s].radius;
-    builder.addShape(getLink(m, shape.body), shape);
   }
-  return builder;
+  return parts;
 }
 
 }  // namespace
 
 Model moveModel(const Model& model, const ModelVariation& direction, double step) {
-  return makeBuilder(model, direction, step).build();
+  return ModelBuilder::restore(moveParts(model, direction, step));
 }
 
 Model addContactsEverywhere(const Model& model) {
-  ModelBuilder builder = makeBuilder(model, ModelVariation(model), 0);
+  ModelParts parts = takeParts(model);
   for (int i = 1; i < model.numBodies(); ++i)
-    builder.addContact("sole of " + getLink(model, i), getLink(model, i), ContactKind::Surface6D, 0.1, 0.05);
-  return builder.build();
+    parts.contacts.push_back({"sole of " + model.bodies()[i].name, i, SE3(), ContactKind::Surface6D, 0.1, 0.05});
+  return ModelBuilder::restore(std::move(parts));
 }
 
 MatrixXd differentiateModel(const Model& model, const std::vector<ModelVariation>& directions, double h,

@@ -7,6 +7,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/robots/robot_loader.h"
+#include "change_model.h"
 #include "math/so3.h"
 #include "mechanisms.h"
 #include "model/joint.h"
@@ -80,10 +81,10 @@ TEST_CASE("a wrong ratio of a coupler is seen") {
   ValidationOptions options;
   options.samples = 2;
   options.start = mechanism.q_closed;
-  REQUIRE(validateAgainst(mechanism.model, copyModel(mechanism.model), options).passed());
-  ModelChanges changes;
-  changes.closure = [](int, Closure& closure) { closure.terms[0].coefficient *= 1.001; };
-  const ValidationReport report = validateAgainst(mechanism.model, copyModel(mechanism.model, changes), options);
+  REQUIRE(validateAgainst(mechanism.model, mechanism.model, options).passed());
+  const Model wrong =
+      changeModel(mechanism.model, [](ModelParts& parts) { parts.closures[0].terms[0].coefficient *= 1.001; });
+  const ValidationReport report = validateAgainst(mechanism.model, wrong, options);
   INFO(print(report));
   CHECK(!report.findRow("accelerations, Simbody solver")->passed());
   CHECK(!report.findRow("constraint forces J'lambda, with rotors")->passed());
@@ -133,9 +134,9 @@ TEST_CASE("a wrong inertia, a moved closure and a turned hinge axis are each see
   ValidationOptions options;
   options.samples = 2;
   options.start = mechanism.q_closed;
-  CHECK(validateAgainst(model, copyModel(model), options).passed());
-  const auto expectFailure = [&](const ModelChanges& changes, const std::set<std::string>& quantities) {
-    const ValidationReport report = validateAgainst(model, copyModel(model, changes), options);
+  CHECK(validateAgainst(model, model, options).passed());
+  const auto expectFailure = [&](const Change& change, const std::set<std::string>& quantities) {
+    const ValidationReport report = validateAgainst(model, changeModel(model, change), options);
     INFO(print(report));
     CHECK(report.failure.empty());
     CHECK(!report.passed());
@@ -144,30 +145,26 @@ TEST_CASE("a wrong inertia, a moved closure and a turned hinge axis are each see
       CHECK(!report.findRow(quantity)->passed());
     }
   };
-  ModelChanges changes;
-  changes.inertia = [](int body, Inertia& inertia) {
-    if (body == 5) inertia.I_com *= 1 + 1e-6;
-  };
-  expectFailure(changes, {"mass matrix", "bias", "kinetic energy", "accelerations, with rotors",
-                          "accelerations, Simbody solver", "closure forces, Simbody solver"});
-  changes = {};
-  changes.inertia = [](int body, Inertia& inertia) {
-    if (body == 5) inertia.com.x() += 1e-6;
-  };
-  expectFailure(changes, {"mass matrix", "potential energy", "accelerations, Simbody solver"});
-  changes = {};
-  changes.closure = [](int, Closure& closure) { closure.X_B2.p += Vector3d(1e-6, 0, 0); };
-  expectFailure(changes,
-                {"accelerations, with rotors", "accelerations, Simbody solver", "closure forces, with rotors"});
-  changes = {};
-  changes.closure = [](int, Closure& closure) {
-    closure.X_B2.R = closure.X_B2.R * exp3(1e-6 * closure.axis.unitOrthogonal());
-  };
-  expectFailure(changes,
-                {"accelerations, with rotors", "accelerations, Simbody solver", "closure forces, with rotors"});
-  changes = {};
-  changes.armature_scale = 1.001;
-  expectFailure(changes, {"mass matrix", "kinetic energy", "accelerations, with rotors"});
+  expectFailure([](ModelParts& parts) { parts.bodies[5].inertia.I_com *= 1 + 1e-6; },
+                {"mass matrix", "bias", "kinetic energy", "accelerations, with rotors", "accelerations, Simbody solver",
+                 "closure forces, Simbody solver"});
+  expectFailure([](ModelParts& parts) { parts.bodies[5].inertia.com.x() += 1e-6; },
+                {"mass matrix", "potential energy", "accelerations, Simbody solver"});
+  const std::set<std::string> closing = {"accelerations, with rotors", "accelerations, Simbody solver",
+                                         "closure forces, with rotors"};
+  expectFailure(
+      [](ModelParts& parts) {
+        for (Closure& closure : parts.closures) closure.X_B2.p.x() += 1e-6;
+      },
+      closing);
+  expectFailure(
+      [](ModelParts& parts) {
+        for (Closure& closure : parts.closures)
+          closure.X_B2.R = closure.X_B2.R * exp3(1e-6 * closure.axis.unitOrthogonal());
+      },
+      closing);
+  expectFailure([](ModelParts& parts) { parts.armature *= 1.001; },
+                {"mass matrix", "kinetic energy", "accelerations, with rotors"});
 }
 
 TEST_CASE("derivatives of a slightly different robot are seen as different") {
@@ -177,11 +174,8 @@ TEST_CASE("derivatives of a slightly different robot are seen as different") {
   ValidationOptions options;
   options.samples = 1;
   options.start = mechanism.q_closed;
-  ModelChanges changes;
-  changes.inertia = [](int body, Inertia& inertia) {
-    if (body == 5) inertia.mass *= 1.001;
-  };
-  const ValidationReport report = validateAgainst(mechanism.model, copyModel(mechanism.model, changes), options);
+  const Model wrong = changeModel(mechanism.model, [](ModelParts& parts) { parts.bodies[5].inertia.mass *= 1.001; });
+  const ValidationReport report = validateAgainst(mechanism.model, wrong, options);
   INFO(print(report));
   for (const std::string quantity : {"da/dq along the closures", "da/dv along the closures", "da/du",
                                      "dlambda/dq along the closures", "dlambda/dv along the closures", "dlambda/du"}) {

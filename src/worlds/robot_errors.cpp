@@ -24,45 +24,6 @@ double calcLeastHeight(const Model& model, ConstVectorRef q) {
   return least;
 }
 
-void addLinks(const Model& model, const std::vector<Inertia>& inertias, ModelBuilder& builder) {
-  const auto getLink = [&model](int body) { return body == 0 ? "world" : model.bodies()[body].name; };
-  for (int i = 1; i < model.numBodies(); ++i) {
-    const Joint& joint = model.joints()[i];
-    const auto select = [&joint](const VectorXd& limits) { return VectorXd(limits.segment(joint.idx_v, joint.nv)); };
-    builder.addLink(getLink(i), getLink(joint.parent), joint, inertias[i],
-                    {select(model.lowerLimits()), select(model.upperLimits()), select(model.velocityLimits())});
-    if (joint.nv == 1 && model.findMotor(joint.name) < 0)
-      builder.setArmature(joint.name, model.armature()[joint.idx_v]);
-  }
-  for (const Frame& frame : model.frames())
-    if (frame.name != getLink(frame.body)) builder.addFrame(frame.name, getLink(frame.body), frame.X_BF);
-}
-
-// The model with other inertias (per body) and frames 1 of closures moved by shifts in their bodies.
-Model rebuild(const Model& model, const std::vector<Inertia>& inertias, const std::vector<Vector3d>& shifts) {
-  ModelBuilder builder(model.name());
-  builder.setGravity(model.gravity());
-  addLinks(model, inertias, builder);
-  const auto addFrame = [&](const std::string& name, int body, const SE3& X) {
-    builder.addFrame(name, body == 0 ? "world" : model.bodies()[body].name, X);
-    return name;
-  };
-  for (size_t c = 0; c < model.closures().size(); ++c) {
-    Closure closure = model.closures()[c];
-    closure.X_B1.p += shifts[c];
-    builder.copyClosure(model, closure);
-  }
-  for (const Motor& motor : model.motors()) builder.addMotor(motor);
-  for (const JointForce& force : model.jointForces()) builder.addJointForce(model.joints()[force.joint].name, force);
-  for (const PointSpring& spring : model.pointSprings()) builder.copyPointSpring(model, spring);
-  for (const ContactFrame& contact : model.contacts())
-    builder.addContact(contact.name, addFrame(contact.name + "|contact", contact.body, contact.X_BF), contact.kind,
-                       contact.half_length, contact.half_width);
-  for (const Reference& reference : model.references()) builder.addReference(reference);
-  for (int joint : model.serialJoints()) builder.addSerialJoint(model.joints()[joint].name);
-  return builder.build();
-}
-
 }  // namespace
 
 Model makeMachine(const Model& model, const RobotErrors& errors) {
@@ -72,17 +33,15 @@ Model makeMachine(const Model& model, const RobotErrors& errors) {
                      "give 0 to less than 1");
   std::mt19937 generator(errors.seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  std::vector<Inertia> inertias;
-  for (const Body& body : model.bodies()) {
+  ModelParts parts = takeParts(model);
+  for (Body& body : parts.bodies) {
     const double factor = 1 + errors.mass * uniform(generator);
-    inertias.push_back({factor * body.inertia.mass, body.inertia.com, factor * body.inertia.I_com});
+    body.inertia.mass *= factor;
+    body.inertia.I_com *= factor;
   }
-  std::vector<Vector3d> shifts;
-  for (size_t c = 0; c < model.closures().size(); ++c) {
-    Vector3d& shift = shifts.emplace_back();
-    for (int axis = 0; axis < 3; ++axis) shift[axis] = errors.rod * uniform(generator);
-  }
-  return rebuild(model, inertias, shifts);
+  for (Closure& closure : parts.closures)
+    for (int axis = 0; axis < 3; ++axis) closure.X_B1.p[axis] += errors.rod * uniform(generator);
+  return ModelBuilder::restore(std::move(parts));
 }
 
 VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRef q) {
