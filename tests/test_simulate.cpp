@@ -348,7 +348,16 @@ TEST_CASE("simulate: predictive control survives a push that gains do not") {
     }
   CHECK(std::isfinite(record.footholds(100, 0)));
   CHECK(readRecord((scratch.path / "gains" / "trajectory.npz").string()).footholds.size() == 0);
-  CHECK(summary["solves"]["worst_ms"].get<double>() >= summary["solves"]["median_ms"].get<double>());
+  const auto& solves = summary["solves"];
+  CHECK(solves["worst_ms"].get<double>() >= solves["median_ms"].get<double>());
+  CHECK(solves["parts"].size() == 6);
+  for (const auto& part : solves["parts"]) {
+    CHECK(part["median_ms"].get<double>() > 0);
+    CHECK(part["p99_ms"].get<double>() >= part["median_ms"].get<double>());
+  }
+  CHECK(solves["step"]["median"].get<double>() <= 1);
+  CHECK(solves["step"]["p1"].get<double>() > 0);
+  CHECK(solves["regularization"]["median"].get<double>() > 0);
 }
 
 TEST_CASE("simulate: a walk follows commands, turns on the way and stops") {

@@ -10,7 +10,7 @@
 namespace bielle {
 namespace {
 
-constexpr size_t kTimes = 100000;  // that are kept
+constexpr size_t kSolves = 100000;  // that are kept
 
 }  // namespace
 
@@ -29,7 +29,7 @@ class PredictiveController::Loop {
     request_.measurement.v.setZero(model.nv());
     request_.measurement.contacts.resize(model.contacts().size());
     request_.u.setZero(model.nu());
-    counts_.seconds.reserve(kTimes);
+    counts_.last.reserve(kSolves);
     if (options.own_thread) thread_ = std::make_unique<SolvingThread>(planner_, request_, solution_);
   }
 
@@ -70,7 +70,7 @@ class PredictiveController::Loop {
     if (thread_) return thread_->begin();
     const double available = getStart(stage_ + 1) - getStart(stage_) - measurement.delay;
     planner_.solve(request_, solution_);
-    counts_.missed += solution_.seconds > available;
+    counts_.missed += solution_.took.seconds > available;
     receive();
   }
 
@@ -83,10 +83,10 @@ class PredictiveController::Loop {
     counts_.failed += !solution_.solved;
     counts_.early += solution_.early;
     counts_.late += solution_.late;
-    if (counts_.seconds.size() < kTimes)
-      counts_.seconds.push_back(solution_.seconds);
+    if (counts_.last.size() < kSolves)
+      counts_.last.push_back(solution_.took);
     else
-      counts_.seconds[static_cast<size_t>(counts_.solves) % kTimes] = solution_.seconds;
+      counts_.last[static_cast<size_t>(counts_.solves) % kSolves] = solution_.took;
     ++counts_.solves;
   }
 
@@ -104,12 +104,12 @@ class PredictiveController::Loop {
   std::unique_ptr<SolvingThread> thread_;  // last: it ends first
 };
 
-double PredictiveCounts::calcQuantile(double share) const {
-  if (seconds.empty()) return 0;
-  std::vector<double> sorted = seconds;
+double PredictiveCounts::calcQuantile(double share, double PredictiveSolve::*value) const {
+  if (last.empty()) return 0;
+  std::vector<double> sorted;
+  for (const PredictiveSolve& solve : last) sorted.push_back(solve.*value);
   std::sort(sorted.begin(), sorted.end());
-  const double last = static_cast<double>(sorted.size() - 1);
-  return sorted[static_cast<size_t>(std::ceil(share * last))];
+  return sorted[static_cast<size_t>(std::ceil(share * static_cast<double>(sorted.size() - 1)))];
 }
 
 PredictiveController::PredictiveController(Motion motion, const ShootingTrajectory& plan,

@@ -1,12 +1,12 @@
 #include "control/window_planner.h"
 
 #include <algorithm>
-#include <chrono>
 
 #include "bielle/dynamics/kinematics.h"
 #include "control/clock.h"
 #include "control/policy_stages.h"
 #include "motion/foot_tasks.h"
+#include "solve/stopwatch.h"
 
 namespace bielle {
 namespace {
@@ -30,6 +30,17 @@ RecedingOptions makeSolverOptions(const PredictiveOptions& options, int iteratio
   out.constraints.initial_penalty = options.penalty;
   out.constraints.penalty_increase = 1;
   return out;
+}
+
+void recordSolve(const FddpSummary& summary, PredictiveSolve& took) {
+  took.evaluate = summary.evaluate_seconds;
+  took.linearize = summary.linearize_seconds;
+  took.sweep = summary.sweep_seconds;
+  took.rollout = summary.rollout_seconds;
+  for (const FddpIteration& line : summary.log) {
+    if (line.step > 0) took.step = std::min(took.step, line.step);
+    took.regularization = std::max(took.regularization, line.regularization);
+  }
 }
 
 }  // namespace
@@ -70,11 +81,14 @@ WindowPlanner::Solution WindowPlanner::makeFirst() {
 }
 
 void WindowPlanner::solve(const Request& request, Solution& solution) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Clock::time_point begin = Clock::now();
   solution.skipped = 0;
   solution.early = solution.late = false;
+  solution.took = {};
   try {
-    solution.solved = predict(request, solution) && solveWindow(solution);
+    const bool predicted = predict(request, solution);
+    solution.took.predict = calcSecondsSince(begin);
+    solution.solved = predicted && solveWindow(solution);
   } catch (const std::exception&) {
     solution.solved = false;
   }
@@ -84,7 +98,7 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
   }
   solution.advance = advance_;
   solution.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;
-  solution.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  solution.took.seconds = calcSecondsSince(begin);
 }
 
 Receding WindowPlanner::makeSolver(int iterations) const {
@@ -227,9 +241,13 @@ bool WindowPlanner::solveWindow(Solution& solution) {
     horizon_->extend(first_ + nodes, trajectory_);
   }
   moveWindow();
-  if (solver_.step(trajectory_).termination == FddpTermination::Failed) return false;
+  const FddpSummary summary = solver_.step(trajectory_);
+  recordSolve(summary, solution.took);
+  if (summary.termination == FddpTermination::Failed) return false;
+  const Clock::time_point begin = Clock::now();
   makePolicy(solver_, solution.target, solution);
   predictFootholds(solution.target, solution);
+  solution.took.policy = calcSecondsSince(begin);
   return true;
 }
 

@@ -25,7 +25,7 @@ class WindowPlanner {
     int skipped = 0;      // stages by which such a foot brings the motion ahead: the present stage is this much farther
     double advance = 0;   // how far such feet have brought the motion ahead of its plan until now, s
     double awaited = -1;  // the instant of the plan with which a late foot is to stand, s; negative: none is late
-    double seconds = 0;   // that it took
+    PredictiveSolve took;
     std::vector<Policy::Stage> stages;
     VectorXd u_hold;
     std::vector<PredictedFoothold> footholds;

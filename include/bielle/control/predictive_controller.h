@@ -40,7 +40,7 @@ struct PredictiveOptions {
   int nodes = 100;               ///< N, 10 to 1000
   int iterations = 2;            ///< of the solver, at every stage
   double regularization = 1e-5;  ///< of its sweeps
-  double penalty = 1;            ///< of violated constraints (fddp.h, Eq. 10)
+  double penalty = 1;            ///< of violated constraints (solve/fddp.h, Eq. 10)
   /// Near the end of a contact phase, reuse the last gains computed at least this long before it, if necessary from an
   /// earlier solution (reason: Policy::setLookAhead()), s; 0: each stage has its own gains.
   double look_ahead = 0;
@@ -55,6 +55,15 @@ struct PredictiveOptions {
   double end_place = 1, end_posture = 100, end_velocity = 10;
 };
 
+/// What one solve took.
+struct PredictiveSolve {
+  double seconds = 0;  ///< until its policy was ready
+  /// Its parts, s: the state for which it solves, those of the solver (FddpSummary), summed over the threads, and the policy.
+  double predict = 0, evaluate = 0, linearize = 0, sweep = 0, rollout = 0, policy = 0;
+  double step = 1;            ///< its shortest, alpha
+  double regularization = 0;  ///< the largest of its sweeps
+};
+
 /// Solves since the start.
 struct PredictiveCounts {
   int solves = 0;
@@ -65,10 +74,10 @@ struct PredictiveCounts {
   /// Without a separate thread the policy takes effect anyway; with one the previous policy stays, and this stage has
   /// no solve.
   int missed = 0;
-  std::vector<double> seconds;  ///< of the last 100000 solves, until their policy was ready
+  std::vector<PredictiveSolve> last;  ///< 100000 solves
 
-  /// The time within which this share of the solves finished (a quantile), s; 0 without solves.
-  double calcQuantile(double share) const;
+  /// The value that this share of the last solves did not exceed (a quantile); 0 without solves.
+  double calcQuantile(double share, double PredictiveSolve::*value = &PredictiveSolve::seconds) const;
 };
 
 /// The motion that predictive control solves: `plan`, followed by copies of its last stage, as many as the window is

@@ -55,6 +55,20 @@ Json listEstimation(const EstimationErrors& e) {
           {"contact_errors", e.contact_errors}};
 }
 
+// Medians, and what 1 % exceed.
+Json listParts(const PredictiveCounts& counts) {
+  Json parts;
+  for (const auto& [name, part] : {std::pair("predict", &PredictiveSolve::predict),
+                                   {"evaluate", &PredictiveSolve::evaluate},
+                                   {"linearize", &PredictiveSolve::linearize},
+                                   {"sweep", &PredictiveSolve::sweep},
+                                   {"rollout", &PredictiveSolve::rollout},
+                                   {"policy", &PredictiveSolve::policy}})
+    parts[name] = {{"median_ms", 1e3 * counts.calcQuantile(0.5, part)},
+                   {"p99_ms", 1e3 * counts.calcQuantile(0.99, part)}};
+  return parts;
+}
+
 Json listSolves(const PredictiveCounts& counts) {
   return {{"count", counts.solves},
           {"missed", counts.missed},
@@ -63,7 +77,14 @@ Json listSolves(const PredictiveCounts& counts) {
           {"late_landings", counts.late},
           {"median_ms", 1e3 * counts.calcQuantile(0.5)},
           {"p99_ms", 1e3 * counts.calcQuantile(0.99)},
-          {"worst_ms", 1e3 * counts.calcQuantile(1)}};
+          {"worst_ms", 1e3 * counts.calcQuantile(1)},
+          {"parts", listParts(counts)},
+          {"step",
+           {{"median", counts.calcQuantile(0.5, &PredictiveSolve::step)},
+            {"p1", counts.calcQuantile(0.01, &PredictiveSolve::step)}}},
+          {"regularization",
+           {{"median", counts.calcQuantile(0.5, &PredictiveSolve::regularization)},
+            {"p99", counts.calcQuantile(0.99, &PredictiveSolve::regularization)}}}};
 }
 
 Json listCommands(const std::vector<TimedCommand>& commands) {
