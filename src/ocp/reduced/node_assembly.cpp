@@ -358,7 +358,7 @@ void NodeAssembly::addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef o
 
 // With Rt = (dr/d(u, dy, dy_v))^T, one column per residual, Rt diag(hessian) Rt^T is the whole Hessian.
 void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
-                                const ConstraintWeights* constraints, const ReducedEvaluation& at, LaneView& view,
+                                const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
                                 StageModel& out) {
   const int nr = reduction_.size, leading = at.leading, columns = leading + 2 * nr;
   no_squares_.setZero();
@@ -381,9 +381,9 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
   }
   jacobians_.s.head(rows).setZero();
   const NodeBases bases(reduction_, at);
-  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases,
-                       &view.linkages},
-                      counted_, jacobians_);
+  costs.differentiate(
+      {model_, view.ws, spec.constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases, &linkages_}, counted_,
+      jacobians_);
   PaddedMap Rt = shapePadded(Rt_, columns, rows), scaled = shapePadded(Rt_scaled_, columns, rows);
   updateResidualDerivatives(costs, contacts, at, view, Rt);
   if (isFree(at))

@@ -1,5 +1,6 @@
 #pragma once
 // The quadratic model of one node from its view, which the kernel has filled: F^T, and residuals by the chain rule.
+#include "dynamics/linkage_workspace.h"
 #include "math/lane_product.h"
 #include "ocp/reduced/reduced_kernel.h"
 
@@ -20,11 +21,13 @@ class NodeAssembly {
                              const LaneView& view);
   // Sets the Gauss-Newton terms of the residuals, overwriting `out`.
   void setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
-                    const ConstraintWeights* constraints, const ReducedEvaluation& at, LaneView& view,
+                    const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
                     StageModel& out);
   // The part of the gradient of the last setResiduals() that is not due to squares, by (u, s, dy, dy_v); zero where s is not
   // free.
   const VectorXd& getGradientOfNoSquares() const { return no_squares_; }
+  // Memory of residuals.
+  LinkageWorkspaces& linkages() { return linkages_; }
 
   // Gap and derivatives of a joint outside all clusters: those of q+ with respect to dy and dv+, which are the identity
   // and h except for curved joints.
@@ -75,6 +78,7 @@ class NodeAssembly {
     int cluster, row;  // cluster and row of its N; or -1 and reduced coordinate
   };
   std::vector<Motor> motors_;
+  LinkageWorkspaces linkages_;
   ResidualJacobians jacobians_;
   CountedRows counted_;
   VectorXd Rt_, Rt_scaled_, gradient_;  // large enough for any node

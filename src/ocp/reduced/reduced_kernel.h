@@ -34,7 +34,6 @@
 //
 // All of it runs in lanes, even for a single node: the result of a lane does not depend on the others, so that results
 // do not depend on batching. Only data whose sizes vary from node to node (costs, F^T) are processed node by node.
-#include "dynamics/linkage_workspace.h"
 #include "dynamics/reduced_tree.h"
 #include "ocp/reduced/cluster_gap.h"
 #include "ocp/reduced/lane_transfer.h"
@@ -119,7 +118,6 @@ struct LaneView {
     std::vector<Contact> contacts;  // per slot
   };
   Workspace ws;
-  LinkageWorkspaces linkages;
   Acceleration acceleration;
   Acceleration foreseen;                // that with which a midpoint step foresees its velocity
   std::vector<Contact> stabilizations;  // of a midpoint step, per slot: their derivatives at the state

@@ -77,7 +77,7 @@ class ReducedTranscription : public Transcription {
   bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
   bool isStep(int node) const { return isRunning(node) && !isImpact(node); }
   bool isMidpoint(int node) const { return isStep(node) && specs_[node].step == StepRule::Midpoint; }
-  void finishEvaluation(int node, LaneView& view, RobotEvaluation& at) const;
+  void finishEvaluation(int node, const LaneView& view, LinkageWorkspaces& linkages, RobotEvaluation& at) const;
   void finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const;
 
   Model model_;
@@ -107,15 +107,17 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
     }
     (isStep(node) ? steps[isMidpoint(node)] : states).add({node, &specs_[node], previous, &at}, i);
   }
+  LinkageWorkspaces& linkages = scratch.assembly.linkages();
   for (Batch<ReducedKernel::StepItem>& batch : steps) {
     if (batch.count > 0) scratch.kernel.step(batch.items.data(), batch.count, scratch.views);
-    for (int l = 0; l < batch.count; ++l) finishEvaluation(batch.items[l].node, scratch.views[l], *batch.items[l].at);
+    for (int l = 0; l < batch.count; ++l)
+      finishEvaluation(batch.items[l].node, scratch.views[l], linkages, *batch.items[l].at);
   }
   if (states.count > 0) scratch.kernel.place(states.items.data(), states.count, scratch.views);
   for (int l = 0; l < states.count; ++l) {
     const ReducedKernel::StepItem& item = states.items[l];
     if (isImpact(item.node) && item.at->status == StepStatus::Ok) scratch.impact.update(item);
-    finishEvaluation(item.node, scratch.views[l], *item.at);
+    finishEvaluation(item.node, scratch.views[l], linkages, *item.at);
   }
 }
 
@@ -143,13 +145,13 @@ void ReducedTranscription::mapGains(const RobotEvaluation& at, const RowMatrixXd
 }
 
 // Computes the costs after a successful step.
-void ReducedTranscription::finishEvaluation(int node, LaneView& view, RobotEvaluation& at) const {
+void ReducedTranscription::finishEvaluation(int node, const LaneView& view, LinkageWorkspaces& linkages,
+                                            RobotEvaluation& at) const {
   if (at.status != StepStatus::Ok) return;
   if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
   const NodeBases bases(reduction_, static_cast<const ReducedEvaluation&>(at));
-  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases,
-                      &view.linkages},
-                     at);
+  costs_[node].calc(
+      {model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases, &linkages}, at);
   if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = StepStatus::Failed;
 }
 
