@@ -128,7 +128,10 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
   const bool is_open = control == PlanControl::Open;
   const bool is_known = !guess.empty() && (is_open || (control == PlanControl::Predictive && summary.converged));
   if (!is_open || !is_known) checkControl(summary, control);
-  if (guess.empty()) solution = solveUnlessInterrupted(motion, {});
+  if (guess.empty()) {
+    solution = solveUnlessInterrupted(motion, {});
+    plan.summary.options = solution.motion.options;  // maybe in shorter stages
+  }
   if (!is_known) solution = solveForGains(summary.file, solution.motion, solution.trajectory, plan.iterations);
   plan.ground = solution.motion.ground;
   plan.schedule = solution.motion.schedule;
