@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "bielle/motion/solve.h"
 #include "bielle/motion/squat.h"
 #include "bielle/robots/robot_loader.h"
 

@@ -13,7 +13,7 @@
 #include "world_trials.h"
 #include "worlds/make_world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 using bielle::testing::getBipetto;
@@ -178,4 +178,4 @@ TEST_CASE("worlds: an unknown one is refused by name") {
   CHECK_THROWS_WITH(makeWorld("moon", getBipetto()), Catch::Contains("world 'moon'") && Catch::Contains("bielle"));
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

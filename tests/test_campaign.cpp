@@ -67,8 +67,8 @@ int countProgress(const CommandResult& result) {
   return count;
 }
 
-study::CampaignRun makeRun(const std::string& direction, const std::string& impulse, bool stood) {
-  study::CampaignRun run;
+tasks::CampaignRun makeRun(const std::string& direction, const std::string& impulse, bool stood) {
+  tasks::CampaignRun run;
   run.values = {"walk", direction, impulse};
   run.result = {{"outcome", stood ? "stood" : "fell"}};
   return run;
@@ -208,10 +208,10 @@ TEST_CASE("campaign: dry runs stop at once when the user asks for it, and equal 
   const std::string calls = directory.path() + "/calls";
   const std::string program = directory.write("simulate", "#!/bin/sh\necho >> " + calls + "\n");
   fs::permissions(program, fs::perms::owner_all);
-  const study::CampaignSpec few = study::readCampaignSpec(directory.write(
+  const tasks::CampaignSpec few = tasks::readCampaignSpec(directory.write(
       "few.yaml", "motions: [" + replaceOnce(squat, "NAME", "a") + ", " + replaceOnce(squat, "NAME", "b") +
                       "]\noptions: {seed: [1, 2]}\npush: {phase: [0.5, 1.5, 2.5], impulse: 1}\n"));
-  CHECK(study::checkCommands(few, program, directory.path() + "/log"));
+  CHECK(tasks::checkCommands(few, program, directory.path() + "/log"));
   CHECK(countLines(calls) == 2);
 }
 
@@ -277,10 +277,10 @@ TEST_CASE("campaign: the specifications of the examples are read") {
   const std::vector<std::pair<std::string, size_t>> examples{
       {"pushes", 32}, {"pushes_predictive", 80}, {"pushes_felt", 80}, {"unknown", 500}, {"worlds", 198}};
   for (const auto& [name, expected] : examples) {
-    const study::CampaignSpec spec = study::readCampaignSpec(BIELLE_SOURCE_DIR "/examples/campaign/" + name + ".yaml");
+    const tasks::CampaignSpec spec = tasks::readCampaignSpec(BIELLE_SOURCE_DIR "/examples/campaign/" + name + ".yaml");
     CHECK(spec.search.has_value() == (name == "pushes"));
     size_t combinations = 1;
-    for (const study::CampaignAxis& axis : spec.axes) combinations *= axis.values.size();
+    for (const tasks::CampaignAxis& axis : spec.axes) combinations *= axis.values.size();
     CHECK(combinations == expected);
   }
 }
@@ -291,7 +291,7 @@ TEST_CASE("campaign: motions are solved with the options that they are given") {
       "spec.yaml",
       std::string("motions:\n  - {name: w, solve: walk, robot: bipetto, set: {steps: 2}, options: {no-limits: "
                   "true, no-check: false, dead-point-margin: 0.25}}\n"));
-  const std::vector<study::CampaignMotion> motions = study::readCampaignSpec(spec).motions;
+  const std::vector<tasks::CampaignMotion> motions = tasks::readCampaignSpec(spec).motions;
   REQUIRE(motions.size() == 1);
   CHECK(motions[0].solve == std::vector<std::string>{"solve", "walk", "--robot", "bipetto", "--set", "steps=2",
                                                      "--no-limits", "--dead-point-margin", "0.25"});
@@ -307,7 +307,7 @@ TEST_CASE("campaign: motions are solved with the options that they are given") {
 }
 
 TEST_CASE("campaign: an impulse counts as survived if all smaller ones were") {
-  study::CampaignResults results;
+  tasks::CampaignResults results;
   results.columns = {"motion", "push direction", "push impulse"};
   for (const auto& [direction, impulse, stood] :
        std::vector<std::tuple<const char*, const char*, bool>>{{"0", "10", true},
@@ -317,7 +317,7 @@ TEST_CASE("campaign: an impulse counts as survived if all smaller ones were") {
                                                                {"90", "3", true},
                                                                {"180", "1", false}})
     results.runs.push_back(makeRun(direction, impulse, stood));
-  const std::vector<study::SurvivedImpulse> found = findSurvivedImpulses(results);
+  const std::vector<tasks::SurvivedImpulse> found = findSurvivedImpulses(results);
   REQUIRE(found.size() == 3);
   CHECK(found[0].impulse == 10);
   CHECK_FALSE(found[0].bounded);

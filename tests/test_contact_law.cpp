@@ -5,7 +5,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "bielle/worlds/contact_law.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 ContactPoint makePoint() {
@@ -138,4 +138,4 @@ TEST_CASE("contact law: stops push back from both sides") {
   CHECK(calcStopForce(stop, -1.01, 0).elastic == Approx(0.5));
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

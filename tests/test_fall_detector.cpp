@@ -8,7 +8,7 @@
 #include "worlds/fall_detector.h"
 #include "worlds/robot_errors.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr double kCrank = 1.047198;  // of the plan, rad
@@ -111,4 +111,4 @@ TEST_CASE("falls: linkages of a robot that differs from its model are followed b
   CHECK(FallDetector(machine, plan, q_start, criterion, {}, {}).find(0, 0, q).empty());
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -14,7 +14,7 @@
 #include "worlds/mujoco_model.h"
 #include "worlds/mujoco_world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 // Measured: 1.4e-3 (half a step of free fall is missing from the work of gravity), 6e-8 and 9e-8 m.
@@ -271,4 +271,4 @@ TEST_CASE("mujoco world: a world that breaks off says so, keeps its last state a
   CHECK(!std::filesystem::exists("MUJOCO_LOG.TXT"));
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

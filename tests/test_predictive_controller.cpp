@@ -15,7 +15,7 @@
 #include "worlds/execution.h"
 #include "worlds/make_world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 using bielle::testing::getBipetto;
@@ -346,4 +346,4 @@ TEST_CASE("predictive control: windows, threads and iterations without sense are
   CHECK_THROWS_AS(makePredictiveMotion(model, MotionPlan(), ProblemOptions(), makeShortWindow(1)), ModelError);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

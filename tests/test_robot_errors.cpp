@@ -9,7 +9,7 @@
 #include "own_robots.h"
 #include "worlds/robot_errors.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 using bielle::testing::loadOwn;
 
 TEST_CASE("robot errors: without errors the machine is the model") {
@@ -91,4 +91,4 @@ TEST_CASE("robot errors: impossible ones are refused") {
   CHECK_THROWS_AS(assembleMachine(robot.model, machine, makeStandingPosture(robot.model)), ModelError);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -6,7 +6,7 @@
 #include "bielle/worlds/sensors.h"
 #include "own_robots.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 using bielle::testing::getBipetto;
@@ -104,4 +104,4 @@ TEST_CASE("sensors: encoders round to their resolution") {
   CHECK(rounded > 0);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -9,7 +9,7 @@
 #include "own_robots.h"
 #include "worlds/serial_belief.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 using bielle::testing::loadOwn;
@@ -123,4 +123,4 @@ TEST_CASE("serial belief: places where linkages cannot follow are reported") {
   for (const Policy::Stage& stage : reference.policy->getStages()) CHECK(stage.q.allFinite());
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -8,7 +8,7 @@
 #include "world_trials.h"
 #include "worlds/simbody_world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 using bielle::testing::getBipetto;
@@ -100,4 +100,4 @@ TEST_CASE("simbody world: a walk goes as in Bielle's world, the more so the fine
   CHECK(compare(follow(*makeBielleWorld(model), policy, model, kDuration - 1e-3)) > 10 * fine);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

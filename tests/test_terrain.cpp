@@ -5,7 +5,7 @@
 #include "bielle/model/error.h"
 #include "bielle/worlds/terrain.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 Ground makeMixedGround() {
@@ -98,4 +98,4 @@ TEST_CASE("terrain: tiles are of the requested heights, and the same for the sam
   CHECK_THROWS_AS(makeTiles(other), ModelError);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -5,7 +5,7 @@
 
 #include "worlds/torque_delay.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 VectorXd make(double value) { return VectorXd::Constant(1, value); }
@@ -66,4 +66,4 @@ TEST_CASE("torque delay: a jitter beyond the delay is refused") {
   CHECK_THROWS_AS(TorqueDelay(1, 1e-3, {1e-3, 2e-3, 1}), std::invalid_argument);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

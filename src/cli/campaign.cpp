@@ -12,7 +12,7 @@
 namespace bielle::cli {
 namespace {
 
-using namespace bielle::study;
+using namespace bielle::tasks;
 
 struct CampaignArguments {
   std::string spec, directory;

@@ -8,7 +8,7 @@
 
 namespace bielle::cli {
 
-using namespace bielle::study;
+using namespace bielle::tasks;
 
 int runAndWrite(const CaseRun& run, const std::function<void(const CaseOutcomes&)>& write) {
   std::vector<Case> cases;

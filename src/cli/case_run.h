@@ -10,11 +10,11 @@
 
 namespace bielle::cli {
 
-using CaseOutcomes = std::map<std::string, study::CaseOutcome>;  // by the name of the case
+using CaseOutcomes = std::map<std::string, tasks::CaseOutcome>;  // by the name of the case
 
 struct CaseRun {
   std::string directory;            // of the directories of the cases
-  std::vector<study::Case> cases;   // those of the same name are run once
+  std::vector<tasks::Case> cases;   // those of the same name are run once
   std::vector<std::string> robots;  // directories of their robots
   TaskArguments tasks;
 };

@@ -7,7 +7,7 @@
 namespace bielle::cli {
 namespace {
 
-using namespace bielle::study;
+using namespace bielle::tasks;
 
 struct CompareArguments {
   std::string spec, directory;

@@ -37,7 +37,7 @@ DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion)
 }
 
 // One design, for others that search.
-int evaluateRequest(const DesignEvaluator& evaluator, const study::DesignRequest& request, const std::string& file) {
+int evaluateRequest(const DesignEvaluator& evaluator, const tasks::DesignRequest& request, const std::string& file) {
   if (request.x.size() != evaluator.robot().start().size())
     throw ModelError("", "--evaluate", "it does not have one number for each variable of the design",
                      "give one number for each");
@@ -53,7 +53,7 @@ DesignRun runSearches(const DesignArguments& arguments, const DesignEvaluator& e
   options.jobs = arguments.tasks.jobs;
   options.progress = [](const std::string& line) { std::cout << line << std::endl; };
   if (!engine) return runDesign(evaluator, spec, options);
-  study::DesignTasks tasks(spec, {std::filesystem::read_symlink("/proc/self/exe"), arguments.directory + "/running",
+  tasks::DesignTasks tasks(spec, {std::filesystem::read_symlink("/proc/self/exe"), arguments.directory + "/running",
                                   engine, options.progress});
   options.evaluations = &tasks;
   return runDesign(evaluator, spec, options);
@@ -104,9 +104,9 @@ void printRun(const DesignEvaluator& evaluator, const DesignSpec& spec, const De
 int run(const DesignArguments& arguments) {
   requireApart(arguments.directory, {arguments.spec, arguments.request});
   DesignSpec spec = readDesignSpec(arguments.spec);
-  std::optional<study::DesignRequest> request;
+  std::optional<tasks::DesignRequest> request;
   if (!arguments.request.empty()) {
-    request = study::readRequest(arguments.request);
+    request = tasks::readRequest(arguments.request);
     if (!request->robot.empty()) spec.robot.name = request->robot;
   }
   // Before there are threads: the engine blocks signals, which none of them may take.

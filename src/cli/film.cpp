@@ -8,7 +8,7 @@
 
 #include "bielle/model/error.h"
 #include "cli/table.h"
-#include "results/aside_file.h"
+#include "formats/aside_file.h"
 #include "results/process.h"
 
 namespace fs = std::filesystem;

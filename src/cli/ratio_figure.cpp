@@ -83,7 +83,13 @@ Plot makeMapPlot(const RatioReport& report) {
 }  // namespace
 
 std::vector<Plot> makeRatioPlots(const RatioReport& report) {
-  return {report.map ? makeMapPlot(report) : makeCurvePlot(report), makeDistancePlot(report)};
+  std::vector<Plot> plots = {report.map ? makeMapPlot(report) : makeCurvePlot(report)};
+  const std::vector<RatioSample>& samples = report.sweep.samples;
+  if (std::any_of(samples.begin(), samples.end(), [](const RatioSample& sample) {
+        return sample.branch == 0 && sample.nearest && std::isfinite(sample.nearest->distance);
+      }))
+    plots.push_back(makeDistancePlot(report));
+  return plots;
 }
 
 }  // namespace bielle::cli

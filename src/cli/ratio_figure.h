@@ -5,7 +5,8 @@
 
 namespace bielle::cli {
 
-// R over the joint angle, or the condition number over both joint angles if there is a map; then the distance from dead points.
+// R over the joint angle, or the condition number over both joint angles if there is a map; then the distance from
+// dead points, if there are any near.
 std::vector<Plot> makeRatioPlots(const RatioReport& report);
 
 }  // namespace bielle::cli

@@ -8,9 +8,9 @@
 
 #include "cli/ratio_figure.h"
 #include "cli/table.h"
+#include "formats/aside_file.h"
 #include "formats/text_file.h"
 #include "model/listing.h"
-#include "results/aside_file.h"
 #include "results/plot.h"
 
 namespace fs = std::filesystem;

@@ -4,7 +4,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/results/result.h"
-#include "results/aside_file.h"
+#include "formats/aside_file.h"
 #include "results/json_text.h"
 
 namespace bielle {

@@ -10,7 +10,7 @@
 #include <iterator>
 
 #include "bielle/model/error.h"
-#include "results/aside_file.h"
+#include "formats/aside_file.h"
 
 namespace bielle {
 

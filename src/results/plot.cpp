@@ -5,7 +5,7 @@
 #include <limits>
 #include <sstream>
 
-#include "results/aside_file.h"
+#include "formats/aside_file.h"
 #include "results/process.h"
 
 namespace bielle {

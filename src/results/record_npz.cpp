@@ -4,8 +4,8 @@
 
 #include "bielle/model/error.h"
 #include "bielle/results/record_files.h"
+#include "formats/aside_file.h"
 #include "motion/record_tables.h"
-#include "results/aside_file.h"
 #include "results/npz.h"
 
 namespace bielle {

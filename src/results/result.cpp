@@ -9,8 +9,8 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "formats/aside_file.h"
 #include "formats/text_file.h"
-#include "results/aside_file.h"
 #include "results/json_text.h"
 #include "results/result_files.h"
 

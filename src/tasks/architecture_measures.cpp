@@ -4,13 +4,14 @@
 #include <filesystem>
 
 #include "bielle/model/names.h"
+#include "bielle/results/result.h"
 #include "results/json_text.h"
 #include "tasks/architecture_report.h"
 #include "tasks/cells.h"
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 constexpr const char* kRemedy = "remove its directory to repeat the case";
@@ -134,4 +135,4 @@ Feat readFeat(const ArchitectureSpec& spec, const Contender& contender, const st
   return feat;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -10,7 +10,7 @@
 #include "results/plot.h"
 #include "tasks/cells.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 struct Row {
@@ -240,4 +240,4 @@ std::vector<std::string> writeArchitectures(const std::string& directory, const 
   return paths;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -6,7 +6,7 @@
 
 #include "tasks/architectures.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 // Torques of the motors of a group.
 struct GroupLoad {
@@ -47,4 +47,4 @@ std::vector<std::string> writeArchitectures(const std::string& directory, const 
                                             const std::vector<Contender>& contenders,
                                             const ArchitectureResults& results, std::vector<std::string>& notes);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

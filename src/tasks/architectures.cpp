@@ -11,7 +11,7 @@
 #include "model/number_text.h"
 #include "results/output_place.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 using Entry = YamlEntry;
@@ -136,4 +136,4 @@ Case makeArchitectureCase(const Contender& contender, const MotionSpec& motion) 
   return {contender.name + "-" + makeName(motion), {solve}, contender.directory};
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

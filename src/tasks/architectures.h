@@ -18,7 +18,7 @@
 #include "design/spec.h"
 #include "tasks/cases.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 struct Architecture {
   std::string name;
@@ -62,4 +62,4 @@ std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::s
 constexpr const char* kMotion = "motion";
 Case makeArchitectureCase(const Contender& contender, const MotionSpec& motion);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

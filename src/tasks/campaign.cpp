@@ -21,7 +21,7 @@
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 constexpr size_t kMostCells = 1'000'000;
@@ -335,4 +335,4 @@ CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directo
   return CampaignRunner(spec, directory, motions, options).run();
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -13,7 +13,7 @@
 #include "tasks/campaign_spec.h"
 #include "tasks/engine.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 struct CampaignOptions {
   std::string bielle, simulate;  ///< paths of the programs
@@ -46,4 +46,4 @@ struct CampaignResults {
 /// program
 CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directory, const CampaignOptions& options);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -10,7 +10,7 @@
 #include "tasks/cells.h"
 #include "tasks/child.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 using Kind = CampaignAxis::Kind;
@@ -133,4 +133,4 @@ bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const 
   return true;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -5,7 +5,7 @@
 
 #include "tasks/campaign_spec.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 // A value of each axis, by its index.
 using CampaignCell = std::vector<size_t>;
@@ -31,4 +31,4 @@ class CampaignCommands {
 // \throws ModelError naming the file and the key that is refused
 bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -12,7 +12,7 @@
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 constexpr const char *kImpulse = "push impulse", *kDirection = "push direction";
@@ -259,4 +259,4 @@ std::vector<std::string> writeCampaign(const std::string& directory, const Campa
   return paths;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

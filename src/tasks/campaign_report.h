@@ -2,7 +2,7 @@
 // The files of a campaign: runs.csv, campaign.md, map.svg if directions of pushes vary, summary.json.
 #include "tasks/campaign.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 // The largest impulse that was survived under some conditions: those at and below it that were tried were survived, the
 // next one was not.
@@ -19,4 +19,4 @@ std::vector<SurvivedImpulse> findSurvivedImpulses(const CampaignResults& results
 std::vector<std::string> writeCampaign(const std::string& directory, const CampaignResults& results,
                                        std::vector<std::string>& notes);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -7,7 +7,7 @@
 #include "tasks/campaign.h"
 #include "tasks/cases.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 constexpr std::size_t kLongestSummary = 4'000'000;
@@ -66,4 +66,4 @@ Json readCampaignResult(const tasks::Task& task, int status) {
   }
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -3,7 +3,7 @@
 #include "results/json_text.h"
 #include "tasks/engine.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 // The fields of a summary that are kept, in it or in a line of the log.
 // \throws std::runtime_error saying which of them is not what it should be
@@ -13,4 +13,4 @@ Json pickCampaignResult(const Json& summary);
 // \throws std::exception saying what is wrong, when the task failed, or its outputs are not a result of the program
 Json readCampaignResult(const tasks::Task& task, int status);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -11,7 +11,7 @@
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 using Kind = CampaignAxis::Kind;
@@ -151,4 +151,4 @@ CampaignSpec readCampaignSpec(const std::string& path) {
   return spec;
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -23,7 +23,7 @@
 
 #include "formats/yaml_entry.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 struct CampaignMotion {
   std::string name;
@@ -61,4 +61,4 @@ void addOption(const std::string& name, const std::string& value, std::vector<st
 /// \throws ModelError naming the file, the key with its line, and the remedy. Options are not checked
 CampaignSpec readCampaignSpec(const std::string& path);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

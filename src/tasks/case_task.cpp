@@ -11,7 +11,7 @@
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 constexpr std::size_t kMostSummary = 64'000'000;
@@ -99,4 +99,4 @@ void bringHome(const Case& one, const std::string& directory, const std::string&
   }
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

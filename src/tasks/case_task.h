@@ -2,7 +2,7 @@
 // A run of a case as a task.
 #include "tasks/cases.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 // For workers elsewhere, the robot goes with it, and its argument is its place there.
 tasks::Task makeStepTask(const Case& one, int step, const std::string& directory, const std::string& program,
@@ -16,4 +16,4 @@ std::string findProblem(const tasks::Task& task, int status);
 // would have named.
 void bringHome(const Case& one, const std::string& directory, const std::string& program);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

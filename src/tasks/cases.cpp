@@ -15,15 +15,15 @@
 
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
+#include "formats/aside_file.h"
 #include "formats/text_file.h"
-#include "results/aside_file.h"
 #include "results/json_text.h"
 #include "results/process.h"
 #include "tasks/case_task.h"
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 // Locks the directory for the lifetime of this process.
@@ -258,4 +258,4 @@ RunOutcome runCases(const std::string& directory, const std::vector<Case>& cases
   return CaseRunner(directory, cases, options).run();
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -12,7 +12,7 @@
 
 #include "tasks/engine.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 struct Case {
   std::string name;  // of its directory; the same name means the same case
@@ -66,4 +66,4 @@ std::string describeLog(const std::string& log);
 // the directory
 RunOutcome runCases(const std::string& directory, const std::vector<Case>& cases, const RunOptions& options);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

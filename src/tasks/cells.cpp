@@ -4,7 +4,7 @@
 #include <cmath>
 #include <sstream>
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 std::string formatExact(double value) {
   if (!std::isfinite(value)) return "";
@@ -27,4 +27,4 @@ std::string quoteCsv(const std::string& text) {
   return quoted + "\"";
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -3,7 +3,7 @@
 #include <limits>
 #include <string>
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
@@ -14,4 +14,4 @@ std::string formatExact(double value);
 // A text as a field of a CSV table.
 std::string quoteCsv(const std::string& text);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -12,7 +12,7 @@
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 constexpr std::size_t kLongestAnswer = 64'000'000;
@@ -169,4 +169,4 @@ void DesignTasks::finish(Order& order, int status) {
   }
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -14,7 +14,7 @@
 #include "design/run.h"
 #include "tasks/engine.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 /// The request: the design, for a stage of a search, and the path of the robot where it is evaluated (empty: that of the
 /// specification).
@@ -73,4 +73,4 @@ class DesignTasks : public DesignEvaluations {
   std::thread thread_;
 };
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

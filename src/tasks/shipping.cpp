@@ -11,7 +11,7 @@
 
 namespace fs = std::filesystem;
 
-namespace bielle::study {
+namespace bielle::tasks {
 namespace {
 
 fs::path getDirectory(const std::string& file) { return fs::absolute(file).lexically_normal().parent_path(); }
@@ -69,4 +69,4 @@ void shipFiles(tasks::Task& task) {
   }
 }
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

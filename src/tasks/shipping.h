@@ -5,7 +5,7 @@
 
 #include "tasks/engine.h"
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 // The directories with the files of a robot, by its name or path: its own and, if it completes one that is published, that.
 std::vector<std::string> listRobotDirectories(const std::string& robot);
@@ -20,4 +20,4 @@ tasks::Task shipMotion(const std::string& motion, const std::string& place, bool
 // Arguments that are files of this machine become inputs; a robot after --robot is taken along.
 void shipFiles(tasks::Task& task);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -14,7 +14,7 @@
 #include "worlds/closed_tree.h"
 #include "worlds/sole_track.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr int kMaxNewton = 8;
@@ -343,4 +343,4 @@ std::unique_ptr<World> makeBielleWorld(const Model& model, const BielleWorldOpti
   return std::make_unique<BielleWorld>(model, options);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

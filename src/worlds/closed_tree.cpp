@@ -4,7 +4,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "model/joint.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 ClosedTree::Cluster::Cluster(const ReducedCluster& l) : cluster(l), scratch(l), state(l), next(l), motion(l) {
   for (VectorXd* x : {&d, &a_d}) x->setZero(l.model.nv());
@@ -132,4 +132,4 @@ void ClosedTree::addReduced(const VectorXd& dw, VectorXd& v) const {
   }
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -14,7 +14,7 @@
 #include "dynamics/reduced_tree.h"
 #include "dynamics/reduction.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// No function allocates after the constructor, except to describe a failure.
 class ClosedTree {
@@ -91,4 +91,4 @@ class ClosedTree {
   std::string failure_;
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -5,7 +5,7 @@
 #include "bielle/model/error.h"
 #include "bielle/robots/robot_loader.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 // A stage of a policy without feedback.
@@ -76,4 +76,4 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   return plan;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -2,7 +2,7 @@
 /// \file A walk that follows a file of commands, made while it is carried out.
 #include "worlds/plan.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// The reference of the plan is the standing posture, moved along the path that the commands foresee, with the ground and the
 /// contacts of that path; there is only predictive control.
@@ -11,4 +11,4 @@ namespace bielle::simulation {
 std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::string& file,
                                         const PredictiveOptions& predictive = {});
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

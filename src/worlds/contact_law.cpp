@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 // A stop gives way by this under a torque of the robot's weight times one metre, or under its weight, rad or m.
@@ -111,4 +111,4 @@ StopForce calcStopForce(const JointStop& stop, double q, double v) {
   return {-sign * normal.force, 0.5 * stop.stiffness * depth * depth, normal.rate};
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

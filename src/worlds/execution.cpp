@@ -14,7 +14,7 @@
 #include "motion/record_tables.h"
 #include "worlds/robot_errors.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 Vector3d calcPush(const std::vector<Push>& pushes, double time) {
@@ -241,4 +241,4 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   return out;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

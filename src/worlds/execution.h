@@ -12,7 +12,7 @@
 #include "worlds/perception.h"
 #include "worlds/torque_delay.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// A constant force on the trunk for a while.
 struct Push {
@@ -76,4 +76,4 @@ using ExecutionObserver = std::function<void(double time, double duration, const
 Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
                   const ExecutionOptions& options = {}, const ExecutionObserver& observer = {});
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -6,7 +6,7 @@
 #include "bielle/model/error.h"
 #include "model/number_text.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr double kHalfTurn = 3.14159265358979323846;  // rad
@@ -90,4 +90,4 @@ bool FallDetector::followsBack(const VectorXd& q) {
                      [this](const Joint& joint) { return calcDeviation(joint, q_back_) < kSamePlace; });
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

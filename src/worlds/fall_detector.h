@@ -7,7 +7,7 @@
 #include "bielle/worlds/terrain.h"
 #include "control/passive_joints.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// When a robot counts as fallen: its trunk (the body of the first joint)
 /// - leans by more than `tilt` from its planned attitude, whatever its heading, or
@@ -51,4 +51,4 @@ class FallDetector {
   double deviation_ = 0, joint_deviation_ = 0;
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

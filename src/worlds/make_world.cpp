@@ -7,7 +7,7 @@
 #endif
 #include "worlds/simbody_world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 struct Entry {
@@ -51,4 +51,4 @@ std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, co
   throw ModelError("", "world '" + name + "'", "there is no such world", "choose one of: " + known);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -4,7 +4,7 @@
 
 #include "bielle/worlds/world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// Names for makeWorld(): those that were built.
 std::vector<std::string> listWorlds();
@@ -12,4 +12,4 @@ std::vector<std::string> listWorlds();
 /// \throws ModelError when there is no world of this name, or it cannot carry the robot
 std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options = {});
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

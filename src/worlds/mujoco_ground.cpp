@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr size_t kMostBoxes = 32;  // of MuJoCo at once
@@ -64,4 +64,4 @@ void MujocoGround::show(mjModel& mj, int geom, const Box& box) const {
   mj.geom_conaffinity[geom] = 1;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -11,7 +11,7 @@
 #include "bielle/model/model.h"
 #include "formats/mjcf.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 class MujocoGround {
  public:
@@ -46,4 +46,4 @@ class MujocoGround {
   std::vector<Sole> soles_;
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -11,7 +11,7 @@
 #include "worlds/mujoco_model.h"
 #include "worlds/sole_track.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 // Soles that move by less than 10 m/s stay within reach of the boxes shown, s.
@@ -236,4 +236,4 @@ std::unique_ptr<World> makeMujocoWorld(const Model& model, const MujocoWorldOpti
   return std::make_unique<MujocoWorld>(model, options);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -12,7 +12,7 @@
 #include "bielle/worlds/world.h"
 #include "formats/mjcf.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 struct MujocoWorldOptions {
   WorldOptions world;  ///< time_step 0: that of MjcfOptions
@@ -30,4 +30,4 @@ struct MujocoWorldOptions {
 /// \throws ModelError when the robot has no closed configuration, or MuJoCo refuses it
 std::unique_ptr<World> makeMujocoWorld(const Model& model, const MujocoWorldOptions& options = {});
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -6,7 +6,7 @@
 #include "bielle/motion/motion.h"
 #include "control/clock.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr int kRestReadings = 2000;
@@ -108,4 +108,4 @@ EstimationErrors Perception::getErrors() const {
   return out;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -5,7 +5,7 @@
 #include "bielle/ocp/contact_schedule.h"
 #include "bielle/worlds/sensors.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 struct PerceptionOptions {
   std::optional<SensorOptions> sensors;  ///< empty: the truth
@@ -55,4 +55,4 @@ class Perception {
   long instants_ = 0;
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -9,7 +9,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "results/interrupt.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 // Of predictive control. Feet may land elsewhere than planned, on steps a little; wrenches keep away from the edges of the
@@ -229,4 +229,4 @@ void freeFeet(LocomotionOptions& options) {
   options.cone_margin = kFeedbackMargin;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -10,7 +10,7 @@
 #include "bielle/results/result.h"
 #include "worlds/serial_belief.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 enum class PlanControl {
   Open,       ///< the torques of the files
@@ -78,4 +78,4 @@ std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control,
 /// keep away from the edges of their cones.
 void freeFeet(LocomotionOptions& options);
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -5,7 +5,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "motion/record_tables.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 MotionRecord makePlannedRecord(const Model& model, const Policy& plan, const MotionRecord& happened) {
   MotionRecord planned = happened;  // its names and times
@@ -30,4 +30,4 @@ MotionRecord makePlannedRecord(const Model& model, const Policy& plan, const Mot
   return planned;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -9,7 +9,7 @@
 #include "bielle/model/builder.h"
 #include "control/passive_joints.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 // Of the corners of all soles, m (world).
@@ -59,4 +59,4 @@ VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRe
   return out;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -2,7 +2,7 @@
 /// \file Errors of the robot: a machine is not the model that its controller believes in.
 #include "bielle/model/model.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 struct RobotErrors {
   double mass = 0;  ///< of a body: its mass and inertia times 1 - mass to 1 + mass, uniformly distributed [1]
@@ -21,4 +21,4 @@ Model makeMachine(const Model& model, const RobotErrors& errors);
 /// \throws ModelError when the loops of the machine cannot be closed
 VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRef q);
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -5,7 +5,7 @@
 #include "math/constants.h"
 #include "math/so3.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr double kGravity = 9.80665;
@@ -92,4 +92,4 @@ const SensorReadings& Sensors::read(const World& world) {
   return readings_;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -3,7 +3,7 @@
 #include "math/decompositions.h"
 #include "motion/posture_lift.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr double kSingular = 1e-3;  // margin (calcLinkageTangent) below which a linkage is at a dead point
@@ -98,4 +98,4 @@ SerialReference makeReference(const Model& closed, const SerialModel& serial, co
   return out;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

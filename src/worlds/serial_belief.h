@@ -20,7 +20,7 @@ namespace bielle {
 class PostureLift;
 }
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// What a controller takes the robot for.
 enum class Belief { Closed, Serial, Ratio };
@@ -54,4 +54,4 @@ struct SerialReference {
 /// Where linkages cannot follow, they stay as they last could. \param plan  of the serial model
 SerialReference makeReference(const Model& closed, const SerialModel& serial, const Policy& plan, Belief belief);
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -7,7 +7,7 @@
 #include "worlds/simbody_tree.h"
 #include "worlds/sole_track.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 using SimTK::MobilizedBody;
@@ -374,4 +374,4 @@ std::unique_ptr<World> makeSimbodyWorld(const Model& model, const SimbodyWorldOp
   return std::make_unique<SimbodyWorld>(model, options);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

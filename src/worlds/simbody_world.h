@@ -12,7 +12,7 @@
 #include "bielle/worlds/contact_law.h"
 #include "bielle/worlds/world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 struct SimbodyWorldOptions {
   WorldOptions world;      ///< time_step is not used
@@ -24,4 +24,4 @@ struct SimbodyWorldOptions {
 
 std::unique_ptr<World> makeSimbodyWorld(const Model& model, const SimbodyWorldOptions& options = {});
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -1,6 +1,6 @@
 #include "worlds/sole_track.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 SoleTrack::SoleTrack(const Model& model)
     : model_(model),
@@ -31,4 +31,4 @@ void SoleTrack::updateFoot(size_t contact, const SE3& X_WF) {
   report.slip = touches ? (X_WF.p - touchdowns_[contact]).head<2>().norm() : 0;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -3,7 +3,7 @@
 #include "bielle/worlds/contact_law.h"
 #include "bielle/worlds/world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// Fills FootReports; one per robot.
 class SoleTrack {
@@ -31,4 +31,4 @@ class SoleTrack {
   std::vector<Vector3d> touchdowns_;  // of the centres of the soles, m (world)
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

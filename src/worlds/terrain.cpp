@@ -7,7 +7,7 @@
 
 #include "bielle/model/error.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr int kLargestGrid = 200000;  // cells
@@ -153,4 +153,4 @@ Ground makeTiles(const TileOptions& o) {
   return ground;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -7,7 +7,7 @@
 
 #include "control/clock.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 // Clocks that sum up their steps may differ by this much; without it, steps as short as rounding would arise.
@@ -58,4 +58,4 @@ double TorqueDelay::getNextChange() const {
   return next;
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -5,7 +5,7 @@
 
 #include "bielle/math/types.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 struct DelayOptions {
   double delay = 0;   ///< from a measurement until its torques act, s
@@ -42,4 +42,4 @@ class TorqueDelay {
   bool started_ = false;
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -11,7 +11,7 @@
 
 namespace bielle::paper {
 
-using study::kMissing;
+using tasks::kMissing;
 
 // The robot, and the motors of the compared joints.
 struct ComparedRobot {

@@ -10,9 +10,9 @@
 
 namespace bielle::paper {
 
-using study::formatCell;
-using study::formatExact;
-using study::quoteCsv;
+using tasks::formatCell;
+using tasks::formatExact;
+using tasks::quoteCsv;
 
 namespace {
 

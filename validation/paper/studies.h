@@ -12,9 +12,9 @@
 
 namespace bielle::paper {
 
-using study::Case;
-using study::CaseOutcome;
-using study::StepOutcome;
+using tasks::Case;
+using tasks::CaseOutcome;
+using tasks::StepOutcome;
 
 // The part of a motion from which torques are taken.
 enum class Window {

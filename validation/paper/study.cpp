@@ -35,7 +35,7 @@ std::vector<Study> chooseStudies(const StudyArguments& arguments) {
   return chosen;
 }
 
-using CaseOutcomes = std::map<std::string, study::CaseOutcome>;  // by the name of the case
+using CaseOutcomes = std::map<std::string, tasks::CaseOutcome>;  // by the name of the case
 
 StudyResult readStudy(const Study& study, const ComparedRobot& robot, const std::string& directory,
                       const CaseOutcomes& outcomes) {
@@ -57,29 +57,29 @@ std::string describeCommand(const StudyArguments& arguments) {
 
 // What results depend on: the robot, and both programs.
 std::string makeIdentity(const fs::path& program, const std::string& robot) {
-  std::vector<fs::path> files = study::listRobotFiles(robot);
+  std::vector<fs::path> files = tasks::listRobotFiles(robot);
   files.push_back(program);
   files.push_back(program.parent_path() / "bielle");
-  return study::makeIdentity(files);
+  return tasks::makeIdentity(files);
 }
 
 int run(const StudyArguments& arguments) {
   const std::vector<Study> studies = chooseStudies(arguments);
   const ComparedRobot robot = loadComparedRobot(arguments.robot);
   makeOutputDirectory(arguments.directory);
-  std::vector<study::Case> cases;
+  std::vector<tasks::Case> cases;
   for (const Study& study : studies)
-    for (const study::Case& one : makeCases(study, arguments.robot))
+    for (const tasks::Case& one : makeCases(study, arguments.robot))
       if (std::none_of(cases.begin(), cases.end(), [&](const auto& other) { return other.name == one.name; }))
         cases.push_back(one);
   const std::string directory = arguments.directory + "/cases";
-  study::RunOptions options;
+  tasks::RunOptions options;
   options.program = fs::read_symlink("/proc/self/exe");
   options.identity = makeIdentity(options.program, robot.robot.directory);
   options.progress = [](const std::string& line) { std::cout << line << std::endl; };
   tasks::LocalTasks engine(arguments.jobs);
   options.engine = &engine;
-  const study::RunOutcome outcome = study::runCases(directory, cases, options);
+  const tasks::RunOutcome outcome = tasks::runCases(directory, cases, options);
   if (outcome.interrupted) {
     std::cerr << "bielle: error: interrupted; run the same command again to continue" << std::endl;
     return 1;

@@ -19,7 +19,7 @@
 #include "bielle/worlds/contact_law.h"
 #include "bielle/worlds/world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 struct BielleWorldOptions {
   WorldOptions world;  ///< time_step 0: kBielleTimeStep
@@ -32,4 +32,4 @@ inline constexpr double kBielleTimeStep = 2.5e-4;  ///< s
 /// \throws ModelError when the robot has no closed standing posture
 std::unique_ptr<World> makeBielleWorld(const Model& model, const BielleWorldOptions& options = {});
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

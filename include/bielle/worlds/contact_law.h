@@ -29,7 +29,7 @@
 #include "bielle/model/model.h"
 #include "bielle/worlds/terrain.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// Scaled by the weight of the robot, so that one choice suits robots of all sizes: soles of hard rubber. A sole that lands
 /// at v rebounds with e v, where by (1) c v - ln(1 + c v) = -c e v - ln(1 - c e v): e = 0.8 at 0.02 m/s, 0.4 at 0.1 m/s.
@@ -85,4 +85,4 @@ struct StopForce {
 };
 StopForce calcStopForce(const JointStop& stop, double q, double v);
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -5,7 +5,7 @@
 #include "bielle/control/estimator.h"
 #include "bielle/worlds/world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// Figures of a data sheet. An offset is one standard deviation of what an axis reads at rest.
 struct SensorParts {
@@ -53,4 +53,4 @@ class Sensors {
   SensorReadings readings_;
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

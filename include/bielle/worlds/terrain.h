@@ -4,7 +4,7 @@
 
 #include "bielle/dynamics/ground.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 /// Height and normal of a Ground. Its boxes are found by a grid of square cells, so that the time of a lookup does not
 /// depend on their number.
@@ -73,4 +73,4 @@ struct TileOptions {
 };
 Ground makeTiles(const TileOptions& options);
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -13,7 +13,7 @@
 #include "bielle/dynamics/ground.h"
 #include "bielle/model/model.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 struct WorldOptions {
   Ground ground;         ///< with its coefficient of friction
@@ -78,4 +78,4 @@ class World {
   }
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -13,7 +13,7 @@
 #include "solve/fddp_checks.h"
 #include "worlds/make_world.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr const char* kPushExample = "t=3,impulse=6,direction=90,duration=0.1";
@@ -211,4 +211,4 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   requireFiniteNumbers(app);
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

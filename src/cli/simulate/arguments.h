@@ -9,7 +9,7 @@
 #include "worlds/plan.h"
 #include "worlds/robot_errors.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 struct SimulateArguments {
   std::string directory, output, world = "bielle", control = "gains", terrain = "planned";
@@ -40,4 +40,4 @@ void parseOptions(SimulateArguments& arguments);
 /// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01". \throws ModelError
 Ground makeGround(const SimulateArguments& arguments, const Ground& planned);
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

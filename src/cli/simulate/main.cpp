@@ -15,7 +15,7 @@
 #include "worlds/make_world.h"
 
 using namespace bielle;
-using namespace bielle::simulation;
+using namespace bielle::worlds;
 
 namespace {
 

@@ -14,7 +14,7 @@
 #include "results/result_files.h"
 #include "worlds/planned_record.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 // A motion that happened, in the form of a solved one.
@@ -277,4 +277,4 @@ std::vector<std::string> write(const SimulateArguments& arguments, const Plan& p
   }
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

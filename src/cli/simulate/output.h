@@ -2,7 +2,7 @@
 // What bielle-simulate prints and writes.
 #include "cli/simulate/arguments.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 void print(const SimulateArguments& arguments, const Plan& plan, const Execution& execution);
 
@@ -10,4 +10,4 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
 std::vector<std::string> write(const SimulateArguments& arguments, const Plan& plan, const Ground& ground,
                                const Execution& execution, const std::vector<std::string>& command);
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

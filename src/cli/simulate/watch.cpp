@@ -4,7 +4,7 @@
 
 #include "model/number_text.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 namespace {
 
 constexpr std::chrono::seconds kBetweenPages{2}, kBetweenLines{5};
@@ -39,4 +39,4 @@ void Watch::update(double time, double duration, const ExecutionSoFar& so_far) {
   }
 }
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

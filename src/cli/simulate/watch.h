@@ -5,7 +5,7 @@
 
 #include "worlds/execution.h"
 
-namespace bielle::simulation {
+namespace bielle::worlds {
 
 // Long runs tell how far they are, on the standard error.
 class Watch {
@@ -28,4 +28,4 @@ class Watch {
   bool has_failed_ = false;
 };
 
-}  // namespace bielle::simulation
+}  // namespace bielle::worlds

@@ -1,4 +1,4 @@
-#include "results/aside_file.h"
+#include "formats/aside_file.h"
 
 #include <signal.h>
 #include <unistd.h>
