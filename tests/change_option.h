@@ -6,7 +6,7 @@
 
 namespace bielle {
 
-// A number is set unchecked, as programs may set the member. \throws ModelError for values that the member cannot hold
+// A number is set unchecked, as programs may set the member. \throws InputError for values that the member cannot hold
 template <typename Options>
 Options changeOption(const Options& options, const std::string& name, double value) {
   OptionSet list = listOptions(options), changed;

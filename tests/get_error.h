@@ -6,12 +6,12 @@
 
 namespace bielle::testing {
 
-/// The text of the ModelError that `act` throws; empty when it throws none.
+/// The text of the InputError that `act` throws; empty when it throws none.
 template <typename Act>
 std::string getError(const Act& act) {
   try {
     act();
-  } catch (const ModelError& error) {
+  } catch (const InputError& error) {
     return error.what();
   }
   return "";

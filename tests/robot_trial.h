@@ -41,7 +41,7 @@ inline TrialResult tryRobot(const std::string& directory) {
     const LoadedRobot robot = loadRobot(directory);
     const std::string wrong = findWrong(robot.model);
     return {wrong.empty() ? Trial::Valid : Trial::Wrong, wrong};
-  } catch (const ModelError& error) {
+  } catch (const InputError& error) {
     const bool clear = isClear(error.what(), directory);
     return {clear ? Trial::Refused : Trial::Wrong, error.what()};
   } catch (const std::exception& error) {

@@ -63,7 +63,7 @@ TEST_CASE("bench: every work is measured, in both formulations") {
 }
 
 TEST_CASE("bench: a robot that cannot walk is refused") {
-  CHECK_THROWS_AS(runBench(loadOwn("fourbar").model, {}), ModelError);
+  CHECK_THROWS_AS(runBench(loadOwn("fourbar").model, {}), InputError);
   CHECK_THROWS_WITH(runBench(loadOwn("fourbar").model, {}), Catch::Contains("foot_left"));
 }
 

@@ -122,7 +122,7 @@ TEST_CASE("four-bar chain: closed by its formula, one mobility per linkage") {
   }
   FourBarChainOptions impossible;
   impossible.coupler = 1;
-  CHECK_THROWS_AS(makeFourBarChain(impossible), ModelError);
+  CHECK_THROWS_AS(makeFourBarChain(impossible), InputError);
 }
 
 TEST_CASE("dead points of the rocker: the crank drives through a whole turn") {

@@ -155,7 +155,7 @@ TEST_CASE("design: a heavier trunk") {
   CHECK(after.mass == Approx(1.5 * before.mass));
   CHECK((after.I_com - 1.5 * before.I_com).norm() < 1e-14);
   CHECK(after.com == before.com);
-  CHECK_THROWS_AS(draft.scaleMass("nothing", 2), ModelError);
+  CHECK_THROWS_AS(draft.scaleMass("nothing", 2), InputError);
 }
 
 TEST_CASE("design: parameters of a generator") {
@@ -253,8 +253,8 @@ TEST_CASE("design: searches find a minimum, the same one for the same seed") {
       minimizeByStages(problem, stages, 8);
       CHECK(points != first);
     }
-  problem.objective = [](const VectorXd&, const SearchStage&) -> double { throw ModelError("a", "b", "c", "d"); };
-  CHECK_THROWS_AS(minimizeByStages(problem, {{}}, 1), ModelError);
+  problem.objective = [](const VectorXd&, const SearchStage&) -> double { throw InputError("a", "b", "c", "d"); };
+  CHECK_THROWS_AS(minimizeByStages(problem, {{}}, 1), InputError);
 }
 
 TEST_CASE("evaluations: what is not one is refused") {
@@ -407,7 +407,7 @@ TEST_CASE("design: errors are reported with their places and remedies") {
   check("algorithm: crs", "algorithm: newton", "use one of crs");
   check("objective:", "objectiv:", "it is unknown");
   check("depth: 0.95", "depth: 0.05", "start design");
-  CHECK_THROWS_AS(readDesignSpec(directory.path() + "/none.yaml"), ModelError);
+  CHECK_THROWS_AS(readDesignSpec(directory.path() + "/none.yaml"), InputError);
   DesignVariable unknown;
   unknown.name = "x", unknown.parameter = "no_such", unknown.lower = 0, unknown.upper = 1;
   CHECK_THROWS_WITH(Parametrization("cleobot", {}, {unknown}), Contains("no_such"));

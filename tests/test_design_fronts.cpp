@@ -127,8 +127,8 @@ TEST_CASE("design: the front of two distances is the line between the points") {
     CHECK(search(7) == first);
     CHECK(search(8) != first);
   }
-  problem.evaluate = [](const auto&) -> std::vector<std::vector<double>> { throw ModelError("a", "b", "c", "d"); };
-  CHECK_THROWS_AS(searchFront(problem, {}, 1), ModelError);
+  problem.evaluate = [](const auto&) -> std::vector<std::vector<double>> { throw InputError("a", "b", "c", "d"); };
+  CHECK_THROWS_AS(searchFront(problem, {}, 1), InputError);
 
   const std::vector<std::vector<double>> points = {{3, 1}, {2, 2}, {2, 3}, {1, 4}, {4, 1}, {2.1, 1.9}};
   CHECK(selectFront(points, 10) == std::vector<size_t>{3, 1, 5, 0});

@@ -125,7 +125,7 @@ TEST_CASE("design goals: the log has what was requested and achieved, and why a 
   DesignMotion odd = makeAskedSquat(0.8, 0.02);
   odd.request.emplace();
   odd.request->planner = [](const Model&, const VectorXd&, const OptionSet&) -> MotionPlan {
-    throw ModelError("leg", "depth", "it is too large");
+    throw InputError("leg", "depth", "it is too large");
   };
   const DesignEvaluator impossible(robot, {odd}, kPeak);
   CHECK(impossible.start().status == DesignStatus::Feasible);

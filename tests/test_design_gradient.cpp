@@ -219,8 +219,8 @@ TEST_CASE("design gradient: searches with gradients take kinks and limits") {
   // From where nothing can be differentiated, nothing is searched; what is thrown comes out.
   problem.sloped = [](const VectorXd&, const SearchStage&) { return SlopedValue{3, {}, {}}; };
   CHECK(minimizeByStages(problem, {{SearchAlgorithm::Slsqp, 10, 1e-3}}, 1).evaluations == 1);
-  problem.sloped = [](const VectorXd&, const SearchStage&) -> SlopedValue { throw ModelError("a", "b", "c", "d"); };
-  CHECK_THROWS_AS(minimizeByStages(problem, {{SearchAlgorithm::Mma, 10, 1e-3}}, 1), ModelError);
+  problem.sloped = [](const VectorXd&, const SearchStage&) -> SlopedValue { throw InputError("a", "b", "c", "d"); };
+  CHECK_THROWS_AS(minimizeByStages(problem, {{SearchAlgorithm::Mma, 10, 1e-3}}, 1), InputError);
 }
 
 namespace {

@@ -250,9 +250,9 @@ TEST_CASE("estimator: readings that are not finite change nothing") {
 
 TEST_CASE("estimator: robots with joints that no motor determines are refused") {
   const LoadedRobot rail = loadOwn("fivebar_leg");
-  CHECK_THROWS_AS(Estimator(rail.model, makeStandingPosture(rail.model)), ModelError);
+  CHECK_THROWS_AS(Estimator(rail.model, makeStandingPosture(rail.model)), InputError);
   const LoadedRobot chain = loadOwn("spring_leg");
-  CHECK_THROWS_AS(Estimator(chain.model, makeStandingPosture(chain.model)), ModelError);
+  CHECK_THROWS_AS(Estimator(chain.model, makeStandingPosture(chain.model)), InputError);
 }
 
 TEST_CASE("estimator: an update does not allocate") {

@@ -92,7 +92,7 @@ TEST_CASE("archives that lie about themselves are refused") {
 }
 
 TEST_CASE("errors are one printable line, whatever the names in the files") {
-  const ModelError error("file", std::string("joint 'a\nb\0c\x1b[2J'", 17), std::string(100000, 'x'), "rename it");
+  const InputError error("file", std::string("joint 'a\nb\0c\x1b[2J'", 17), std::string(100000, 'x'), "rename it");
   const std::string text = error.what();
   CHECK(text.rfind("file: joint 'a b\\x00c\\x1b[2J': xxx", 0) == 0);
   CHECK(text.size() < 2000);
@@ -119,8 +119,8 @@ TEST_CASE("a pipe is written to, a file is replaced, a directory is refused") {
   CHECK_THROWS_WITH(writeTextFile("/dev/full", std::string(100000, 'x')),
                     Catch::Contains("/dev/full: file: it cannot be written"));
   CHECK(fs::is_character_file("/dev/full"));
-  CHECK_THROWS_AS(writeTextFile(directory.path(), "x"), ModelError);
-  CHECK_THROWS_AS(writeTextFile(directory.path() + "/none/file", "x"), ModelError);
+  CHECK_THROWS_AS(writeTextFile(directory.path(), "x"), InputError);
+  CHECK_THROWS_AS(writeTextFile(directory.path() + "/none/file", "x"), InputError);
   int left = 0;
   for (const auto& entry : fs::directory_iterator(directory.path()))
     left += entry.path().string().find(".part") != std::string::npos;

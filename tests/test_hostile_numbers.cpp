@@ -1,6 +1,6 @@
 // Random mechanisms with random, mostly unreasonable numbers: singular starts, loops that cannot close, motors and
 // links without mass, extreme speeds and gains, time steps from 0 to 10^6 s, one node or ten thousand. Every outcome
-// has a status, without NaN under a good one; rejections are ModelErrors.
+// has a status, without NaN under a good one; rejections are InputErrors.
 #include <catch2/catch.hpp>
 #include <iostream>
 #include <map>
@@ -218,7 +218,7 @@ TEST_CASE("optimal control of random mechanisms with random options") {
     try {
       motion.problem =
           std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()), std::move(specs), formulation);
-    } catch (const ModelError& error) {
+    } catch (const InputError& error) {
       CHECK(std::string(error.what()) != "");
       ++refused;
       continue;
@@ -310,7 +310,7 @@ void tryMotion(Random& rng, const Model& model, Motion (*make)(const Model&, con
     CHECK(areFinite(motion.guess.us));
     if (summary.termination != FddpTermination::Failed) CHECK(std::isfinite(summary.cost));
     ++solved;
-  } catch (const ModelError& error) {
+  } catch (const InputError& error) {
     CHECK(std::string(error.what()).find("; ") != std::string::npos);
     ++refused;
   }

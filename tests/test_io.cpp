@@ -115,7 +115,7 @@ TEST_CASE("coordinate names have the sizes of q and v, and name one-coordinate j
   CHECK(q[rod.idx_q + 3] == "transmission_knee_right.qw");
   CHECK(v[rod.idx_v + 2] == "transmission_knee_right.wz");
   CHECK(findColumn(v, "transmission_knee_right.wz") == rod.idx_v + 2);
-  CHECK_THROWS_AS(findColumn(v, "transmission_knee_right"), ModelError);
+  CHECK_THROWS_AS(findColumn(v, "transmission_knee_right"), InputError);
 }
 
 TEST_CASE("a record holds what the dynamics say at each node") {
@@ -469,7 +469,7 @@ TEST_CASE("a place that cannot be written to is an error that says why") {
   writeText(directory / "file", "");
   CHECK_THROWS_WITH(makeOutputDirectory(directory / "file"), Catch::Contains("file: directory: results cannot be"));
   CHECK_THROWS_WITH(makeOutputDirectory(directory / "file/below"), Catch::Contains("Not a directory"));
-  CHECK_THROWS_AS(makeOutputDirectory("/proc/bielle"), ModelError);
+  CHECK_THROWS_AS(makeOutputDirectory("/proc/bielle"), InputError);
   ShortSquat squat;
   const MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
   CHECK_THROWS_WITH(writeCsv(directory / "none/t.csv", record), Catch::Contains("No such file or directory"));

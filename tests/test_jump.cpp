@@ -130,10 +130,10 @@ TEST_CASE("jump: impossible options are refused by name") {
     try {
       make(option, value);
       FAIL("accepted");
-    } catch (const ModelError& error) {
+    } catch (const InputError& error) {
       CHECK(std::string(error.what()).find("'" + option + "'") != std::string::npos);
     }
   }
   const Model fourbar = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar").model;
-  CHECK_THROWS_AS(makeJump(fourbar), ModelError);
+  CHECK_THROWS_AS(makeJump(fourbar), InputError);
 }

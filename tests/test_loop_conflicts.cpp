@@ -98,7 +98,7 @@ TEST_CASE("conflicts: bars too short by a known length, and the least change tha
       CHECK(std::abs(remedy.change.p.norm() - (ground - 0.8)) < 1e-9);
     }
     checkRemedies(model, conflicts[0]);
-    const ModelError error = makeClosingError(model, "robot.urdf", open);
+    const InputError error = makeClosingError(model, "robot.urdf", open);
     CHECK(error.element() == "closure 'loop'");
     CHECK(describeConflict(model, conflicts[0]) == "loop 'loop' cannot close");
     CHECK_THAT(error.remedy(), Catch::Contains("mm along (-1, 0, 0)") || Catch::Contains("mm along (1, 0, 0)"));
@@ -147,7 +147,7 @@ TEST_CASE("conflicts: loops that close alone but not together; one beside them h
     for (const LoopRemedy& remedy : conflicts[0].remedies)
       if (remedy.place.kind != ModelPlace::Kind::Joint) CHECK(std::abs(remedy.size - missing) < 1e-9);
     checkRemedies(model, conflicts[0]);
-    const ModelError error = makeClosingError(model, "robot.urdf", open);
+    const InputError error = makeClosingError(model, "robot.urdf", open);
     CHECK_THAT(error.problem(),
                Catch::Contains("loops 'rod_up' and 'rod_down' cannot close together, although each can alone"));
     CHECK_THAT(error.remedy(), Catch::Contains("the smallest change that closes them is one of: "));

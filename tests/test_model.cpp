@@ -199,7 +199,7 @@ TEST_CASE("what cannot be a robot is refused by name") {
                b.addReference({"r", {{"jb2", {0, 0, 0, 0}}}, "", 0, {}});
              }),
              named("reference 'r'") && Contains("unit length"));
-  CHECK_THROWS_AS(ModelBuilder("empty").build(), ModelError);
+  CHECK_THROWS_AS(ModelBuilder("empty").build(), InputError);
 }
 
 TEST_CASE("impossible inertias are refused, rounded ones are not") {
@@ -210,6 +210,6 @@ TEST_CASE("impossible inertias are refused, rounded ones are not") {
   };
   CHECK(build({0, 0.1, 0.1}) == 1);                 // a slender rod
   CHECK(build({0.1, 0.2, 0.3 * (1 + 1e-7)}) == 1);  // a plate, rounded up
-  CHECK_THROWS_AS(build({0.1, 0.2, 0.301}), ModelError);
-  CHECK_THROWS_AS(build({-0.001, 0.2, 0.2}), ModelError);
+  CHECK_THROWS_AS(build({0.1, 0.2, 0.301}), InputError);
+  CHECK_THROWS_AS(build({-0.001, 0.2, 0.2}), InputError);
 }

@@ -133,10 +133,10 @@ TEST_CASE("squat: impossible options are refused, unknown ones are named") {
                                                                                  {"friction", 0},
                                                                                  {"depht", 0.7}}) {
     CAPTURE(option, value);
-    CHECK_THROWS_AS(make(option, value), ModelError);
+    CHECK_THROWS_AS(make(option, value), InputError);
     CHECK_THROWS_WITH(make(option, value), Catch::Contains(option));
   }
-  CHECK_THROWS_AS(makeSquat(loadOwn("fourbar").model, {}), ModelError);  // no feet
+  CHECK_THROWS_AS(makeSquat(loadOwn("fourbar").model, {}), InputError);  // no feet
 }
 
 TEST_CASE("weights by joint come with the robot's file, whatever the joints are called") {
@@ -312,6 +312,6 @@ TEST_CASE("benchmark walk: the schedule that speed is measured on") {
 
   BenchmarkWalkOptions options;
   options.total_nodes = 100;
-  CHECK_THROWS_AS(makeBenchmarkWalk(model, options), ModelError);
-  CHECK_THROWS_AS(makeBenchmarkWalk(loadOwn("fourbar").model), ModelError);
+  CHECK_THROWS_AS(makeBenchmarkWalk(model, options), InputError);
+  CHECK_THROWS_AS(makeBenchmarkWalk(loadOwn("fourbar").model), InputError);
 }

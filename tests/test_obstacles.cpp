@@ -90,12 +90,12 @@ TEST_CASE("footholds: a file's errors name the entry, impossible steps their num
                                                         {"{foot: left, x: 0.1, y: 0.1, pitch: 1}", "steeper"},
                                                         {"{foot: left, x: 0.1, y: 0.1, height: 1}", "height"}}) {
     CAPTURE(entry);
-    CHECK_THROWS_AS(read("footholds:\n  - " + entry + "\n"), ModelError);
+    CHECK_THROWS_AS(read("footholds:\n  - " + entry + "\n"), InputError);
     CHECK_THROWS_WITH(read("footholds:\n  - " + entry + "\n"), Catch::Contains("footholds_under_test.yaml") &&
                                                                    Catch::Contains("line 2") && Catch::Contains(word));
   }
   CHECK_THROWS_WITH(read("footholds: []\n"), Catch::Contains("no foothold"));
-  CHECK_THROWS_AS(readFootholds("no_such_file.yaml"), ModelError);
+  CHECK_THROWS_AS(readFootholds("no_such_file.yaml"), InputError);
   for (const auto& [text, word] : std::vector<std::pair<std::string, std::string>>{
            {"- {foot: right, x: 0.2, y: -0.1, pitch: 0.1}", "level"},
            {"- {foot: right, x: 0.2, y: -0.1}\n- {foot: right, x: 0.3, y: -0.1}", "alternately"},
@@ -158,7 +158,7 @@ TEST_CASE("box, gap: what cannot be done is refused by name") {
                                                                        {false, "width", 0, "width"},
                                                                        {false, "depth", 0, "depth"}}) {
     CAPTURE(box, option, value);
-    CHECK_THROWS_AS(make(box, option, value), ModelError);
+    CHECK_THROWS_AS(make(box, option, value), InputError);
     CHECK_THROWS_WITH(make(box, option, value), Catch::Contains(word));
   }
 }

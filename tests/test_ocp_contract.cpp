@@ -132,10 +132,10 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
     return RobotProblem(model, mechanism.q_closed, v, std::move(stages), formulation);
   };
   CHECK_NOTHROW(make([](StageSpec&) {}));
-  CHECK_THROWS_AS(make([](StageSpec& s) { s.dt = 0; }), ModelError);
-  CHECK_THROWS_AS(make([](StageSpec& s) { s.state.weights.resize(3); }), ModelError);
-  CHECK_THROWS_AS(make([](StageSpec& s) { s.control.reference.resize(0); }), ModelError);
-  CHECK_THROWS_AS(make([](StageSpec& s) { s.costs[0].activation.weights.resize(2); }), ModelError);
+  CHECK_THROWS_AS(make([](StageSpec& s) { s.dt = 0; }), InputError);
+  CHECK_THROWS_AS(make([](StageSpec& s) { s.state.weights.resize(3); }), InputError);
+  CHECK_THROWS_AS(make([](StageSpec& s) { s.control.reference.resize(0); }), InputError);
+  CHECK_THROWS_AS(make([](StageSpec& s) { s.costs[0].activation.weights.resize(2); }), InputError);
   for (double weight : {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     const auto refuse = [&](const auto& spoil, const std::string& what) {
       CHECK_THAT(getError([&] { make([&](StageSpec& s) { spoil(s) = weight; }); }), Catch::Contains(what));
@@ -148,8 +148,8 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
     refuse([](StageSpec& s) -> double& { return s.control.weights[0]; }, "a weight of the control cost is");
     refuse([](StageSpec& s) -> double& { return s.time_weight; }, "its cost per second is");
   }
-  CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, VectorXd::Zero(3), {}), ModelError);
-  CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, v, {}), ModelError);
+  CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, VectorXd::Zero(3), {}), InputError);
+  CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, v, {}), InputError);
   const RobotProblem whole = make([](StageSpec&) {});
   ProblemProbe problem(whole);
   VectorXd x = problem.initialState(), next = x;

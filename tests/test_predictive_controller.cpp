@@ -343,7 +343,7 @@ TEST_CASE("predictive control: windows, threads and iterations without sense are
   PredictiveOptions options = makeShortWindow(1);
   options.iterations = 0;
   CHECK_THROWS_WITH(make(options), Catch::Contains("max_iterations"));
-  CHECK_THROWS_AS(makePredictiveMotion(model, MotionPlan(), ProblemOptions(), makeShortWindow(1)), ModelError);
+  CHECK_THROWS_AS(makePredictiveMotion(model, MotionPlan(), ProblemOptions(), makeShortWindow(1)), InputError);
 }
 
 }  // namespace bielle::worlds

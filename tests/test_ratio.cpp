@@ -326,7 +326,7 @@ TEST_CASE("joints without a linkage of their own: direct, or refused") {
 
   const auto refuse = [](const std::string& name, const std::vector<std::string>& joints, const std::string& text) {
     CHECK_THROWS_WITH(Robot(name, joints), Catch::Contains(text));
-    CHECK_THROWS_AS(Robot(name, joints), ModelError);
+    CHECK_THROWS_AS(Robot(name, joints), InputError);
   };
   refuse("bipetto", {"knee"}, "there is no moving joint of this name");
   refuse("bipetto", {"free_knee_left"}, "universal joint of 2 coordinates");

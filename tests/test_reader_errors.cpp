@@ -289,8 +289,8 @@ TEST_CASE("XML entities are refused for what they are") {
   }
 }
 
-// For any bytes, loadRobot returns a model or throws a ModelError.
-TEST_CASE("truncated and corrupted files never do worse than a ModelError") {
+// For any bytes, loadRobot returns a model or throws a InputError.
+TEST_CASE("truncated and corrupted files never do worse than a InputError") {
   const RobotDirectory directory;
   const std::string urdf = kToyUrdf, yaml = std::string(kToyYaml) + "contacts: {toe: {frame: hand, type: 6d}}\n";
   int refused = 0, tried = 0;

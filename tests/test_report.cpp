@@ -243,7 +243,7 @@ TEST_CASE("a directory that is none of ours is refused with the file and the rem
   directory.write("arm.urdf", kArm);
   const std::string place = directory.path() + "/r", robot = directory.path() + "/arm.urdf";
   const auto refuse = [&](const std::string& text) {
-    CHECK_THROWS_AS(makeReport({place}), ModelError);
+    CHECK_THROWS_AS(makeReport({place}), InputError);
     CHECK_THROWS_WITH(makeReport({place}), Catch::Contains(text));
   };
   refuse("summary.json: file: it cannot be read");
@@ -266,6 +266,6 @@ TEST_CASE("a directory that is none of ours is refused with the file and the rem
   CHECK_NOTHROW(makeReport({place}));
   fs::remove(place + "/trajectory.npz");
   refuse("trajectory.npz: file: it cannot be read");
-  CHECK_THROWS_AS(makeReport({}), ModelError);
+  CHECK_THROWS_AS(makeReport({}), InputError);
   CHECK_THROWS_WITH(writeReport("/nonexistent/report.html", {place}), Catch::Contains("trajectory.npz"));
 }

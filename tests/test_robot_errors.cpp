@@ -85,10 +85,10 @@ TEST_CASE("robot errors: the machine is closed, its motors and its lowest sole w
 
 TEST_CASE("robot errors: impossible ones are refused") {
   const LoadedRobot robot = loadOwn("fivebar");
-  CHECK_THROWS_AS(makeMachine(robot.model, {1, 0, 1}), ModelError);
+  CHECK_THROWS_AS(makeMachine(robot.model, {1, 0, 1}), InputError);
   // A planar linkage whose hinge leaves the plane cannot be closed: its rows are redundant.
   const Model machine = makeMachine(robot.model, {0, 1e-3, 1});
-  CHECK_THROWS_AS(assembleMachine(robot.model, machine, makeStandingPosture(robot.model)), ModelError);
+  CHECK_THROWS_AS(assembleMachine(robot.model, machine, makeStandingPosture(robot.model)), InputError);
 }
 
 }  // namespace bielle::worlds

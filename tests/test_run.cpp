@@ -258,7 +258,7 @@ TEST_CASE("run, hop: what cannot be done is refused by name") {
                                                                        {false, "flight", 3, "flight"},
                                                                        {false, "length", 2, "reach"}}) {
     CAPTURE(run, option, value);
-    CHECK_THROWS_AS(make(run, option, value), ModelError);
+    CHECK_THROWS_AS(make(run, option, value), InputError);
     CHECK_THROWS_WITH(make(run, option, value), Catch::Contains(word));
   }
 }

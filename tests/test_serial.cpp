@@ -273,5 +273,5 @@ TEST_CASE("a lift fails where the linkage ends, and says so") {
   CHECK(singular.nodes.back().joint == "rocker_joint");
 
   to_the_end.a.pop_back();
-  CHECK_THROWS_AS(lift(fourbar, serial, to_the_end), ModelError);
+  CHECK_THROWS_AS(lift(fourbar, serial, to_the_end), InputError);
 }

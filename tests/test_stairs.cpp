@@ -75,7 +75,7 @@ TEST_CASE("stairs: what cannot be done is refused by name") {
                                                                  {"width", 0.2, "width"},
                                                                  {"single_support", 0.4, "no such option"}}) {
     CAPTURE(option, value);
-    CHECK_THROWS_AS(make(option, value), ModelError);
+    CHECK_THROWS_AS(make(option, value), InputError);
     CHECK_THROWS_WITH(make(option, value), Catch::Contains(word));
   }
 }

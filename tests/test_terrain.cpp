@@ -95,7 +95,7 @@ TEST_CASE("terrain: tiles are of the requested heights, and the same for the sam
   other.seed = 6;
   CHECK(makeTiles(other).steps[0].top != ground.steps[0].top);
   other.size = 0;
-  CHECK_THROWS_AS(makeTiles(other), ModelError);
+  CHECK_THROWS_AS(makeTiles(other), InputError);
 }
 
 }  // namespace bielle::worlds

@@ -168,11 +168,11 @@ TEST_CASE("which phases are free") {
   CHECK(list(kAll) == Names{"stand", "push", "land", "settle"});
   CHECK(list({{{"push", {0.8, 1.2}}}, 0}) == Names{"push"});
   CHECK(list({{{kAllPhases, {}}, {"flight", {0.9, 1.1}}}, 0}) == Names{"stand", "push", "flight", "land", "settle"});
-  CHECK_THROWS_AS(list({{{"swing", {}}}, 0}), ModelError);
-  CHECK_THROWS_AS(list({{{"push", {1.2, 0.8}}}, 0}), ModelError);
-  CHECK_THROWS_AS(list({{{"push", {0, 0.8}}}, 0}), ModelError);
-  CHECK_THROWS_AS(list({{{"push", {}}}, -1}), ModelError);
-  CHECK_THROWS_AS(list({{}, 1}), ModelError);
+  CHECK_THROWS_AS(list({{{"swing", {}}}, 0}), InputError);
+  CHECK_THROWS_AS(list({{{"push", {1.2, 0.8}}}, 0}), InputError);
+  CHECK_THROWS_AS(list({{{"push", {0, 0.8}}}, 0}), InputError);
+  CHECK_THROWS_AS(list({{{"push", {}}}, -1}), InputError);
+  CHECK_THROWS_AS(list({{}, 1}), InputError);
 
   // The gains suit the longest step.
   ProblemOptions options;

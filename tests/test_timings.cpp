@@ -344,13 +344,13 @@ TEST_CASE("free timings: what makes no sense is refused") {
     return RobotProblem(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages));
   };
   CHECK_NOTHROW(make([](std::vector<StageSpec>&) {}));
-  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[1].timing.lower = 0; }), ModelError);
-  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[1].timing.upper = 1.5; }), ModelError);
-  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[0].timing = {0, 2, 0.5}; }), ModelError);
-  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[3].timing.phase = 0; }), ModelError);
-  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[4].timing = {3, 0.5, 2}; }), ModelError);
+  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[1].timing.lower = 0; }), InputError);
+  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[1].timing.upper = 1.5; }), InputError);
+  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[0].timing = {0, 2, 0.5}; }), InputError);
+  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[3].timing.phase = 0; }), InputError);
+  CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[4].timing = {3, 0.5, 2}; }), InputError);
   const auto makeImpact = [](std::vector<StageSpec>& s) { s[1].kind = StageKind::Impact, s[1].dt = 0; };
-  CHECK_THROWS_AS(make(makeImpact), ModelError);
+  CHECK_THROWS_AS(make(makeImpact), InputError);
   // A time that runs backwards fails, and says so.
   const RobotProblem problem = make([](std::vector<StageSpec>&) {});
   RobotEvaluator evaluator(problem);

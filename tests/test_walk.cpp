@@ -399,7 +399,7 @@ TEST_CASE("walk: what cannot be done is refused by name") {
                                                                  {"com_weight", -1, "com_weight"},
                                                                  {"swing_apex", 1, "swing_apex"}}) {
     CAPTURE(option, value);
-    CHECK_THROWS_AS(make(option, value), ModelError);
+    CHECK_THROWS_AS(make(option, value), InputError);
     CHECK_THROWS_WITH(make(option, value), Catch::Contains(word));
   }
   TurnOptions turn;
@@ -409,5 +409,5 @@ TEST_CASE("walk: what cannot be done is refused by name") {
   turn.radius = -1;
   CHECK_THROWS_WITH(makeTurn(getBipetto(), turn), Catch::Contains("radius"));
   const LoadedRobot fourbar = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar");
-  CHECK_THROWS_AS(makeWalk(fourbar.model), ModelError);
+  CHECK_THROWS_AS(makeWalk(fourbar.model), InputError);
 }

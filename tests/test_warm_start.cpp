@@ -102,5 +102,5 @@ TEST_CASE("warm start: other lengths are resampled, feet carried to their places
   CHECK_THROWS_WITH(makeStart(record, motion), Catch::Contains("finite"));
   record.u_names.front() = "other";
   CHECK_THROWS_WITH(makeStart(record, motion), Catch::Contains("motors"));
-  CHECK_THROWS_AS(readResultRecord("/nowhere/at/all"), ModelError);
+  CHECK_THROWS_AS(readResultRecord("/nowhere/at/all"), InputError);
 }

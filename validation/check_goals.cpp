@@ -44,7 +44,7 @@ class GoalMeter {
  private:
   void require(bool ok, const std::string& problem) const {
     if (!ok)
-      throw ModelError(context_.motion.summary.file, "goal '" + goal_.name + "'", problem,
+      throw InputError(context_.motion.summary.file, "goal '" + goal_.name + "'", problem,
                        "recreate it with `bielle solve`");
   }
   const Vector3d& getCom(int node) const { return context_.trace.nodes[node].com; }

@@ -16,7 +16,7 @@ namespace {
 const char* const kRemedy = "recreate it with `bielle solve`";
 
 void require(bool ok, const CheckedMotion& motion, const std::string& element, const std::string& problem) {
-  if (!ok) throw ModelError(motion.summary.file, element, problem, kRemedy);
+  if (!ok) throw InputError(motion.summary.file, element, problem, kRemedy);
 }
 
 bool isFinite(const Ground& ground) {
@@ -33,7 +33,7 @@ void checkNames(const CheckedMotion& motion) {
   const auto compare = [&](const char* what, const std::vector<std::string>& names,
                            const std::vector<std::string>& expected) {
     if (names == expected) return;
-    throw ModelError(motion.summary.file, std::string("trajectory of '") + model.name() + "'",
+    throw InputError(motion.summary.file, std::string("trajectory of '") + model.name() + "'",
                      std::string("its ") + what + " are not those of the robot",
                      "check it with the robot it was made for, or recreate it");
   };

@@ -28,10 +28,10 @@ struct CheckedMotion {
 };
 
 /// Reads DIR/summary.json, DIR/trajectory.npz and the robot, from its file or, if that no longer exists, by its name.
-/// \throws ModelError naming the file, the entry and what is wrong with it
+/// \throws InputError naming the file, the entry and what is wrong with it
 CheckedMotion readMotion(const std::string& directory);
 
-/// \throws ModelError when names, sizes, phases or contacts of the parts contradict each other
+/// \throws InputError when names, sizes, phases or contacts of the parts contradict each other
 void checkConsistency(const CheckedMotion& motion);
 
 }  // namespace bielle::validation

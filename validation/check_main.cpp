@@ -44,7 +44,7 @@ int main(int argc, char** argv) {
       printReport(std::cout, report, brief ? CheckPrint::Failures : CheckPrint::All);
     finishStandardOutput();
     return report.passed() ? kPasses : kFails;
-  } catch (const ModelError& error) {
+  } catch (const InputError& error) {
     std::cerr << "bielle: error: " << error.what() << std::endl;
   } catch (const std::exception& error) {  // of Simbody, for a robot it does not support
     std::cerr << "bielle: error: " << directory << ": Simbody: " << error.what() << std::endl;

@@ -109,7 +109,7 @@ int main(int argc, char** argv) {
     }
     if (json) std::cout << nlohmann::json{{"passed", passed}, {"robots", reports}}.dump(2) << "\n";
     finishStandardOutput();
-  } catch (const ModelError& error) {
+  } catch (const InputError& error) {
     std::cerr << "bielle-validate: " << error.what() << "\n";
     return kBadInput;
   }

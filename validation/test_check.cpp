@@ -273,7 +273,7 @@ TEST_CASE("check: files that are missing, broken or of another robot are refused
   const RobotDirectory directory;
   const auto refuse = [&directory](const std::string& what) {
     CHECK_THROWS_WITH(readMotion(directory.path()), Catch::Contains(what));
-    CHECK_THROWS_AS(readMotion(directory.path()), ModelError);
+    CHECK_THROWS_AS(readMotion(directory.path()), InputError);
   };
   refuse("summary.json");
   using Json = nlohmann::json;

@@ -15,7 +15,7 @@
 
 namespace bielle::validation {
 
-/// \throws ModelError when MuJoCo refuses the robot
+/// \throws InputError when MuJoCo refuses the robot
 ValidationReport validateByMujoco(const Model& model, const ValidationOptions& options = {});
 
 /// The same with MuJoCo's robot made from another model with the same joints and closures: a wrong model must fail.

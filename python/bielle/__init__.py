@@ -9,7 +9,7 @@
 from ._bielle import *
 from . import named as named, plot as plot, residuals as residuals, show as _show
 from .programs import campaign as campaign, check as check, design as design, simulate as simulate
-from .errors import ModelError as ModelError
+from .errors import InputError as InputError
 from .motions import *
 from .named import (
     Dynamics as Dynamics,

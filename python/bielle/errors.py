@@ -3,7 +3,7 @@
 from typing import Tuple, Type
 
 
-class ModelError(ValueError):
+class InputError(ValueError):
     """Invalid input: what is wrong with which element of which file, and the remedy.
 
     Fields: file ("" for what was built in a program), element, problem, remedy.
@@ -18,5 +18,5 @@ class ModelError(ValueError):
         self.problem = problem
         self.remedy = remedy
 
-    def __reduce__(self) -> Tuple[Type["ModelError"], Tuple[str, str, str, str, str]]:
+    def __reduce__(self) -> Tuple[Type["InputError"], Tuple[str, str, str, str, str]]:
         return type(self), (str(self), self.file, self.element, self.problem, self.remedy)

@@ -115,7 +115,7 @@ void bindParametrization(py::module_& module) {
             "A robot as a function of bounded numbers: lengths and shifts of a given one, or parameters of a "
             "generator.");
   type.def(py::init(&parametrizeGiven), py::arg("model"), py::arg("variables"),
-           "Raises ModelError for unknown names, places on different bodies, bounds that exclude the model.")
+           "Raises InputError for unknown names, places on different bodies, bounds that exclude the model.")
       .def_static("generated", &parametrizeGenerated, py::arg("generator"), py::arg("variables"),
                   py::arg("settings") = OptionValues(),
                   "Parametrizes a generator (see `generators`); settings: its other parameters by name and value.")
@@ -138,7 +138,7 @@ void bindParametrization(py::module_& module) {
             const py::gil_scoped_release release;
             return std::make_shared<Model>(p.robot.make(point));
           },
-          py::arg("x"), "The Model at x (n,). Raises ModelError when the numbers do not define a robot.")
+          py::arg("x"), "The Model at x (n,). Raises InputError when the numbers do not define a robot.")
       .def("__repr__",
            [](const HeldParametrization& p) {
              std::string names;

@@ -109,7 +109,7 @@ void bindEstimator(py::module_& module) {
       "loops, the trunk by an invariant extended Kalman filter, contacts by the forces on the feet.")
       .def(py::init<std::shared_ptr<Model>, const py::object&, const EstimatorOptions&>(), py::arg("model"),
            py::arg("q"), py::arg("options") = EstimatorOptions(),
-           "q: a closed configuration (nq,). Raises ModelError when motors do not determine a joint.")
+           "q: a closed configuration (nq,). Raises InputError when motors do not determine a joint.")
       .def("reset", &HeldEstimator::reset, py::arg("time"), py::arg("q"), py::arg("v"), py::arg("contacts"),
            "Starts from a closed state (nq,), (nv,), standing on the named contacts.")
       .def("update", &HeldEstimator::update, py::arg("readings"), py::arg("planned") = std::vector<std::string>(),

@@ -70,7 +70,7 @@ void bindSerial(py::module_& module) {
       .field("dropped_targets", &NamedSerial::dropped_targets, "targets of references that named frozen joints");
   module.def("make_serial_model", &makeSerial, py::arg("model"), py::arg("q"), py::arg("armature") = "",
              "The SerialModel of a robot, frozen at the closed configuration q (nq,).\n\n"
-             "armature: of the new motors in kg m^2, or 'reflected'. Raises ModelError when there is no equivalent.");
+             "armature: of the new motors in kg m^2, or 'reflected'. Raises InputError when there is no equivalent.");
 }
 
 void bindOutcome(py::module_& module) {

@@ -42,7 +42,7 @@ ConstraintSet requireFit(const Model& model, const ConstraintSet& set) {
 int findContact(const Model& model, const std::string& name) {
   const int contact = model.findContact(name);
   if (contact < 0)
-    throw ModelError(model.name(), "contact '" + name + "'", "there is no contact of this name",
+    throw InputError(model.name(), "contact '" + name + "'", "there is no contact of this name",
                      "name one of Model.contacts");
   return contact;
 }
@@ -142,7 +142,7 @@ void addConfigurations(ModelType& type) {
   type.def(
       "standing", [](const Model& m) { return makeArray(makeStandingPosture(m)); },
       "The starting posture of motions (nq,): the reference `half_sitting`, or the only one.\n\n"
-      "Raises ModelError when there is none, or it cannot be closed.");
+      "Raises InputError when there is none, or it cannot be closed.");
   type.def(
       "integrate",
       [](const Model& m, const py::object& q, const py::object& dq) {
@@ -175,7 +175,7 @@ void addConfigurations(ModelType& type) {
 
 const AssemblyResult& requireClosed(const Model& model, const AssemblyResult& result) {
   if (result.status != AssemblyStatus::Closed)
-    throw ModelError(model.name(), "posture", result.message, "start from a closer configuration");
+    throw InputError(model.name(), "posture", result.message, "start from a closer configuration");
   return result;
 }
 
@@ -191,7 +191,7 @@ void addAssembly(ModelType& type) {
         }
         return makeArray(requireClosed(m, result).q);
       },
-      py::arg("q"), "The closed configuration nearest to q (nq,).\n\nRaises ModelError when the loops do not close.");
+      py::arg("q"), "The closed configuration nearest to q (nq,).\n\nRaises InputError when the loops do not close.");
   type.def(
       "posture",
       [](const Model& m, const std::string& name) {
@@ -205,7 +205,7 @@ void addAssembly(ModelType& type) {
       },
       py::arg("name") = "",
       "A reference by name, closed (nq,); without a name some closed configuration.\n\n"
-      "Raises ModelError when there is no such reference, or the loops do not close.");
+      "Raises InputError when there is no such reference, or the loops do not close.");
   type.def(
       "mobility",
       [](const Model& m, const py::object& q) {
@@ -225,7 +225,7 @@ void bindBuilder(py::module_& module) {
       module, "ModelBuilder",
       "Collects bodies, joints, closures, motors and frames, then validates them and makes the model.\n\nBodies go by "
       "the name of their link; \"world\" is the ground. Elements must be declared before they are referred to. Errors "
-      "are ModelErrors that name the element and the remedy.")
+      "are InputErrors that name the element and the remedy.")
       .def(py::init<std::string>(), py::arg("name"))
       .def("add_link", &ModelBuilder::addLink, py::arg("link"), py::arg("parent_link"), py::arg("joint"),
            py::arg("inertia"), py::arg("limits") = JointLimits(),
@@ -278,7 +278,7 @@ void bindBuilder(py::module_& module) {
            "Inertia that is added to every dof of a joint, kg m^2 or kg.")
       .def(
           "build", [](const ModelBuilder& self) { return std::make_shared<Model>(self.build()); },
-          "The Model. Raises ModelError naming the faulty element.");
+          "The Model. Raises InputError naming the faulty element.");
 }
 
 }  // namespace

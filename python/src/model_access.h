@@ -24,10 +24,10 @@ struct Convert<std::shared_ptr<Model>> {
   static bool same(const std::shared_ptr<Model>& a, const std::shared_ptr<Model>& b);
 };
 
-/// The link, frame or contact of a name. \throws ModelError when the robot has none
+/// The link, frame or contact of a name. \throws InputError when the robot has none
 Frame findFrame(const Model& model, const std::string& name);
 
-/// Index of a contact. \throws ModelError when the robot has none of this name
+/// Index of a contact. \throws InputError when the robot has none of this name
 int findContact(const Model& model, const std::string& name);
 
 /// A set of the model: its closures and contacts, with places of the contacts and gains that may be any.

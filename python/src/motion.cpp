@@ -16,7 +16,7 @@ MotionRequest Request::make() const {
   for (const auto& [name, value] : options) request.options.set(name, value);
   for (const MotionFile& file : std::vector<MotionFile>(request.files)) {
     if (!files.count(file.name))
-      throw ModelError("", "file '" + file.name + "'", "motion '" + motion + "' needs it", "give a path: " + file.help);
+      throw InputError("", "file '" + file.name + "'", "motion '" + motion + "' needs it", "give a path: " + file.help);
     file.read(files.at(file.name), request);
   }
   return request;
@@ -232,7 +232,7 @@ void bindHeldMotion(py::module_& module) {
             "A problem ready to be solved: of a plan (Motion(model, plan, options)), or of a request (Motion.make).");
   type.def(py::init(&makeFromPlan), py::arg("model"), py::arg("plan"), py::arg("options") = ProblemOptions())
       .def_static("make", &makeHeldMotion, py::arg("model"), py::arg("request"), py::arg("options") = ProblemOptions(),
-                  py::call_guard<py::gil_scoped_release>(), "The motion of a request. Raises ModelError.")
+                  py::call_guard<py::gil_scoped_release>(), "The motion of a request. Raises InputError.")
       .def_static(
           "plan",
           [](const std::shared_ptr<Model>& model, const Request& request) {

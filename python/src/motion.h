@@ -16,7 +16,7 @@ struct Request {
   std::map<std::string, OptionValue> options;  // by name
   std::map<std::string, std::string> files;
 
-  /// \throws ModelError when motion, option or file do not exist
+  /// \throws InputError when motion, option or file do not exist
   MotionRequest make() const;
 };
 

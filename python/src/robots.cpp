@@ -82,7 +82,7 @@ void bindRobots(py::module_& module) {
   module.def("load_robot", &load, py::arg("name"), py::arg("base") = py::none(),
              py::call_guard<py::gil_scoped_release>(),
              "Loads a robot by name, by directory, or by .urdf or .yaml file.\n\n"
-             "base: 'free' or 'fixed' overrides the robot's own. Raises ModelError, whatever the files contain.");
+             "base: 'free' or 'fixed' overrides the robot's own. Raises InputError, whatever the files contain.");
   module.def(
       "generate_robot",
       [](const std::string& name, const std::string& directory, const py::kwargs& parameters) {

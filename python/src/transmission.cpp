@@ -68,7 +68,7 @@ void bindTransmission(py::module_& module) {
       py::arg("model"), py::arg("joint"), py::arg("q"), py::arg("step") = SweepOptions().step,
       py::arg("length") = SweepOptions().length,
       "Moves a joint through its range from the closed configuration q (nq,), other joints of its linkage held.\n\n"
-      "step: largest along the curve, rad or m. Raises ModelError when no linkage drives the joint.");
+      "step: largest along the curve, rad or m. Raises InputError when no linkage drives the joint.");
 }
 
 }  // namespace bielle::python

@@ -32,7 +32,7 @@ MakeWorld findEngine(const std::string& engine) {
     return reinterpret_cast<MakeWorld>(function);
   } catch (py::error_already_set& error) {
     if (!error.matches(PyExc_ModuleNotFoundError)) throw;
-    throw ModelError("", "world '" + engine + "'", "this build only has its own engine",
+    throw InputError("", "world '" + engine + "'", "this build only has its own engine",
                      "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody), or use engine='bielle'");
   }
 }

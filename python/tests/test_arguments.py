@@ -344,7 +344,7 @@ def test_numbers_are_finite(model, bad):
     for spoil in (lambda s: s.replace(costs=[s.costs[0].replace(weight=bad), *s.costs[1:]]),
                   lambda s: s.replace(state=s.state.replace(weight=bad)),
                   lambda s: s.replace(control=s.control.replace(weight=bad))):  # fmt: skip
-        with pytest.raises(bielle.ModelError, match="stage 2: .* is negative or not finite"):
+        with pytest.raises(bielle.InputError, match="stage 2: .* is negative or not finite"):
             bielle.Motion(model, plan.replace(stages=[*plan.stages[:2], spoil(plan.stages[2]), *plan.stages[3:]]))
 
 

@@ -32,7 +32,7 @@ def test_a_robot_as_a_function_of_numbers(knee, model):
     assert again.variables == knee.variables and again.make([2e-3, 0]) == moved
     with pytest.raises(ValueError, match=r"x: expected shape \(2,\)"):
         knee.make([0])
-    with pytest.raises(bielle.ModelError, match="nowhere"):
+    with pytest.raises(bielle.InputError, match="nowhere"):
         bielle.Parametrization(model, [shift("motor_x", "nowhere")])
 
 

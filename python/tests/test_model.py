@@ -141,7 +141,7 @@ def test_wrong_shapes_say_which_was_wanted(model):
 
 
 def test_model_errors_have_fields():
-    with pytest.raises(bielle.ModelError) as caught:
+    with pytest.raises(bielle.InputError) as caught:
         bielle.load_robot("no such robot")
     assert caught.value.problem and caught.value.remedy
     assert str(caught.value).endswith(caught.value.problem + "; " + caught.value.remedy)
@@ -150,7 +150,7 @@ def test_model_errors_have_fields():
 def test_model_errors_name_the_file(tmp_path):
     path = tmp_path / "leg.urdf"
     path.write_text("<robot name='leg'><link name='a'/><joint name='j' type='revolute'/></robot>")
-    with pytest.raises(bielle.ModelError) as caught:
+    with pytest.raises(bielle.InputError) as caught:
         bielle.load_robot(str(path))
     assert caught.value.file == str(path) and "j" in caught.value.element
 
@@ -159,7 +159,7 @@ def test_contacts_of_another_robot_are_refused(model):
     other = bielle.load_robot("fourbar").model
     with pytest.raises(ValueError, match="does not belong to the model"):
         other.static_torques(other.neutral(), model.constraints(("foot_left",)))
-    with pytest.raises(bielle.ModelError, match="there is no contact"):
+    with pytest.raises(bielle.InputError, match="there is no contact"):
         model.constraints(("hand",))
 
 
@@ -188,7 +188,7 @@ def test_couplers_and_springs_from_nothing():
     assert model.closure_residual([0.1, 0.2]) == pytest.approx([0])
     a = model.forward_dynamics([0.1, 0.2], np.zeros(2), []).a
     assert a == pytest.approx([-10 * 0.1 / (1 + 4), -2 * 10 * 0.1 / (1 + 4)])
-    with pytest.raises(bielle.ModelError):
+    with pytest.raises(bielle.InputError):
         builder.add_coupler("slack", {"a": 1})
 
 
@@ -205,7 +205,7 @@ def test_a_spring_between_two_points():
     assert model.forward_dynamics([0.4], [-0.15], []).a == pytest.approx([-9.81 - 0.8 * tension / 2])
     assert pickle.loads(pickle.dumps(model)).point_springs == model.point_springs
     assert spring.replace(rest=0.3).rest == 0.3
-    with pytest.raises(bielle.ModelError):
+    with pytest.raises(bielle.InputError):
         builder.add_point_spring("mass", "mass", spring.replace(name="none"))
 
 
@@ -213,7 +213,7 @@ def test_generated_robots(tmp_path):
     assert "upper_length" in bielle.generators()["cleobot"]
     short = bielle.generate_robot("cleobot", str(tmp_path / "short"), upper_length=0.2)
     assert short.file.endswith("short.urdf") and short.model.nq == bielle.generate_robot("cleobot").model.nq
-    with pytest.raises(bielle.ModelError):
+    with pytest.raises(bielle.InputError):
         bielle.generate_robot("cleobot", upper_length=-1)
 
 

@@ -49,14 +49,14 @@ def test_options_are_those_of_the_registry(robot):
         assert motion["help"].split()[0] in getattr(bielle, "solve_" + name.replace("-", "_")).__doc__
     with pytest.raises(TypeError, match="solve_squat has no option 'deep'; it has: depth, "):
         bielle.solve_squat(robot, deep=0.7)
-    with pytest.raises(bielle.ModelError) as caught:
+    with pytest.raises(bielle.InputError) as caught:
         bielle.solve_squat(robot, depth=-1)
     assert "depth" in caught.value.element
-    with pytest.raises(bielle.ModelError, match="option 'foot': 'middle' is not one of its choices; .*left, right"):
+    with pytest.raises(bielle.InputError, match="option 'foot': 'middle' is not one of its choices; .*left, right"):
         bielle.solve_hop(robot, foot="middle")
-    with pytest.raises(bielle.ModelError, match="option 'steps': '2.5' is not a whole number"):
+    with pytest.raises(bielle.InputError, match="option 'steps': '2.5' is not a whole number"):
         bielle.solve_walk(robot, steps=2.5)
-    with pytest.raises(bielle.ModelError, match="option 'rigid_landing': .*true or false"):
+    with pytest.raises(bielle.InputError, match="option 'rigid_landing': .*true or false"):
         bielle.solve_walk(robot, rigid_landing=1)
     defaults = {name: option["default"] for name, option in bielle.motions()["hop"]["options"].items()}
     assert defaults["foot"] == "left" and defaults["hops"] == 1 and defaults["rigid_landing"] is False

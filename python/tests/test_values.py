@@ -47,7 +47,7 @@ VALUES.update(
             "fivebar_leg", [bielle.DesignVariable(name="upper", lower=0.1, upper=0.3, parameter="upper_length")]
         ),
         "SerialModel": make_serial,
-        "ModelError": lambda: bielle.ModelError("m", "file", "element", "problem", "remedy"),
+        "InputError": lambda: bielle.InputError("m", "file", "element", "problem", "remedy"),
     }
 )
 
@@ -75,7 +75,7 @@ def test_every_public_value_pickles(name):
 
 def same(a, b):
     """Of errors and tuples of arrays, which have no == of their own; of Motion, Solution and Parametrization by what they hold or make."""
-    if isinstance(a, bielle.ModelError):
+    if isinstance(a, bielle.InputError):
         return (str(a), vars(a)) == (str(b), vars(b))
     if isinstance(a, bielle.Residual):
         return vars(a) == vars(b)
@@ -115,7 +115,7 @@ def test_models_survive_to_the_last_bit():
     for name in bielle.list_robots():
         try:
             model = bielle.load_robot(name).model
-        except bielle.ModelError:
+        except bielle.InputError:
             continue  # completes a published robot that is not here
         twin = pickle.loads(pickle.dumps(model))
         q = np.random.default_rng(4).standard_normal((3, model.nq))

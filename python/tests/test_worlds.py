@@ -154,7 +154,7 @@ def test_squat_stands_in_other_engines(controller, model, engine):
 
 
 def test_engines_have_names(model):
-    with pytest.raises(bielle.ModelError, match="nowhere"):
+    with pytest.raises(bielle.InputError, match="nowhere"):
         bielle.World(model, engine="nowhere")
 
 

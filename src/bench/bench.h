@@ -98,7 +98,7 @@ struct BenchReport {
   std::vector<SizeTime> horizons;  ///< linearization, sweep and one rollout of a walk of this many nodes
 };
 
-/// \throws ModelError when the robot has no feet
+/// \throws InputError when the robot has no feet
 BenchReport runBench(const Model& model, const BenchOptions& options = {});
 
 }  // namespace bielle

@@ -18,7 +18,7 @@ namespace {
 int adopt(const RobotArgument& argument, const std::string& directory) {
   const LoadedRobot robot = argument.load();
   if (fs::path(robot.file).extension() == ".yaml" && !readYaml(robot.file).models.empty())
-    throw ModelError(robot.file, "robot", "it already completes another robot", "edit it");
+    throw InputError(robot.file, "robot", "it already completes another robot", "edit it");
   const fs::path place = fs::absolute(directory).lexically_normal();
   const std::string name = (place.has_filename() ? place : place.parent_path()).filename().string();
   const Adoption adoption = adoptRobot(robot, fs::path(robot.file).lexically_relative(place).string());
@@ -26,9 +26,9 @@ int adopt(const RobotArgument& argument, const std::string& directory) {
   fs::create_directories(place, error);
   const fs::path file = place / (name + ".yaml");
   if (error)
-    throw ModelError(directory, "directory", "it cannot be created: " + error.message(), "give another one with -o");
+    throw InputError(directory, "directory", "it cannot be created: " + error.message(), "give another one with -o");
   if (fs::exists(file))
-    throw ModelError(file.string(), "file", "it already exists", "give another directory, or remove it");
+    throw InputError(file.string(), "file", "it already exists", "give another directory, or remove it");
   writeTextFile(file.string(), adoption.yaml);
   std::cout << (fs::path(directory) / (name + ".yaml")).lexically_normal().string() << "\n";
   for (const std::string& guess : adoption.guesses) std::cout << "  " << guess << "\n";

@@ -26,7 +26,7 @@ int run(const CampaignArguments& arguments) {
   options.bielle = std::filesystem::read_symlink("/proc/self/exe");
   options.simulate = findCompanion("bielle-simulate");
   if (options.simulate.find('/') == std::string::npos)
-    throw ModelError("", options.simulate, "it is not installed beside this program",
+    throw InputError("", options.simulate, "it is not installed beside this program",
                      "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody)");
   auto engine = makeTaskEngine(arguments.tasks);
   options.engine = engine.get();

@@ -21,7 +21,7 @@ struct CaseRun {
 
 // Runs the cases with a line for each, then `write`, which makes the requested output from them. Returns the exit
 // status: kFailed when the user interrupts, in which case nothing is written, or when cases crashed.
-// \throws ModelError as runCases does
+// \throws InputError as runCases does
 int runAndWrite(const CaseRun& run, const std::function<void(const CaseOutcomes&)>& write);
 
 // Prints the written files to the standard output, and notes to the standard error.

@@ -39,7 +39,7 @@ DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion)
 // One design, for others that search.
 int evaluateRequest(const DesignEvaluator& evaluator, const tasks::DesignRequest& request, const std::string& file) {
   if (request.x.size() != evaluator.robot().start().size())
-    throw ModelError("", "--evaluate", "it does not have one number for each variable of the design",
+    throw InputError("", "--evaluate", "it does not have one number for each variable of the design",
                      "give one number for each");
   writeTextFile(file, formatEvaluation(evaluateDesign(evaluator, request.stage, request.x)) + "\n");
   return kOk;

@@ -55,7 +55,7 @@ class StateReader {
 
  private:
   [[noreturn]] void fail(const std::string& element, const std::string& problem, const std::string& remedy) const {
-    throw ModelError(file_, element, problem, remedy);
+    throw InputError(file_, element, problem, remedy);
   }
 
   // A key given twice would silently hide the first one.

@@ -12,7 +12,7 @@ struct EvalState {
   std::vector<int> contacts;  // indices of the contacts in force, as listed
 };
 
-// Reads a file, or the standard input for "-". \throws ModelError naming the file and the element
+// Reads a file, or the standard input for "-". \throws InputError naming the file and the element
 EvalState readState(const Model& model, const std::string& path);
 
 // The part of eval's help that describes the format of a state.

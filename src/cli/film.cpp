@@ -38,7 +38,7 @@ class ScratchDirectory {
 std::string findBrowser() {
   for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
     if (isOnPath(name)) return name;
-  throw ModelError("", "browser", "Chromium, which draws the pictures, is not on the PATH",
+  throw InputError("", "browser", "Chromium, which draws the pictures, is not on the PATH",
                    "install it (Debian: chromium), or open the page with any browser");
 }
 
@@ -105,7 +105,7 @@ std::vector<std::string> takePictures(const std::string& page, const FilmOptions
     pictures.push_back(decodeBase64(result.out.substr(at, end - at)));
   }
   if (pictures.size() != (separate ? options.times.size() : 1))
-    throw ModelError(page, "pictures", "the browser drew only some of them, or none",
+    throw InputError(page, "pictures", "the browser drew only some of them, or none",
                      "open the page to see whether the browser supports WebGL; request fewer or smaller pictures");
   return pictures;
 }
@@ -120,7 +120,7 @@ void writeStrip(const std::string& page, const FilmOptions& options, const std::
 
 void writeFilm(const std::string& page, const FilmOptions& options, double rate, const std::string& path) {
   if (!isOnPath("ffmpeg"))
-    throw ModelError("", "ffmpeg", "it is not on the PATH, but is needed to make films", "install it (Debian: ffmpeg)");
+    throw InputError("", "ffmpeg", "it is not on the PATH, but is needed to make films", "install it (Debian: ffmpeg)");
   const std::vector<std::string> pictures = takePictures(page, options, true);
   const ScratchDirectory scratch;
   for (size_t i = 0; i < pictures.size(); ++i) {
@@ -135,7 +135,7 @@ void writeFilm(const std::string& page, const FilmOptions& options, double rate,
       600);
   std::error_code error;
   if (result.status != 0 || fs::file_size(made, error) == 0 || error)
-    throw ModelError(path, "film", "ffmpeg could not encode it", "check that it supports libx264; give an even size");
+    throw InputError(path, "film", "ffmpeg could not encode it", "check that it supports libx264; give an even size");
   std::ifstream film(made, std::ios::binary);
   AsideFile file(path);
   file.write({std::istreambuf_iterator<char>(film), std::istreambuf_iterator<char>()});

@@ -15,10 +15,10 @@ struct FilmOptions {
   std::string show, hide;  // layers, separated by commas
 };
 
-// One PNG with a picture per time. \throws ModelError when there is no browser, or it fails
+// One PNG with a picture per time. \throws InputError when there is no browser, or it fails
 void writeStrip(const std::string& page, const FilmOptions& options, const std::string& path);
 
-// H.264, `rate` pictures per second of real time. \throws ModelError when there is no browser or no ffmpeg, or one
+// H.264, `rate` pictures per second of real time. \throws InputError when there is no browser or no ffmpeg, or one
 // fails
 void writeFilm(const std::string& page, const FilmOptions& options, double rate, const std::string& path);
 

@@ -15,7 +15,7 @@ struct TimingArguments {
 // --free-timings and --time-weight. \param arguments  must outlive the parser
 void addTimingOptions(CLI::App& sub, TimingArguments& arguments);
 
-// \throws ModelError when the text of a phase makes no sense
+// \throws InputError when the text of a phase makes no sense
 TimingOptions makeTimings(const TimingArguments& arguments);
 
 // A table of the chosen durations, unless there are none.

@@ -64,10 +64,10 @@ int run(const LiftArguments& arguments) {
   requireApart(arguments.directory, {arguments.serial_directory});
   const MotionSummary summary = readSummary(arguments.serial_directory);
   if (summary.model != "serial")
-    throw ModelError(summary.file, "model '" + summary.model + "'", "it is not a motion of the serial model",
+    throw InputError(summary.file, "model '" + summary.model + "'", "it is not a motion of the serial model",
                      "make one with `bielle solve " + summary.motion + " --model serial`");
   if (summary.step != StepRule::Euler)
-    throw ModelError(summary.file, std::string("step '") + getName(summary.step) + "'",
+    throw InputError(summary.file, std::string("step '") + getName(summary.step) + "'",
                      "only motions with Euler steps, which have accelerations at their nodes, can be lifted",
                      "make one with `bielle solve " + summary.motion + " --model serial --step euler`");
   const MotionRecord record = readResultRecord(arguments.serial_directory);

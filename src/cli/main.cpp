@@ -80,7 +80,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     return fail(describe(app, error, argc, argv), kBadInput);
-  } catch (const bielle::ModelError& error) {
+  } catch (const bielle::InputError& error) {
     return fail(error.what(), kBadInput);
   } catch (const std::exception& error) {
     return fail(error.what(), kFailed);
@@ -94,7 +94,7 @@ int main(int argc, char** argv) {
   const int status = run(argc, argv);
   try {
     bielle::finishStandardOutput();
-  } catch (const bielle::ModelError& error) {
+  } catch (const bielle::InputError& error) {
     if (status == bielle::cli::kOk) return fail(error.what(), bielle::cli::kBadInput);
   }
   return status;

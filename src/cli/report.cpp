@@ -48,7 +48,7 @@ void readSize(const std::string& text, FilmOptions& film) {
   char rest = 0;
   if (std::sscanf(text.c_str(), "%dx%d%c", &film.width, &film.height, &rest) != 2 || film.width < 16 ||
       film.height < 16 || film.width > 8192 || film.height > 8192)
-    throw ModelError("", "--size '" + text + "'", "it is not of the form WIDTHxHEIGHT with 16 to 8192 pixels each",
+    throw InputError("", "--size '" + text + "'", "it is not of the form WIDTHxHEIGHT with 16 to 8192 pixels each",
                      "e.g. --size 640x480");
 }
 

@@ -23,7 +23,7 @@ int readPort(const std::string& text) {
   const bool is_number = !text.empty() && text.size() <= 5 && text.find_first_not_of("0123456789") == std::string::npos;
   const int port = is_number ? std::stoi(text) : 0;
   if (port < 1 || port > kMostPort)
-    throw ModelError("", "--workers " + text, "it is not a port", "give 1 to 65535, or auto for any free port");
+    throw InputError("", "--workers " + text, "it is not a port", "give 1 to 65535, or auto for any free port");
   return port;
 }
 
@@ -50,10 +50,10 @@ std::unique_ptr<tasks::TaskEngine> makeTaskEngine(const TaskArguments& arguments
   if (arguments.workers.empty()) return std::make_unique<tasks::LocalTasks>(arguments.jobs);
   const int port = readPort(arguments.workers);
   if (!arguments.password.empty() && readTextFile(arguments.password).find_first_not_of(" \n") == std::string::npos)
-    throw ModelError(arguments.password, "file", "it is empty", "write a password into it");
+    throw InputError(arguments.password, "file", "it is empty", "write a password into it");
   const std::string program = findCompanion("bielle-workers");
   if (program.find('/') == std::string::npos)
-    throw ModelError("", program, "it is not installed beside this program",
+    throw InputError("", program, "it is not installed beside this program",
                      "install the packages coop-computing-tools and coop-computing-tools-dev, and build Bielle again");
   auto engine = std::make_unique<tasks::WorkerTasks>(tasks::WorkerOptions{program, port, arguments.password});
   std::cerr << "start workers with: work_queue_worker " << (arguments.password.empty() ? "" : "--password FILE ")

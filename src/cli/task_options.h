@@ -18,7 +18,7 @@ struct TaskArguments {
 // Adds --jobs (with its help), --workers and --password.
 void addTaskOptions(CLI::App& command, const std::string& jobs_help, TaskArguments& arguments);
 
-// With workers, prints how they join to the standard error. \throws ModelError when there can be none
+// With workers, prints how they join to the standard error. \throws InputError when there can be none
 std::unique_ptr<tasks::TaskEngine> makeTaskEngine(const TaskArguments& arguments);
 
 }  // namespace bielle::cli

@@ -20,7 +20,7 @@ namespace bielle {
 class DeadPointStop {
  public:
   /// \param q  nq: closed, where all transmissions are 1   \param stop  s_0; 0: no stops
-  /// \throws ModelError when there are stops and q is open or a dead point
+  /// \throws InputError when there are stops and q is open or a dead point
   DeadPointStop(const Model& model, ConstVectorRef q, double stop);
   /// Adds (2) to the torques (nu). It neither allocates nor throws.
   void add(const Measurement& measurement, VectorRef u);

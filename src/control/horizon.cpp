@@ -166,12 +166,12 @@ Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOp
                             const PredictiveOptions& options) {
   checkNodes(options);
   if (plan.stages.size() < 2 || plan.schedule.phases.empty() || plan.guess.us.empty() || plan.guess.xs.empty())
-    throw ModelError(model.name(), "motion '" + plan.name + "'", "its plan has no stage, phase or guess",
+    throw InputError(model.name(), "motion '" + plan.name + "'", "its plan has no stage, phase or guess",
                      "fill them in, e.g. by planSquat()");
   const size_t copies = static_cast<size_t>(options.nodes);
   const StageSpec last = *(plan.stages.end() - 2);
   if (last.kind != StageKind::Dynamics)
-    throw ModelError(model.name(), "motion '" + plan.name + "'", "it ends with an impact",
+    throw InputError(model.name(), "motion '" + plan.name + "'", "it ends with an impact",
                      "let it end with the robot standing");
   plan.stages.insert(plan.stages.end() - 1, copies, last);
   plan.schedule.phases.back().nodes += options.nodes;

@@ -27,7 +27,7 @@ PassiveJoints::PassiveJoints(const Model& model, ConstVectorRef q) : model_(mode
   for (Linkage& linkage : selectLinkages(model, reduction)) {
     const ReducedCluster& cluster = *linkage.cluster;
     if (linkage.size() != cluster.size)
-      throw ModelError(
+      throw InputError(
           model.name(), "closure '" + model.closures()[cluster.closure_indices.front()].name + "'",
           "its linkage has " + std::to_string(linkage.size()) + " motors and mobility " + std::to_string(cluster.size),
           "an estimator needs as many motors as mobility");
@@ -40,7 +40,7 @@ PassiveJoints::PassiveJoints(const Model& model, ConstVectorRef q) : model_(mode
     const int motor = model.findMotor(joint.name);
     if (joint.kind == JointKind::FreeFlyer && i == 1) continue;
     if (motor < 0)
-      throw ModelError(model.name(), "joint '" + joint.name + "'", "no motor determines its position",
+      throw InputError(model.name(), "joint '" + joint.name + "'", "no motor determines its position",
                        "an estimator needs a motor, or a linkage driven by motors");
     places_[joint.idx_v] = {-1, motor};
   }

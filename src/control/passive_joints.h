@@ -27,7 +27,7 @@ class PassiveJoints {
   static constexpr double kDeadPointMargin = 0.02;
 
   /// \param model  must outlive it   \param q  closed configuration at which ranks are determined
-  /// \throws ModelError when motors do not determine a joint other than the free-flyer of the trunk
+  /// \throws InputError when motors do not determine a joint other than the free-flyer of the trunk
   PassiveJoints(const Model& model, ConstVectorRef q);
 
   /// Starts from a closed configuration.

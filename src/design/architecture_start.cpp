@@ -37,7 +37,7 @@ std::vector<int> findNamed(const Model& model, const std::vector<std::string>& n
   std::vector<std::string> unknown;
   std::vector<int> motors = findMotors(model, names, &unknown);
   if (!unknown.empty())
-    throw ModelError(model.name(), std::string(where) + ": motor '" + unknown.front() + "'", "there is no such motor",
+    throw InputError(model.name(), std::string(where) + ": motor '" + unknown.front() + "'", "there is no such motor",
                      "`bielle info` lists them; * stands for any text");
   for (int m = 0; m < model.nu() && names.empty(); ++m) motors.push_back(m);
   return motors;
@@ -62,7 +62,7 @@ void readNames(const std::vector<ObjectiveTerm>& objective, const std::vector<De
     };
     named.erase(std::remove_if(named.begin(), named.end(), [&](int m) { return !is_limited(m); }), named.end());
     if (named.empty())
-      throw ModelError(model.name(), std::string("constraints: ") + getName(constraint.measure),
+      throw InputError(model.name(), std::string("constraints: ") + getName(constraint.measure),
                        "none of the motors has such a limit",
                        "choose `motor` from a catalogue, or give the windings in the robot's YAML file");
     start.constraint_motors.push_back(std::move(named));
@@ -85,7 +85,7 @@ ArchitectureStart makeArchitectureStart(Model model, const std::vector<DesignMot
     start.solved.emplace_back();
     try {
       start.solved.back() = solveStartMotion(start.model, motion, options.solver, options.postures, must_keep);
-    } catch (const ModelError&) {  // designs are solved from the plan's guess
+    } catch (const InputError&) {  // designs are solved from the plan's guess
       if (must_solve) throw;
     }
   }

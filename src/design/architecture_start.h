@@ -18,7 +18,7 @@ struct ArchitectureStart {
 
 /// \param must_solve  whether a motion that fails is an error
 /// \param must_keep  whether motions are carried over to other designs
-/// \throws ModelError for unknown motors, motors without the limits of a constraint, and the motions that must be
+/// \throws InputError for unknown motors, motors without the limits of a constraint, and the motions that must be
 ArchitectureStart makeArchitectureStart(Model model, const std::vector<DesignMotion>& motions,
                                         const std::vector<ObjectiveTerm>& objective, const EvaluationOptions& options,
                                         bool must_solve, bool must_keep);

@@ -18,7 +18,7 @@ enum class LinkageSide {
 class LinkageConditioning {
  public:
   /// The model must outlive it.
-  /// \param q  closed configuration at which ranks are determined. \throws ModelError as makeReduction
+  /// \param q  closed configuration at which ranks are determined. \throws InputError as makeReduction
   LinkageConditioning(const Model& model, ConstVectorRef q, LinkageSide side = LinkageSide::Motors);
   /// The worst cluster at a closed configuration; infinite if one has lost rank.
   double calc(ConstVectorRef q);

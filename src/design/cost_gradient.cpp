@@ -21,7 +21,7 @@ VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const
     const Model ahead = robot.make(x + dx), behind = robot.make(x - dx);
     gradient[i] = envelope.calcDerivative(plan(ahead), plan(behind), step);
     if (!std::isfinite(gradient[i]))
-      throw ModelError(robot.startModel().name(), "variable '" + robot.variables()[static_cast<size_t>(i)].name + "'",
+      throw InputError(robot.startModel().name(), "variable '" + robot.variables()[static_cast<size_t>(i)].name + "'",
                        "no gradient: the motion cannot be transferred to neighbouring robots",
                        "move x away from the limit at which the mechanism no longer closes");
   }

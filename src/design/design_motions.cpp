@@ -157,7 +157,7 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
   MotionOutcome outcome = load(model, motion);
   solve(makeDesignMotion(*outcome.loaded, motion, makeStandingPosture(*outcome.loaded)), nullptr, options, {}, outcome);
   if (outcome.missing > 0)
-    throw ModelError(model.name(), "start design", outcome.message, "request a motion that the robot can make");
+    throw InputError(model.name(), "start design", outcome.message, "request a motion that the robot can make");
   const ShootingTrajectory& solution = outcome.solution->trajectory;
   const Motion& solved = outcome.solution->motion;
   SolvedMotion out{makeRecord(solved, solution), solved.goals, solved.schedule, {}, {}, {}};
@@ -166,7 +166,7 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
     out.postures.push_back(solution.xs[p * last / std::max(1, postures - 1)].head(model.nq()));
   try {
     addKeptMotion(*outcome.loaded, motion, out);
-  } catch (const ModelError&) {  // no serial chain, or impacts: motions can be solved but not kept
+  } catch (const InputError&) {  // no serial chain, or impacts: motions can be solved but not kept
     if (must_keep) throw;
   }
   return out;

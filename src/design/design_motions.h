@@ -61,7 +61,7 @@ struct MotionOutcome {
 
 /// \param model  without payload, here and below   \param postures  that are listed
 /// \param must_keep  whether the motion has to have a serial equivalent
-/// \throws ModelError when the motion fails
+/// \throws InputError when the motion fails
 SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, const FddpOptions& options, int postures,
                               bool must_keep);
 

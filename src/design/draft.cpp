@@ -16,10 +16,10 @@ int RobotDraft::findMovable(const std::string& name, bool& is_joint) const {
   is_joint = joint > 0;
   if (is_joint) return joint;
   if (frame < 0)
-    throw ModelError(model_.name(), "place '" + name + "'", "there is no such joint or frame",
+    throw InputError(model_.name(), "place '" + name + "'", "there is no such joint or frame",
                      "`bielle info` lists them");
   if (getLink(model_.frames()[frame].body) == name)
-    throw ModelError(model_.name(), "place '" + name + "'", "it is a link, which is the origin of its own coordinates",
+    throw InputError(model_.name(), "place '" + name + "'", "it is a link, which is the origin of its own coordinates",
                      "name the joint that carries it");
   return frame;
 }
@@ -35,7 +35,7 @@ Vector3d RobotDraft::getPlaceIn(int body, const std::string& name) const {
   if (model_.joints()[body].name == name) return Vector3d::Zero();
   const Place place = getPlace(name);
   if (place.body != body)
-    throw ModelError(model_.name(), "place '" + name + "'",
+    throw InputError(model_.name(), "place '" + name + "'",
                      "it is fixed to '" + getLink(place.body) + "', not to '" + getLink(body) + "'",
                      "name two places of one body");
   return place.p;
@@ -51,7 +51,7 @@ int RobotDraft::findLink(const std::string& name) const {
   int body = 1;
   while (body < model_.numBodies() && model_.bodies()[body].name != name) ++body;
   if (body == model_.numBodies())
-    throw ModelError(model_.name(), "link '" + name + "'", "there is no such body", "`bielle info` lists them");
+    throw InputError(model_.name(), "link '" + name + "'", "there is no such body", "`bielle info` lists them");
   return body;
 }
 

@@ -17,10 +17,10 @@ class RobotDraft {
     Vector3d p = Vector3d::Zero();
   };
   /// Position of a joint in its parent body, or of a frame in its body.
-  /// \throws ModelError when there is neither, or the name is that of a whole body
+  /// \throws InputError when there is neither, or the name is that of a whole body
   Place getPlace(const std::string& name) const;
   /// A place by name in the frame of `body`: that of getPlace, or the origin for the joint that carries `body`.
-  /// \throws ModelError when it is fixed to another body
+  /// \throws InputError when it is fixed to another body
   Vector3d getPlaceIn(int body, const std::string& name) const;
   /// Moves a joint with everything that it carries, or a frame with the closures, springs and contacts attached to it.
   void setPlace(const std::string& name, const Vector3d& p);

@@ -45,17 +45,17 @@ void DesignEvaluator::Data::checkSpec() {
   const bool needs_motions = std::any_of(objective.begin(), objective.end(), is_of_motions) ||
                              std::any_of(options.constraints.begin(), options.constraints.end(), is_of_motions);
   if (motions.empty() && needs_motions)
-    throw ModelError(model.name(), "motions", "there are none", "name at least one");
+    throw InputError(model.name(), "motions", "there are none", "name at least one");
   for (const DesignMotion& motion : motions) {
     if (!(motion.weight >= 0 && std::isfinite(motion.weight)))
-      throw ModelError(model.name(), "motion '" + motion.name + "'", "its weight is negative or not finite",
+      throw InputError(model.name(), "motion '" + motion.name + "'", "its weight is negative or not finite",
                        "give 0 or more");
     addPayload(model, motion.payload);  // \throws what is wrong with it
   }
-  if (objective.empty()) throw ModelError(model.name(), "objective", "it is empty", "name a measure");
+  if (objective.empty()) throw InputError(model.name(), "objective", "it is empty", "name a measure");
   for (const ObjectiveTerm& term : objective) {
     if (!(term.weight > 0 && std::isfinite(term.weight)))
-      throw ModelError(model.name(), std::string("objective: ") + getName(term.measure), "its weight is not positive",
+      throw InputError(model.name(), std::string("objective: ") + getName(term.measure), "its weight is not positive",
                        "give a positive number");
     weight += term.weight;
     requested.insert(term.measure);
@@ -66,11 +66,11 @@ void DesignEvaluator::Data::checkSpec() {
       const auto has = [&](const VectorXd& x) { return !findBodyPairs(robot.make(x), {names}).empty(); };
       const std::vector<VectorXd> all = robot.listCombinations();
       if (std::none_of(all.begin(), all.end(), has))
-        throw ModelError(model.name(), "constraints: distance: except [" + names[0] + ", " + names[1] + "]",
+        throw InputError(model.name(), "constraints: distance: except [" + names[0] + ", " + names[1] + "]",
                          "there are no two such bodies", "`bielle info` lists them; * stands for any text");
     }
     if (constraint.measure == Measure::Margin && model.serialJoints().empty())
-      throw ModelError(model.name(), "constraints: margin", "the robot has no serial joints, which the margin is about",
+      throw InputError(model.name(), "constraints: margin", "the robot has no serial joints, which the margin is about",
                        "name them in its YAML file, `serial_joints`");
   }
 }
@@ -110,11 +110,11 @@ void DesignEvaluator::Data::solveStart() {
   const Model& model = base.model;
   makeMotions(base, model, start);
   if (start.status != DesignStatus::Feasible)
-    throw ModelError(model.name(), "start design", start.message, "request a motion that the robot can make");
+    throw InputError(model.name(), "start design", start.message, "request a motion that the robot can make");
   for (size_t i = 0; i < objective.size(); ++i) {
     start.terms.push_back(calcTerm(i, base, model, start.motions));
     if (!(start.terms[i] > 0 && std::isfinite(start.terms[i])))
-      throw ModelError(model.name(), std::string("objective: ") + getName(objective[i].measure),
+      throw InputError(model.name(), std::string("objective: ") + getName(objective[i].measure),
                        "its value at the start design is zero or infinite",
                        "choose another measure, other motors or other weights of motions");
   }
@@ -129,7 +129,7 @@ void DesignEvaluator::Data::makeMotions(const ArchitectureStart& base, const Mod
   for (size_t i = 0; i < motions.size(); ++i) {
     const SolvedMotion* from = base.solved[i] ? &*base.solved[i] : nullptr;
     if (!from && options.mode == MotionMode::Kept)
-      throw ModelError(model.name(), motions[i].name, "the start design with these parts cannot make it",
+      throw InputError(model.name(), motions[i].name, "the start design with these parts cannot make it",
                        "leave them out");
     MotionOutcome outcome = options.mode == MotionMode::Kept
                                 ? keepMotion(model, motions[i], *from, drives, options.margin)
@@ -253,7 +253,7 @@ Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<Motion
     makeMotions(base, model, out, outcomes);
     if (out.status == DesignStatus::Feasible) sumUp(base, model, out);
     if (made) *made = std::move(model);
-  } catch (const ModelError& error) {  // numbers that define no robot, postures from which no motion can start
+  } catch (const InputError& error) {  // numbers that define no robot, postures from which no motion can start
     out.status = DesignStatus::MotionFailed;
     out.message = error.what();
     out.value = weight * 2;
@@ -273,7 +273,7 @@ Evaluation DesignEvaluator::solveUsually(const VectorXd& x) const {
     ShootingTrajectory trajectory;
     try {
       outcome = bielle::solveUsually(model, motion, drives, trajectory);
-    } catch (const ModelError& error) {  // there is no guess to start from
+    } catch (const InputError& error) {  // there is no guess to start from
       outcome.message = motion.name + ": " + error.what();
     }
     if (!data_->addMotion(motion.name, base, 1, trajectory, outcome, out)) return out;

@@ -114,7 +114,7 @@ struct SlopedEvaluation {
 /// not depend on the order, by any number of threads at a time.
 class DesignEvaluator {
  public:
-  /// \throws ModelError when the motions of the start design fail, or the objective names unknown motors
+  /// \throws InputError when the motions of the start design fail, or the objective names unknown motors
   DesignEvaluator(const Parametrization& robot, std::vector<DesignMotion> motions, std::vector<ObjectiveTerm> objective,
                   const EvaluationOptions& options = {});
   ~DesignEvaluator();
@@ -122,7 +122,7 @@ class DesignEvaluator {
   Evaluation evaluate(const VectorXd& x) const;
   /// The same with gradients (gradient.h, optimum_gradient.h). If they do not exist, as at a dead point, the design counts as one whose
   /// motion fails.
-  /// \throws ModelError when a measure has no gradient
+  /// \throws InputError when a measure has no gradient
   SlopedEvaluation differentiate(const VectorXd& x) const;
   /// The same with every motion as `bielle solve` makes it, by its usual steps and not from a motion of the start
   /// design. Its cost is that of another discretization.

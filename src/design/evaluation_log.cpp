@@ -124,7 +124,7 @@ EvaluationLog::EvaluationLog(const std::string& path, const std::string& header,
                                         evaluator.objective().size(), evaluator.constraints().size());
       if (!flaw.empty()) throw std::runtime_error(flaw);
     } catch (const std::exception& error) {
-      throw ModelError(path, "line " + std::to_string(line), "it was changed or damaged: " + describeJsonError(error),
+      throw InputError(path, "line " + std::to_string(line), "it was changed or damaged: " + describeJsonError(error),
                        "remove the file to repeat the search");
     }
   }
@@ -135,7 +135,7 @@ std::optional<LoggedEvaluation> EvaluationLog::replay(const std::string& stage, 
   const LoggedEvaluation evaluation = left_.front();
   left_.pop_front();
   if (evaluation.stage != stage || evaluation.x != x)
-    throw ModelError(log_.getPath(), "log", "its evaluations do not belong to this search",
+    throw InputError(log_.getPath(), "log", "its evaluations do not belong to this search",
                      "remove the file to repeat the search");
   return evaluation;
 }

@@ -51,7 +51,7 @@ void addShares(const MotorTrace& trace, Eigen::Index m, const Motor& motor, Moto
 
 std::vector<MotorConversion> makeDrives(const Model& model, const DriveTable& table) {
   const auto require = [&](bool ok, const std::string& element, const std::string& problem, const std::string& remedy) {
-    if (!ok) throw ModelError(model.name(), "drives: " + element, problem, remedy);
+    if (!ok) throw InputError(model.name(), "drives: " + element, problem, remedy);
   };
   const auto requireConstant = [&](double value, const std::string& element) {
     require(value > 0 && std::isfinite(value), element, "it is not positive",

@@ -54,7 +54,7 @@ struct DriveTable {
   double regeneration = 0;
   std::vector<std::pair<std::string, double>> motor_constants;
 };
-/// \throws ModelError for unknown motors, constants that are not positive, shares outside 0 .. 1
+/// \throws InputError for unknown motors, constants that are not positive, shares outside 0 .. 1
 std::vector<MotorConversion> makeDrives(const Model& model, const DriveTable& table);
 
 /// Measures of one motor over a motion of N stages.

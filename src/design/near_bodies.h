@@ -18,7 +18,7 @@ namespace bielle {
 using BodyPairs = std::set<std::pair<int, int>>;
 
 /// Of those that listShapePairs() names, those whose shapes overlap in the standing posture, both fitted.
-/// \throws ModelError when the robot cannot stand
+/// \throws InputError when the robot cannot stand
 BodyPairs findOverlaps(const Model& model);
 
 /// Every pair of bodies that two names fit, in which * stands for any text.

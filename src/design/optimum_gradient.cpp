@@ -210,7 +210,7 @@ std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const V
     return out;
   } catch (const std::invalid_argument& error) {  // an optimum that is none to second order, a plan with other stages
     return fail(std::string(": ") + error.what());
-  } catch (const ModelError& error) {
+  } catch (const InputError& error) {
     return fail(std::string(": ") + error.what());
   }
 }

@@ -61,7 +61,7 @@ bool matters(const Parametrization& robot, const VectorXd& x, size_t i) {
   const DesignVariable& variable = robot.variables()[i];
   try {
     return variable.isArchitecture() || format_with(variable.lower) != format_with(variable.upper);
-  } catch (const ModelError&) {  // one of them defines no robot
+  } catch (const InputError&) {  // one of them defines no robot
     return true;
   }
 }

@@ -86,12 +86,12 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
     const DesignVariable& variable = variables_[i];
     const std::string element = "variable '" + variable.name + "'";
     if (variable.isChoice())
-      throw ModelError(source_, element,
+      throw InputError(source_, element,
                        "a given robot has no parts to choose, and its links include the masses of its motors",
                        "give the `ratio` of its motors, or a generator");
     const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.motors.empty();
     if (!variable.parameter.empty() || kinds != 1)
-      throw ModelError(source_, element, "it is not a length, a shift or a ratio",
+      throw InputError(source_, element, "it is not a length, a shift or a ratio",
                        "give `length`, `shift` or `ratio`; `parameter` is for generated robots");
     RobotDraft draft(model_);
     for (const ShiftChange& shift : variable.shifts) draft.getPlace(shift.of);
@@ -100,7 +100,7 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
       const double length = getLine(draft, change).along.norm();
       if (k == 0) start_[static_cast<Eigen::Index>(i)] = length;
       if (!(length > 1e-9 && length + variable.lower - start_[static_cast<Eigen::Index>(i)] > 1e-9))
-        throw ModelError(source_, element,
+        throw InputError(source_, element,
                          "the distance of '" + change.from + "' and '" + change.to + "' is zero, or would become zero",
                          "name two separate places, or raise the lower bound");
       setLength(draft, change, length, length);
@@ -120,7 +120,7 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
   for (size_t i = 0; i < variables_.size(); ++i) {
     const DesignVariable& variable = variables_[i];
     if (variable.parameter.empty() && variable.motors.empty())
-      throw ModelError(source_, "variable '" + variable.name + "'",
+      throw InputError(source_, "variable '" + variable.name + "'",
                        "it is neither a parameter of the generator nor one of its motors",
                        "give `parameter`, `ratio` or `motor`; `length` and `shift` are for given robots");
     if (variable.parameter.empty()) continue;
@@ -134,13 +134,13 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
     }
     const double* value = std::get_if<double>(&parameter.value);
     if (!value)
-      throw ModelError(source_, "variable '" + variable.name + "'",
+      throw InputError(source_, "variable '" + variable.name + "'",
                        "parameter '" + parameter.name + "' does not vary continuously",
                        "give it `choices`, or set it for all designs");
     start = *value;
     const OptionBounds& bounds = parameter.bounds;
     if (!(variable.lower >= bounds.lower && variable.upper <= bounds.upper))
-      throw ModelError(source_, "variable '" + variable.name + "'",
+      throw InputError(source_, "variable '" + variable.name + "'",
                        "its bounds " + describeRange(variable.lower, variable.upper) +
                            " go beyond those of parameter '" + parameter.name + "', " +
                            describeRange(bounds.lower, bounds.upper) +
@@ -200,7 +200,7 @@ void Parametrization::refuseSharedTargets(const Model& robot) const {
     for (const std::string& target : listTargets(variable, robot)) {
       const std::string& owner = owners.emplace(target, variable.name).first->second;
       if (owner != variable.name)
-        throw ModelError(source_, "variables '" + owner + "' and '" + variable.name + "'", "both set " + target,
+        throw InputError(source_, "variables '" + owner + "' and '" + variable.name + "'", "both set " + target,
                          "keep one of them");
     }
 }
@@ -221,7 +221,7 @@ void Parametrization::readStart() {
       }
       const std::vector<int> named = findMotors(robot, variable.motors);
       if (named.empty())
-        throw ModelError(source_, "variable '" + variable.name + "'", "the robot has no such motor",
+        throw InputError(source_, "variable '" + variable.name + "'", "the robot has no such motor",
                          "`bielle info` lists them; * stands for any text");
       const MotorDrive& drive = motors[static_cast<size_t>(named.front())].drive;
       if (!choices) start = drive.ratio;
@@ -235,7 +235,7 @@ void Parametrization::readStart() {
 }
 
 void Parametrization::finish() {
-  if (variables_.empty()) throw ModelError(source_, "variables", "there are none", "name at least one");
+  if (variables_.empty()) throw InputError(source_, "variables", "there are none", "name at least one");
   for (DesignVariable& variable : variables_)
     if (variable.isChoice()) variable.lower = 0, variable.upper = static_cast<double>(variable.choices.size()) - 1;
   readStart();
@@ -248,15 +248,15 @@ void Parametrization::finish() {
     std::ostringstream bounds;
     bounds << variable.lower << " .. " << variable.upper;
     const std::string element = "variable '" + variable.name + "'";
-    if (!names.insert(variable.name).second) throw ModelError(source_, element, "it is given twice", "rename one");
+    if (!names.insert(variable.name).second) throw InputError(source_, element, "it is given twice", "rename one");
     if (!(std::isfinite(variable.lower) && std::isfinite(variable.upper) &&
           (variable.isChoice() || variable.lower < variable.upper)))
-      throw ModelError(source_, element, "its bounds " + bounds.str() + " are in the wrong order",
+      throw InputError(source_, element, "its bounds " + bounds.str() + " are in the wrong order",
                        "give the lower one first");
     if (!(start_[k] >= variable.lower && start_[k] <= variable.upper)) {
       std::ostringstream problem;
       problem << "the robot has " << describeValue(variable, start_[k]) << ", outside its bounds " << bounds.str();
-      throw ModelError(source_, element, problem.str(),
+      throw InputError(source_, element, problem.str(),
                        variable.motors.empty() ? "widen the bounds" : "widen the bounds, or give `start`");
     }
   }
@@ -297,7 +297,7 @@ std::vector<VectorXd> Parametrization::listCombinations() const {
 
 Model Parametrization::make(const VectorXd& x) const {
   if (x.size() != start_.size() || !x.allFinite())
-    throw ModelError(source_, "design", "it does not have one finite number for each variable");
+    throw InputError(source_, "design", "it does not have one finite number for each variable");
   return changeMotors(generator_.empty() ? changePlaces(x) : generate(x), x);
 }
 

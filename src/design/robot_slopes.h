@@ -28,7 +28,7 @@ struct RobotSlopes {
 };
 
 /// Central differences between robots made for x, a hundred-thousandth of the bounds apart; motions do not come into it.
-/// \param drives  of those robots   \throws ModelError as Parametrization::make
+/// \param drives  of those robots   \throws InputError as Parametrization::make
 RobotSlopes calcRobotSlopes(const Parametrization& robot, const VectorXd& x, const DriveTable& drives);
 
 }  // namespace bielle

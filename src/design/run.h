@@ -81,7 +81,7 @@ struct DesignRun {
   std::vector<FrontDesign> front;             ///< if one is requested, by increasing first measure
 };
 
-/// \throws ModelError when a log belongs to another problem, is used by another process, or cannot be written
+/// \throws InputError when a log belongs to another problem, is used by another process, or cannot be written
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options);
 
 /// The masses of a design's motors which are known from a catalogue and which no variable gives to its links, where
@@ -91,7 +91,7 @@ double calcMassInLinks(const Parametrization& robot, const VectorXd& x);
 /// Writes DIR/best (a robot), DIR/front/01 and so on (those of the front, if there is one), design.md (before and after) and, if gnuplot is installed, design.svg (values over the
 /// evaluations), design_front.svg, design_MOTION.svg (torques and speeds before and after) and design_mechanism.svg (both
 /// mechanisms).
-/// The same run, resumed or not, writes the same bytes. Returns the paths. \throws ModelError when a file cannot be
+/// The same run, resumed or not, writes the same bytes. Returns the paths. \throws InputError when a file cannot be
 /// written
 std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,
                                      const DesignSpec& spec, const DesignRun& run);

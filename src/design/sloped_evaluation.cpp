@@ -101,7 +101,7 @@ MeasurePieces DesignEvaluator::Data::calcLimits(const ArchitectureStart& base, c
 SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   Data& data = *data_;
   if (const auto obstacle = findGradientObstacle(data.options.mode, data.objective, data.options.constraints))
-    throw ModelError(data.robot.startModel().name(), "search", obstacle->problem, obstacle->remedy);
+    throw InputError(data.robot.startModel().name(), "search", obstacle->problem, obstacle->remedy);
   std::vector<MotionOutcome> outcomes;
   std::optional<Model> model;
   SlopedEvaluation out{data.evaluate(x, &outcomes, &model), {}, {}};

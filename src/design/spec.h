@@ -100,10 +100,10 @@ struct DesignSpec {
   std::optional<FrontSpec> front;  ///< then there are no searches and stages
 };
 
-/// \throws ModelError naming the file, the key with its line, and the remedy
+/// \throws InputError naming the file, the key with its line, and the remedy
 DesignSpec readDesignSpec(const std::string& path);
 
-/// The robot of a file with its variables. \throws ModelError when there is no such robot or variable
+/// The robot of a file with its variables. \throws InputError when there is no such robot or variable
 Parametrization makeParametrization(const DesignSpec& spec);
 
 }  // namespace bielle

@@ -18,7 +18,7 @@ RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map);
 std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry, bool weighed = false);
 
 // \param file  the file that names the robot: paths are relative to it
-// \throws ModelError when there is no such robot, generator or parameter
+// \throws InputError when there is no such robot, generator or parameter
 std::string locateRobot(const RobotSpec& spec, const std::string& file);
 Model makeRobot(const RobotSpec& spec, const std::string& file);
 // The directory of its files; empty for one of a generator.

@@ -72,7 +72,7 @@ std::vector<ModelVariation> calcVariations(const Parametrization& robot, const V
     for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
       const Model there = make(x + steps * h * VectorXd::Unit(x.size(), i));
       if (!isSameButForPlaces(here, there))
-        throw ModelError(here.name(), "variable '" + robot.variables()[i].name + "'",
+        throw InputError(here.name(), "variable '" + robot.variables()[i].name + "'",
                          "it changes an axis, a gain or gravity, for which motor torques have no gradient",
                          "search without gradients, with bobyqa or sbplx");
       addChange(here, there, weight / (12 * h), out[i]);

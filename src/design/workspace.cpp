@@ -23,10 +23,10 @@ using Kind = WorkspaceAxis::Kind;
 
 int findContact(const Model& model, const std::string& name) {
   if (model.contacts().empty())
-    throw ModelError(model.name(), "workspace", "the robot has no contacts", "name its feet in its YAML file");
+    throw InputError(model.name(), "workspace", "the robot has no contacts", "name its feet in its YAML file");
   const int contact = name.empty() ? 0 : model.findContact(name);
   if (contact < 0)
-    throw ModelError(model.name(), "workspace: foot '" + name + "'", "there is no such contact",
+    throw InputError(model.name(), "workspace: foot '" + name + "'", "there is no such contact",
                      "`bielle info` lists them");
   return contact;
 }
@@ -38,7 +38,7 @@ int findBase(const Model& model, const std::string& name) {
   }
   for (int i = 0; i < model.numBodies(); ++i)
     if (model.bodies()[i].name == name || (i == 0 && name == "world")) return i;
-  throw ModelError(model.name(), "workspace: base '" + name + "'", "there is no such link", "`bielle info` lists them");
+  throw InputError(model.name(), "workspace: base '" + name + "'", "there is no such link", "`bielle info` lists them");
 }
 
 // Ranges and counts with the defaults filled in.
@@ -55,13 +55,13 @@ std::array<WorkspaceAxis, 6> fillAxes(const Model& model, const WorkspaceRegion&
     if (axis.kind == Kind::Default) axis.kind = i > 2 && foot.kind == ContactKind::Point3D ? Kind::Free : Kind::Range;
     if (axis.kind == Kind::Free || axis.lower == axis.upper) axis.points = 1;
     if (!(axis.lower <= axis.upper && axis.points > 0))
-      throw ModelError(model.name(), std::string("workspace: ") + kAxes[i],
+      throw InputError(model.name(), std::string("workspace: ") + kAxes[i],
                        "its range is in the wrong order, or has no points",
                        "give the lower bound first, and at least one point");
     total *= axis.points;
   }
   if (total > kMostPoints)
-    throw ModelError(model.name(), "workspace", "it has more than 100000 points", "give fewer points per axis");
+    throw InputError(model.name(), "workspace", "it has more than 100000 points", "give fewer points per axis");
   return axes;
 }
 

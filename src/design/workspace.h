@@ -43,14 +43,14 @@ struct WorkspaceGrid {
   double max_conditioning = std::numeric_limits<double>::infinity();
 };
 
-/// \throws ModelError for unknown names, crossed ranges, more than 100000 points, a robot without contacts
+/// \throws InputError for unknown names, crossed ranges, more than 100000 points, a robot without contacts
 WorkspaceGrid makeWorkspaceGrid(const Model& start, const WorkspaceRegion& region);
 
 struct WorkspaceCoverage {
   std::vector<char> reached;  ///< by point
   double share = 0;           ///< 0 .. 1
 };
-/// \throws ModelError when the design cannot stand
+/// \throws InputError when the design cannot stand
 WorkspaceCoverage calcCoverage(const Model& model, const WorkspaceGrid& grid);
 
 }  // namespace bielle

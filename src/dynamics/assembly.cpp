@@ -268,10 +268,10 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
   for (const auto& [name, values] : reference.joints) {
     const int index = model.findJoint(name);
     const std::string element = "reference '" + reference.name + "'";
-    if (index < 0) throw ModelError(model.name(), element, "there is no joint '" + name + "'", "name a moving joint");
+    if (index < 0) throw InputError(model.name(), element, "there is no joint '" + name + "'", "name a moving joint");
     const Joint& joint = model.joints()[index];
     if (static_cast<int>(values.size()) != joint.nq)
-      throw ModelError(
+      throw InputError(
           model.name(), element,
           "joint '" + name + "' has " + std::to_string(joint.nq) + " values, not " + std::to_string(values.size()),
           "give its q in the order of notation.h");
@@ -282,7 +282,7 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
   for (const auto& [name, position] : reference.feet) {
     const int index = model.findContact(name);
     if (index < 0)
-      throw ModelError(model.name(), "reference '" + reference.name + "'", "there is no contact '" + name + "'",
+      throw InputError(model.name(), "reference '" + reference.name + "'", "there is no contact '" + name + "'",
                        "name one of the contacts of the file");
     const ContactFrame& contact = model.contacts()[index];
     FrameTarget target;
@@ -296,7 +296,7 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
   if (!reference.height_frame.empty()) {
     const int index = model.findFrame(reference.height_frame);
     if (index < 0)
-      throw ModelError(model.name(), "reference '" + reference.name + "'",
+      throw InputError(model.name(), "reference '" + reference.name + "'",
                        "there is no frame '" + reference.height_frame + "'", "name a link or frame");
     FrameTarget target;
     target.name = "height of " + reference.height_frame;
@@ -316,7 +316,7 @@ AssemblyResult assembleReference(const Model& model, const std::string& name, co
     if (reference.name == name) return assemble(model, makeReferenceProblem(model, reference), options);
     known += (known.empty() ? "" : ", ") + reference.name;
   }
-  throw ModelError(model.name(), "reference '" + name + "'", "the robot has no such reference",
+  throw InputError(model.name(), "reference '" + name + "'", "the robot has no such reference",
                    known.empty() ? "add one under `references` in its YAML file" : "it has: " + known);
 }
 

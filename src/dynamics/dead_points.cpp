@@ -152,7 +152,7 @@ std::vector<DeadPointTrace> traceDeadPoints(const Model& model, const RowMatrixX
   if (!qs.allFinite()) return {};
   try {
     linkages = listLinkagesAnywhere(model, qs.row(0).transpose());
-  } catch (const ModelError&) {  // its loops are open
+  } catch (const InputError&) {  // its loops are open
     return {};
   }
   std::vector<DeadPointTrace> traces;

@@ -48,7 +48,7 @@ int findScalarJoint(const Model& model, const std::string& name) {
   const std::string element = "joint '" + name + "'";
   const int index = model.findJoint(name);
   if (index < 0)
-    throw ModelError(
+    throw InputError(
         model.name(), element, "there is no moving joint of this name",
         "`bielle info` lists the joints; the serial ones are: " + [&model] {
           std::vector<std::string> serial;
@@ -57,7 +57,7 @@ int findScalarJoint(const Model& model, const std::string& name) {
         }());
   const Joint& joint = model.joints()[index];
   if (joint.nv != 1)
-    throw ModelError(
+    throw InputError(
         model.name(), element,
         "it is a " + std::string(getName(joint.kind)) + " joint of " + std::to_string(joint.nv) + " coordinates",
         "a ratio needs joints of one coordinate");
@@ -69,7 +69,7 @@ Linkage makeDirectLinkage(const Model& model, int joint) {
   const std::string& name = model.joints()[joint].name;
   const int motor = model.findMotor(name);
   if (motor < 0)
-    throw ModelError(model.name(), "joint '" + name + "'", "nothing drives it: it is in no loop and has no motor",
+    throw InputError(model.name(), "joint '" + name + "'", "nothing drives it: it is in no loop and has no motor",
                      "name a joint that a motor moves");
   linkage.joints = {joint};
   linkage.motors = {motor};
@@ -91,11 +91,11 @@ Linkage makeLoopLinkage(const Model& model, const ReducedCluster& cluster, int i
   const std::string mobility = "its linkage has mobility " + std::to_string(cluster.size),
                     motors = listItems(linkage.motor_names);
   if (linkage.size() != cluster.size)
-    throw ModelError(model.name(), element,
+    throw InputError(model.name(), element,
                      mobility + " and " + std::to_string(linkage.size()) + " motors (" + motors + ")",
                      "a ratio needs as many motors as mobility");
   if (static_cast<int>(linkage.joints.size()) != cluster.size)
-    throw ModelError(model.name(), element,
+    throw InputError(model.name(), element,
                      mobility + ", driven by " + motors + "; " + std::to_string(linkage.joints.size()) +
                          " of its joints are named or listed as serial joints",
                      "name " + std::to_string(cluster.size) + " joints of this linkage");
@@ -126,14 +126,14 @@ Linkage makeLinkage(const Model& model, const Reduction& reduction, const std::v
     for (size_t b = 0; b < reduction.clusters.size(); ++b)
       if (contains(reduction.clusters[b].joints, joint)) owner = static_cast<int>(b);
     if (!joints.empty() && (owner != cluster || owner < 0))
-      throw ModelError(model.name(), "joint '" + name + "'",
+      throw InputError(model.name(), "joint '" + name + "'",
                        "it is not in the linkage of '" + model.joints()[joints.front()].name + "'",
                        "name joints of one linkage at a time");
-    if (contains(joints, joint)) throw ModelError(model.name(), "joint '" + name + "'", "it is named twice", "");
+    if (contains(joints, joint)) throw InputError(model.name(), "joint '" + name + "'", "it is named twice", "");
     cluster = owner;
     joints.push_back(joint);
   }
-  if (joints.empty()) throw ModelError(model.name(), "joints", "none are named", "name a joint");
+  if (joints.empty()) throw InputError(model.name(), "joints", "none are named", "name a joint");
   return cluster < 0 ? makeDirectLinkage(model, joints.front())
                      : makeLoopLinkage(model, reduction.clusters[cluster], cluster, std::move(joints));
 }

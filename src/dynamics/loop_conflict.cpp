@@ -280,7 +280,7 @@ std::string describeRemedies(const Model& model, const LoopConflict& conflict) {
                            " is one of: " + out;
 }
 
-ModelError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open) {
+InputError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open) {
   std::string element = open.worst;
   std::string problem = "its loop cannot be closed: from every start it stays open by at least " +
                         formatNumber(open.gap, "%.6g") + " (m or rad)";

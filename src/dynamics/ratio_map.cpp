@@ -52,7 +52,7 @@ void append(const RatioSweep& sweep, std::vector<RatioSample>& dead_points) {
 RatioMap mapRatio(const Model& model, const Linkage& linkage, ConstVectorRef q, int count,
                   const SweepOptions& options) {
   if (linkage.size() != 2)
-    throw ModelError(model.name(), "linkage of joint '" + linkage.joint_names.front() + "'",
+    throw InputError(model.name(), "linkage of joint '" + linkage.joint_names.front() + "'",
                      "it has mobility " + std::to_string(linkage.size()) + ", but a map needs two joints",
                      "sweep one joint");
   RatioMap map;

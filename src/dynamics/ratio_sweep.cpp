@@ -230,7 +230,7 @@ RatioSweep sweepRatio(const Model& model, const Linkage& linkage, ConstVectorRef
   LinkageCurve curve(linkage, joint, q_cluster);
   CurvePoint start;
   if (!curve.start(start) || std::abs(start.joint_rate) < 1e-9)
-    throw ModelError(model.name(), "joint '" + linkage.joint_names[joint] + "'",
+    throw InputError(model.name(), "joint '" + linkage.joint_names[joint] + "'",
                      curve.why().empty() ? "the start is one of its dead points" : curve.why(),
                      "start from another configuration");
   RatioSweep sweep;

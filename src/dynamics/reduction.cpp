@@ -124,13 +124,13 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
     updatePositions(cluster.model, ws, q_cluster);
     for (const Closure& closure : cluster.closures.closures)
       if (!(calcClosureResidual(ws, closure).cwiseAbs().maxCoeff() < 1e-8))
-        throw ModelError(model.name(), "closure '" + closure.name + "'", "it is open at the given configuration",
+        throw InputError(model.name(), "closure '" + closure.name + "'", "it is open at the given configuration",
                          "close the configuration first (assemble, closeConfiguration)");
     out.clusters.push_back(std::move(cluster));
   }
   for (const PointSpring& spring : model.pointSprings())
     if (calcPointSpringLength(spring, whole) < kShortestSpring)
-      throw ModelError(model.name(), "point spring '" + spring.name + "'",
+      throw InputError(model.name(), "point spring '" + spring.name + "'",
                        "its points coincide at the given configuration, where its force has no direction",
                        "move one of its points, or start from another posture");
   // Reduced joints and their reduced coordinates, in the order of the first joint of each.
@@ -162,7 +162,7 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
     out.joints.push_back(reduced);
   }
   if (out.size == 0)
-    throw ModelError(model.name(), "closures", "they leave the robot without mobility", "see `bielle info` for ranks");
+    throw InputError(model.name(), "closures", "they leave the robot without mobility", "see `bielle info` for ranks");
   return out;
 }
 

@@ -75,7 +75,7 @@ struct Reduction {
 };
 
 /// \param q closed configuration at which ranks are determined
-/// \throws ModelError when q is not closed (to 1e-8), the points of a point spring are closer than kShortestSpring or the
+/// \throws InputError when q is not closed (to 1e-8), the points of a point spring are closer than kShortestSpring or the
 /// model has no mobility
 Reduction makeReduction(const Model& model, ConstVectorRef q);
 

@@ -172,7 +172,7 @@ std::vector<Linkage> listLinkages(const Model& model, ConstVectorRef q_reference
   std::vector<Linkage> out = listLinkagesAnywhere(model, q_reference);
   for (const Linkage& linkage : out)
     if (!hasReference(linkage))
-      throw ModelError(model.name(), "linkage of joint '" + model.joints()[linkage.cluster->joints.front()].name + "'",
+      throw InputError(model.name(), "linkage of joint '" + model.joints()[linkage.cluster->joints.front()].name + "'",
                        "the given posture is a dead point", "give another posture");
   return out;
 }

@@ -68,7 +68,7 @@ class Adopter {
 
  private:
   [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
-    throw ModelError(path_, "robot '" + model_.name() + "'", problem, remedy);
+    throw InputError(path_, "robot '" + model_.name() + "'", problem, remedy);
   }
 
   // A guess as a comment, before what it explains.

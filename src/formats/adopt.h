@@ -22,7 +22,7 @@ struct Adoption {
 ///   on a lever of 20 mm;
 /// - serial joints: those from base to foot, if they are six of one coordinate each.
 /// \param model  value of the key `model`: the path of the robot, as the file will name it
-/// \throws ModelError when the robot has no free base, no loop that closes or no such foot
+/// \throws InputError when the robot has no free base, no loop that closes or no such foot
 Adoption adoptRobot(const LoadedRobot& robot, const std::string& model);
 
 }  // namespace bielle

@@ -16,7 +16,7 @@
 namespace bielle {
 
 void failToWrite(const std::string& path, const std::string& why) {
-  throw ModelError(path, "file", "it cannot be written: " + why,
+  throw InputError(path, "file", "it cannot be written: " + why,
                    "check the directory, its permissions and the free space");
 }
 

@@ -15,16 +15,16 @@ class AsideFile {
 
   /// The stream to write to.
   const std::string& aside() const { return aside_; }
-  /// \throws ModelError when the text cannot be written
+  /// \throws InputError when the text cannot be written
   void write(const std::string& text);
-  /// Renames the file to its final name, replacing any existing file. \throws ModelError when it cannot
+  /// Renames the file to its final name, replacing any existing file. \throws InputError when it cannot
   void commit();
 
  private:
   std::string path_, aside_;
 };
 
-/// \throws ModelError "path: file: it cannot be written: why; ..."
+/// \throws InputError "path: file: it cannot be written: why; ..."
 [[noreturn]] void failToWrite(const std::string& path, const std::string& why);
 
 }  // namespace bielle

@@ -26,7 +26,7 @@ class ColladaReader {
   }
 
  private:
-  [[noreturn]] static void fail() { throw ModelError("", "mesh", "it is damaged", "save it again"); }
+  [[noreturn]] static void fail() { throw InputError("", "mesh", "it is damaged", "save it again"); }
 
   void listIds(const XMLElement& e) {
     if (const std::string id = getAttribute(&e, "id"); !id.empty()) ids_[id] = &e;
@@ -117,7 +117,7 @@ Eigen::Matrix3Xd readCollada(const std::string& text) {
   XMLDocument document;
   try {
     return ColladaReader(parseXml(text, "", "COLLADA", document)).read();
-  } catch (const ModelError&) {
+  } catch (const InputError&) {
     return {};
   }
 }

@@ -62,7 +62,7 @@ class DrakeWriter {
   void alignUniversal(int i) {
     Joint& joint = parts_.joints[i];
     if (std::abs(joint.axis.dot(joint.axis2)) > 1e-12)
-      throw ModelError(parts_.name, "universal joint '" + joint.name + "'",
+      throw InputError(parts_.name, "universal joint '" + joint.name + "'",
                        "its axes are not perpendicular, which Drake does not support",
                        "change the model, or replace it by two revolute joints");
     if (joint.axis == Vector3d::UnitX() && joint.axis2 == Vector3d::UnitY()) return;

@@ -20,7 +20,7 @@ inline constexpr double kDrakeHingeLever = 0.05;
 /// Distance of the points of a weld from its frame, m.
 inline constexpr double kDrakeWeldLever = 0.1;
 
-/// \throws ModelError naming a universal joint whose axes are not at right angles
+/// \throws InputError naming a universal joint whose axes are not at right angles
 UrdfText formatDrake(const Model& model);
 
 }  // namespace bielle

@@ -23,7 +23,7 @@ void merge(const XMLElement& element, const std::string& path, MjcfAttributes& a
   for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next())
     attributes[a->Name()] = {a->Value(), element.GetLineNum()};
   if (attributes.size() > kMostAttributes)
-    throw ModelError(path, describe(element), "it has more than " + std::to_string(kMostAttributes) + " attributes",
+    throw InputError(path, describe(element), "it has more than " + std::to_string(kMostAttributes) + " attributes",
                      "remove the unused ones");
 }
 
@@ -68,13 +68,13 @@ std::vector<std::string> MjcfNotes::format(const std::string& path) const {
 void readMjcfDefaults(const XMLElement& element, const std::string& parent, MjcfSettings& settings) {
   const char* text = element.Attribute("class");
   const std::string name = text ? text : parent.empty() ? "main" : "";
-  if (name.empty()) throw ModelError(settings.path, describe(element), "it has no class", "name it");
+  if (name.empty()) throw InputError(settings.path, describe(element), "it has no class", "name it");
   if (!settings.defaults.count(name))
     settings.defaults[name] = parent.empty() ? std::map<std::string, MjcfAttributes>() : settings.defaults.at(parent);
   auto& defaults = settings.defaults[name];
   for (const auto& [tag, attributes] : defaults) settings.num_defaults += 1 + attributes.size();
   if (settings.num_defaults > kMostDefaults)
-    throw ModelError(settings.path, describe(element), "there are more defaults than any robot needs",
+    throw InputError(settings.path, describe(element), "there are more defaults than any robot needs",
                      "remove classes");
   for (const XMLElement* e : getChildren(element))
     if (getTag(*e) != "default") merge(*e, settings.path, defaults[getDefaultTag(getTag(*e))]);
@@ -110,7 +110,7 @@ std::string MjcfElement::describe() const {
 }
 
 void MjcfElement::fail(const std::string& problem, const std::string& remedy) const {
-  throw ModelError(settings_.path, describe(), problem, remedy);
+  throw InputError(settings_.path, describe(), problem, remedy);
 }
 
 void MjcfElement::note(const std::string& problem) const { settings_.notes.add("<" + tag_ + ">", line_, problem); }

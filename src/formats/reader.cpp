@@ -71,7 +71,7 @@ void setImportance(const YamlFile& yaml, UrdfFile& urdf) {
   for (const auto& [name, values] : yaml.importance) {
     const auto it = findJoint(urdf.joints, name);
     if (it == urdf.joints.end() || it->joint.kind == JointKind::Fixed)
-      throw ModelError(yaml.path, "importance of '" + name + "'", "there is no moving joint of this name",
+      throw InputError(yaml.path, "importance of '" + name + "'", "there is no moving joint of this name",
                        "name a joint of the robot that is not fixed");
     it->joint.position_importance = values[0];
     it->joint.velocity_importance = values[1];
@@ -120,7 +120,7 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   if (!std::filesystem::exists(settings)) return files;
   const YamlFile own = readYaml(settings.string());
   if (!own.models.empty() || own.generator)
-    throw ModelError(own.path, own.generator ? "key 'generator'" : "key 'model'",
+    throw InputError(own.path, own.generator ? "key 'generator'" : "key 'model'",
                      "there is a URDF beside this file, " + path.string(),
                      "remove the key, or move the file to another directory");
   complete(own, files.yaml);
@@ -136,7 +136,7 @@ RobotFiles readCompleted(const YamlFile& own, const Generate& generate) {
   if (model.empty()) {
     std::string models;
     for (const std::string& name : own.models) models += (models.empty() ? "" : ", ") + name;
-    throw ModelError(own.path, "key 'model'",
+    throw InputError(own.path, "key 'model'",
                      models.empty() ? "it is missing, as is `generator`, and there is no URDF beside this file"
                                     : "the robot that this file completes was not found: " + models,
                      "put its directory into one of those in BIELLE_ROBOTS, or correct the key");
@@ -193,7 +193,7 @@ void addMotors(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder
     const auto joint = findJoint(urdf.joints, motor.joint);
     const bool found = joint != urdf.joints.end();
     if (motor.armature && armature.count(motor.joint))
-      throw ModelError(yaml.path, "motor '" + motor.joint + "'", "'motors' and 'armature' both give its armature",
+      throw InputError(yaml.path, "motor '" + motor.joint + "'", "'motors' and 'armature' both give its armature",
                        "keep one of them");
     const bool armature_of_joint = armature.count(motor.joint) > 0;
     const double from_map = armature_of_joint ? armature[motor.joint] : yaml.motor_armature.value_or(0);
@@ -218,7 +218,7 @@ class FrameResolver {
     if (name == "world" || urdf_.links.count(name)) return name;
     const auto joint = findJoint(urdf_.joints, name);
     if (joint == urdf_.joints.end())
-      throw ModelError(yaml_.path, element, "there is no link or joint '" + name + "' in the URDF", "correct the name");
+      throw InputError(yaml_.path, element, "there is no link or joint '" + name + "' in the URDF", "correct the name");
     return joint->child;
   }
 
@@ -232,7 +232,7 @@ void addMimics(const UrdfFile& urdf, ModelBuilder& builder) {
   for (const UrdfJoint& j : urdf.joints) {
     if (j.mimicked.empty()) continue;
     if (j.mimicked == j.joint.name)
-      throw ModelError(urdf.path, "joint '" + j.joint.name + "'", "it mimics itself", "name another joint");
+      throw InputError(urdf.path, "joint '" + j.joint.name + "'", "it mimics itself", "name another joint");
     builder.addCoupler(j.joint.name, {{j.joint.name, 1}, {j.mimicked, -j.multiplier}}, j.offset);
   }
 }

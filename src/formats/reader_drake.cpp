@@ -45,7 +45,7 @@ class DrakeReader {
 
  private:
   [[noreturn]] void fail(const XMLElement& e, const std::string& problem, const std::string& remedy) const {
-    throw ModelError(file_.path, describe(e), problem, remedy);
+    throw InputError(file_.path, describe(e), problem, remedy);
   }
 
   void warn(const XMLElement& e, const std::string& problem) {

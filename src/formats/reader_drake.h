@@ -17,7 +17,7 @@ void removeDrake(XMLElement& robot);
 
 /// Adds what the elements say to the contents of the two files. Frames for the ends of loops are links with fixed joints.
 /// \param file  the tree, to which limits on one side and frames are added
-/// \throws ModelError naming the line for what lacks an entry, is no number, or names what does not exist
+/// \throws InputError naming the line for what lacks an entry, is no number, or names what does not exist
 void readDrakeElements(const XMLElement& robot, UrdfFile& file, YamlFile& settings);
 
 }  // namespace bielle

@@ -45,7 +45,7 @@ std::string findInDirectory(const fs::path& directory) {
   for (const char* extension : {".yaml", ".xml"})
     if (found.empty() && isFile(directory / (stem + extension))) return (directory / (stem + extension)).string();
   std::sort(found.begin(), found.end());
-  throw ModelError(directory.string(), "directory",
+  throw InputError(directory.string(), "directory",
                    found.empty() ? "it holds no .urdf file" : "it holds several .urdf files: " + listItems(found),
                    found.empty() ? "put robot.urdf there" : "give one of them by its path");
 }
@@ -66,7 +66,7 @@ bool hasGenerator(const fs::path& path) {
 bool isRobotByItself(const fs::path& path) {
   try {
     return hasGenerator(path) || (isFile(path) && !findModel(readYaml(path.string())).empty());
-  } catch (const ModelError&) {
+  } catch (const InputError&) {
     return false;  // reported when the robot is requested
   }
 }
@@ -76,7 +76,7 @@ bool isRobotByItself(const fs::path& path) {
 std::string readRobotText(const std::string& path) {
   std::error_code unknown;
   if (const auto size = fs::file_size(path, unknown); !unknown && size > kLargestFile)
-    throw ModelError(path, "file", "it exceeds the largest size of a robot file (256 MB)", "give a URDF or YAML file");
+    throw InputError(path, "file", "it exceeds the largest size of a robot file (256 MB)", "give a URDF or YAML file");
   return readTextFile(path);
 }
 
@@ -143,7 +143,7 @@ std::string findRobotFile(const std::string& name_or_path) {
     if (const std::string file = findByName(name_or_path); !file.empty()) return file;
   if (isDirectory(path)) return findInDirectory(path);
   if (isFile(path)) return name_or_path;
-  throw ModelError("", "robot '" + name_or_path + "'",
+  throw InputError("", "robot '" + name_or_path + "'",
                    is_name
                        ? "there is no robot of this name in " + listItems(getRobotDirectories()) + ", and no such path"
                        : "there is no such file or directory",

@@ -56,7 +56,7 @@ void MjcfReader::noteElement(const XMLElement& e, const std::string& problem) {
 }
 
 void MjcfReader::refuse(const XMLElement& e, const std::string& problem, const std::string& remedy) const {
-  throw ModelError(settings_.path, describe(e), problem, remedy);
+  throw InputError(settings_.path, describe(e), problem, remedy);
 }
 
 // A name that nothing else has: that of the file, or one made from `made`.
@@ -226,7 +226,7 @@ UrdfJoint& MjcfReader::addLink(const std::string& link, const std::string& paren
   joint.joint.X_PJ = X_PJ;
   tree_.joints.push_back(std::move(joint));
   if (tree_.joints.size() > kMostJoints)
-    throw ModelError(settings_.path, "document", "it has more than " + std::to_string(kMostJoints) + " bodies or sites",
+    throw InputError(settings_.path, "document", "it has more than " + std::to_string(kMostJoints) + " bodies or sites",
                      "no robot needs so many");
   return tree_.joints.back();
 }
@@ -421,7 +421,7 @@ void MjcfReader::readJointClamp(MjcfElement& e, const Element& joint) {
 MjcfFile readMjcf(const std::string& path) {
   const std::string xml = readRobotText(path);
   if (xml.size() > kMostBytes)
-    throw ModelError(path, "file", "it exceeds the largest size of a MuJoCo file (16 MB)",
+    throw InputError(path, "file", "it exceeds the largest size of a MuJoCo file (16 MB)",
                      "give one without embedded data");
   XMLDocument document;
   return MjcfReader(path, parseXml(xml, path, "mujoco", document)).read();

@@ -77,7 +77,7 @@ void checkNumbers(const XMLElement& element, const std::string& owner, const std
   for (const NumberRule& rule : kNumbers) {
     const char* text = getTag(element) == rule.tag ? element.Attribute(rule.attribute) : nullptr;
     if (text && !areFiniteNumbers(text, rule.count))
-      throw ModelError(path, owner,
+      throw InputError(path, owner,
                        "<" + getTag(element) + " " + rule.attribute + "=\"" + text + "\"> (line " +
                            std::to_string(element.GetLineNum()) + ") is not made of " + std::to_string(rule.count) +
                            " finite number(s)",
@@ -92,10 +92,10 @@ std::set<std::string> collectNames(const XMLElement& robot, const std::string& t
   for (const XMLElement* e : getChildren(robot)) {
     if (tag == "joint" ? !isJoint(*e) : getTag(*e) != tag) continue;
     const std::string name = getAttribute(e, "name"), line = " (line " + std::to_string(e->GetLineNum()) + ")";
-    if (name.empty()) throw ModelError(path, tag + line, "it has no name", "give it a name attribute");
+    if (name.empty()) throw InputError(path, tag + line, "it has no name", "give it a name attribute");
     const std::string element = tag + " '" + name + "'";
     if (!names.insert(name).second)
-      throw ModelError(path, element, "it is declared twice" + line, "rename one of them");
+      throw InputError(path, element, "it is declared twice" + line, "rename one of them");
     checkNumbers(*e, element, path);
   }
   return names;
@@ -116,7 +116,7 @@ void checkJoint(const XMLElement& joint, const std::string& path, std::vector<st
   if (!kinds.count(type)) {
     std::string known;
     for (const auto& [name, kind] : kinds) known += (known.empty() ? "" : ", ") + name;
-    throw ModelError(path, element, "its type '" + type + "' is unknown", "use one of " + known);
+    throw InputError(path, element, "its type '" + type + "' is unknown", "use one of " + known);
   }
   if (joint.FirstChildElement("mimic") && kinds.at(type) == JointKind::Fixed)
     warnings.push_back(path + ": " + element + ": it is fixed, so <mimic> is ignored");
@@ -143,12 +143,12 @@ std::vector<Edge> collectEdges(const XMLElement& robot, const std::set<std::stri
                        getAttribute(j->FirstChildElement("child"), "link"), getKinds(*j).at(getAttribute(j, "type"))};
     for (const auto& [end, link] : {std::pair("parent", edge.parent), std::pair("child", edge.child)})
       if (!links.count(link))
-        throw ModelError(path, "joint '" + edge.joint + "'",
+        throw InputError(path, "joint '" + edge.joint + "'",
                          std::string("its ") + end + " link '" + link + "' does not exist",
                          "declare the link or correct the name");
     const auto [other, is_first] = carrier.emplace(edge.child, edge.joint);
     if (!is_first)
-      throw ModelError(path, "link '" + edge.child + "'",
+      throw InputError(path, "link '" + edge.child + "'",
                        "it is the child of two joints, '" + other->second + "' and '" + edge.joint + "'",
                        "cut the loop there and declare it as a closure");
     edges.push_back(edge);
@@ -159,8 +159,8 @@ std::vector<Edge> collectEdges(const XMLElement& robot, const std::set<std::stri
 Tree makeTree(const XMLElement& robot, const std::string& path) {
   const std::set<std::string> links = collectNames(robot, "link", path);
   if (getAttribute(&robot, "name").empty())
-    throw ModelError(path, "element 'robot'", "it has no name", "give it a name attribute");
-  if (links.empty()) throw ModelError(path, "element 'robot'", "it has no links", "declare at least one");
+    throw InputError(path, "element 'robot'", "it has no name", "give it a name attribute");
+  if (links.empty()) throw InputError(path, "element 'robot'", "it has no links", "declare at least one");
   collectNames(robot, "joint", path);
   Tree tree;
   tree.robot = getAttribute(&robot, "name");
@@ -173,7 +173,7 @@ Tree makeTree(const XMLElement& robot, const std::string& path) {
     below[edge.parent].push_back(&edge);
   }
   if (unreached.size() > 1)
-    throw ModelError(path, "link '" + *unreached.rbegin() + "'",
+    throw InputError(path, "link '" + *unreached.rbegin() + "'",
                      "it is a second root beside '" + *unreached.begin() + "'", "connect it by a joint, or remove it");
   if (!unreached.empty()) tree.root = *unreached.begin();
   unreached = links;
@@ -189,7 +189,7 @@ Tree makeTree(const XMLElement& robot, const std::string& path) {
     stack.insert(stack.end(), next.rbegin(), next.rend());
   }
   if (!unreached.empty())
-    throw ModelError(path, "link '" + *unreached.begin() + "'", "the joints above it form a cycle without a root",
+    throw InputError(path, "link '" + *unreached.begin() + "'", "the joints above it form a cycle without a root",
                      "cut the loop and declare it as a closure");
   return tree;
 }
@@ -207,7 +207,7 @@ Visual makeShape(const Element& element, const char* kind, const std::string& li
   Visual out;
   out.X_BV = toSE3(element.origin);
   if (!element.geometry)
-    throw ModelError(path, "link '" + link + "'", std::string("a ") + kind + " has no geometry",
+    throw InputError(path, "link '" + link + "'", std::string("a ") + kind + " has no geometry",
                      "give one or remove it");
   switch (element.geometry->type) {
     case urdf::Geometry::BOX:
@@ -294,13 +294,13 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
     out.damping = joint.dynamics->damping;
     out.friction = joint.dynamics->friction;
     if (out.damping < 0 || out.friction < 0)
-      throw ModelError(path, "joint '" + joint.name + "'", "the damping or friction of its <dynamics> is negative",
+      throw InputError(path, "joint '" + joint.name + "'", "the damping or friction of its <dynamics> is negative",
                        "give 0 or more");
   }
   if (!joint.limits) return out;
   const urdf::JointLimits& limits = *joint.limits;
   if (limits.effort < 0 || limits.velocity < 0)
-    throw ModelError(path, "joint '" + joint.name + "'", "its effort or velocity limit is negative",
+    throw InputError(path, "joint '" + joint.name + "'", "its effort or velocity limit is negative",
                      "give a positive limit, or 0 for none");
   if ((limits.lower != 0 || limits.upper != 0) && kind != JointKind::Continuous && getNv(kind) == 1) {
     out.lower = VectorXd::Constant(1, limits.lower);
@@ -338,7 +338,7 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
   }
   // urdfdom continues after some errors (a link whose inertial it could not read has none); we do not.
   if (!model || !complaints.empty())
-    throw ModelError(path, "robot '" + tree.robot + "'", "urdfdom cannot read it: " + complaints,
+    throw InputError(path, "robot '" + tree.robot + "'", "urdfdom cannot read it: " + complaints,
                      "correct the element");
   UrdfFile file;
   file.path = path;

@@ -102,10 +102,10 @@ struct YamlFile {
 
 /// \param path  named in errors, and the place of meshes
 /// \param settings  gets what elements of Drake say
-/// \throws ModelError for anything but one tree of named links with finite numbers
+/// \throws InputError for anything but one tree of named links with finite numbers
 UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& settings);
 
-/// \throws ModelError for unknown keys, wrong types, lists that do not match
+/// \throws InputError for unknown keys, wrong types, lists that do not match
 YamlFile parseYaml(const std::string& text, const std::string& path);
 YamlFile readYaml(const std::string& path);
 
@@ -115,10 +115,10 @@ struct MjcfFile {
   YamlFile settings;
 };
 
-/// \throws ModelError for what is not MJCF, or cannot be read as a robot
+/// \throws InputError for what is not MJCF, or cannot be read as a robot
 MjcfFile readMjcf(const std::string& path);
 
-/// The whole content of a file. \throws ModelError when it cannot be read, or is too large
+/// The whole content of a file. \throws InputError when it cannot be read, or is too large
 std::string readRobotText(const std::string& path);
 
 /// The URDF, the MJCF or the YAML file with a generator of the robot that a file with the key `model` completes; empty if none of

@@ -45,7 +45,7 @@ std::string findFrameName(const Model& model, int body, const SE3& X_BF, const s
 }
 
 void refuseToWrite(const Model& model, const std::string& element, const std::string& problem) {
-  throw ModelError(model.name(), element, problem + ", which its files cannot express", "change the model");
+  throw InputError(model.name(), element, problem + ", which its files cannot express", "change the model");
 }
 
 }  // namespace bielle

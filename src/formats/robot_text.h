@@ -23,7 +23,7 @@ bool hasImpliedFreeFlyer(const Model& model);
 /// A frame of the model at this place; if there is none, `made`.
 std::string findFrameName(const Model& model, int body, const SE3& X_BF, const std::string& made);
 
-/// \throws ModelError
+/// \throws InputError
 [[noreturn]] void refuseToWrite(const Model& model, const std::string& element, const std::string& problem);
 
 }  // namespace bielle

@@ -252,7 +252,7 @@ void writeRobot(const Model& model, const std::string& directory, const std::str
   std::error_code error;
   fs::create_directories(path, error);
   if (error)
-    throw ModelError(directory, "directory", "it cannot be created: " + error.message(), "give another one with -o");
+    throw InputError(directory, "directory", "it cannot be created: " + error.message(), "give another one with -o");
   writeTextFile((path / (name + ".urdf")).string(), text.urdf);
   writeTextFile((path / (name + ".yaml")).string(), text.yaml);
 }

@@ -46,7 +46,7 @@ class SdfWriter {
   std::string getLink(int body) const { return body == 0 ? "world" : model_.bodies()[body].name; }
 
   [[noreturn]] void refuse(const Joint& joint, const std::string& problem) const {
-    throw ModelError(model_.name(), "joint '" + joint.name + "'", problem + ", which SDF cannot express",
+    throw InputError(model_.name(), "joint '" + joint.name + "'", problem + ", which SDF cannot express",
                      "write another format, or change the model");
   }
 

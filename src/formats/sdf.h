@@ -18,7 +18,7 @@ struct SdfText {
 };
 
 /// \param q_ref  closed configuration (nq), as of findClosedConfiguration
-/// \throws ModelError naming a joint that SDF does not have: planar, or a free-flyer that a body carries
+/// \throws InputError naming a joint that SDF does not have: planar, or a free-flyer that a body carries
 SdfText formatSdf(const Model& model, ConstVectorRef q_ref);
 
 }  // namespace bielle

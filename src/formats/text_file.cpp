@@ -17,7 +17,7 @@ std::string readTextFile(const std::string& path, const std::string& remedy) {
       return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
     } catch (const std::ios_base::failure&) {  // thrown by the iterators when reading fails
     }
-  throw ModelError(path, "file", "it cannot be read", remedy);
+  throw InputError(path, "file", "it cannot be read", remedy);
 }
 
 // By the ranges of RFC 3629, section 4: no overlong forms, no surrogates, nothing beyond U+10FFFF.
@@ -46,7 +46,7 @@ void requireUtf8(const std::string& text, const std::string& path) {
   char byte[8];
   std::snprintf(byte, sizeof byte, "0x%02x", static_cast<unsigned char>(text[bad]));
   const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(bad), '\n');
-  throw ModelError(path, "line " + std::to_string(line), std::string("its byte ") + byte + " is not UTF-8",
+  throw InputError(path, "line " + std::to_string(line), std::string("its byte ") + byte + " is not UTF-8",
                    "save the file in UTF-8, as by `iconv -f latin1 -t utf-8`");
 }
 

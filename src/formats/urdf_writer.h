@@ -10,7 +10,7 @@ namespace bielle {
 
 /// The tree with its mimics as <robot>; whatever of it the file cannot say goes to `warnings`.
 /// \param for_drake  joints are <drake:joint> where URDF has none, limits are only where there are some, and frames for loops nowhere
-/// \throws ModelError for joints that it does not have
+/// \throws InputError for joints that it does not have
 XMLElement& addUrdfTree(const Model& model, bool for_drake, XMLDocument& document, FormatWarnings& warnings);
 
 /// The URDF of a pair with a YAML file: frames of closures and contacts without a name get one.

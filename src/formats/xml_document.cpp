@@ -14,10 +14,10 @@ void checkAttributes(const XMLElement& element, const std::string& path) {
   for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
     const std::string attribute = std::string("its attribute '") + a->Name() + "'";
     if (findNotUtf8(a->Value()) != std::string::npos)
-      throw ModelError(path, describe(element), attribute + " refers to a character that is not in UTF-8",
+      throw InputError(path, describe(element), attribute + " refers to a character that is not in UTF-8",
                        "write the character itself, in UTF-8");
     if (!names.insert(a->Name()).second)
-      throw ModelError(path, describe(element), attribute + " is given twice", "keep one of them");
+      throw InputError(path, describe(element), attribute + " is given twice", "keep one of them");
   }
   for (const XMLElement* e : getChildren(element)) checkAttributes(*e, path);
 }
@@ -26,7 +26,7 @@ void refuseEntities(const XMLDocument& document, const std::string& path) {
   for (const tinyxml2::XMLNode* node = document.FirstChild(); node; node = node->NextSibling()) {
     const std::string text = node->ToUnknown() ? node->Value() : "";
     if (text.rfind("DOCTYPE", 0) == 0 && text.find('[') != std::string::npos)
-      throw ModelError(path, "<!DOCTYPE> (line " + std::to_string(node->GetLineNum()) + ")",
+      throw InputError(path, "<!DOCTYPE> (line " + std::to_string(node->GetLineNum()) + ")",
                        "it declares entities, which are not read",
                        "have them replaced, as by `xmllint --noent --dropdtd`, or use properties of xacro");
   }
@@ -44,16 +44,16 @@ const XMLElement& parseXml(const std::string& xml, const std::string& path, cons
                            XMLDocument& document) {
   requireUtf8(xml, path);
   if (document.Parse(xml.c_str()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED)
-    throw ModelError(path, "document",
+    throw InputError(path, "document",
                      "elements are nested deeper than " + std::to_string(TINYXML2_MAX_ELEMENT_DEPTH),
                      "close them; a robot needs few levels");
   refuseEntities(document, path);
   const int line = document.ErrorLineNum();  // 0 of an empty text
   if (document.Error())
-    throw ModelError(path, line > 0 ? "line " + std::to_string(line) : "document",
+    throw InputError(path, line > 0 ? "line " + std::to_string(line) : "document",
                      std::string("it is not well-formed XML (") + document.ErrorName() + ")", "correct the syntax");
   if (!document.RootElement() || getTag(*document.RootElement()) != root)
-    throw ModelError(path, "document", "its outermost element is not <" + root + ">",
+    throw InputError(path, "document", "its outermost element is not <" + root + ">",
                      root == "robot" ? "give a URDF file" : "give a MuJoCo file (MJCF)");
   checkAttributes(*document.RootElement(), path);
   return *document.RootElement();

@@ -13,7 +13,7 @@ using tinyxml2::XMLDocument;
 using tinyxml2::XMLElement;
 
 /// \returns the outermost element, whose tag is `root`
-/// \throws ModelError naming `path` for text that is not UTF-8 or not well-formed XML, that declares entities, that gives an
+/// \throws InputError naming `path` for text that is not UTF-8 or not well-formed XML, that declares entities, that gives an
 ///   attribute twice, that nests deeper than tinyxml2 allows (100), or that has another root
 const XMLElement& parseXml(const std::string& xml, const std::string& path, const std::string& root,
                            XMLDocument& document);

@@ -16,7 +16,7 @@ YamlEntry::YamlEntry(std::string path, std::string element, const YAML::Node& no
 
 void YamlEntry::fail(const std::string& problem, const std::string& remedy) const {
   const int line = node_->IsDefined() ? node_->Mark().line : -1;
-  throw ModelError(
+  throw InputError(
       path_, (element_.empty() ? "document" : element_) + (line >= 0 ? " (line " + std::to_string(line + 1) + ")" : ""),
       problem, remedy);
 }
@@ -108,7 +108,7 @@ void readYamlDocument(const std::string& path, const std::string& text,
   try {
     read(YamlEntry(path, "", YAML::Load(text)));
   } catch (const YAML::Exception& error) {
-    throw ModelError(path, "line " + std::to_string(error.mark.line + 1), "it is not well-formed YAML: " + error.msg,
+    throw InputError(path, "line " + std::to_string(error.mark.line + 1), "it is not well-formed YAML: " + error.msg,
                      "correct the syntax");
   }
 }

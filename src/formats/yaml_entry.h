@@ -20,7 +20,7 @@ class YamlEntry {
  public:
   YamlEntry(std::string path, std::string element, const YAML::Node& node);
 
-  /// \throws ModelError, naming file, element and line
+  /// \throws InputError, naming file, element and line
   [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const;
   const std::string& element() const { return element_; }
   bool isMap() const;
@@ -49,10 +49,10 @@ using YamlFields = std::map<std::string, YamlEntry>;
 
 /// Null if the key is missing.
 const YamlEntry* find(const YamlFields& fields, const std::string& key);
-/// \throws ModelError naming the owner, if the key is missing
+/// \throws InputError naming the owner, if the key is missing
 const YamlEntry& require(const YamlFields& fields, const std::string& key, const YamlEntry& owner);
 
-/// Passes the document to `read`. \throws ModelError if `text`, of the file `path`, is not YAML in UTF-8
+/// Passes the document to `read`. \throws InputError if `text`, of the file `path`, is not YAML in UTF-8
 void readYamlDocument(const std::string& path, const std::string& text,
                       const std::function<void(const YamlEntry&)>& read);
 

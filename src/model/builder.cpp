@@ -27,7 +27,7 @@ ModelBuilder::ModelBuilder(std::string name, std::string source) : source_(std::
 }
 
 void ModelBuilder::fail(const std::string& element, const std::string& problem, const std::string& remedy) const {
-  throw ModelError(source_, element, problem, remedy);
+  throw InputError(source_, element, problem, remedy);
 }
 
 ModelBuilder::FramePlace ModelBuilder::getFrame(const std::string& name, const std::string& element) const {

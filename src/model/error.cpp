@@ -24,7 +24,7 @@ std::string makePrintable(const std::string& text) {
 
 }  // namespace
 
-ModelError::ModelError(const std::string& source, const std::string& element, const std::string& problem,
+InputError::InputError(const std::string& source, const std::string& element, const std::string& problem,
                        const std::string& remedy)
     : std::runtime_error((source.empty() ? "" : makePrintable(source) + ": ") + makePrintable(element) + ": " +
                          makePrintable(problem) + (remedy.empty() ? "" : "; " + makePrintable(remedy))),

@@ -66,7 +66,7 @@ std::vector<std::string> makeWrenchNames(const std::vector<std::string>& names) 
 
 int findColumn(const std::vector<std::string>& names, const std::string& name) {
   const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) throw ModelError("", "column '" + name + "'", "the trajectory does not have it");
+  if (found == names.end()) throw InputError("", "column '" + name + "'", "the trajectory does not have it");
   return static_cast<int>(found - names.begin());
 }
 

@@ -98,7 +98,7 @@ const Option& OptionSet::get(const std::string& name) const {
   const auto nearest = std::min_element(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
     return calcDistance(name, a) < calcDistance(name, b);
   });
-  throw ModelError(
+  throw InputError(
       owner_, noun_ + " '" + name + "'", "there is no such " + noun_,
       names.empty() ? "leave it out" : "the nearest is '" + *nearest + "'; choose one of: " + joinNames(names));
 }
@@ -113,7 +113,7 @@ void OptionSet::fail(const Option& option, const std::string& problem) const {
   const std::string remedy = !option.choices.empty() ? "one of " + allowed
                              : option.unit.empty()   ? allowed
                                                      : describeKind(option) + (allowed.empty() ? "" : ", " + allowed);
-  throw ModelError(owner_, noun_ + " '" + option.name + "'", problem, "give " + remedy + unit);
+  throw InputError(owner_, noun_ + " '" + option.name + "'", problem, "give " + remedy + unit);
 }
 
 void OptionSet::check(const Option& option, const OptionValue& value) const {

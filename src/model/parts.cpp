@@ -8,7 +8,7 @@ namespace {
 
 void require(bool ok, const ModelParts& parts, const std::string& element) {
   if (!ok)
-    throw ModelError("", "robot '" + parts.name + "'", "its " + element + " are inconsistent",
+    throw InputError("", "robot '" + parts.name + "'", "its " + element + " are inconsistent",
                      "take them from a model");
 }
 

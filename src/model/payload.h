@@ -15,7 +15,7 @@ struct Payload {
 };
 
 // The robot with the mass as part of its trunk. All else is the same to the last bit, and the whole robot is if the mass is zero.
-// \throws ModelError when the mass is negative, a place is not finite, or a motor moves the first body, which is no trunk then
+// \throws InputError when the mass is negative, a place is not finite, or a motor moves the first body, which is no trunk then
 Model addPayload(const Model& model, const Payload& payload);
 
 }  // namespace bielle

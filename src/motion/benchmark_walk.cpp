@@ -42,7 +42,7 @@ std::vector<BenchmarkPhase> makePhases(const Model& model, const BenchmarkWalkOp
     used += phase.nodes;
   }
   if (!possible || used > o.total_nodes)
-    throw ModelError(model.name(), "benchmark walk",
+    throw InputError(model.name(), "benchmark walk",
                      "its phases do not fit into " + std::to_string(o.total_nodes) + " nodes (they need " +
                          std::to_string(used) + ", at least one each)",
                      "give fewer or shorter phases");
@@ -53,7 +53,7 @@ std::vector<BenchmarkPhase> makePhases(const Model& model, const BenchmarkWalkOp
 int findFoot(const Model& model, const std::string& name) {
   const int contact = model.findContact(name);
   if (contact < 0)
-    throw ModelError(model.name(), "contact '" + name + "'",
+    throw InputError(model.name(), "contact '" + name + "'",
                      "the benchmark walk needs it, but the robot has no such contact",
                      "name the contacts of its left and right foot");
   return contact;

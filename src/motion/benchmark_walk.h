@@ -40,7 +40,7 @@ struct BenchmarkWalkOptions {
   std::string right = "foot_right";
 };
 
-/// \throws ModelError when the robot lacks a foot, or the schedule does not fit into total_nodes
+/// \throws InputError when the robot lacks a foot, or the schedule does not fit into total_nodes
 Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& options = {},
                          Formulation formulation = Formulation::Reduced);
 

@@ -66,7 +66,7 @@ void checkCommand(const Model& model, const LocomotionOptions& options, const Ve
   const StepCommand step{T * command.forward, T * command.sideways, T * command.turning};
   // Placements of feet do not tell a full turn from none.
   if (!(std::abs(step.yaw) <= kPi))
-    throw ModelError(model.name(), element, "it turns by more than half a turn in a step",
+    throw InputError(model.name(), element, "it turns by more than half a turn in a step",
                      "give a lower rate of turning, e.g. 0.4 rad/s");
   const Stance stance = makeStance(model, options, makeStandingPosture(model));
   for (const Side first : {Side::Left, Side::Right}) {

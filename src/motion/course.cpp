@@ -40,7 +40,7 @@ void check(const Model& model, const Stance& stance, const Course& course, const
     const Footstep& step = course.steps[i];
     const ContactFrame& sole = model.contacts()[stance.contacts[static_cast<int>(step.side)]];
     const auto refuse = [&](const std::string& problem, const std::string& remedy) {
-      throw ModelError(model.name(),
+      throw InputError(model.name(),
                        "step " + std::to_string(i + 1) + " of the " + course.name + " (" + getName(step.side) + ")",
                        problem, remedy);
     };

@@ -14,7 +14,7 @@ struct Course {
 GroundStep makeStone(const ContactFrame& sole, const SE3& X_WF, double rim);
 
 // Steps of a locomotion on the footholds of the course; the last one brings the feet together.
-// \throws ModelError naming the first step whose sole does not lie on the ground or whose swing leads through it, besides
+// \throws InputError naming the first step whose sole does not lie on the ground or whose swing leads through it, besides
 // the errors of planLocomotion()
 MotionPlan planCourse(const Model& model, const Stance& stance, const Course& course, const LocomotionOptions& gait);
 

@@ -45,7 +45,7 @@ std::vector<Footstep> makeSteps(const Stance& stance, const std::vector<Footstep
   std::vector<Footstep> steps;
   for (const Footstep& foothold : footholds) {
     if (!steps.empty() && steps.back().side == foothold.side)
-      throw ModelError("", "foothold " + std::to_string(steps.size() + 1),
+      throw InputError("", "foothold " + std::to_string(steps.size() + 1),
                        std::string("the ") + getName(foothold.side) + " steps twice in a row",
                        "let the feet step alternately");
     steps.push_back({foothold.side, start * foothold.X_WF});
@@ -54,7 +54,7 @@ std::vector<Footstep> makeSteps(const Stance& stance, const std::vector<Footstep
   const SE3& foot = stance.feet[static_cast<int>(last.side)];
   const SE3 moved = last.X_WF * foot.inverse();
   if (std::abs(moved.R(2, 2) - 1) > kSamePlace * kSamePlace)
-    throw ModelError("", "foothold " + std::to_string(steps.size()),
+    throw InputError("", "foothold " + std::to_string(steps.size()),
                      "it is inclined, but the motion ends there with both feet on the ground",
                      "make the last foothold level: no pitch, no roll");
   const Side other = getOther(last.side);
@@ -128,7 +128,7 @@ std::vector<Footstep> readFootholds(const std::string& path) {
 
 MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const VectorXd& q0) {
   if (o.footholds.empty())
-    throw ModelError("", "footholds", "none are given", "give a file with footholds (`--footholds FILE.yaml`)");
+    throw InputError("", "footholds", "none are given", "give a file with footholds (`--footholds FILE.yaml`)");
   listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, q0);
   Course course{"footholds", makeSteps(stance, o.footholds), {}};

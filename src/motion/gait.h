@@ -76,7 +76,7 @@ struct GaitStart {
 /// \param timing  with the length of the stages
 /// \param com  centre of mass at the start, where the robot stands still, m
 /// \param gravity  m/s^2
-/// \throws ModelError on impossible durations
+/// \throws InputError on impossible durations
 Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape, double stretch,
               const Vector3d& com, double gravity);
 /// The same for given phases.

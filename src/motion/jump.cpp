@@ -175,7 +175,7 @@ void check(const Model& model, const JumpOptions& o) {
                 "give seconds, e.g. 0.3");
   requireStages(o.stand + o.push + o.flight + o.land + o.settle, o.time_step);
   if (model.contacts().empty())
-    throw ModelError(model.name(), "contacts", "a jump needs feet, but the robot has no contact frames",
+    throw InputError(model.name(), "contacts", "a jump needs feet, but the robot has no contact frames",
                      "add `contacts` to its YAML file");
 }
 

@@ -253,7 +253,7 @@ LiftResult lift(const Model& closed, const SerialModel& serial, const SerialTraj
            (k == stages || (trajectory.a[k].size() == serial.model.nv() && trajectory.a[k].allFinite() &&
                             trajectory.forces[k].size() == trajectory.constraints[k].rows));
   if (!fits)
-    throw ModelError(closed.name(), "trajectory",
+    throw InputError(closed.name(), "trajectory",
                      "its sizes differ from those of the serial model, or it is not finite",
                      "give a motion of the serial model of this robot");
   return Lifter(closed, serial, trajectory, options).run();

@@ -26,9 +26,9 @@ VectorXd replaceByName(const Model& model, VectorXd values, const std::map<std::
     if (motor < 0) {
       std::string known;
       for (const Motor& m : model.motors()) known += (known.empty() ? "" : ", ") + m.name;
-      throw ModelError(model.name(), element, "there is no such motor", "choose one of: " + known);
+      throw InputError(model.name(), element, "there is no such motor", "choose one of: " + known);
     }
-    if (!(value > 0)) throw ModelError(model.name(), element, "it is not positive", "give a positive limit");
+    if (!(value > 0)) throw InputError(model.name(), element, "it is not positive", "give a positive limit");
     values[motor] = value;
   }
   return values;
@@ -52,11 +52,11 @@ std::vector<Bound> listRanges(const Model& model, const VectorXd& q0) {
     if (joint.nv != 1 || !(std::isfinite(lower) || std::isfinite(upper))) continue;
     const std::string element = "joint '" + joint.name + "'";
     if (lower == upper)
-      throw ModelError(model.name(), element, "its range has zero width, so no constraint can enforce it",
+      throw InputError(model.name(), element, "its range has zero width, so no constraint can enforce it",
                        "make the joint fixed, or widen its range");
     const double q = q0[joint.idx_q];
     if (q < lower || q > upper)
-      throw ModelError(model.name(), element,
+      throw InputError(model.name(), element,
                        "its range excludes the starting posture, where the joint is at " + std::to_string(q),
                        "widen its range, or start elsewhere");
     bounds.push_back({"range of " + joint.name, k, lower, upper});

@@ -35,7 +35,7 @@ void check(const Scene& scene) {
   const ContactFrame& left = model.contacts()[scene.stance.contacts[0]];
   const ContactFrame& right = model.contacts()[scene.stance.contacts[1]];
   const auto refuse = [&](int step, const std::string& problem, const std::string& remedy) {
-    throw ModelError(model.name(), "step " + std::to_string(step) + " of the " + scene.task.name, problem, remedy);
+    throw InputError(model.name(), "step " + std::to_string(step) + " of the " + scene.task.name, problem, remedy);
   };
   for (const GaitNode& node : scene.gait.nodes) {
     const std::array<SE3, 2> feet = getFeet(scene, node);
@@ -159,7 +159,7 @@ std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, 
 
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0) {
   if (!model.hasFreeFlyer())
-    throw ModelError(model.name(), "root joint",
+    throw InputError(model.name(), "root joint",
                      "its base is fixed, or moves on a rail, but a motion with steps needs a free one over two feet",
                      "take `squat` or `jump`, which need no steps, or a robot with a free base");
   Stance stance;
@@ -171,7 +171,7 @@ Stance makeStance(const Model& model, const LocomotionOptions& options, const Ve
     const std::string& name = i == 0 ? options.left : options.right;
     stance.contacts[i] = model.findContact(name);
     if (stance.contacts[i] < 0)
-      throw ModelError(model.name(), "contact '" + name + "'", "a walk needs it, but the robot has no such contact",
+      throw InputError(model.name(), "contact '" + name + "'", "a walk needs it, but the robot has no such contact",
                        "name the contacts of its left and right foot");
     const ContactFrame& contact = model.contacts()[stance.contacts[i]];
     stance.feet[i] = getPlacement(ws, contact.body, contact.X_BF);

@@ -22,7 +22,7 @@ void requireStages(double seconds, double time_step) {
 }
 
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
-  if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
+  if (!ok) throw InputError("", "option '" + option + "'", problem, remedy);
 }
 
 namespace {
@@ -140,7 +140,7 @@ StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constra
 
 VectorXd makeStandingPosture(const Model& model) {
   if (model.references().empty())
-    throw ModelError(model.name(), "references", "the robot has no reference posture to start from",
+    throw InputError(model.name(), "references", "the robot has no reference posture to start from",
                      "add `references: {half_sitting: ...}` to its YAML file");
   const Reference* standing = &model.references().front();
   for (const Reference& reference : model.references())
@@ -158,7 +158,7 @@ VectorXd makeStandingPosture(const Model& model) {
     }
   }
   if (result.status != AssemblyStatus::Closed)
-    throw ModelError(model.name(), "reference '" + standing->name + "'", result.message, "correct its targets");
+    throw InputError(model.name(), "reference '" + standing->name + "'", result.message, "correct its targets");
   return settleSprings(model, *standing, result.q);
 }
 

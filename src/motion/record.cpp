@@ -73,7 +73,7 @@ void requireWhole(const MotionRecord& record) {
   const Eigen::Index nodes = record.time.size();
   const auto require = [](bool holds, const std::string& array) {
     if (!holds)
-      throw ModelError("", "record, array '" + array + "'", "its shape does not match the names and the times",
+      throw InputError("", "record, array '" + array + "'", "its shape does not match the names and the times",
                        "give one row per node, or per stage, and one column per name");
   };
   require(nodes > 0, "time");

@@ -18,7 +18,7 @@ std::vector<RecordTable> listTables(const MotionRecord& record);
 // Sets the size of every table; the names must be set.
 void resizeRecord(int stages, MotionRecord& record);
 
-// Throws ModelError unless every table has as many rows and columns as times and names ask for.
+// Throws InputError unless every table has as many rows and columns as times and names ask for.
 void requireWhole(const MotionRecord& record);
 
 }  // namespace bielle

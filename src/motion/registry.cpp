@@ -132,7 +132,7 @@ const MotionEntry& findMotion(const std::string& file, const std::string& name) 
     if (entry.name == name) return entry;
     known += (known.empty() ? "" : ", ") + entry.name;
   }
-  throw ModelError(file, "motion '" + name + "'", "there is no such motion", "choose one of: " + known);
+  throw InputError(file, "motion '" + name + "'", "there is no such motion", "choose one of: " + known);
 }
 
 MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {

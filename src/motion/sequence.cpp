@@ -45,7 +45,7 @@ Ground joinGrounds(const Model& model, const std::vector<MotionPlan>& plans) {
   for (const MotionPlan& plan : plans) {
     ground.height = std::min(ground.height, plan.ground.height);
     if (plan.ground.friction != ground.friction)
-      throw ModelError("", "option '" + plan.name + ".friction'", "it differs from that of the previous motions",
+      throw InputError("", "option '" + plan.name + ".friction'", "it differs from that of the previous motions",
                        "give the same friction for all motions of the sequence");
   }
   for (const MotionPlan& plan : plans) {
@@ -66,7 +66,7 @@ void checkSoles(const Model& model, const MotionPlan& plan, const Ground& ground
         for (double y : {-frame.half_width, frame.half_width}) {
           const Vector3d corner = sole.X_WT.act(Vector3d(x, y, 0));
           if (ground.calcHeight(corner.x(), corner.y()) > corner.z() + kSameLevel)
-            throw ModelError(
+            throw InputError(
                 "", "motion '" + plan.name + "' of the sequence",
                 "its phase '" + phase.name + "' stands where another motion of the sequence has higher ground",
                 "move away from there first, e.g. by a walk");
@@ -78,7 +78,7 @@ void checkSoles(const Model& model, const MotionPlan& plan, const Ground& ground
 
 MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0) {
   if (parts.empty())
-    throw ModelError("", "sequence", "it has no motions", "give at least one, e.g. squat, walk, stairs or jump");
+    throw InputError("", "sequence", "it has no motions", "give at least one, e.g. squat, walk, stairs or jump");
   std::vector<MotionPlan> plans;
   for (const SequencePart& part : parts) {
     plans.push_back(part.plan(model, plans.empty() ? q0 : plans.back().q_end));

@@ -31,7 +31,7 @@ std::vector<Linkage> listLinkages(const Model& closed, const Reduction& reductio
         coordinates += closed.joints()[i].nv;
       }
     if (joints.empty() || coordinates != cluster.size)
-      throw ModelError(closed.name(), "closures " + listItems(closures),
+      throw InputError(closed.name(), "closures " + listItems(closures),
                        "there is no equivalent serial chain: their linkage has mobility " +
                            std::to_string(cluster.size) + ", but its serial joints (" + listItems(joints) + ") have " +
                            std::to_string(coordinates) + " coordinates",
@@ -125,7 +125,7 @@ void addJointForces(const Model& closed, const std::vector<bool>& frozen, ModelB
   for (const JointForce& force : closed.jointForces()) {
     const std::string& name = closed.joints()[force.joint].name;
     if (frozen[force.joint])
-      throw ModelError(
+      throw InputError(
           closed.name(), "force on joint '" + name + "'", "the serial model freezes this joint",
           "use the closed model, or move spring, damper and friction to joints that the serial model keeps");
     builder.addJointForce(name, force);
@@ -137,7 +137,7 @@ void addPointSprings(const Model& closed, const std::vector<bool>& frozen, Model
   for (const PointSpring& spring : closed.pointSprings()) {
     for (int k : spring.dofs)
       if (const int joint = closed.dofs()[k].joint; frozen[joint])
-        throw ModelError(
+        throw InputError(
             closed.name(), "point spring '" + spring.name + "'",
             "the serial model freezes joint '" + closed.joints()[joint].name + "', which moves one end of it",
             "use the closed model, or attach it to bodies that the serial model keeps");
@@ -163,7 +163,7 @@ void forCommonJoints(const Model& from, const Model& model, const Copy& copy) {
     if (joint.nv == 0) continue;
     const int index = from.findJoint(joint.name);
     if (index < 0 || from.joints()[index].kind != joint.kind)
-      throw ModelError(from.name(), "joint '" + joint.name + "'", "the other model has no such joint",
+      throw InputError(from.name(), "joint '" + joint.name + "'", "the other model has no such joint",
                        "map between a closed model and the serial model made from it");
     copy(from.joints()[index], joint);
   }
@@ -181,7 +181,7 @@ SerialModelOptions parseSerialArmature(const std::string& text) {
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, options.armature);
   if (error != std::errc() || stop != end)
-    throw ModelError("", "armature '" + text + "' of the serial model", "it is neither a number nor 'reflected'",
+    throw InputError("", "armature '" + text + "' of the serial model", "it is neither a number nor 'reflected'",
                      "give kg m^2, e.g. 1e-3");
   return options;
 }
@@ -203,7 +203,7 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialM
     double margin = 0;
     if (!point.update(*linkage.cluster, q_cluster) || !calcLinkageTangent(linkage, point, T, &margin) ||
         margin < kSmallestMargin || !calcLinkageRatio(linkage, point, ratio))
-      throw ModelError(closed.name(), "joints " + listItems(linkage.joint_names),
+      throw InputError(closed.name(), "joints " + listItems(linkage.joint_names),
                        "their linkage is at a dead point at the reference, so they do not determine it",
                        "freeze it at another configuration");
     out.replacements.push_back({linkage.motor_names, linkage.joint_names, ratio.R});

@@ -17,7 +17,7 @@ void check(const Model& model, const SquatOptions& o) {
                 "give seconds, e.g. 0.015");
   requireStages(o.duration + 2 * o.settle, o.time_step);
   if (model.contacts().empty())
-    throw ModelError(model.name(), "contacts", "a squat needs feet, but the robot has no contact frames",
+    throw InputError(model.name(), "contacts", "a squat needs feet, but the robot has no contact frames",
                      "add `contacts` to its YAML file");
 }
 

@@ -25,12 +25,12 @@ void check(const TimingOptions& options, const ContactSchedule& schedule) {
   for (const auto& [name, bounds] : options.phases) {
     const std::string element = "free timing of '" + name + "'";
     if (!(bounds.lower > 0 && bounds.lower <= bounds.upper && std::isfinite(bounds.upper)))
-      throw ModelError("", element, "its bounds are not positive, or in the wrong order", "give e.g. 0.6:1.6");
+      throw InputError("", element, "its bounds are not positive, or in the wrong order", "give e.g. 0.6:1.6");
     if (isNamed(name, schedule)) continue;
     std::string known = kAllPhases;
     for (const ContactPhase& phase : schedule.phases)
       if (phase.dt > 0 && known.find(getOwnName(phase)) == std::string::npos) known += ", " + getOwnName(phase);
-    throw ModelError("", element, "the motion has no such phase", "choose one of: " + known);
+    throw InputError("", element, "the motion has no such phase", "choose one of: " + known);
   }
 }
 

@@ -17,7 +17,7 @@ int matchRow(int i, int count, Eigen::Index rows) {
 
 void requireSame(const std::vector<std::string>& recorded, const std::vector<std::string>& names, const char* what) {
   if (recorded != names)
-    throw ModelError("", "warm start", std::string("the recorded motion and the robot have different ") + what,
+    throw InputError("", "warm start", std::string("the recorded motion and the robot have different ") + what,
                      "give a result of the same robot");
 }
 
@@ -76,10 +76,10 @@ StartingPoint makeStart(const MotionRecord& record, const Motion& motion) {
   const Eigen::Index rows = record.q.rows();  // maybe more than times: steps are halved
   if (record.q.cols() != model.nq() || record.v.cols() != model.nv() || record.u.cols() != model.nu() ||
       record.v.rows() != rows || record.u.rows() != rows - 1)
-    throw ModelError("", "warm start", "the shapes of the recorded q, v and u do not match the robot",
+    throw InputError("", "warm start", "the shapes of the recorded q, v and u do not match the robot",
                      "give one row per node, or per stage, and one column per name");
   if (rows < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() || !record.u.allFinite())
-    throw ModelError("", "warm start", "the recorded motion is empty or contains numbers that are not finite",
+    throw InputError("", "warm start", "the recorded motion is empty or contains numbers that are not finite",
                      "give the result of a successful solve");
   const int nodes = motion.problem->numStages() + 1;
   StartingPoint start{motion.guess, record.multipliers};

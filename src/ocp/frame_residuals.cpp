@@ -105,7 +105,7 @@ BodyFrame getBodyFrame(const Model& model, const std::string& name) {
     return {model.contacts()[contact].body, model.contacts()[contact].X_BF};
   if (const int frame = model.findFrame(name); frame >= 0)
     return {model.frames()[frame].body, model.frames()[frame].X_BF};
-  throw ModelError(model.name(), "frame '" + name + "'", "the robot has no such link, frame or contact",
+  throw InputError(model.name(), "frame '" + name + "'", "the robot has no such link, frame or contact",
                    "see `bielle info` for its names");
 }
 

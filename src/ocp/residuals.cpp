@@ -232,7 +232,7 @@ class MotorVoltage : public Residual {
     for (int m : motors_) {
       const Motor& motor = model.motors().at(m);
       if (!motor.hasEnvelope())
-        throw ModelError(model.name(), "motor '" + motor.name + "'", "it has no winding or no supply voltage",
+        throw InputError(model.name(), "motor '" + motor.name + "'", "it has no winding or no supply voltage",
                          "give its torque_constant and its voltage");
       per_effort_.push_back(motor.getVoltsPerEffort());
       per_speed_.push_back(motor.getVoltsPerSpeed());

@@ -16,7 +16,7 @@ bool areWeights(const VectorXd& weights) { return std::all_of(weights.begin(), w
 void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool terminal) {
   // Messages are put together when they are needed: a problem has thousands of these.
   const auto refuse = [&](const std::string& what, const char* remedy) {
-    throw ModelError(model.name(), "stage " + std::to_string(index), what, remedy);
+    throw InputError(model.name(), "stage " + std::to_string(index), what, remedy);
   };
   const auto require = [&](bool ok, const char* what, const char* remedy) {
     if (!ok) refuse(what, remedy);
@@ -87,13 +87,13 @@ std::vector<TimeScalePlace> placeTimeScales(const Model& model, const std::vecto
     if (!places[k].in_state) places[k].in_controls = true;
     const std::string element = "stage " + std::to_string(k);
     if (std::find(ended.begin(), ended.end(), timing.phase) != ended.end())
-      throw ModelError(model.name(), element, "its phase of free duration ended earlier", "give it a separate number");
+      throw InputError(model.name(), element, "its phase of free duration ended earlier", "give it a separate number");
     if (next.phase != timing.phase) {
       ended.push_back(timing.phase);
       continue;
     }
     if (next.lower != timing.lower || next.upper != timing.upper)
-      throw ModelError(model.name(), element, "the next step of its phase has different bounds of the time scale",
+      throw InputError(model.name(), element, "the next step of its phase has different bounds of the time scale",
                        "give all steps of the phase the same bounds");
     places[k].in_next = places[k + 1].in_state = true;
   }
@@ -193,9 +193,9 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
                            Formulation formulation)
     : model_(model), formulation_(formulation), specs_(std::move(stages)) {
   if (specs_.empty())
-    throw ModelError(model.name(), "shooting problem", "it has no stages", "give at least the terminal stage");
+    throw InputError(model.name(), "shooting problem", "it has no stages", "give at least the terminal stage");
   if (q0.size() != model.nq() || v0.size() != model.nv())
-    throw ModelError(model.name(), "shooting problem", "the initial state has the wrong size", "q0: nq, v0: nv");
+    throw InputError(model.name(), "shooting problem", "the initial state has the wrong size", "q0: nq, v0: nv");
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k, k + 1 == specs_.size());
   places_ = placeTimeScales(model, specs_);
   const NodeList nodes{specs_, places_};

@@ -40,7 +40,7 @@ struct NodeList {
   const std::vector<TimeScalePlace>& places;
 };
 std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const NodeList& nodes);
-// \throws ModelError when q0 is open
+// \throws InputError when q0 is open
 std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0, const NodeList& nodes);
 
 // Gives `at` the sizes, the state, the controls and the length of a task, and the status Failed. False if they are not

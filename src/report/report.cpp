@@ -42,7 +42,7 @@ std::vector<std::string> makeLabels(const std::vector<std::string>& directories)
 
 std::string makeReport(const std::vector<std::string>& directories) {
   if (directories.empty())
-    throw ModelError("", "report", "no directories are given", "give one that `bielle solve` wrote");
+    throw InputError("", "report", "no directories are given", "give one that `bielle solve` wrote");
   const std::vector<std::string> labels = makeLabels(directories);
   Json runs = Json::array();
   for (size_t i = 0; i < directories.size(); ++i) {

@@ -29,18 +29,18 @@ LoadedRobot loadRobotOf(const Json& summary, const fs::path& path) {
   std::error_code error;
   if (!file.empty() && fs::exists(file, error)) return loadRobot(file);
   if (name.empty())
-    throw ModelError(path.string(), "key 'robot'", "it is missing", "give a directory that `bielle solve` wrote");
+    throw InputError(path.string(), "key 'robot'", "it is missing", "give a directory that `bielle solve` wrote");
   return loadRobot(name);
 }
 
-// \throws ModelError when the record is not one of this robot
+// \throws InputError when the record is not one of this robot
 MotionRecord readRecordOf(const LoadedRobot& robot, const fs::path& path) {
   MotionRecord record = readRecord(path.string());
   const Model& model = robot.model;
   if (record.q_names != makePositionNames(model) || record.v_names != makeVelocityNames(model) ||
       record.u_names != getNames(model.motors()) || record.closure_names != getNames(model.closures()) ||
       record.contact_names != getNames(model.contacts()))
-    throw ModelError(path.string(), "columns", "they differ from those of the robot in " + robot.directory,
+    throw InputError(path.string(), "columns", "they differ from those of the robot in " + robot.directory,
                      "solve again, or restore the robot");
   return record;
 }

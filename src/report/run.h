@@ -17,7 +17,7 @@ struct ReportRun {
   LoadedRobot robot;
 };
 
-// \throws ModelError naming the file and what is wrong
+// \throws InputError naming the file and what is wrong
 ReportRun readRun(const std::string& directory);
 
 // The robot: its drawing (drawing.h), joints, motors, closures, contacts.

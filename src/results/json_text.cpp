@@ -54,7 +54,7 @@ void readJsonFile(const std::string& path, const std::string& remedy, const std:
     if (!json.is_object()) throw std::runtime_error("it is not an object");
     read(json);
   } catch (const std::exception& error) {
-    throw ModelError(path, "JSON", describeJsonError(error), remedy);
+    throw InputError(path, "JSON", describeJsonError(error), remedy);
   }
 }
 

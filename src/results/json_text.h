@@ -22,7 +22,7 @@ Json parseJson(const std::string& text);
 std::string describeJsonError(const std::exception& error);
 
 /// Passes the object in a file to `read`, which may access missing elements.
-/// \throws ModelError naming the file when it cannot be read, holds no object, or lacks an element that `read` accesses
+/// \throws InputError naming the file when it cannot be read, holds no object, or lacks an element that `read` accesses
 void readJsonFile(const std::string& path, const std::string& remedy, const std::function<void(const Json&)>& read);
 
 }  // namespace bielle

@@ -15,7 +15,7 @@ SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& 
   const int stages = problem.numStages();
   if (record.a.rows() != stages || record.q_names != makePositionNames(model) ||
       record.v_names != makeVelocityNames(model) || record.contact_names != getNames(model.contacts()))
-    throw ModelError(model.name(), "trajectory", "its stages, joints or contacts differ from those of this motion",
+    throw InputError(model.name(), "trajectory", "its stages, joints or contacts differ from those of this motion",
                      "recreate it with `bielle solve --model serial`");
   SerialTrajectory out;
   for (int k = 0; k <= stages; ++k) {
@@ -23,7 +23,7 @@ SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& 
     out.v.push_back(record.v.row(k));
     if (k == stages) break;
     if (problem.spec(k).kind == StageKind::Impact)
-      throw ModelError(model.name(), "stage " + std::to_string(k), "it is a rigid impact, which cannot be lifted",
+      throw InputError(model.name(), "stage " + std::to_string(k), "it is a rigid impact, which cannot be lifted",
                        "solve the serial motion with `--set rigid_landing=false`");
     out.a.push_back(record.a.row(k));
     out.dt.push_back(problem.spec(k).dt);

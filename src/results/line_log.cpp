@@ -19,7 +19,7 @@ LineLog::LineLog(const std::string& path, const std::string& header, const std::
   if (file_ < 0) failToWrite(path, std::strerror(errno));
   try {
     if (flock(file_, LOCK_EX | LOCK_NB) != 0)
-      throw ModelError(path, "log", "another process is using it", "wait for it, or give another directory");
+      throw InputError(path, "log", "another process is using it", "wait for it, or give another directory");
     read(header, mismatch);
   } catch (...) {
     close(file_);
@@ -45,7 +45,7 @@ void LineLog::read(const std::string& header, const std::string& mismatch) {
     begin = end + 1;
   }
   if (lines_.front() != header)
-    throw ModelError(path_, "line 1", mismatch, "give another directory, or remove this one");
+    throw InputError(path_, "line 1", mismatch, "give another directory, or remove this one");
   lines_.erase(lines_.begin());
 }
 

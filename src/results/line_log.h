@@ -8,7 +8,7 @@ namespace bielle {
 class LineLog {
  public:
   // Opens and locks the file, and drops a last line that was cut off. A new file gets the header.
-  // \throws ModelError when another process has locked it, it cannot be written, or `header` is not its first line, for
+  // \throws InputError when another process has locked it, it cannot be written, or `header` is not its first line, for
   //   which `mismatch` says what has changed
   LineLog(const std::string& path, const std::string& header, const std::string& mismatch);
   ~LineLog();
@@ -18,7 +18,7 @@ class LineLog {
   // Those of earlier runs, without the header.
   const std::vector<std::string>& getLines() const { return lines_; }
   const std::string& getPath() const { return path_; }
-  // Writes a line and its end. \throws ModelError when it cannot be written
+  // Writes a line and its end. \throws InputError when it cannot be written
   void append(const std::string& line);
 
  private:

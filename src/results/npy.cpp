@@ -69,7 +69,7 @@ std::string formatNpy(const NpyArray& array) {
 
 NpyArray parseNpy(const std::string& path, const std::string& element, const std::string& bytes) {
   const auto require = [&](bool ok, const std::string& problem) {
-    if (!ok) throw ModelError(path, element, problem, "give a trajectory that Bielle wrote");
+    if (!ok) throw InputError(path, element, problem, "give a trajectory that Bielle wrote");
   };
   require(bytes.size() >= kPrelude && bytes.compare(0, sizeof kMagic, kMagic, sizeof kMagic) == 0,
           "it is not an array in .npy format 1.0");

@@ -15,7 +15,7 @@ constexpr zip_uint16_t kFirstDay = (1 << 5) | 1;
 constexpr size_t kLargest = size_t{1} << 28;  // all arrays together, bytes
 
 [[noreturn]] void fail(const std::string& path, const std::string& element, const std::string& problem) {
-  throw ModelError(path, element, problem, "give a trajectory that Bielle wrote");
+  throw InputError(path, element, problem, "give a trajectory that Bielle wrote");
 }
 
 // Errors of libzip that cannot occur: everything is in memory and we set the sizes.

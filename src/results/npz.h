@@ -16,7 +16,7 @@ using NpyArrays = std::map<std::string, NpyArray>;
 
 // The whole archive, as bytes.
 std::string formatArchive(const NpyArrays& arrays);
-// \throws ModelError naming the file and what is wrong with it
+// \throws InputError naming the file and what is wrong with it
 NpyArrays readArchive(const std::string& path);
 
 // One array, as bytes. `element` names it in errors.

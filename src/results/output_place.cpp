@@ -10,7 +10,7 @@ void requireApart(const std::string& output, const std::vector<std::string>& inp
   std::error_code error;
   for (const std::string& input : inputs)
     if (std::filesystem::equivalent(output, input, error))
-      throw ModelError(output, "output", "it is also an input" + (input == output ? "" : ", '" + input + "'"),
+      throw InputError(output, "output", "it is also an input" + (input == output ? "" : ", '" + input + "'"),
                        "give another place with -o, so that nothing is lost");
 }
 

@@ -46,7 +46,7 @@ constexpr const char *kClosedColor = "#1f77b4", *kLiftedColor = "#d62728", *kSer
 const char* getCurveColor(size_t index);
 
 // Draws the plots one below the other, to a temporary file that is renamed. False if gnuplot is not installed.
-// \throws ModelError when it cannot draw or the file cannot be written
+// \throws InputError when it cannot draw or the file cannot be written
 bool drawPlots(const std::string& path, const std::vector<Plot>& plots);
 
 }  // namespace bielle

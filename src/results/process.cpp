@@ -69,7 +69,7 @@ pid_t startProcess(const std::vector<std::string>& arguments, const ProcessOptio
   argv.push_back(nullptr);
   const pid_t parent = getpid(), child = fork();
   if (child == 0) becomeProgram(argv.data(), parent, options);
-  if (child < 0) throw ModelError("", "new process", std::strerror(errno), "end other processes");
+  if (child < 0) throw InputError("", "new process", std::strerror(errno), "end other processes");
   return child;
 }
 

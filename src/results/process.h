@@ -17,7 +17,7 @@ struct ProcessOptions {
   bool apart = false;
 };
 // Starts a program, which is searched on the PATH unless arguments[0] has a slash.
-// \throws ModelError when there can be no new process
+// \throws InputError when there can be no new process
 pid_t startProcess(const std::vector<std::string>& arguments, const ProcessOptions& options = {});
 
 // How a process has ended, as shells tell it: the status of its exit, or 128 + the signal that ended it.

@@ -21,7 +21,7 @@ const std::pair<const char*, Names> kNames[] = {{"q_names", &MotionRecord::q_nam
 NpyArray takeArray(const std::string& path, const std::string& name, bool is_text, NpyArrays& arrays) {
   const auto it = arrays.find(name);
   if (it == arrays.end() || it->second.is_text != is_text)
-    throw ModelError(path, "array '" + name + "'", "it is missing, or of another type",
+    throw InputError(path, "array '" + name + "'", "it is missing, or of another type",
                      "give a trajectory that Bielle wrote");
   return it->second;
 }
@@ -53,7 +53,7 @@ Multipliers takeMultipliers(const std::string& path, size_t nodes, NpyArrays& ar
                             rows = takeArray(path, "multiplier_rows", false, arrays).numbers,
                             penalty = takeArray(path, "multiplier_penalty", false, arrays).numbers;
   const auto refuse = [&path](const char* problem) {
-    throw ModelError(path, "array 'multipliers'", problem, "give a trajectory that Bielle wrote");
+    throw InputError(path, "array 'multipliers'", problem, "give a trajectory that Bielle wrote");
   };
   if (rows.size() != nodes) refuse("it does not give the number of multipliers of each node");
   if (penalty.size() != 1 || !(penalty[0] > 0) || !std::isfinite(penalty[0])) refuse("its penalty is not positive");
@@ -75,7 +75,7 @@ RowMatrixXd takeFootholds(const std::string& path, size_t nodes, size_t contacts
   if (arrays.count("footholds") == 0) return {};
   const NpyArray array = takeArray(path, "footholds", false, arrays);
   if (array.shape != std::vector<size_t>{nodes, contacts, MotionRecord::kFootholdEntries})
-    throw ModelError(path, "array 'footholds'", "its shape does not match the contacts and nodes",
+    throw InputError(path, "array 'footholds'", "its shape does not match the contacts and nodes",
                      "give a trajectory that Bielle wrote");
   return RowMatrixXd::Map(array.numbers.data(), nodes, contacts * MotionRecord::kFootholdEntries);
 }
@@ -114,7 +114,7 @@ MotionRecord readRecord(const std::string& path) {
   record.has_midpoints = arrays.count("q_mid") > 0;
   const NpyArray time = takeArray(path, "time", false, arrays);
   if (time.shape.size() != 1 || time.numbers.empty())
-    throw ModelError(path, "array 'time'", "it is not a list with one number per node",
+    throw InputError(path, "array 'time'", "it is not a list with one number per node",
                      "give a trajectory that Bielle wrote");
   const size_t nodes = time.numbers.size();
   record.time = VectorXd::Map(time.numbers.data(), nodes);
@@ -122,7 +122,7 @@ MotionRecord readRecord(const std::string& path) {
     const size_t rows = table.per == RecordTable::Per::Node ? nodes : nodes - 1;
     const NpyArray array = takeArray(path, table.array, false, arrays);
     if (array.shape != makeShape(table, rows))
-      throw ModelError(path, "array '" + table.array + "'", "its shape does not match the names and nodes",
+      throw InputError(path, "array '" + table.array + "'", "its shape does not match the names and nodes",
                        "give a trajectory that Bielle wrote");
     record.*table.data = RowMatrixXd::Map(array.numbers.data(), rows, table.columns.size());
   }

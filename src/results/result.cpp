@@ -237,7 +237,7 @@ MotionResult makeResult(const RunInfo& run, const Solution& solution) {
 
 void makeOutputDirectory(const std::string& directory) {
   const auto fail = [&directory](const std::string& why) {
-    throw ModelError(directory, "directory", "results cannot be written there: " + why,
+    throw InputError(directory, "directory", "results cannot be written there: " + why,
                      "give another one, or correct its permissions");
   };
   std::error_code error;

@@ -228,7 +228,7 @@ std::vector<std::string> checkReferences(const LoadedRobot& robot) {
       const std::string joint = "'" + model.joints()[of.joint].name + "'", range = describeMissedRange(model, of);
       const bool is_met = closed && of.moved <= kReferenceTolerance;
       if (!range.empty() && !is_met)
-        throw ModelError(file.string(), element,
+        throw InputError(file.string(), element,
                          "joint " + joint + " cannot be at " + format(of.given) + ", outside " + range,
                          "give a value that it can have, or correct the range");
       if (!range.empty()) outside += (outside.empty() ? "" : ", ") + joint + " is outside " + range;

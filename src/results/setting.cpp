@@ -10,7 +10,7 @@ std::pair<std::string, std::string> splitSetting(const std::string& flag, const 
                                                  const std::string& example) {
   const size_t equals = setting.find('=');
   if (equals == std::string::npos)
-    throw ModelError("", flag + " '" + setting + "'", "it is not of the form name=value",
+    throw InputError("", flag + " '" + setting + "'", "it is not of the form name=value",
                      "e.g. " + flag + " " + example);
   return {setting.substr(0, equals), setting.substr(equals + 1)};
 }
@@ -23,7 +23,7 @@ std::pair<std::string, double> parseSetting(const std::string& flag, const std::
   const char* begin = equals == std::string::npos ? end : setting.data() + equals + 1;
   const auto [stop, error] = std::from_chars(begin, end, value);
   if (error != std::errc() || stop != end)
-    throw ModelError("", flag + " '" + setting + "'", "it is not of the form name=number",
+    throw InputError("", flag + " '" + setting + "'", "it is not of the form name=number",
                      "e.g. " + flag + " " + example);
   return {setting.substr(0, equals), value};
 }

@@ -13,7 +13,7 @@ void ignoreClosedPipes() { std::signal(SIGPIPE, SIG_IGN); }
 void finishStandardOutput() {
   std::cout.flush();
   if (!std::cout || std::fflush(stdout) != 0 || std::ferror(stdout))
-    throw ModelError("", "standard output", "the output could not be written completely",
+    throw InputError("", "standard output", "the output could not be written completely",
                      "check the free space, or the program that reads the output");
 }
 

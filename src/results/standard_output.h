@@ -5,7 +5,7 @@ namespace bielle {
 /// Prevents a reader that ends early (`| head`) from terminating the program, which may still have results to write.
 void ignoreClosedPipes();
 
-/// Call this at the end. \throws ModelError when the standard output could not be written completely
+/// Call this at the end. \throws InputError when the standard output could not be written completely
 void finishStandardOutput();
 
 }  // namespace bielle

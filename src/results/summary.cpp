@@ -134,9 +134,9 @@ MotionSummary readSummary(const std::string& directory) {
       return summary;
     }
   } catch (const std::exception& error) {
-    throw ModelError(path, "file", describeJsonError(error), "recreate it with `bielle solve`");
+    throw InputError(path, "file", describeJsonError(error), "recreate it with `bielle solve`");
   }
-  throw ModelError(path, "motion", "it is a motion carried out, not a plan", "give the directory of `bielle solve`");
+  throw InputError(path, "motion", "it is a motion carried out, not a plan", "give the directory of `bielle solve`");
 }
 
 MotionRequest remakeRequest(const MotionSummary& summary) {

@@ -87,7 +87,7 @@ std::vector<Solid> makeFoot(const SerialBipedParameters& p) {
 Reference makeSerialHalfSitting(const std::string& robot, const SerialBipedParameters& p) {
   const double a = p.thigh_length, b = p.shank_length, reach = p.hip_height - p.ankle_height;
   if (!(reach > std::abs(a - b) && reach < a + b))
-    throw ModelError(robot, "parameter 'hip_height'", "the legs do not reach the ground from this height",
+    throw InputError(robot, "parameter 'hip_height'", "the legs do not reach the ground from this height",
                      "give a height above ankle_height that thigh and shank can span");
   const double thigh = std::acos((reach * reach + a * a - b * b) / (2 * reach * a));
   const double shank = std::acos((reach * reach + b * b - a * a) / (2 * reach * b));

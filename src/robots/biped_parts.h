@@ -71,7 +71,7 @@ void addHipLinks(const BipedSide& side, const SerialBipedParameters& p, const st
 void addHip(const BipedSide& side, const SerialBipedParameters& p, ModelBuilder& builder);
 // Sole and post of a foot, 0.7 of its mass.
 std::vector<Solid> makeFoot(const SerialBipedParameters& p);
-// Hips over the ankles, by the law of cosines. \throws ModelError if the legs do not reach
+// Hips over the ankles, by the law of cosines. \throws InputError if the legs do not reach
 Reference makeSerialHalfSitting(const std::string& robot, const SerialBipedParameters& p);
 
 // Reference `half_sitting` except for its joints: soles under the hips, the trunk's frame at a height.

@@ -6,7 +6,7 @@
 
 namespace bielle {
 
-// \throws ModelError naming the first parameter outside its bounds
+// \throws InputError naming the first parameter outside its bounds
 template <typename Parameters>
 void checkParameters(const std::string& robot, const Parameters& parameters) {
   listOptions(parameters, "parameter", robot).check();

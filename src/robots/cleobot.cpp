@@ -38,7 +38,7 @@ Limb makeLimb(const Side& side, int index) {
   const double span = (limb.ball - limb.base).norm(), l1 = p.upper_length, l2 = p.shank_length;
   const double along = (span * span + l1 * l1 - l2 * l2) / (2 * span), square = l1 * l1 - along * along;
   if (!(height > 0 && square > 0))
-    throw ModelError("cleobot", "limb " + std::to_string(index),
+    throw InputError("cleobot", "limb " + std::to_string(index),
                      "its upper rod and its shank do not meet when the robot stands, or the thigh is under the foot",
                      "change hip_height, thigh_length, ankle_height, upper_length or shank_length");
   const Vector3d down = (limb.ball - limb.base) / span;

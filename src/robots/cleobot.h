@@ -65,7 +65,7 @@ struct CleobotParameters {
 
 void describe(OptionFields& fields, CleobotParameters& parameters);
 
-/// \throws ModelError when a parameter is outside its bounds, or the limbs do not reach the foot
+/// \throws InputError when a parameter is outside its bounds, or the limbs do not reach the foot
 Model makeCleobot(const CleobotParameters& parameters = {});
 
 }  // namespace bielle

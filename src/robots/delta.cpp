@@ -73,7 +73,7 @@ Model makeDelta(const DeltaParameters& p) {
   const double reach = p.base_radius + p.upper_length * std::cos(p.arm_angle) - p.platform_radius;
   const double square = p.forearm_length * p.forearm_length - reach * reach;
   if (!(square > 0))
-    throw ModelError("delta", "parameter 'forearm_length'", "the forearms do not reach the platform",
+    throw InputError("delta", "parameter 'forearm_length'", "the forearms do not reach the platform",
                      "make them longer, or change arm_angle, base_radius or platform_radius");
   const double depth = p.upper_length * std::sin(p.arm_angle) + std::sqrt(square);
 

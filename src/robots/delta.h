@@ -33,7 +33,7 @@ struct DeltaParameters {
 
 void describe(OptionFields& fields, DeltaParameters& parameters);
 
-/// \throws ModelError when a parameter is outside its bounds, or the forearms do not reach the platform
+/// \throws InputError when a parameter is outside its bounds, or the forearms do not reach the platform
 Model makeDelta(const DeltaParameters& parameters = {});
 
 }  // namespace bielle

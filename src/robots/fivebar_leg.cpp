@@ -38,7 +38,7 @@ Model makeFiveBarLeg(const FiveBarLegParameters& p) {
   const double side = p.upper_length * std::sin(p.stand_angle), square = p.lower_length * p.lower_length - side * side;
   const double depth = square > 0 ? p.upper_length * std::cos(p.stand_angle) + std::sqrt(square) : 0;
   if (!(depth > 0))
-    throw ModelError("fivebar_leg", "parameter 'lower_length'", "the lower rods do not meet below the motors",
+    throw InputError("fivebar_leg", "parameter 'lower_length'", "the lower rods do not meet below the motors",
                      "make them longer, or change stand_angle");
   ModelBuilder builder("fivebar_leg");
   Visual post;

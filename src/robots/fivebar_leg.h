@@ -27,7 +27,7 @@ struct FiveBarLegParameters {
 
 void describe(OptionFields& fields, FiveBarLegParameters& parameters);
 
-/// \throws ModelError when a parameter is outside its bounds, or the lower rods do not meet
+/// \throws InputError when a parameter is outside its bounds, or the lower rods do not meet
 Model makeFiveBarLeg(const FiveBarLegParameters& parameters = {});
 
 }  // namespace bielle

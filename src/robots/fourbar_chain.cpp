@@ -45,7 +45,7 @@ Vector3d closeFourBar(const FourBarChainOptions& o) {
   const double h = (l * l + o.coupler * o.coupler - o.rocker * o.rocker) / (2 * l);
   const double square = o.coupler * o.coupler - h * h;
   if (!(o.count >= 1 && o.density > 0 && l > 0 && square >= 0))
-    throw ModelError("", "four-bar chain",
+    throw InputError("", "four-bar chain",
                      "crank, coupler and rocker do not meet at a crank angle of " + std::to_string(o.crank_angle) +
                          " rad, or its count or density is not positive",
                      "change the lengths or the angle");

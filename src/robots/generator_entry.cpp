@@ -15,7 +15,7 @@ GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settin
         parameters.set(key, parseOption(value.getText()));
       }
     return {&generator, std::move(parameters)};
-  } catch (const ModelError& error) {
+  } catch (const InputError& error) {
     if (!error.source().empty() && error.source() != name.getText()) throw;  // it names file and line
     entry.fail(error.problem(), error.remedy());
   }

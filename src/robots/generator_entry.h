@@ -12,7 +12,7 @@ struct GeneratorEntry {
 
 /// \param name      of the generator
 /// \param settings  a map from parameters to numbers, or to names of choices; null for none
-/// \throws ModelError naming file, line, parameter and remedy
+/// \throws InputError naming file, line, parameter and remedy
 GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settings);
 
 }  // namespace bielle

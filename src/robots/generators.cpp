@@ -87,7 +87,7 @@ const Generator& findGenerator(const std::string& name) {
     if (generator.name == name) return generator;
     known += (known.empty() ? "" : ", ") + generator.name;
   }
-  throw ModelError("", "robot '" + name + "'", "there is no such generator", "choose one of: " + known);
+  throw InputError("", "robot '" + name + "'", "there is no such generator", "choose one of: " + known);
 }
 
 }  // namespace bielle

@@ -28,7 +28,7 @@ struct HumanoidParameters : LegBipedParameters {
 };
 void describe(OptionFields& fields, HumanoidParameters& parameters);
 
-/// \throws ModelError as makeRsuBiped() does
+/// \throws InputError as makeRsuBiped() does
 Model makeHumanoid(const HumanoidParameters& parameters = {});
 
 }  // namespace bielle

@@ -204,10 +204,10 @@ void addLeg(KangarooLeg& leg, const Vector3d& hip) {
 void check(const std::string& robot, const KangarooParameters& p) {
   checkParameters(robot, p);
   if (!(p.lower_crank_height < p.upper_crank_height && p.upper_crank_height + p.ankle_arm < p.shank_length))
-    throw ModelError(robot, "parameter 'upper_crank_height'", "the upper cranks are not between lower cranks and knee",
+    throw InputError(robot, "parameter 'upper_crank_height'", "the upper cranks are not between lower cranks and knee",
                      "give more than lower_crank_height, and less than shank_length without ankle_arm");
   if (!(p.knee_screw_drop + p.knee_crank_height + p.knee_arm < p.thigh_length))
-    throw ModelError(robot, "parameter 'knee_screw_drop'", "the thigh has no room for the knee screw",
+    throw InputError(robot, "parameter 'knee_screw_drop'", "the thigh has no room for the knee screw",
                      "make the sum of it, knee_crank_height and knee_arm less than thigh_length");
 }
 

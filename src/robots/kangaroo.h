@@ -56,7 +56,7 @@ struct KangarooParameters : SerialBipedParameters {
 void describe(OptionFields& fields, KangarooParameters& parameters);
 
 /// Free in space, on two legs.
-/// \throws ModelError when a parameter is outside its bounds, or the legs do not reach from hip_height to the ground
+/// \throws InputError when a parameter is outside its bounds, or the legs do not reach from hip_height to the ground
 Model makeKangaroo(const KangarooParameters& parameters = {});
 
 /// The left leg, its trunk on a vertical rail over the sole.

@@ -87,7 +87,7 @@ void describe(OptionFields& fields, LegBipedParameters& parameters);
 /// Trunk, legs and soles, for a robot with more on its trunk.
 void addLegBiped(const LegBipedParameters& parameters, ModelBuilder& builder);
 
-/// \throws ModelError when a parameter is outside its bounds, or the legs do not reach from hip_height to the ground
+/// \throws InputError when a parameter is outside its bounds, or the legs do not reach from hip_height to the ground
 Model makeLegBiped(const LegBipedParameters& parameters = {});
 
 /// Bipeds of certain parts, with one mass for all motors. BeltBiped: belt and differential; RsuBiped: serial and rsu.

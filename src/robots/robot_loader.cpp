@@ -16,7 +16,7 @@ RobotFiles generate(const YamlFile& yaml) {
   RobotText text;
   try {
     text = formatRobot(entry.generator->make(entry.parameters));
-  } catch (const ModelError& error) {  // parameters that are possible one by one, but not together
+  } catch (const InputError& error) {  // parameters that are possible one by one, but not together
     yaml.generator->fail(error.element() + ": " + error.problem(), error.remedy());
   }
   RobotFiles files;

@@ -47,7 +47,7 @@ Inertia calcInertia(const Solid& solid) {
       moments = Vector3d::Constant(0.4 * square.x());
       break;
     case Visual::Shape::Mesh:
-      throw ModelError("", "solid", "the inertia of a mesh is not computed", "use a box, a cylinder or a sphere");
+      throw InputError("", "solid", "the inertia of a mesh is not computed", "use a box, a cylinder or a sphere");
   }
   const Matrix3d I = (solid.mass * moments).asDiagonal();
   return Inertia{solid.mass, Vector3d::Zero(), I}.transformed(solid.X_LS);

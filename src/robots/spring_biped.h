@@ -31,7 +31,7 @@ struct SpringBipedParameters : SpringLegParameters {
 
 void describe(OptionFields& fields, SpringBipedParameters& parameters);
 
-/// \throws ModelError as makeSpringLeg()
+/// \throws InputError as makeSpringLeg()
 Model makeSpringBiped(const SpringBipedParameters& parameters = {});
 
 }  // namespace bielle

@@ -37,7 +37,7 @@ Outline makeShape(const std::string& robot, const SpringLegParameters& p, double
   const double rod_in_plane = std::sqrt(std::max(0.0, std::pow(p.heel_rod_length, 2) - std::pow(p.rod_offset, 2)));
   const std::optional<Vector3d> H = findMeeting(kOrigin, rod_in_plane, T, p.heel_length);
   if (!H)
-    throw ModelError(robot, "parameter 'heel_rod_length'", "the rod does not reach the heel in the neutral posture",
+    throw InputError(robot, "parameter 'heel_rod_length'", "the rod does not reach the heel in the neutral posture",
                      "change it, heel_length, thigh_angle or shin_angle");
   shape.heel = *H - T;
   shape.rod = *H - shape.rod_start;
@@ -48,7 +48,7 @@ Outline makeShape(const std::string& robot, const SpringLegParameters& p, double
   const Vector3d lever_end = shape.tarsus + shape.lever;
   const std::optional<Vector3d> E = findMeeting(shape.crank_pivot, p.crank_length, lever_end, p.plantar_length);
   if (!E)
-    throw ModelError(robot, "parameter 'plantar_length'",
+    throw InputError(robot, "parameter 'plantar_length'",
                      "the plantar rod does not reach from crank to lever in the neutral posture",
                      "change it, crank_place, crank_length, lever_length or lever_angle");
   shape.crank = *E - shape.crank_pivot;
@@ -234,7 +234,7 @@ void describe(OptionFields& f, SpringLegParameters& p) {
 void addSpringLeg(const std::string& robot, const SpringLegParameters& p, const SpringLegMount& mount,
                   ModelBuilder& builder) {
   if (!(p.crank_place < p.tarsus_length))
-    throw ModelError(robot, "parameter 'crank_place'", "the crank would be beyond the toe",
+    throw InputError(robot, "parameter 'crank_place'", "the crank would be beyond the toe",
                      "give less than tarsus_length");
   const SpringLeg leg{p, mount, makeShape(robot, p, mount.side), builder};
   addHip(leg);

@@ -76,7 +76,7 @@ void describe(OptionFields& fields, SpringLegParameters& parameters);
 /// \param armature  its help
 void describeSpringLeg(OptionFields& fields, SpringLegParameters& parameters, const std::string& armature);
 
-/// \throws ModelError when a parameter is outside its bounds, a rod does not reach, or the crank is beyond the toe
+/// \throws InputError when a parameter is outside its bounds, a rod does not reach, or the crank is beyond the toe
 Model makeSpringLeg(const SpringLegParameters& parameters = {});
 
 enum class SpringLegToe {
@@ -94,7 +94,7 @@ struct SpringLegMount {
 };
 
 /// Links, frames and closures of a leg; its motors are the caller's.
-/// \throws ModelError as makeSpringLeg()
+/// \throws InputError as makeSpringLeg()
 void addSpringLeg(const std::string& robot, const SpringLegParameters& parameters, const SpringLegMount& mount,
                   ModelBuilder& builder);
 

@@ -42,7 +42,7 @@ struct ArchitectureResults {
 };
 
 // Writes the page, the table and the figures. Returns their paths; `notes` lists figures that could not be drawn.
-// \throws ModelError when a file cannot be written
+// \throws InputError when a file cannot be written
 std::vector<std::string> writeArchitectures(const std::string& directory, const ArchitectureSpec& spec,
                                             const std::vector<Contender>& contenders,
                                             const ArchitectureResults& results, std::vector<std::string>& notes);

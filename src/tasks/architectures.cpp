@@ -82,10 +82,10 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
 double calcTrunkFactor(const ArchitectureSpec& spec, const std::string& name, const Model& model) {
   if (spec.mass == 0) return 1;
   if (!model.hasFreeFlyer())
-    throw ModelError(spec.path, "robot '" + name + "'", "it has no free trunk", "leave out `mass` or the robot");
+    throw InputError(spec.path, "robot '" + name + "'", "it has no free trunk", "leave out `mass` or the robot");
   const double trunk = model.bodies()[1].inertia.mass, factor = 1 + (spec.mass - model.mass()) / trunk;
   if (!(factor > 0))
-    throw ModelError(spec.path, "robot '" + name + "'",
+    throw InputError(spec.path, "robot '" + name + "'",
                      "its mass without the trunk is already " + formatValue(model.mass() - trunk) + " kg",
                      "give a larger `mass`");
   return factor;

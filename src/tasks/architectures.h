@@ -44,7 +44,7 @@ struct ArchitectureSpec {
   DriveTable drives;               // without constants of single motors
 };
 
-// \throws ModelError naming the file, the key with its line, and the remedy
+// \throws InputError naming the file, the key with its line, and the remedy
 ArchitectureSpec readArchitectureSpec(const std::string& path);
 
 // A robot in a comparison.
@@ -55,7 +55,7 @@ struct Contender {
 };
 
 // Makes the robots and writes them to directory/NAME.
-// \throws ModelError when there is no such robot, or its trunk cannot compensate for the mass
+// \throws InputError when there is no such robot, or its trunk cannot compensate for the mass
 std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::string& directory);
 
 // Its result is in kMotion.

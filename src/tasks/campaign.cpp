@@ -46,7 +46,7 @@ size_t countCells(const CampaignSpec& spec) {
   for (const CampaignAxis& axis : spec.axes) {
     count *= axis.values.size();
     if (count > kMostCells)
-      throw ModelError(spec.path, "campaign", "it has more than a million combinations", "give fewer values");
+      throw InputError(spec.path, "campaign", "it has more than a million combinations", "give fewer values");
   }
   return count;
 }
@@ -139,7 +139,7 @@ class CampaignRunner {
         const Json json = parseJson(line);
         results_[{json.at("motion"), json.at("run")}] = pickCampaignResult(json.at("result"));
       } catch (const std::exception& error) {
-        throw ModelError(log_.getPath(), "line " + std::to_string(number),
+        throw InputError(log_.getPath(), "line " + std::to_string(number),
                          "it was changed or damaged: " + describeJsonError(error),
                          "remove the line to repeat that run");
       }
@@ -307,7 +307,7 @@ std::vector<std::string> solveMotions(const CampaignSpec& spec, const std::strin
     if (!motion.directory.empty()) continue;
     const CaseOutcome& solved = outcome.cases[next++];
     if (!solved.complete || solved.steps.empty() || solved.steps.back().status != 0)
-      throw ModelError(spec.path, "motion '" + motion.name + "'", "it was not solved",
+      throw InputError(spec.path, "motion '" + motion.name + "'", "it was not solved",
                        "see step1.log in " + directory + "/motions/" + motion.name);
     for (const GoalOutcome& goal : readSummary(directories.back()).goals)
       if (!goal.met() && options.progress)

@@ -42,7 +42,7 @@ struct CampaignResults {
 };
 
 /// Checks options by dry runs, solves the motions that are to be solved (in DIR/motions), and does what the log lacks.
-/// \throws ModelError when an option is refused, a motion cannot be solved, or the log is of another version of the
+/// \throws InputError when an option is refused, a motion cannot be solved, or the log is of another version of the
 /// program
 CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directory, const CampaignOptions& options);
 

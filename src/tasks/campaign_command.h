@@ -15,7 +15,7 @@ std::string formatImpulse(const ImpulseSearch& search, int multiple);
 class CampaignCommands {
  public:
   // \param directories  of the motions; empty: phases count as time 0
-  // \throws ModelError when a plan has no such phase
+  // \throws InputError when a plan has no such phase
   CampaignCommands(const CampaignSpec& spec, const std::vector<std::string>& directories);
 
   // Arguments of `bielle simulate` after the motion. `impulse`: of a search, N s.
@@ -28,7 +28,7 @@ class CampaignCommands {
 
 // Dry runs of one cell and of those that differ from it in one value, equal ones once. `log`: a file for the outputs.
 // False if the user asks for the end before they are done.
-// \throws ModelError naming the file and the key that is refused
+// \throws InputError naming the file and the key that is refused
 bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log);
 
 }  // namespace bielle::tasks

@@ -15,7 +15,7 @@ struct SurvivedImpulse {
 std::vector<SurvivedImpulse> findSurvivedImpulses(const CampaignResults& results);
 
 // Returns the paths; a figure that cannot be drawn is left out with a note. The same results make the same bytes.
-// \throws ModelError when a file cannot be written
+// \throws InputError when a file cannot be written
 std::vector<std::string> writeCampaign(const std::string& directory, const CampaignResults& results,
                                        std::vector<std::string>& notes);
 

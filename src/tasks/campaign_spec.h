@@ -58,7 +58,7 @@ struct CampaignSpec {
 /// Adds `--name value` to a command; for true the name alone, for false nothing.
 void addOption(const std::string& name, const std::string& value, std::vector<std::string>& arguments);
 
-/// \throws ModelError naming the file, the key with its line, and the remedy. Options are not checked
+/// \throws InputError naming the file, the key with its line, and the remedy. Options are not checked
 CampaignSpec readCampaignSpec(const std::string& path);
 
 }  // namespace bielle::tasks

@@ -36,7 +36,7 @@ class DirectoryLock {
     if (file_ < 0) failToWrite(path, "it cannot be opened");
     if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
       close(file_);
-      throw ModelError(directory, "directory", "another study is using it", "wait for it, or give another one");
+      throw InputError(directory, "directory", "another study is using it", "wait for it, or give another one");
     }
   }
   ~DirectoryLock() { close(file_); }

@@ -62,7 +62,7 @@ std::string findError(const std::string& log);
 // ": " and its last line, for a program that failed; empty if it printed nothing.
 std::string describeLog(const std::string& log);
 
-// Runs the cases in directory/NAME. \throws ModelError when directories or files cannot be made, or another study uses
+// Runs the cases in directory/NAME. \throws InputError when directories or files cannot be made, or another study uses
 // the directory
 RunOutcome runCases(const std::string& directory, const std::vector<Case>& cases, const RunOptions& options);
 

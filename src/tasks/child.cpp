@@ -38,10 +38,10 @@ pid_t startChild(const std::vector<std::string>& arguments, const std::string& l
 
 PipedChild startPipedChild(const std::vector<std::string>& arguments) {
   int in[2], out[2];
-  if (pipe2(in, O_CLOEXEC) != 0) throw ModelError("", "new pipe", std::strerror(errno), "close other files");
+  if (pipe2(in, O_CLOEXEC) != 0) throw InputError("", "new pipe", std::strerror(errno), "close other files");
   if (pipe2(out, O_CLOEXEC) != 0) {
     close(in[0]), close(in[1]);
-    throw ModelError("", "new pipe", std::strerror(errno), "close other files");
+    throw InputError("", "new pipe", std::strerror(errno), "close other files");
   }
   PipedChild child{0, in[1], out[0]};
   try {

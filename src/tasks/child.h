@@ -10,7 +10,7 @@
 namespace bielle::tasks {
 
 // Starts a program apart (results/process.h), with both outputs in the file `log` and no input.
-// \throws ModelError when there can be no new process
+// \throws InputError when there can be no new process
 pid_t startChild(const std::vector<std::string>& arguments, const std::string& log);
 
 // A program that is spoken with: what is written to `in` it reads, what it prints is read from `out`; its errors go where

@@ -24,7 +24,7 @@ struct DesignRequest {
   std::string robot;
 };
 std::string formatRequest(const DesignRequest& request);
-/// \throws ModelError naming the file
+/// \throws InputError naming the file
 DesignRequest readRequest(const std::string& path);
 
 struct DesignTaskOptions {

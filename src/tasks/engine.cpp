@@ -32,9 +32,9 @@ std::string getRemoteArgument(const Task& task, const std::string& argument) {
 std::string readOutput(const std::string& path, std::size_t most) {
   std::error_code error;
   if (!fs::is_regular_file(fs::symlink_status(path, error)))
-    throw ModelError(path, "file", "the task did not write it", "run the task again");
+    throw InputError(path, "file", "the task did not write it", "run the task again");
   if (const auto size = fs::file_size(path, error); error || size > most)
-    throw ModelError(path, "file", "it is larger than any result of this kind", "run the task again");
+    throw InputError(path, "file", "it is larger than any result of this kind", "run the task again");
   return readTextFile(path);
 }
 

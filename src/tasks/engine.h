@@ -40,10 +40,10 @@ class TaskEngine {
   virtual ~TaskEngine() = default;
   /// Whether another task would be done soon. An engine with room for nothing but what it does takes more, too.
   virtual bool hasRoom() const = 0;
-  /// Returns the number by which its end will be known. \throws ModelError when nothing can be started
+  /// Returns the number by which its end will be known. \throws InputError when nothing can be started
   virtual int submit(const Task& task) = 0;
   /// Sleeps until a task ends. Empty if the user asks for the end. Only while tasks are under way.
-  /// \throws ModelError when the engine itself has broken down
+  /// \throws InputError when the engine itself has broken down
   virtual std::optional<TaskEnd> wait() = 0;
   /// Ends all tasks that are under way. Nothing is submitted afterwards.
   virtual void stop() = 0;
@@ -60,7 +60,7 @@ std::string getLocalArgument(const Task& task, const std::string& argument);
 std::string getRemoteArgument(const Task& task, const std::string& argument);
 
 /// The text of a file that a task has written: not larger than `most` bytes, no link, no pipe.
-/// \throws ModelError naming the file
+/// \throws InputError naming the file
 std::string readOutput(const std::string& path, std::size_t most);
 
 }  // namespace bielle::tasks

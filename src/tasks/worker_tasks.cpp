@@ -86,7 +86,7 @@ std::vector<int> readStatuses(const std::string& output, size_t count) {
 }
 
 [[noreturn]] void failWith(const std::string& problem) {
-  throw ModelError("", "bielle-workers", problem, "run the same command again to continue");
+  throw InputError("", "bielle-workers", problem, "run the same command again to continue");
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ struct WorkerOptions {
 
 class WorkerTasks : public TaskEngine {
  public:
-  /// \throws ModelError when there is no such program or port, or the password cannot be read
+  /// \throws InputError when there is no such program or port, or the password cannot be read
   explicit WorkerTasks(const WorkerOptions& options);
   ~WorkerTasks() override { WorkerTasks::stop(); }
   WorkerTasks(const WorkerTasks&) = delete;

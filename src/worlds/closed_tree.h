@@ -21,7 +21,7 @@ class ClosedTree {
  public:
   /// \param q  closed configuration at which ranks are determined   \param tips  bodies
   /// whose velocities and loads are of interest
-  /// \throws ModelError as makeReduction() does
+  /// \throws InputError as makeReduction() does
   ClosedTree(const Model& model, ConstVectorRef q, const std::vector<int>& tips);
   ClosedTree(const ClosedTree&) = delete;
   ClosedTree& operator=(const ClosedTree&) = delete;

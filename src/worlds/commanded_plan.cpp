@@ -48,7 +48,7 @@ void foresee(CommandedWalk walk, double duration, Plan& plan) {
 std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::string& file,
                                         const PredictiveOptions& predictive) {
   if (request.motion != "walk")
-    throw ModelError(file, "motion '" + request.motion + "'", "it does not follow commands", "give 'walk'");
+    throw InputError(file, "motion '" + request.motion + "'", "it does not follow commands", "give 'walk'");
   auto plan = std::make_unique<Plan>();
   plan->commands = readCommands(file);
   plan->robot = loadRobot(request.robot);

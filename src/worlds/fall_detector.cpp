@@ -32,7 +32,7 @@ FallDetector::FallDetector(const Model& model, const Policy& plan, const VectorX
   if (!criterion.only_whirling || model.closures().empty()) return;
   try {
     linkages_.emplace(model, q);
-  } catch (const ModelError&) {
+  } catch (const InputError&) {
     // Motors do not determine all joints: nothing can be said of where linkages would follow them.
   }
 }

@@ -48,7 +48,7 @@ std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, co
     if (entry.name == name) return entry.make(model, options);
     known += (known.empty() ? "" : ", ") + std::string(entry.name);
   }
-  throw ModelError("", "world '" + name + "'", "there is no such world", "choose one of: " + known);
+  throw InputError("", "world '" + name + "'", "there is no such world", "choose one of: " + known);
 }
 
 }  // namespace bielle::worlds

@@ -28,7 +28,7 @@ MjModel load(const Model& model, const std::string& xml) {
   char error[1000] = "";
   MjModel mj(mj_loadXML(kName, files.get(), error, sizeof error), mj_deleteModel);
   mj_deleteVFS(files.get());
-  if (!mj) throw ModelError(model.name(), "MuJoCo", error, "change the robot");
+  if (!mj) throw InputError(model.name(), "MuJoCo", error, "change the robot");
   return mj;
 }
 

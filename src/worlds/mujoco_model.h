@@ -13,7 +13,7 @@ namespace bielle {
 class MujocoModel {
  public:
   /// \param q_ref  closed configuration (nq) at which the loops are tied
-  /// \throws ModelError with MuJoCo's message when it refuses the robot
+  /// \throws InputError with MuJoCo's message when it refuses the robot
   MujocoModel(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options = {});
 
   const mjModel* get() const { return mj_.get(); }

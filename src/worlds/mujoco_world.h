@@ -27,7 +27,7 @@ struct MujocoWorldOptions {
 /// zero. Eq. (1) of world.h then misses the error of the steps, which is of first order in their length.
 ///
 /// Wrenches of soles are means over the last advance(). Steps are those of the options, or a little shorter.
-/// \throws ModelError when the robot has no closed configuration, or MuJoCo refuses it
+/// \throws InputError when the robot has no closed configuration, or MuJoCo refuses it
 std::unique_ptr<World> makeMujocoWorld(const Model& model, const MujocoWorldOptions& options = {});
 
 }  // namespace bielle::worlds

@@ -23,7 +23,7 @@ constexpr int kMaxIterations = 200;  // more than a motion takes from its own so
 double getNumber(const MotionSummary& summary, const std::string& name, const OptionValue& value) {
   if (const int* whole = std::get_if<int>(&value)) return *whole;
   if (const double* number = std::get_if<double>(&value)) return *number;
-  throw ModelError(summary.file, "option '" + name + "'", "it is not a number", "solve the motion again");
+  throw InputError(summary.file, "option '" + name + "'", "it is not a number", "solve the motion again");
 }
 
 // Limits given by motor are recorded with the options of the motion.
@@ -81,7 +81,7 @@ Solution solveForGains(const std::string& source, const Motion& motion, const Sh
   options.refine = false;
   Solution solution = solveUnlessInterrupted(motion, options);
   if (!solution.converged())
-    throw ModelError(source, "motion '" + motion.name + "'",
+    throw InputError(source, "motion '" + motion.name + "'",
                      std::string("the solve for its gains ended as: ") + getName(solution.summary.termination),
                      "give a motion that converges, or --control open");
   iterations = solution.summary.iterations;
@@ -95,10 +95,10 @@ Solution solveForGains(const std::string& source, const Motion& motion, const Sh
 
 void checkControl(const MotionSummary& summary, PlanControl control) {
   if (summary.objective.objective == Objective::PeakTorque)
-    throw ModelError(summary.file, "objective 'peak-torque'", "its gains never let a torque exceed the peak",
+    throw InputError(summary.file, "objective 'peak-torque'", "its gains never let a torque exceed the peak",
                      "give --control open, or solve the motion for another objective");
   if (control == PlanControl::Predictive && summary.formulation != Formulation::Reduced)
-    throw ModelError(summary.file, "formulation 'full'", "predictive control needs states with closed loops",
+    throw InputError(summary.file, "formulation 'full'", "predictive control needs states with closed loops",
                      "solve the motion without --formulation full, or give --control gains");
 }
 

@@ -59,7 +59,7 @@ void requireNoInterrupt();
 /// Makes the motion again from its request. For gains it is solved again, from the solution in the files, which do not
 /// hold them; for predictive control only if that has not converged.
 /// \param belief  what the controller takes the robot for; empty: the model of the motion, which is solved anew for another
-/// \throws InterruptedPlan, as makePlan() does; ModelError when the files cannot be read, the motion does not converge, or has the least peak torque or the full formulation, and gains or predictive control are wanted that need others
+/// \throws InterruptedPlan, as makePlan() does; InputError when the files cannot be read, the motion does not converge, or has the least peak torque or the full formulation, and gains or predictive control are wanted that need others
 std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control,
                                const PredictiveOptions& predictive = {}, std::optional<Belief> belief = {});
 
@@ -70,7 +70,7 @@ struct PlanRequest {
   double duration = 0;        ///< s; motions of steps take as many as there is time for; 0: their default
   Belief belief = Belief::Closed;
 };
-/// \throws ModelError when robot, motion or an option do not exist, or it does not converge
+/// \throws InputError when robot, motion or an option do not exist, or it does not converge
 std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control,
                                const PredictiveOptions& predictive = {});
 

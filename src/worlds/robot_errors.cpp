@@ -28,7 +28,7 @@ double calcLeastHeight(const Model& model, ConstVectorRef q) {
 
 Model makeMachine(const Model& model, const RobotErrors& errors) {
   if (!(errors.mass >= 0 && errors.mass < 1))
-    throw ModelError(model.name(), "masses",
+    throw InputError(model.name(), "masses",
                      "an error of " + std::to_string(errors.mass) + " can make them zero or negative",
                      "give 0 to less than 1");
   std::mt19937 generator(errors.seed);
@@ -47,13 +47,13 @@ Model makeMachine(const Model& model, const RobotErrors& errors) {
 VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRef q) {
   const AssemblyResult closed = closeConfiguration(machine, q);
   if (closed.status != AssemblyStatus::Closed)
-    throw ModelError(machine.name(), closed.worst, "its loop cannot be closed: " + closed.message,
+    throw InputError(machine.name(), closed.worst, "its loop cannot be closed: " + closed.message,
                      "allow smaller errors; loops with redundant rows allow no errors");
   PassiveJoints joints(machine, closed.q);
   VectorXd motors(machine.nu()), out = q;
   for (int m = 0; m < machine.nu(); ++m) motors[m] = q[machine.joints()[machine.motors()[m].joint].idx_q];
   if (joints.update(motors, out) != ClosingStatus::Closed)
-    throw ModelError(machine.name(), "closures", "they cannot close at the motors' positions", "allow smaller errors");
+    throw InputError(machine.name(), "closures", "they cannot close at the motors' positions", "allow smaller errors");
   if (machine.hasFreeFlyer() && !machine.contacts().empty())
     out[2] += calcLeastHeight(model, q) - calcLeastHeight(machine, out);
   return out;

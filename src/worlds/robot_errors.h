@@ -13,12 +13,12 @@ struct RobotErrors {
 };
 
 /// The machine of a model.
-/// \throws ModelError when its masses would not be positive
+/// \throws InputError when its masses would not be positive
 Model makeMachine(const Model& model, const RobotErrors& errors);
 
 /// Where the machine is when its controller believes that it is at q (nq, closed in the model): the motors of both are at
 /// the same positions, the loops of the machine are closed, the lowest corner of its soles is as high.
-/// \throws ModelError when the loops of the machine cannot be closed
+/// \throws InputError when the loops of the machine cannot be closed
 VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRef q);
 
 }  // namespace bielle::worlds

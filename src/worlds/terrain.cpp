@@ -14,7 +14,7 @@ constexpr int kLargestGrid = 200000;  // cells
 constexpr double kBeyond = 1e-6;      // a side of a box is free if the ground is lower this far beyond it, m
 
 void require(bool ok, const char* what, const char* remedy) {
-  if (!ok) throw ModelError("terrain", what, "it is out of range", remedy);
+  if (!ok) throw InputError("terrain", what, "it is out of range", remedy);
 }
 
 }  // namespace

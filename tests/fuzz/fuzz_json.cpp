@@ -12,14 +12,14 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   scratch.write("summary.json", text);
   try {
     readSummary(scratch.path());
-  } catch (const ModelError&) {
+  } catch (const InputError&) {
   }
   static const Model model = makeFourBarChain().model;
   const std::string path = scratch.write("state.json", text);
   try {
     const cli::EvalState state = cli::readState(model, path);
     if (!state.q.allFinite() || !state.v.allFinite() || !state.u.allFinite()) fuzz::fail("a state is not finite");
-  } catch (const ModelError&) {
+  } catch (const InputError&) {
   }
   return 0;
 }

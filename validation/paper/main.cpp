@@ -42,7 +42,7 @@ int run(int argc, char** argv) {
     return action({argv, argv + argc});
   } catch (const CLI::ParseError& error) {
     return error.get_exit_code() == 0 ? app.exit(error) : fail(error.what(), 2);
-  } catch (const bielle::ModelError& error) {
+  } catch (const bielle::InputError& error) {
     return fail(error.what(), 2);
   } catch (const std::exception& error) {
     return fail(error.what(), 1);

@@ -31,7 +31,7 @@ std::pair<int, int> findWindow(Window window, const MotionSummary& summary, int 
   if (steps.size() < 5) return {0, nodes - 1};
   const std::pair<int, int> found(steps[2].first, steps[steps.size() - 3].second);
   if (found.first > found.second || found.second >= nodes)
-    throw ModelError(summary.file, "phases", "they are not as long as the trajectory", kCaseRemedy);
+    throw InputError(summary.file, "phases", "they are not as long as the trajectory", kCaseRemedy);
   return found;
 }
 

@@ -19,7 +19,7 @@ struct ComparedRobot {
   ComparedJoints joints;
   std::vector<std::string> knee_motors, ankle_motors;  // of the closed model; the serial one has them on the joints
 };
-// \throws ModelError when the robot has no such joints
+// \throws InputError when the robot has no such joints
 ComparedRobot loadComparedRobot(const std::string& name);
 
 // Torques of some motors over the window, absolute values, N m.

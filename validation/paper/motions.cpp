@@ -57,7 +57,7 @@ struct LiftArguments {
 int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   const MotionSummary summary = readSummary(arguments.serial_directory);
   if (summary.motion != "paper-walk" || summary.model != "serial")
-    throw ModelError(summary.file, "motion '" + summary.motion + "' of the " + summary.model + " model",
+    throw InputError(summary.file, "motion '" + summary.motion + "' of the " + summary.model + " model",
                      "it is not the paper's walk of the serial model", "make one with `bielle-paper walk --serial`");
   WalkOptions walk;
   for (const auto& [name, value] : summary.options)

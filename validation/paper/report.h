@@ -14,7 +14,7 @@ struct StudyPage {
   std::vector<std::string> notes;  // figures that could not be drawn
 };
 
-// Writes the table, the figures and the page. \throws ModelError when a file cannot be written
+// Writes the table, the figures and the page. \throws InputError when a file cannot be written
 StudyPage writeStudy(const std::string& directory, const StudyResult& result, const ComparedRobot& robot);
 
 // report.md: the pages under one heading. Returns its path.

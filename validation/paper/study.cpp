@@ -29,7 +29,7 @@ std::vector<Study> chooseStudies(const StudyArguments& arguments) {
     if (arguments.name == "all" || arguments.name == study.name) chosen.push_back(study);
   if (arguments.values.empty()) return chosen;
   if (arguments.name == "all" || chosen[0].motion.empty())
-    throw ModelError("", "--values", "'" + arguments.name + "' is not a study of one parameter",
+    throw InputError("", "--values", "'" + arguments.name + "' is not a study of one parameter",
                      "give values to squat, speed, walk, stairs or jump");
   chosen[0].values = arguments.values;
   return chosen;

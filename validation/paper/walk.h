@@ -29,7 +29,7 @@ struct WalkOptions {
   ContactGains contacts{0, 100}, closures{0, 0};
 };
 
-// \param q0  a standing posture   \throws ModelError when the robot lacks feet
+// \param q0  a standing posture   \throws InputError when the robot lacks feet
 Motion makeWalk(const Model& model, const WalkOptions& options, const VectorXd& q0,
                 Formulation formulation = Formulation::Reduced);
 

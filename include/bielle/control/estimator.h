@@ -64,7 +64,7 @@ enum class EstimatorStatus {
 class Estimator {
  public:
   /// \param q  closed configuration, e.g. a posture
-  /// \throws ModelError when motors do not determine a joint other than the free-flyer of the trunk
+  /// \throws InputError when motors do not determine a joint other than the free-flyer of the trunk
   Estimator(const Model& model, ConstVectorRef q, const EstimatorOptions& options = {});
   ~Estimator();
   Estimator(Estimator&&) noexcept;

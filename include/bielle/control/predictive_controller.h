@@ -82,7 +82,7 @@ struct PredictiveCounts {
 
 /// The motion that predictive control solves: `plan`, followed by copies of its last stage, as many as the window is
 /// long, with terminal weights from PredictiveOptions.
-/// \throws ModelError as makeMotion() does
+/// \throws InputError as makeMotion() does
 Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
                             const PredictiveOptions& options);
 
@@ -90,9 +90,9 @@ class PredictiveController : public Controller {
  public:
   /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation
   /// \param plan  the solved motion, without the copies of its last stage: where windows end, and what the first one
-  /// starts from   \throws ModelError when motors brake and the start is a dead point
+  /// starts from   \throws InputError when motors brake and the start is a dead point
   PredictiveController(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
-  /// \param walk  of which no stage has been made yet   \throws ModelError likewise
+  /// \param walk  of which no stage has been made yet   \throws InputError likewise
   PredictiveController(CommandedWalk walk, const PredictiveOptions& options);
   ~PredictiveController() override;
 

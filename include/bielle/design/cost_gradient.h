@@ -12,7 +12,7 @@ namespace bielle {
 /// \param x       for which the motion of the envelope is optimal
 /// \param make    the same motion for another robot: same options; posture, footholds and references planned again
 /// \return (variables), zero for choices
-/// \throws ModelError when a neighbour of x has no such motion
+/// \throws InputError when a neighbour of x has no such motion
 VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
                           const std::function<Motion(const Model&)>& make);
 

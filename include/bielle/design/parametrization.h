@@ -52,7 +52,7 @@ class Parametrization {
  public:
   /// A given robot.
   /// \param source  file that defines the variables, named in errors
-  /// \throws ModelError for unknown names, places on different bodies, bounds that cross or exclude the given robot,
+  /// \throws InputError for unknown names, places on different bodies, bounds that cross or exclude the given robot,
   ///   two variables that set the same thing
   Parametrization(Model model, std::vector<DesignVariable> variables, std::string source = "");
   /// A generated robot; `settings` are the values of other parameters of the generator. Bounds beyond those of a
@@ -74,7 +74,7 @@ class Parametrization {
   std::vector<VectorXd> listCombinations() const;
 
   /// A given robot is changed in the order of the variables. Choices are rounded to whole numbers.
-  /// \throws ModelError when the numbers do not define a robot
+  /// \throws InputError when the numbers do not define a robot
   Model make(const VectorXd& x) const;
 
  private:
@@ -97,7 +97,7 @@ class Parametrization {
 /// are smooth functions of the numbers, polynomials of at most the third degree for lengths and shifts; they are
 /// differenced by the five-point rule over a thousandth of the bounds, which is exact for polynomials up to the fourth
 /// degree.
-/// \throws ModelError when a variable changes anything but placements, inertias and armatures (an axis, a gain)
+/// \throws InputError when a variable changes anything but placements, inertias and armatures (an axis, a gain)
 std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x);
 
 }  // namespace bielle

@@ -70,7 +70,7 @@ AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions
 /// The assembly problem of a reference of the robot's file: preferred joint values, feet flat at their places, height.
 AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference);
 /// Assembled reference by name.
-/// \throws ModelError when there is no such reference
+/// \throws InputError when there is no such reference
 AssemblyResult assembleReference(const Model& model, const std::string& name, const AssemblyOptions& options = {});
 
 /// A joint that a reference gives: its q there and in an assembled configuration.

@@ -50,12 +50,12 @@ struct Linkage {
 };
 
 /// The linkages of all loop clusters with as many motors as mobility, with their serial joints or bodies as output.
-/// \param q_reference  nq, closed   \throws ModelError when it is open or a dead point
+/// \param q_reference  nq, closed   \throws InputError when it is open or a dead point
 std::vector<Linkage> listLinkages(const Model& model, ConstVectorRef q_reference);
 /// The linkage that drives the joints, without a reference. When the linkage has more mobility than joints are named, the
 /// other serial joints of the model in it are added. A joint outside all loops with its own motor is a linkage too.
 /// \param q  nq, closed: where the mobility of the linkages is evaluated
-/// \throws ModelError when a joint is unknown, has several coordinates, is not driven, or when mobility, joints and
+/// \throws InputError when a joint is unknown, has several coordinates, is not driven, or when mobility, joints and
 /// motors of the linkage do not match
 Linkage makeLinkage(const Model& model, ConstVectorRef q, const std::vector<std::string>& joints);
 

@@ -57,6 +57,6 @@ std::string describeRemedies(const Model& model, const LoopConflict& conflict);
 
 /// The error for a robot without a closed configuration according to findClosedConfiguration().
 /// \param source  file or name of the robot
-ModelError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open);
+InputError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open);
 
 }  // namespace bielle

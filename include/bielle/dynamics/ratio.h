@@ -71,7 +71,7 @@ struct RatioSweep {
 
 /// \param q  closed configuration of the whole model to start from
 /// \param joint  which joint of the linkage is swept; the others keep their angles of q
-/// \throws ModelError when the start is a dead point of the swept joint
+/// \throws InputError when the start is a dead point of the swept joint
 RatioSweep sweepRatio(const Model& model, const Linkage& linkage, ConstVectorRef q, int joint = 0,
                       const SweepOptions& options = {});
 

@@ -94,7 +94,7 @@ struct LoadedRobot {
   std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
 };
 
-/// The file of a robot by name or path, as loadRobot (robots/robot_loader.h) finds it. \throws ModelError listing the places searched
+/// The file of a robot by name or path, as loadRobot (robots/robot_loader.h) finds it. \throws InputError listing the places searched
 std::string findRobotFile(const std::string& name_or_path);
 
 /// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),

@@ -16,7 +16,7 @@ struct RobotText {
 /// frame, closure, motor, contact and reference keeps its name; links that were merged into a body become frames.
 /// Bodies keep their order if the model lists them depth first.
 /// \param remark  comment at the head of both files
-/// \throws ModelError naming anything that the files cannot express: a universal joint whose axes are not axes of its
+/// \throws InputError naming anything that the files cannot express: a universal joint whose axes are not axes of its
 ///   frame, limits of joints with several coordinates
 RobotText formatRobot(const Model& model, const std::string& remark = "");
 
@@ -27,11 +27,11 @@ struct UrdfText {
 
 /// A URDF alone, for programs that read nothing else: couplers of two joints as <mimic>, dampers and friction as
 /// <dynamics>, motor limits as joint limits.
-/// \throws ModelError naming a joint that URDF does not have (universal, spherical), or as above
+/// \throws InputError naming a joint that URDF does not have (universal, spherical), or as above
 UrdfText formatUrdf(const Model& model);
 
 /// Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.
-/// \throws ModelError as above, or when they cannot be written
+/// \throws InputError as above, or when they cannot be written
 void writeRobot(const Model& model, const std::string& directory, const std::string& remark = "");
 
 /// The entry of a motor in a YAML file besides its armature and limits: its loss, drive and continuous effort, as keys and values.

@@ -34,7 +34,7 @@ ModelParts takeParts(const Model& model);
 
 /// Collects bodies, joints, closures, motors and frames, then validates them and makes the model.
 /// Bodies are referred to by the name of the link; "world" is the ground. A link must be declared before it is used;
-/// otherwise calls may come in any order. build() throws ModelError naming the element and the remedy.
+/// otherwise calls may come in any order. build() throws InputError naming the element and the remedy.
 class ModelBuilder {
  public:
   explicit ModelBuilder(std::string name, std::string source = "");
@@ -89,7 +89,7 @@ class ModelBuilder {
   Model build(std::vector<std::string>* warnings = nullptr) const;
 
   /// The model of these parts, bitwise equal to the one that they were taken from.
-  /// \throws ModelError when an index or a size among them does not fit
+  /// \throws InputError when an index or a size among them does not fit
   static Model restore(ModelParts parts);
 
  private:

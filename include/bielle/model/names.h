@@ -27,7 +27,7 @@ constexpr std::array<const char*, 6> kWrenchEntries = {"fx", "fy", "fz", "nx", "
 /// name.fx, ..., name.nz for every name.
 std::vector<std::string> makeWrenchNames(const std::vector<std::string>& names);
 
-/// Index of the name, i.e. a column of a record. \throws ModelError when it is absent
+/// Index of the name, i.e. a column of a record. \throws InputError when it is absent
 int findColumn(const std::vector<std::string>& names, const std::string& name);
 
 /// The names of a list of named things.

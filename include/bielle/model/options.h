@@ -49,7 +49,7 @@ struct Option {
 /// Options in their order.
 class OptionSet {
  public:
-  /// \param noun  in messages   \param owner  whose options they are, the source of a ModelError
+  /// \param noun  in messages   \param owner  whose options they are, the source of a InputError
   explicit OptionSet(std::string noun = "option", std::string owner = "")
       : noun_(std::move(noun)), owner_(std::move(owner)) {}
 
@@ -58,7 +58,7 @@ class OptionSet {
 
   /// Null if there is none of this name.
   const Option* find(const std::string& name) const;
-  /// \throws ModelError with the nearest name, and all
+  /// \throws InputError with the nearest name, and all
   const Option& get(const std::string& name) const;
   /// The value of an option of type T. \throws std::bad_variant_access for another type
   template <typename T>
@@ -68,11 +68,11 @@ class OptionSet {
 
   void add(Option option) { options_.push_back(std::move(option)); }
   /// Takes a whole number for a number, and a number that is whole for an integer.
-  /// \throws ModelError naming the option and what is allowed, or as get() does
+  /// \throws InputError naming the option and what is allowed, or as get() does
   void set(const std::string& name, const OptionValue& value);
 
   OptionValues listValues() const;
-  /// \throws ModelError naming the first option whose value is not allowed
+  /// \throws InputError naming the first option whose value is not allowed
   void check() const;
 
  private:

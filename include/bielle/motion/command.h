@@ -30,7 +30,7 @@ struct TimedCommand {
   VelocityCommand velocity;
 };
 
-/// \throws ModelError naming file, entry and line
+/// \throws InputError naming file, entry and line
 std::vector<TimedCommand> readCommands(const std::string& path);
 
 /// The velocity that holds at a time; rest before the first. \param commands  in the order of time
@@ -41,7 +41,7 @@ double calcMeanSpeed(const std::vector<TimedCommand>& commands, double duration)
 
 /// Checks that legs reach the footholds of steps at this velocity, that none turns by more than half a turn, and that soles do
 /// not collide.
-/// \param element  names the command in messages   \throws ModelError unless they do
+/// \param element  names the command in messages   \throws InputError unless they do
 void checkCommand(const Model& model, const LocomotionOptions& options, const VelocityCommand& command,
                   const std::string& element);
 

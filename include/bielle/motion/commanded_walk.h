@@ -35,7 +35,7 @@ class CommandedWalk {
   /// From the standing posture q0, at time 0.
   /// \param options  `flight`, `rigid_landing` and `landing_speed` are
   /// ignored; a time step of 0 is 12 ms
-  /// \throws ModelError as planLocomotion() and addLimits() do
+  /// \throws InputError as planLocomotion() and addLimits() do
   CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits, CommandSource command,
                 const VectorXd& q0);
 

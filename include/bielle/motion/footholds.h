@@ -26,10 +26,10 @@ struct FootholdsOptions {
 /// What can be set besides the footholds.
 void describe(OptionFields& fields, FootholdsOptions& options);
 
-/// \throws ModelError naming file, entry and line
+/// \throws InputError naming file, entry and line
 std::vector<Footstep> readFootholds(const std::string& path);
 
-/// From the standing posture q0. \throws ModelError naming the step that is impossible: a sole on the edge of another
+/// From the standing posture q0. \throws InputError naming the step that is impossible: a sole on the edge of another
 /// stone or in it, a swing that would touch the ground, and see locomotion.h
 MotionPlan planFootholds(const Model& model, const FootholdsOptions& options, const VectorXd& q0);
 Motion makeFootholds(const Model& model, const FootholdsOptions& options, const ProblemOptions& problem = {});

@@ -72,7 +72,7 @@ struct JumpHeight {
 JumpHeight calcJumpHeight(const JumpOptions& options, double gravity, double t);
 
 /// A jump off all contacts of the robot at once, from the standing posture q0.
-/// \throws ModelError when the request is impossible (durations, lengths, no contact)
+/// \throws InputError when the request is impossible (durations, lengths, no contact)
 MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0);
 Motion makeJump(const Model& model, const JumpOptions& options = {}, const ProblemOptions& problem = {});
 

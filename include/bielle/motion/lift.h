@@ -71,7 +71,7 @@ struct LiftResult {
 /// The stages of a problem with these dynamics and without costs, terminal node included.
 std::vector<StageSpec> makeStages(const std::vector<double>& dt, const std::vector<ConstraintSet>& constraints);
 
-/// \throws ModelError when the trajectory does not belong to the serial model
+/// \throws InputError when the trajectory does not belong to the serial model
 LiftResult lift(const Model& closed, const SerialModel& serial, const SerialTrajectory& trajectory,
                 const LiftOptions& options = {});
 

@@ -27,12 +27,12 @@ struct LimitOptions {
   bool areGiven() const { return !(efforts.empty() && velocities.empty() && powers.empty()); }
 };
 
-/// Effort limits by motor (nu), those of the model or the given replacements. \throws ModelError as addLimits() does
+/// Effort limits by motor (nu), those of the model or the given replacements. \throws InputError as addLimits() does
 VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
 
 /// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
 /// \param q0  configuration of the first node (nq)
-/// \throws ModelError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range
+/// \throws InputError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range
 /// has zero width or excludes q0
 bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages);
 

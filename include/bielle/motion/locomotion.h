@@ -97,7 +97,7 @@ struct Stance {
   std::array<int, 2> contacts{};  ///< indices of the left and right foot
   std::array<SE3, 2> feet;        ///< their placements
 };
-/// The stance in a closed posture q0. \throws ModelError when the robot lacks a foot
+/// The stance in a closed posture q0. \throws InputError when the robot lacks a foot
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0);
 
 /// The steps to take and the ground to take them on.
@@ -117,7 +117,7 @@ std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, 
                                  int steps_per_cycle = 1);
 
 /// Its goals are the footholds.
-/// \throws ModelError when the request is impossible: footholds out of the legs' reach, soles that collide, durations
+/// \throws InputError when the request is impossible: footholds out of the legs' reach, soles that collide, durations
 MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
                           const LocomotionOptions& options);
 

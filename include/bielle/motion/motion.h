@@ -16,10 +16,10 @@
 
 namespace bielle {
 
-/// \throws ModelError naming the option unless `ok`
+/// \throws InputError naming the option unless `ok`
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy);
 
-/// \throws ModelError when a motion of this duration has more than 100000 stages, which may exceed the memory
+/// \throws InputError when a motion of this duration has more than 100000 stages, which may exceed the memory
 void requireStages(double seconds, double time_step);
 
 /// A motion before it becomes a problem; a sequence joins several. It starts and ends standing.
@@ -86,7 +86,7 @@ ObjectiveOptions scaleObjective(const Motion& effort, const ShootingTrajectory& 
 
 /// Turns a plan into a problem that starts at rest, adding limits, free durations, objective and step rule to its stages.
 /// Gains are limited to values that are stable for a step (limitGains).
-/// \throws ModelError as addLimits(), freeTimings() and setObjective() do
+/// \throws InputError as addLimits(), freeTimings() and setObjective() do
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as far as possible: with a = v = 0,
@@ -99,7 +99,7 @@ struct StaticTorques {
 StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q);
 
 /// The starting posture: the reference `half_sitting`, or the only one; springs that it does not name and that no motor
-/// holds are deflected until the robot stands still, if possible. \throws ModelError when there is no reference, or it
+/// holds are deflected until the robot stands still, if possible. \throws InputError when there is no reference, or it
 /// cannot be closed
 VectorXd makeStandingPosture(const Model& model);
 

@@ -49,7 +49,7 @@ double getDefaultRegularization(Objective objective);
 double calcElectricalPower(const Motor& motor, double u, double w, double regeneration);
 
 /// Weakens the costs that do not define the motion, and adds that of the energy.
-/// \throws ModelError when a number is out of its range
+/// \throws InputError when a number is out of its range
 void setObjective(const Model& model, const ObjectiveOptions& options, std::vector<StageSpec>& stages);
 
 /// L of the peak torque, nu. \param limits  those of the motion, which replace some of the model

@@ -29,7 +29,7 @@ struct GapOptions {
 void describe(OptionFields& fields, BoxOptions& options);
 void describe(OptionFields& fields, GapOptions& options);
 
-/// From the standing posture q0. \throws ModelError when the request is impossible: sizes, a swing that would touch the
+/// From the standing posture q0. \throws InputError when the request is impossible: sizes, a swing that would touch the
 /// box, and see locomotion.h
 MotionPlan planBox(const Model& model, const BoxOptions& options, const VectorXd& q0);
 MotionPlan planGap(const Model& model, const GapOptions& options, const VectorXd& q0);

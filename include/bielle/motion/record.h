@@ -50,7 +50,7 @@ Slip calcSlip(const Motion& motion, const MotionTrack& track);
 /// node, with the recorded durations where phases are free; otherwise each node takes the recorded one at the same
 /// fraction of the duration. If stance feet are more than 0.5 mm away from their places in the new motion, the base is
 /// moved there. Multipliers are those of the record.
-/// \throws ModelError when the coordinates or motors differ, or the record contains numbers that are not finite
+/// \throws InputError when the coordinates or motors differ, or the record contains numbers that are not finite
 StartingPoint makeStart(const MotionRecord& record, const Motion& motion);
 
 }  // namespace bielle

@@ -13,7 +13,7 @@ struct MotionRequest;
 /// Data of a motion that come from a file (`--NAME FILE`).
 struct MotionFile {
   std::string name, help;
-  std::function<void(const std::string& path, MotionRequest&)> read;  ///< throws ModelError
+  std::function<void(const std::string& path, MotionRequest&)> read;  ///< throws InputError
 };
 
 using MotionPlanner = std::function<MotionPlan(const Model&, const VectorXd& q0, const OptionSet& options)>;
@@ -36,11 +36,11 @@ struct MotionEntry {
 
 const std::vector<MotionEntry>& getMotions();
 
-/// Finds a motion by name. \throws ModelError naming the file that requests it, when there is none
+/// Finds a motion by name. \throws InputError naming the file that requests it, when there is none
 const MotionEntry& findMotion(const std::string& file, const std::string& name);
 
 /// Consecutive motions by name. Options are "NAME.option"; if a motion is repeated NAME is "walk2" and so on.
-/// \throws ModelError when there is no such motion
+/// \throws InputError when there is no such motion
 inline constexpr const char* kSequence = "sequence";
 MotionRequest makeSequenceRequest(const std::vector<std::string>& motions);
 /// The motions of a sequence; none of another request.
@@ -52,7 +52,7 @@ inline constexpr const char *kEffortLimit = "limit ", *kVelocityLimit = "velocit
 inline constexpr const char* kDeadPointMargin = "dead-point-margin";
 
 /// The motion of a request from the robot's standing posture. The limits given by motor are listed with the other options.
-/// \throws ModelError as makeMotion() does
+/// \throws InputError as makeMotion() does
 Motion makeMotion(const Model& model, const MotionRequest& request, const ProblemOptions& problem = {});
 
 }  // namespace bielle

@@ -40,7 +40,7 @@ struct HopOptions {
 void describe(OptionFields& fields, RunOptions& options);
 void describe(OptionFields& fields, HopOptions& options);
 
-/// From the standing posture q0. \throws ModelError when the request is impossible (see locomotion.h)
+/// From the standing posture q0. \throws InputError when the request is impossible (see locomotion.h)
 MotionPlan planRun(const Model& model, const RunOptions& options, const VectorXd& q0);
 MotionPlan planHop(const Model& model, const HopOptions& options, const VectorXd& q0);
 

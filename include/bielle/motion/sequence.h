@@ -15,7 +15,7 @@ struct SequencePart {
   std::function<MotionPlan(const Model&, const VectorXd& q_start)> plan;  ///< e.g. planSquat with its options
 };
 
-/// \throws ModelError when there is no part, when one is impossible, or when they differ in friction or do not fit on
+/// \throws InputError when there is no part, when one is impossible, or when they differ in friction or do not fit on
 /// one ground
 MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0);
 

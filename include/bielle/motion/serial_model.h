@@ -26,7 +26,7 @@ struct SerialModelOptions {
 };
 
 /// Parses an armature: kg m^2, or "reflected"; empty for the default.
-/// \throws ModelError for any other text
+/// \throws InputError for any other text
 SerialModelOptions parseSerialArmature(const std::string& text);
 
 struct SerialModel {
@@ -45,7 +45,7 @@ struct SerialModel {
 };
 
 /// \param q_reference  closed configuration where the linkages are frozen
-/// \throws ModelError naming the linkage and the reason, when the robot has no equivalent serial chain
+/// \throws InputError naming the linkage and the reason, when the robot has no equivalent serial chain
 SerialModel makeSerialModel(const Model& closed, ConstVectorRef q_reference, const SerialModelOptions& options = {});
 
 /// Entries of q (nq) or v (nv) of the joints that `model` also has, by name: the serial part of a closed state.

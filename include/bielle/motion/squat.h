@@ -28,7 +28,7 @@ struct SquatOptions {
 void describe(OptionFields& fields, SquatOptions& options);
 
 /// A squat on all contacts of the robot, from the standing posture q0.
-/// \throws ModelError when the request is impossible (depth, durations, no contact)
+/// \throws InputError when the request is impossible (depth, durations, no contact)
 MotionPlan planSquat(const Model& model, const SquatOptions& options, const VectorXd& q0);
 Motion makeSquat(const Model& model, const SquatOptions& options = {}, const ProblemOptions& problem = {});
 

@@ -26,7 +26,7 @@ void describe(OptionFields& fields, StairsOptions& options);
 /// The stairs in front of feet whose middle (calcMiddle) is initially X_WP.
 Ground makeStairsGround(const StairsOptions& options, const SE3& X_WP);
 
-/// From the standing posture q0. \throws ModelError when the request is impossible (see locomotion.h)
+/// From the standing posture q0. \throws InputError when the request is impossible (see locomotion.h)
 MotionPlan planStairs(const Model& model, const StairsOptions& options, const VectorXd& q0);
 Motion makeStairs(const Model& model, const StairsOptions& options = {}, const ProblemOptions& problem = {});
 

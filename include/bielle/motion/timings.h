@@ -33,7 +33,7 @@ struct TimingOptions {
 
 /// Makes the durations named by the options free, each phase of the schedule separately.
 /// \param stages  those of the schedule, and the terminal one
-/// \throws ModelError when bounds are invalid, or there is no phase of a name
+/// \throws InputError when bounds are invalid, or there is no phase of a name
 void freeTimings(const TimingOptions& options, const ContactSchedule& schedule, std::vector<StageSpec>& stages);
 
 /// The options without names that are not phases of the schedule.

@@ -29,7 +29,7 @@ void describe(OptionFields& fields, WalkOptions& options);
 void describe(OptionFields& fields, SideWalkOptions& options);
 void describe(OptionFields& fields, TurnOptions& options);
 
-/// From the standing posture q0. \throws ModelError when the request is impossible (see locomotion.h)
+/// From the standing posture q0. \throws InputError when the request is impossible (see locomotion.h)
 MotionPlan planWalk(const Model& model, const WalkOptions& options, const VectorXd& q0);
 MotionPlan planSideWalk(const Model& model, const SideWalkOptions& options, const VectorXd& q0);
 MotionPlan planTurn(const Model& model, const TurnOptions& options, const VectorXd& q0);

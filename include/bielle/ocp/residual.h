@@ -67,7 +67,7 @@ struct BodyFrame {
   int body = 0;
   SE3 X_BF;
 };
-/// The link, frame or contact of this name. \throws ModelError when the robot has none
+/// The link, frame or contact of this name. \throws InputError when the robot has none
 BodyFrame getBodyFrame(const Model& model, const std::string& name);
 
 /// Centre of mass minus a reference (3), m.
@@ -120,7 +120,7 @@ std::unique_ptr<Residual> makeTransmission(const Linkage& linkage);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
 /// Voltages of motors, given by their indices in the model, from their torques and their speeds when the torques act, with the
-/// factors Motor::getVoltsPerEffort() and getVoltsPerSpeed() (n), V. \throws ModelError for one without an envelope
+/// factors Motor::getVoltsPerEffort() and getVoltsPerSpeed() (n), V. \throws InputError for one without an envelope
 std::unique_ptr<Residual> makeMotorVoltage(const Model& model, const std::vector<int>& motors);
 /// Electrical powers P_m = u_m w_m + loss_m u_m^2 of all motors, w their speeds when the torques act, then their torques
 /// (2 nu), W and N m: what Activation::makeEnergy reads. \param losses  nu, W/(N m)^2

@@ -135,7 +135,7 @@ class RobotProblem : public ShootingProblem {
  public:
   /// \param q0, v0  initial state; for the reduced formulation closed, with a velocity that keeps it closed
   /// \param stages  N running stages, then the terminal one
-  /// \throws ModelError on sizes that do not match, a weight that is negative or not finite, or an open
+  /// \throws InputError on sizes that do not match, a weight that is negative or not finite, or an open
   /// configuration in the reduced formulation
   RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,
                Formulation formulation = Formulation::Full);
@@ -173,7 +173,7 @@ class RobotProblem : public ShootingProblem {
   Formulation formulation() const { return formulation_; }
   const StageSpec& spec(int node) const { return specs_[node]; }
   /// Replaces a stage, for endless receding horizons. Evaluations of other nodes stay valid; no solve may be running.
-  /// \throws ModelError as the constructor does   \throws std::invalid_argument when the duration of the stage is free,
+  /// \throws InputError as the constructor does   \throws std::invalid_argument when the duration of the stage is free,
   /// or it has more costs, constraints or rows of them than any stage of the constructor had, or other bodies in
   /// contact
   void replaceStage(int stage, StageSpec spec);

@@ -12,11 +12,11 @@
 namespace bielle {
 
 /// The page. The robots are loaded again, by `robot_file` or else by name.
-/// \throws ModelError naming the file that is missing or inconsistent (for example a robot that has changed since)
+/// \throws InputError naming the file that is missing or inconsistent (for example a robot that has changed since)
 std::string makeReport(const std::vector<std::string>& directories);
 
 /// Writes the page to a temporary file and renames it when complete.
-/// \throws ModelError as above, or when it cannot be written
+/// \throws InputError as above, or when it cannot be written
 void writeReport(const std::string& path, const std::vector<std::string>& directories);
 
 }  // namespace bielle

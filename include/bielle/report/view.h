@@ -12,10 +12,10 @@
 
 namespace bielle {
 
-/// \throws ModelError when no closed configuration is found
+/// \throws InputError when no closed configuration is found
 std::string makeView(const LoadedRobot& robot);
 
-/// Writes the page to a temporary file and renames it. \throws ModelError as above, or when it cannot be written
+/// Writes the page to a temporary file and renames it. \throws InputError as above, or when it cannot be written
 void writeView(const std::string& path, const LoadedRobot& robot);
 
 }  // namespace bielle

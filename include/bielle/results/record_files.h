@@ -19,7 +19,7 @@ void writeCsv(const std::string& path, const MotionRecord& record);
 void writeNpz(const std::string& path, const MotionRecord& record);
 
 /// Reads an archive that writeNpz() wrote.
-/// \throws ModelError naming the file and what is wrong with it, as the writers do when they cannot write
+/// \throws InputError naming the file and what is wrong with it, as the writers do when they cannot write
 MotionRecord readRecord(const std::string& path);
 
 /// What the two write.
@@ -27,7 +27,7 @@ std::string formatCsv(const MotionRecord& record);
 std::string formatNpz(const MotionRecord& record);
 
 /// The record in a directory written by writeResult().
-/// \throws ModelError naming the file and why it cannot be read
+/// \throws InputError naming the file and why it cannot be read
 MotionRecord readResultRecord(const std::string& directory);
 
 }  // namespace bielle

@@ -80,19 +80,19 @@ struct MotionSummary {
   Ground ground;
 };
 
-/// \throws ModelError naming the file, the entry and what is wrong with it: a motion carried out is no plan
+/// \throws InputError naming the file, the entry and what is wrong with it: a motion carried out is no plan
 MotionSummary readSummary(const std::string& directory);
 
 /// The request recorded in a result, without limits, which are part of the problem and not of the motion.
-/// \throws ModelError when there is no such motion or option
+/// \throws InputError when there is no such motion or option
 MotionRequest remakeRequest(const MotionSummary& summary);
 
 /// Creates the directory with its parents and verifies that files can be written there.
-/// \throws ModelError naming the directory and the reason
+/// \throws InputError naming the directory and the reason
 void makeOutputDirectory(const std::string& directory);
 
 /// Writes trajectory.csv, trajectory.npz and summary.json to temporary files, which are renamed when all are complete,
-/// summary.json last. Returns their paths. \throws ModelError naming the file and the reason
+/// summary.json last. Returns their paths. \throws InputError naming the file and the reason
 std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result);
 /// Writes summary.json alone.
 void writeSummary(const std::string& directory, const MotionResult& result);
@@ -107,7 +107,7 @@ BuildInfo getBuildInfo();
 
 /// The input of lift() from a record of a motion of the serial model.
 /// \param motion  the same request made again, for the active contacts of every stage
-/// \throws ModelError when the record does not belong to that motion
+/// \throws InputError when the record does not belong to that motion
 SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& record);
 
 /// The lifted part of the motion in the form of a solved one: converged if it was lifted entirely; its cost is the mean
@@ -116,7 +116,7 @@ MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Mot
                               double seconds);
 
 /// Writes lift.json: the outcome, and per node status, errors, margin and evaluations; given a result, also
-/// trajectory.csv, trajectory.npz and summary.json. Returns the paths. \throws ModelError naming the file and the
+/// trajectory.csv, trajectory.npz and summary.json. Returns the paths. \throws InputError naming the file and the
 /// reason
 std::vector<std::string> writeLift(const std::string& directory, LiftMethod method, const LiftResult& lifted,
                                    const MotionResult* result);

@@ -13,7 +13,7 @@ std::string makeRobotInfo(const LoadedRobot& robot);
 
 /// Warnings "file: reference: problem" for references that close with a given joint farther than kReferenceTolerance from its
 /// value, or that give and have one outside its range.
-/// \throws ModelError for a reference that gives a value outside the range of its joint and does not close there
+/// \throws InputError for a reference that gives a value outside the range of its joint and does not close there
 std::vector<std::string> checkReferences(const LoadedRobot& robot);
 inline constexpr double kReferenceTolerance = 0.01;  // rad or m
 

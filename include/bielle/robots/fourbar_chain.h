@@ -39,7 +39,7 @@ struct FourBarChain {
   VectorXd q_closed;  ///< by Eq. (2), on the branch above w
 };
 
-/// \throws ModelError when the lengths do not close at this crank angle
+/// \throws InputError when the lengths do not close at this crank angle
 FourBarChain makeFourBarChain(const FourBarChainOptions& options = {});
 
 }  // namespace bielle

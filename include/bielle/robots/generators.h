@@ -12,13 +12,13 @@ namespace bielle {
 struct Generator {
   std::string name, help;
   OptionSet parameters;  ///< at their defaults; bounds are what the generator accepts, not a recommendation
-  /// \throws ModelError when the parameters do not define a robot
+  /// \throws InputError when the parameters do not define a robot
   std::function<Model(const OptionSet& parameters)> make;
 };
 
 const std::vector<Generator>& getGenerators();
 
-/// \throws ModelError listing the generators
+/// \throws InputError listing the generators
 const Generator& findGenerator(const std::string& name);
 
 }  // namespace bielle

@@ -29,7 +29,7 @@ struct BielleWorldOptions {
 inline constexpr double kBielleTimeStep = 2.5e-4;  ///< s
 
 /// advance() does not allocate. Its steps are those of the options, or a little shorter, to reach its end.
-/// \throws ModelError when the robot has no closed standing posture
+/// \throws InputError when the robot has no closed standing posture
 std::unique_ptr<World> makeBielleWorld(const Model& model, const BielleWorldOptions& options = {});
 
 }  // namespace bielle::worlds

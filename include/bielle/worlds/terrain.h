@@ -51,7 +51,7 @@ class Terrain {
 };
 
 /// A ramp from x = `start` on, `length` long and `width` wide about y = 0, that rises by `slope` (height over length; negative:
-/// it goes down). \throws ModelError on numbers that make no sense, as makeTiles() does
+/// it goes down). \throws InputError on numbers that make no sense, as makeTiles() does
 struct RampOptions {
   double slope = 0.05;  ///< 1
   double start = 0.3;   ///< m

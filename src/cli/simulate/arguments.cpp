@@ -19,7 +19,7 @@ namespace {
 constexpr const char* kPushExample = "t=3,impulse=6,direction=90,duration=0.1";
 
 [[noreturn]] void refusePush(const std::string& text, const std::string& problem) {
-  throw ModelError("", "--push '" + text + "'", problem, std::string("e.g. --push ") + kPushExample);
+  throw InputError("", "--push '" + text + "'", problem, std::string("e.g. --push ") + kPushExample);
 }
 
 // E.g. kPushExample. \param shortest  that acts at an instant of control, s
@@ -54,7 +54,7 @@ Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
     ground = planned;
   } else if (arguments.terrain != "flat") {
     const auto [name, value] = parseSetting("--terrain", arguments.terrain, "tiles=0.01");
-    if (!std::isfinite(value)) throw ModelError("", "terrain '" + name + "'", "it is not finite", "e.g. tiles=0.01");
+    if (!std::isfinite(value)) throw InputError("", "terrain '" + name + "'", "it is not finite", "e.g. tiles=0.01");
     if (name == "ramp") {
       RampOptions ramp;
       ramp.slope = value;
@@ -66,7 +66,7 @@ Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
       tiles.seed = arguments.seed;
       ground = makeTiles(tiles);
     } else {
-      throw ModelError("", "terrain '" + name + "'", "there is no such terrain",
+      throw InputError("", "terrain '" + name + "'", "there is no such terrain",
                        "choose one of: planned, flat, ramp=SLOPE, tiles=HEIGHT, uneven=HEIGHT");
     }
   }
@@ -79,20 +79,20 @@ void parseOptions(SimulateArguments& arguments) {
     arguments.execution.pushes.push_back(parsePush(push, arguments.execution.control_period));
   if (!arguments.commands.empty()) {
     if (arguments.robot.empty() || arguments.control != "mpc")
-      throw ModelError("", "--command", "only predictive control can follow commands, with a walk that it plans itself",
+      throw InputError("", "--command", "only predictive control can follow commands, with a walk that it plans itself",
                        "give the motion walk, --robot and --control mpc");
-    if (arguments.speed) throw ModelError("", "--speed", "the commands already set the speed", "leave it out");
+    if (arguments.speed) throw InputError("", "--speed", "the commands already set the speed", "leave it out");
     if (!arguments.model.empty() && arguments.model != "closed")
-      throw ModelError("", "--model " + arguments.model, "commanded walks need the closed model", "leave it out");
+      throw InputError("", "--model " + arguments.model, "commanded walks need the closed model", "leave it out");
     readCommands(arguments.commands);
   }
   if (arguments.execution.real_time && arguments.live)
-    throw ModelError("", "--live", "writing files would delay the world in real time", "leave out --real-time");
+    throw InputError("", "--live", "writing files would delay the world in real time", "leave out --real-time");
   if (arguments.execution.real_time && arguments.control != "mpc")
-    throw ModelError("", "--real-time", "only predictive control solves while the motion runs", "give --control mpc");
+    throw InputError("", "--real-time", "only predictive control solves while the motion runs", "give --control mpc");
   arguments.predictive.own_thread = arguments.execution.real_time;
   if (arguments.jitter > arguments.delay)
-    throw ModelError("", "--jitter", "it is longer than the delay", "give at most --delay");
+    throw InputError("", "--jitter", "it is longer than the delay", "give at most --delay");
   arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};
   makeGround(arguments, {});
 }

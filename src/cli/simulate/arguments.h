@@ -34,10 +34,10 @@ struct SimulateArguments {
 
 void addOptions(CLI::App& app, SimulateArguments& arguments);
 
-/// Reads pushes and delays, and checks what can be checked without the motion. \throws ModelError
+/// Reads pushes and delays, and checks what can be checked without the motion. \throws InputError
 void parseOptions(SimulateArguments& arguments);
 
-/// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01". \throws ModelError
+/// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01". \throws InputError
 Ground makeGround(const SimulateArguments& arguments, const Ground& planned);
 
 }  // namespace bielle::worlds

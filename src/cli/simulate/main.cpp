@@ -33,7 +33,7 @@ std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
   if (!arguments.model.empty()) belief = beliefs.at(arguments.model);
   if (arguments.robot.empty()) {
     if (arguments.speed || !arguments.settings.empty())
-      throw ModelError("", arguments.speed ? "--speed" : "--set", "a solved motion has its own",
+      throw InputError("", arguments.speed ? "--speed" : "--set", "a solved motion has its own",
                        "give --robot and the name of a motion");
     return readPlan(arguments.directory, control, arguments.predictive, belief);
   }
@@ -59,9 +59,9 @@ std::optional<Model> makeOtherRobot(const Plan& plan, const SimulateArguments& a
   try {
     if (!machine.references().empty()) makeStandingPosture(machine);
     assembleMachine(plan.robot.model, machine, q);
-  } catch (const ModelError& error) {  // which names the robot's file, where nothing is wrong
+  } catch (const InputError& error) {  // which names the robot's file, where nothing is wrong
     if (errors.rod == 0) throw;
-    throw ModelError("", "--rod-error " + formatNumber(errors.rod),
+    throw InputError("", "--rod-error " + formatNumber(errors.rod),
                      std::string("the loops of such a robot do not close: ") + error.what(), "give a smaller error");
   }
   return machine;
