@@ -1,10 +1,11 @@
 #pragma once
 // The paper's jump (its section IV-B), as far as its weights can be read from its figures.
 //
-// Feet are free in flight; at touchdown their costs are height, tilt and velocity. The height of the centre of mass has a cost at
-// mid-flight alone. With T the time in the air and v0 = g T / 2, the load is m (g + v0 / D) while pushing and landing, each for D
-// seconds, and m g before and after. Hips are weighted like other joints, the heading is not. Terminal costs are the height and
-// the heading of the base, and the joints of the legs (Model::serialJoints) with their velocities.
+// Feet are free in flight; at touchdown their costs are height, tilt and velocity. The height of the centre of mass has
+// a cost at mid-flight alone. With T the time in the air and v0 = g T / 2, the load is m (g + v0 / D) while pushing and
+// landing, each for D seconds, and m g before and after. Hips are weighted like other joints, the heading is not.
+// Terminal costs are the height and the heading of the base, and the joints of the legs (Model::serialJoints) with
+// their velocities.
 #include "paper/problem.h"
 
 namespace bielle::paper {

@@ -1,6 +1,6 @@
 #pragma once
-// The problems of the paper's example code: Euler steps and costs alone, without limits of motors or joints and without any
-// other constraint.
+// The problems of the paper's example code: Euler steps and costs alone, without limits of motors or joints and without
+// any other constraint.
 #include "bielle/motion/motion.h"
 
 namespace bielle::paper {
@@ -26,7 +26,8 @@ void addLandingCosts(const ContactFrame& foot, const SE3& X_WF, const LandingWei
 StageSpec makeRegularizedStage(const Model& model, const VectorXd& q, double state_weight, const VectorXd& weights,
                                double control_weight);
 
-// Appends a phase to the schedule, and to the guess the torques that hold the robot at q. \param nodes  stages of kTimeStep
+// Appends a phase to the schedule, and to the guess the torques that hold the robot at q. \param nodes  stages of
+// kTimeStep
 void addPhase(const Model& model, const std::string& name, int nodes, const std::vector<ContactTarget>& contacts,
               const VectorXd& q, Motion& motion);
 

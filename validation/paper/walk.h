@@ -1,18 +1,18 @@
 #pragma once
 // The paper's walk on level ground, known to the last digit from its example code.
 //
-// There are no footholds: only the velocity of the centre of mass leads forward. The costs of a landing foot are its height,
-// tilt and velocity; its place, its heading and the path of a swing have no costs, but its horizontal velocity near the ground
-// does (fly high), and so do feet that come near each other. The force reference is the weight on one foot, half of it on each
-// of two, and changes at once; forces and centres of pressure are in the axes of the world. Contacts and closures have the gains
-// given, beyond what our own motions keep to (limitGains). The only terminal costs are the velocities of the joints of the legs
-// (Model::serialJoints). The guess is the standing posture at rest.
+// There are no footholds: only the velocity of the centre of mass leads forward. The costs of a landing foot are its
+// height, tilt and velocity; its place, its heading and the path of a swing have no costs, but its horizontal velocity
+// near the ground does (fly high), and so do feet that come near each other. The force reference is the weight on one
+// foot, half of it on each of two, and changes at once; forces and centres of pressure are in the axes of the world.
+// Contacts and closures have the gains given, beyond what our own motions keep to (limitGains). The only terminal costs
+// are the velocities of the joints of the legs (Model::serialJoints). The guess is the standing posture at rest.
 #include "paper/problem.h"
 
 namespace bielle::paper {
 
-// The weights of its example code. Durations there are truncated to whole time steps: 13 in double support at the start, 26 on
-// one foot, 1 on both feet between steps, and 14 at the end.
+// The weights of its example code. Durations there are truncated to whole time steps: 13 in double support at the
+// start, 26 on one foot, 1 on both feet between steps, and 14 at the end.
 struct WalkOptions {
   double speed = 0.5;  // of the centre of mass, forward, m/s
   int steps = 8;       // the left foot first
