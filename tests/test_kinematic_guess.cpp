@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/motion/solve.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
 #include "motion/kinematic_guess.h"

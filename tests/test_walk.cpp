@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/impact.h"
 #include "bielle/model/error.h"
+#include "bielle/motion/solve.h"
 #include "bielle/motion/walk.h"
 #include "bielle/robots/robot_loader.h"
 #include "change_option.h"
