@@ -110,8 +110,8 @@ int main(int argc, char** argv) {
   const SwayOptions options;
   const Motion motion = makeSway(robot.model, options);
   const Solution solution = solve(motion);
-  const FddpSummary& summary = solution.summary;
   const MotionResult result = makeResult({"bipetto", robot.file, {}}, solution);
+  const FddpSummary& summary = solution.summary;
   std::printf("%s after %d iterations\n", getName(summary.termination), summary.iterations);
   writeResult(argc > 1 ? argv[1] : "sway", result);
 

@@ -226,6 +226,8 @@ void bindRequests(py::module_& module) {
       "The motions by name: what they do, their options with defaults and units, files.");
 }
 
+using SolutionType = py::class_<HeldSolution, std::shared_ptr<HeldSolution>>;
+
 void bindHeldMotion(py::module_& module) {
   using Type = py::class_<HeldMotion, std::shared_ptr<HeldMotion>>;
   Type type(module, "Motion",
@@ -289,9 +291,8 @@ void bindHeldMotion(py::module_& module) {
   });
 }
 
-void bindSolution(py::module_& module) {
-  py::class_<HeldSolution, std::shared_ptr<HeldSolution>>(module, "Solution", "A solved Motion.")
-      .def_readonly("motion", &HeldSolution::motion,
+void bindSolution(SolutionType& type) {
+  type.def_readonly("motion", &HeldSolution::motion,
                     "Motion that was solved: the given one, or that made again of its request")
       .def_property_readonly(
           "trajectory", [](const HeldSolution& h) { return h.solution.trajectory; }, "Trajectory")
@@ -300,7 +301,7 @@ void bindSolution(py::module_& module) {
       .def_property_readonly(
           "multipliers", [](const HeldSolution& h) { return h.solution.multipliers; }, "Multipliers of the constraints")
       .def_property_readonly(
-          "gains", [](const HeldSolution& h) { return show(h.solution.gains, {}); },
+          "gains", [](const HeldSolution& h) { return show(h.solution.gains, py::cast(h)); },
           "Gains of every stage, of the solver's last sweep; () for the least peak torque")
       .def_property_readonly(
           "converged", [](const HeldSolution& h) { return h.solution.converged(); },
@@ -313,7 +314,7 @@ void bindSolution(py::module_& module) {
       .def(py::pickle(
           [](const HeldSolution& h) {
             const Solution& s = h.solution;
-            return py::make_tuple(h.motion, s.trajectory, s.summary, s.multipliers, show(s.gains, {}));
+            return py::make_tuple(h.motion, s.trajectory, s.summary, s.multipliers, show(s.gains, py::cast(h)));
           },
           [](const py::tuple& state) {
             auto held = std::make_shared<HeldSolution>();
@@ -328,8 +329,9 @@ void bindSolution(py::module_& module) {
 
 void bindMotions(py::module_& module) {
   bindRequests(module);
+  SolutionType solution(module, "Solution", "A solved Motion.");  // before what returns it
   bindHeldMotion(module);
-  bindSolution(module);
+  bindSolution(solution);
   module.def("_make_residuals", &makeResiduals, py::arg("model"), py::arg("made_of"), py::arg("options") = py::none());
 }
 

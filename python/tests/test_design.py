@@ -116,4 +116,4 @@ def test_info(robot, model):
 def test_they_show_themselves(robot, model):
     assert "<iframe" in robot._repr_html_()
     motion = bielle.Motion.make(model, bielle.Request(motion="squat", options={"depth": 0.9}))
-    assert "<iframe" in motion._repr_html_()
+    assert "<iframe" in motion.solve()._repr_html_()
