@@ -342,7 +342,7 @@ TEST_CASE("predictive control: windows, threads and iterations without sense are
   for (int threads : {-1, 20000}) CHECK_THROWS_WITH(make(makeShortWindow(threads)), Catch::Contains("threads"));
   PredictiveOptions options = makeShortWindow(1);
   options.iterations = 0;
-  CHECK_THROWS_WITH(make(options), Catch::Contains("max_iterations"));
+  CHECK_THROWS_WITH(make(options), Catch::Contains("iterations"));
   CHECK_THROWS_AS(makePredictiveMotion(model, MotionPlan(), ProblemOptions(), makeShortWindow(1)), InputError);
 }
 
