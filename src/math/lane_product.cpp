@@ -6,39 +6,39 @@ namespace bielle {
 
 namespace {
 
-// A vector of kLane numbers anywhere in memory; the compiler splits it if the processor's registers are shorter.
-typedef double Lane __attribute__((vector_size(kLane * sizeof(double)), aligned(sizeof(double)), may_alias));
-
-// With L lanes and C columns, L C sums, L vectors of A and one number of B must fit into 32 registers.
+// With L lanes and C columns, L C sums, L vectors of A and one number of B must fit into the registers: 32 of AVX-512, else
+// 16, of which a lane takes several.
 #ifdef __AVX512F__
 constexpr int kMaxLanes = 6;
 #else
 constexpr int kMaxLanes = 1;
 #endif
-constexpr int kColumns = 4;
+constexpr int kColumns = kRegister == 2 ? 2 : 4;
+constexpr int kParts = kLane / kRegister;
 
 enum class Into { Sum, Nothing };  // whether a product is added to its destination or overwrites it
 
 template <Into into, int L, int C>
 void addBlock(Eigen::Index depth, double sign, ConstPaddedMatrix A, StridedMatrix B, PaddedMatrix out) {
-  Lane sums[C][L] = {};
+  constexpr int kRows = L * kParts;
+  Register sums[C][kRows] = {};
   const double *a = A.data, *b = B.data;
   for (Eigen::Index k = 0; k < depth; ++k, a += A.stride, b += B.row_stride) {
-    Lane column[L];
+    Register column[kRows];
 #pragma GCC unroll 8
-    for (int i = 0; i < L; ++i) column[i] = *reinterpret_cast<const Lane*>(a + i * kLane);
+    for (int i = 0; i < kRows; ++i) column[i] = *reinterpret_cast<const RegisterAnywhere*>(a + i * kRegister);
 #pragma GCC unroll 8
     for (int j = 0; j < C; ++j) {
       const double factor = b[j * B.col_stride];
 #pragma GCC unroll 8
-      for (int i = 0; i < L; ++i) sums[j][i] += column[i] * factor;
+      for (int i = 0; i < kRows; ++i) sums[j][i] += column[i] * factor;
     }
   }
 #pragma GCC unroll 8
   for (int j = 0; j < C; ++j) {
 #pragma GCC unroll 8
-    for (int i = 0; i < L; ++i) {
-      Lane& entry = *reinterpret_cast<Lane*>(out.data + j * out.stride + i * kLane);
+    for (int i = 0; i < kRows; ++i) {
+      RegisterAnywhere& entry = *reinterpret_cast<RegisterAnywhere*>(out.data + j * out.stride + i * kRegister);
       entry = into == Into::Sum ? entry + sign * sums[j][i] : sign * sums[j][i];
     }
   }
@@ -53,7 +53,7 @@ void addRows(Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatr
     }
   };
   addColumns(addBlock<into, L, kColumns>, kColumns);
-  addColumns(addBlock<into, L, 2>, 2);
+  if constexpr (kColumns > 2) addColumns(addBlock<into, L, 2>, 2);
   addColumns(addBlock<into, L, 1>, 1);
 }
 
@@ -65,23 +65,24 @@ void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double 
   if constexpr (L > 1) addLanes<into, L - 1>(lanes, cols, depth, sign, A, B, C);
 }
 
-// A lower triangle of at most kColumns rows: the entries below its diagonal, and the inverse of its diagonal.
+// A lower triangle of at most kTriangle rows: the entries below its diagonal, and the inverse of its diagonal.
+constexpr int kTriangle = 4;
 struct Triangle {
-  double entries[kColumns][kColumns], scales[kColumns];
+  double entries[kTriangle][kTriangle], scales[kTriangle];
 };
 
 // X T^{-T} for X of C columns at distance `stride`, kept in registers.
 template <int C>
 void solveColumns(const Triangle& T, Eigen::Index rows, PaddedMatrix X, Eigen::Index stride) {
-  for (Eigen::Index i = 0; i < rows; i += kLane) {
-    Lane x[C];
+  for (Eigen::Index i = 0; i < rows; i += kRegister) {
+    Register x[C];
 #pragma GCC unroll 4
     for (int j = 0; j < C; ++j) {
-      x[j] = *reinterpret_cast<const Lane*>(X.data + i + j * stride);
+      x[j] = *reinterpret_cast<const RegisterAnywhere*>(X.data + i + j * stride);
 #pragma GCC unroll 4
       for (int m = 0; m < j; ++m) x[j] -= x[m] * T.entries[j][m];
       x[j] *= T.scales[j];
-      *reinterpret_cast<Lane*>(X.data + i + j * stride) = x[j];
+      *reinterpret_cast<RegisterAnywhere*>(X.data + i + j * stride) = x[j];
     }
   }
 }
@@ -95,7 +96,7 @@ void solveColumns(const Triangle& T, int cols, Eigen::Index rows, PaddedMatrix X
     case 3:
       return solveColumns<3>(T, rows, X, stride);
     default:
-      return solveColumns<kColumns>(T, rows, X, stride);
+      return solveColumns<kTriangle>(T, rows, X, stride);
   }
 }
 
@@ -118,8 +119,8 @@ void clearPadding(PaddedMap A) {
 }
 
 bool factorizeColumns(PaddedMap H, Eigen::Index num) {
-  for (Eigen::Index k = 0; k < num; k += kColumns) {
-    const Eigen::Index i = k / kLane * kLane, cols = std::min<Eigen::Index>(kColumns, num - k);
+  for (Eigen::Index k = 0; k < num; k += kTriangle) {
+    const Eigen::Index i = k / kLane * kLane, cols = std::min<Eigen::Index>(kTriangle, num - k);
     addProduct(H.rows() - i, cols, k, -1, pad(H, i), {H.data() + k, H.outerStride(), 1}, pad(H, i, k));
     Triangle L;
     for (int j = 0; j < cols; ++j) {
@@ -139,8 +140,8 @@ bool factorizeColumns(PaddedMap H, Eigen::Index num) {
 }
 
 void solveTransposedFromRight(ConstMatrixRef L, PaddedMap X) {
-  for (Eigen::Index k = 0; k < X.cols(); k += kColumns) {
-    const Eigen::Index cols = std::min<Eigen::Index>(kColumns, X.cols() - k);
+  for (Eigen::Index k = 0; k < X.cols(); k += kTriangle) {
+    const Eigen::Index cols = std::min<Eigen::Index>(kTriangle, X.cols() - k);
     addProduct(X.rows(), cols, k, -1, pad(X), {L.data() + k, L.outerStride(), 1}, pad(X, 0, k));
     Triangle block;
     for (int j = 0; j < cols; ++j) {
@@ -154,7 +155,7 @@ void solveTransposedFromRight(ConstMatrixRef L, PaddedMap X) {
 // The same from the last column on.
 void solveFromRight(ConstMatrixRef L, PaddedMap X) {
   for (Eigen::Index end = X.cols(), cols; end > 0; end -= cols) {
-    cols = std::min<Eigen::Index>(kColumns, end);
+    cols = std::min<Eigen::Index>(kTriangle, end);
     const Eigen::Index k = end - cols, rest = X.cols() - end;
     if (rest > 0)
       addProduct(X.rows(), cols, rest, -1, pad(X, 0, end), {L.data() + end + k * L.outerStride(), 1, L.outerStride()},

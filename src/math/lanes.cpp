@@ -13,65 +13,72 @@ constexpr double kHalfPi1 = 1.57079632673412561417e+00, kHalfPi2 = 6.07710050630
 constexpr double kLargest = 1e5;
 constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: adding and subtracting it rounds to an integer
 
-using Vector = Lanes::Vector;
-typedef double Anywhere __attribute__((vector_size(kLane * sizeof(double)), aligned(sizeof(double)), may_alias));
-
 // Exchanges entries across the diagonal between rows at this distance. Entry I of the upper row stays where I & distance
-// is 0, and that of the lower row where it is not; the others come from the other row, whose entries count from kLane on.
+// is 0, and that of the lower row where it is not; the others come from the other row, whose entries count from kRegister on.
 template <int distance, int... I>
-void exchange(std::array<Vector, kLane>& rows, std::integer_sequence<int, I...>) {
+void exchange(std::array<Register, kRegister>& rows, std::integer_sequence<int, I...>) {
 #pragma GCC unroll 8
-  for (int i = 0; i < kLane; ++i) {
+  for (int i = 0; i < kRegister; ++i) {
     if (i & distance) continue;
-    const Vector a = rows[i], b = rows[i + distance];
-    rows[i] = __builtin_shufflevector(a, b, (I & distance ? I - distance + kLane : I)...);
-    rows[i + distance] = __builtin_shufflevector(a, b, (I & distance ? I + kLane : I + distance)...);
+    const Register a = rows[i], b = rows[i + distance];
+    rows[i] = __builtin_shufflevector(a, b, (I & distance ? I - distance + static_cast<int>(kRegister) : I)...);
+    rows[i + distance] =
+        __builtin_shufflevector(a, b, (I & distance ? I + static_cast<int>(kRegister) : I + distance)...);
   }
 }
 
 // Rows become columns.
-void transpose(std::array<Vector, kLane>& rows) {
-  constexpr std::make_integer_sequence<int, kLane> entries;
+void transpose(std::array<Register, kRegister>& rows) {
+  constexpr std::make_integer_sequence<int, kRegister> entries;
   exchange<1>(rows, entries);
-  exchange<2>(rows, entries);
-  exchange<4>(rows, entries);
+  if constexpr (kRegister > 2) exchange<2>(rows, entries);
+  if constexpr (kRegister > 4) exchange<4>(rows, entries);
 }
+
+Register load(const double* from) { return *reinterpret_cast<const RegisterAnywhere*>(from); }
+void store(const Register& x, double* to) { *reinterpret_cast<RegisterAnywhere*>(to) = x; }
 
 }  // namespace
 
-// Processes kLane numbers of each lane at a time; the last block overlaps the one before.
+// Processes kRegister numbers of as many lanes at a time; the last block overlaps the one before.
 void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, Lanes* out) {
-  if (size < kLane) {
+  if (size < kRegister) {
     for (Eigen::Index i = 0; i < size; ++i)
-      for (Eigen::Index l = 0; l < kLane; ++l) out[i].v[l] = in[l][i];
+      for (Eigen::Index l = 0; l < kLane; ++l) out[i].set(l, in[l][i]);
     return;
   }
-  for (Eigen::Index k = 0; k < size; k += kLane) {
-    const Eigen::Index i = std::min(k, size - kLane);
-    std::array<Vector, kLane> rows;
+  double* to = reinterpret_cast<double*>(out);
+  for (Eigen::Index k = 0; k < size; k += kRegister) {
+    const Eigen::Index i = std::min(k, size - kRegister);
+    for (Eigen::Index first = 0; first < kLane; first += kRegister) {
+      std::array<Register, kRegister> rows;
 #pragma GCC unroll 8
-    for (Eigen::Index l = 0; l < kLane; ++l) rows[l] = *reinterpret_cast<const Anywhere*>(in[l] + i);
-    transpose(rows);
+      for (Eigen::Index l = 0; l < kRegister; ++l) rows[l] = load(in[first + l] + i);
+      transpose(rows);
 #pragma GCC unroll 8
-    for (Eigen::Index l = 0; l < kLane; ++l) out[i + l].v = rows[l];
+      for (Eigen::Index l = 0; l < kRegister; ++l) store(rows[l], to + (i + l) * kLane + first);
+    }
   }
 }
 
 void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out, Eigen::Index stride) {
-  if (size < kLane) {
+  if (size < kRegister) {
     for (Eigen::Index l = 0; l < kLane; ++l)
-      for (Eigen::Index i = 0; i < size && out[l]; ++i) out[l][i] = in[i * stride].v[l];
+      for (Eigen::Index i = 0; i < size && out[l]; ++i) out[l][i] = in[i * stride][l];
     return;
   }
-  for (Eigen::Index k = 0; k < size; k += kLane) {
-    const Eigen::Index i = std::min(k, size - kLane);
-    std::array<Vector, kLane> rows;
+  const double* from = reinterpret_cast<const double*>(in);
+  for (Eigen::Index k = 0; k < size; k += kRegister) {
+    const Eigen::Index i = std::min(k, size - kRegister);
+    for (Eigen::Index first = 0; first < kLane; first += kRegister) {
+      std::array<Register, kRegister> rows;
 #pragma GCC unroll 8
-    for (Eigen::Index l = 0; l < kLane; ++l) rows[l] = in[(i + l) * stride].v;
-    transpose(rows);
+      for (Eigen::Index l = 0; l < kRegister; ++l) rows[l] = load(from + (i + l) * stride * kLane + first);
+      transpose(rows);
 #pragma GCC unroll 8
-    for (Eigen::Index l = 0; l < kLane; ++l)
-      if (out[l]) *reinterpret_cast<Anywhere*>(out[l] + i) = rows[l];
+      for (Eigen::Index l = 0; l < kRegister; ++l)
+        if (out[first + l]) store(rows[l], out[first + l] + i);
+    }
   }
 }
 
@@ -92,8 +99,9 @@ void calcSineCosine(const Lanes& x, Lanes& sine, Lanes& cosine) {
                             z * (2.48015872894767294178e-05 +
                                  z * (-2.75573143513906633035e-07 +
                                       z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
-  const LaneMask::Vector quadrant = reinterpret_cast<LaneMask::Vector>(shifted.v) & 3;
-  const LaneMask odd{(quadrant & 1) == 1}, negative_sine{quadrant >= 2}, negative_cosine{((quadrant + 1) & 2) == 2};
+  const LaneIntegers one = spread(1LL), two = spread(2LL), quadrant = getBits(shifted.v) & spread(3LL);
+  const LaneMask odd{(quadrant & one) == one}, negative_sine{quadrant >= two},
+      negative_cosine{((quadrant + one) & two) == two};
   sine = select(odd, c, s);
   cosine = select(odd, s, c);
   sine = select(negative_sine, -sine, sine);

@@ -5,38 +5,35 @@
 /// operations on vectors of 3 to 14 numbers. With one node per lane, each operation of such a chain processes kLane
 /// nodes in a full register. Lanes never mix: the result in one lane is bitwise independent of the contents of the
 /// others, so that nodes can be grouped in any way.
-#include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <type_traits>
 
+#include "math/lane_registers.h"
+
 namespace bielle {
 
-/// Count of numbers in one vector register.
-constexpr Eigen::Index kLane = 8;
-
-/// kLane numbers; the compiler splits them if the processor's registers are shorter.
-struct Lanes {
-  typedef double Vector __attribute__((vector_size(kLane * sizeof(double))));
-  Vector v;
+/// kLane numbers.
+struct alignas(kLane * sizeof(double)) Lanes {
+  LaneReals v;
 
   Lanes() = default;
-  Lanes(double x) : v(x - Vector{}) {}  // the same number in every lane
-  explicit Lanes(const Vector& x) : v(x) {}
+  Lanes(double x) : v(spread(x)) {}  // the same number in every lane
+  explicit Lanes(const LaneReals& x) : v(x) {}
   double operator[](Eigen::Index lane) const { return v[lane]; }
-  void set(Eigen::Index lane, double x) { v[lane] = x; }
+  void set(Eigen::Index lane, double x) { setLane(v, lane, x); }
 
-  Lanes& operator+=(const Lanes& o) { return v += o.v, *this; }
-  Lanes& operator-=(const Lanes& o) { return v -= o.v, *this; }
-  Lanes& operator*=(const Lanes& o) { return v *= o.v, *this; }
-  Lanes& operator/=(const Lanes& o) { return v /= o.v, *this; }
+  Lanes& operator+=(const Lanes& o) { return v = v + o.v, *this; }
+  Lanes& operator-=(const Lanes& o) { return v = v - o.v, *this; }
+  Lanes& operator*=(const Lanes& o) { return v = v * o.v, *this; }
+  Lanes& operator/=(const Lanes& o) { return v = v / o.v, *this; }
 
   friend Lanes sqrt(const Lanes& x) {
     Lanes out;
-    for (Eigen::Index l = 0; l < kLane; ++l) out.v[l] = std::sqrt(x.v[l]);
+    for (Eigen::Index l = 0; l < kLane; ++l) out.set(l, std::sqrt(x[l]));
     return out;
   }
-  friend Lanes abs(const Lanes& x) { return Lanes(x.v < 0 ? -x.v : x.v); }
+  friend Lanes abs(const Lanes& x) { return Lanes(blend(x.v < spread(0.0), -x.v, x.v)); }
 };
 
 inline Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
@@ -47,9 +44,9 @@ inline Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
 
 /// The result of a comparison in each lane; for double it is a bool.
 struct LaneMask {
-  typedef long long Vector __attribute__((vector_size(kLane * sizeof(double))));
-  Vector v;  // -1 or 0
+  LaneIntegers v;  // -1 or 0
   bool operator[](Eigen::Index lane) const { return v[lane] != 0; }
+  void set(Eigen::Index lane, bool x) { setLane(v, lane, x ? -1 : 0); }
 };
 inline LaneMask operator<(const Lanes& a, const Lanes& b) { return {a.v < b.v}; }
 inline LaneMask operator<=(const Lanes& a, const Lanes& b) { return {a.v <= b.v}; }
@@ -57,17 +54,13 @@ inline LaneMask operator>(const Lanes& a, const Lanes& b) { return {a.v > b.v}; 
 inline LaneMask operator&&(const LaneMask& a, const LaneMask& b) { return {a.v & b.v}; }
 inline LaneMask operator||(const LaneMask& a, const LaneMask& b) { return {a.v | b.v}; }
 inline LaneMask operator!(const LaneMask& a) { return {~a.v}; }
-inline bool any(const LaneMask& a) {
-  const LaneMask::Vector halves = a.v | __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7, 0, 1, 2, 3);
-  const LaneMask::Vector quarters = halves | __builtin_shufflevector(halves, halves, 2, 3, 0, 1, 6, 7, 4, 5);
-  return (quarters[0] | quarters[1]) != 0;
-}
+inline bool any(const LaneMask& a) { return isAny(a.v); }
 inline bool any(bool a) { return a; }
 inline double getLane(const Lanes& x, Eigen::Index lane) { return x[lane]; }
 inline bool getLane(const LaneMask& x, Eigen::Index lane) { return x[lane]; }
 inline double getLane(double x, Eigen::Index) { return x; }
 inline bool getLane(bool x, Eigen::Index) { return x; }
-inline Lanes select(const LaneMask& mask, const Lanes& a, const Lanes& b) { return Lanes(mask.v ? a.v : b.v); }
+inline Lanes select(const LaneMask& mask, const Lanes& a, const Lanes& b) { return Lanes(blend(mask.v, a.v, b.v)); }
 inline double select(bool mask, double a, double b) { return mask ? a : b; }
 
 /// sin and cos of every lane, to rounding.
@@ -79,9 +72,9 @@ inline void calcSineCosine(double x, double& sine, double& cosine) {
 
 /// An index for each lane.
 struct LaneIndex {
-  LaneMask::Vector v;
+  LaneIntegers v;
   int operator[](Eigen::Index lane) const { return static_cast<int>(v[lane]); }
-  void set(Eigen::Index lane, int i) { v[lane] = i; }
+  void set(Eigen::Index lane, int i) { setLane(v, lane, i); }
 };
 inline bool operator!=(const LaneIndex& a, const LaneIndex& b) { return any(LaneMask{a.v != b.v}); }
 
@@ -102,10 +95,12 @@ typename LogicOf<T>::Index makeIndex(int i) {
   if constexpr (std::is_same_v<T, double>)
     return i;
   else
-    return {i - LaneMask::Vector{}};
+    return {spread(static_cast<long long>(i))};
 }
 inline int select(bool mask, int a, int b) { return mask ? a : b; }
-inline LaneIndex select(const LaneMask& mask, const LaneIndex& a, const LaneIndex& b) { return {mask.v ? a.v : b.v}; }
+inline LaneIndex select(const LaneMask& mask, const LaneIndex& a, const LaneIndex& b) {
+  return {blend(mask.v, a.v, b.v)};
+}
 inline LaneIndex select(const LaneMask& mask, int a, const LaneIndex& b) {
   return select(mask, makeIndex<Lanes>(a), b);
 }
@@ -115,7 +110,7 @@ inline bool isUniform(const LaneIndex& i) { return !(i != makeIndex<Lanes>(i[0])
 inline Lanes getEntry(const Lanes* x, const LaneIndex& i) {
   if (isUniform(i)) return x[i[0]];
   Lanes out;
-  for (Eigen::Index l = 0; l < kLane; ++l) out.v[l] = x[i[l]].v[l];
+  for (Eigen::Index l = 0; l < kLane; ++l) out.set(l, x[i[l]][l]);
   return out;
 }
 inline void setEntry(double* x, int i, double value) { x[i] = value; }
@@ -124,14 +119,14 @@ inline void setEntry(Lanes* x, const LaneIndex& i, const Lanes& value) {
     x[i[0]] = value;
     return;
   }
-  for (Eigen::Index l = 0; l < kLane; ++l) x[i[l]].v[l] = value.v[l];
+  for (Eigen::Index l = 0; l < kLane; ++l) x[i[l]].set(l, value[l]);
 }
 
 /// f applied to each lane separately, for functions that branch. double: f(x).
 template <typename F>
 inline auto applyLanes(const Lanes& x, const F& f) {
   Lanes out;
-  for (Eigen::Index l = 0; l < kLane; ++l) out.v[l] = f(x.v[l]);
+  for (Eigen::Index l = 0; l < kLane; ++l) out.set(l, f(x[l]));
   return out;
 }
 

@@ -96,7 +96,7 @@ LaneMask ReducedKernel::placeAll(const StepItem* items, int count) {
     for (int l = 0; l < count; ++l) {
       if (regular[l] || items[l].previous) continue;
       if (placed[l]) items[l].at->failure = describeFailure(c.cluster, c.scratch, l);
-      placed.v[l] = 0;
+      placed.set(l, false);
     }
   }
   loadPoints(items, count);
