@@ -86,10 +86,7 @@ function(bielle_fast target)
   if(NOT BIELLE_SANITIZE)
     set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
   endif()
-  get_target_property(libraries ${target} LINK_LIBRARIES)
-  if(NOT "OpenMP::OpenMP_CXX" IN_LIST libraries)  # its flags are others
-    bielle_precompile(${target} fast)
-  endif()
+  bielle_precompile(${target} fast)
 endfunction()
 
 # bielle_plain(TARGET): everything else. -O1 takes three quarters of the time to compile; GCC 12 then reports its AVX-512

@@ -1,4 +1,5 @@
 bielle_test(lq SOURCES test_lq.cpp LIBS bielle_solve)
+bielle_test(team SOURCES test_team.cpp LIBS bielle_solve)
 bielle_test(fddp SOURCES test_fddp.cpp LIBS bielle_solve bielle_model)
 bielle_test(flat_models SOURCES test_flat_models.cpp LIBS bielle_solve bielle_model)
 bielle_test(fddp_failures SOURCES test_fddp_failures.cpp LIBS bielle_solve bielle_model)

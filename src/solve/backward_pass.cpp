@@ -42,25 +42,24 @@ int BackwardPass::update(const BackwardInput& input) {
   std::atomic<int> next{num_batches - 1};
   std::atomic_flag sweeping = ATOMIC_FLAG_INIT;
   ParallelErrors errors;
-  double linearize_seconds = 0, sweep_seconds = 0;
-#pragma omp parallel num_threads(std::min(input.threads, num_batches)) reduction(+ : linearize_seconds, sweep_seconds)
-  {
+  std::atomic<double> linearize_seconds{linearize_seconds_}, sweep_seconds{sweep_seconds_};
+  input.team.run(std::min(input.threads, num_batches), [&](int thread) {
     for (int i; (i = next.fetch_sub(1, std::memory_order_relaxed)) >= 0;) {
       const Clock::time_point start = Clock::now();
-      errors.run(i, [&] { linearize(input, i * size, std::min(N + 1, (i + 1) * size)); });
-      linearize_seconds += calcSecondsSince(start);
+      errors.run(i, [&] { linearize(input, thread, i * size, std::min(N + 1, (i + 1) * size)); });
+      add(calcSecondsSince(start), linearize_seconds);
       if (sweeping.test_and_set(std::memory_order_acquire)) continue;
       const Clock::time_point start_sweep = Clock::now();
       sweepReadyNodes(input);
-      sweep_seconds += calcSecondsSince(start_sweep);
+      add(calcSecondsSince(start_sweep), sweep_seconds);
       sweeping.clear(std::memory_order_release);
     }
-  }
+  });
   errors.rethrow();
   const Clock::time_point start_rest = Clock::now();
   sweepReadyNodes(input);
-  linearize_seconds_ += linearize_seconds;
-  sweep_seconds_ += sweep_seconds + calcSecondsSince(start_rest);
+  linearize_seconds_ = linearize_seconds;
+  sweep_seconds_ = sweep_seconds + calcSecondsSince(start_rest);
   for (int k = 0; k <= N; ++k)
     if (!failures_[k].empty()) return k;
   return -1;
@@ -80,13 +79,13 @@ void BackwardPass::sweepReadyNodes(const BackwardInput& input) {
 }
 
 // Runs in parallel: writes only to entries of its own nodes.
-void BackwardPass::linearize(const BackwardInput& input, int begin, int end) {
+void BackwardPass::linearize(const BackwardInput& input, int thread, int begin, int end) {
   for (int k = begin; k < end; ++k) {
     hessians_.lend(models_[k]);
     tasks_[k].status = StepStatus::Failed;
     tasks_[k].failure.clear();
   }
-  input.problem.linearize(&tasks_[begin], end - begin, input.evaluations.getScratch());
+  input.problem.linearize(&tasks_[begin], end - begin, input.evaluations.getScratch(thread));
   for (int k = begin; k < end; ++k) {
     failures_[k] = checkModel(input.problem, k);
     if (failures_[k].empty()) linearized_[k].store(true, std::memory_order_release);

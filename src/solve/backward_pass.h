@@ -16,6 +16,7 @@ struct BackwardInput {
   const AugmentedLagrangian& lagrangian;
   const std::vector<ControlBox>& boxes;
   LqRegularization regularization;
+  Team& team;
   int threads;
 };
 
@@ -38,7 +39,7 @@ class BackwardPass {
   double getSweepSeconds() const { return sweep_seconds_; }
 
  private:
-  void linearize(const BackwardInput& input, int begin, int end);
+  void linearize(const BackwardInput& input, int thread, int begin, int end);
   std::string checkModel(const ShootingProblem& problem, int k) const;
   void sweepReadyNodes(const BackwardInput& input);
 

@@ -1,7 +1,5 @@
 #include "solve/fddp_iterations.h"
 
-#include <omp.h>
-
 #include <cmath>
 #include <stdexcept>
 
@@ -39,8 +37,10 @@ void FddpMemory::resize(const ShootingProblem& problem, const IterationOptions& 
 void FddpIterations::start() {
   N_ = problem_.numStages();
   checkSizes(problem_, trajectory_);
-  // Each has memory of its own, and no more than one a node has work.
-  threads_ = std::min(options_.threads > 0 ? options_.threads : omp_get_max_threads(), N_ + 1);
+  // Each has memory of its own, and no more than one a batch of nodes has work.
+  const int batches = N_ / problem_.getBatchSize() + 1;
+  threads_ = std::min(options_.threads > 0 ? options_.threads : getDefaultThreads(), batches);
+  shift_.emplace(memory_.team, threads_);
   memory_.resize(problem_, options_, threads_);
   trajectory_.xs[0] = problem_.initialState();
   for (size_t k = 0; k < memory_.bounds.size(); ++k) {
@@ -64,7 +64,7 @@ FddpIterations::End FddpIterations::evaluate() {
     memory_.boxes[k].lower = memory_.bounds[k].lower - trajectory_.us[k];
     memory_.boxes[k].upper = memory_.bounds[k].upper - trajectory_.us[k];
   }
-  const int failed = memory_.evaluations.update(problem_, trajectory_, threads_);
+  const int failed = memory_.evaluations.update(problem_, trajectory_, memory_.team, threads_);
   if (failed < 0) {
     for (int k = 0; k <= N_; ++k) line_.cost += getIterate()[k]->cost;
     memory_.lagrangian.evaluate(getIterate());
@@ -88,7 +88,7 @@ FddpIterations::End FddpIterations::updateModels() {
 FddpIterations::End FddpIterations::linearizeAndSweep() {
   const LqRegularization regularization{regularization_, regularization_ * options_.state_regularization_ratio};
   const int failed = memory_.backward.update(
-      {problem_, memory_.evaluations, memory_.lagrangian, memory_.boxes, regularization, threads_});
+      {problem_, memory_.evaluations, memory_.lagrangian, memory_.boxes, regularization, memory_.team, threads_});
   swept_ = true;
   if (failed < 0) return {};
   summary_.message = "node " + std::to_string(failed) + ": " + memory_.backward.getFailure(failed);

@@ -20,6 +20,7 @@ struct FddpMemory {
   std::vector<ControlBox> bounds;  // of u, N or none
   std::vector<ControlBox> boxes;   // of du, N or none
   std::vector<char> open;          // N: whether the gap after a stage counts as open
+  Team team;
 
   void resize(const ShootingProblem& problem, const IterationOptions& options, int threads);
 };
@@ -107,6 +108,7 @@ class FddpIterations {
 
   Clock::time_point start_ = Clock::now();
   int threads_ = 1;
+  std::optional<Team::Shift> shift_;
   double gap_sum_ = 0, gap_weight_ = 0;  // c, of the gaps that count as open, and nu of Eq. (5)
   double slope_ = 0, curvature_ = 0;     // Eq. (1)
   double accepted_merit_ = 0, last_gradient_ = 0;

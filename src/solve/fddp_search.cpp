@@ -47,6 +47,7 @@ RolloutInput FddpIterations::startSearch() {
           memory_.dx,
           memory_.bounds,
           memory_.open,
+          memory_.team,
           threads_};
 }
 

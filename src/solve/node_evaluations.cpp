@@ -1,7 +1,6 @@
 #include "solve/node_evaluations.h"
 
-#include <omp.h>
-
+#include <atomic>
 #include <stdexcept>
 
 #include "solve/parallel_errors.h"
@@ -31,26 +30,14 @@ void NodeEvaluations::resize(const ShootingProblem& problem, int num_rolling, in
   grow(problem, num_nodes, iterate_);
   grow(problem, num_nodes, trial_);
   grow(problem, num_rolling, rolling_);
-  if (static_cast<int>(scratch_.size()) < threads) makeScratch(problem, threads);
+  while (static_cast<int>(scratch_.size()) < threads) scratch_.push_back(problem.makeScratch());
   tasks_.reserve(num_nodes);
   if (!advanced_ || static_cast<int>(fresh_.size()) != num_nodes) fresh_.assign(num_nodes, false);
   advanced_ = false;
   seconds_ = 0;
 }
 
-// Each thread makes its own: memory is placed near the thread that first writes to it.
-void NodeEvaluations::makeScratch(const ShootingProblem& problem, int threads) {
-  std::vector<std::unique_ptr<ProblemScratch>> made(threads);
-  ParallelErrors errors;
-#pragma omp parallel for num_threads(threads) schedule(static)
-  for (int i = 0; i < threads; ++i) {
-    errors.run(i, [&] { made[i] = problem.makeScratch(); });
-  }
-  errors.rethrow();
-  scratch_ = std::move(made);
-}
-
-int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int threads) {
+int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajectory& nodes, Team& team, int threads) {
   const int num_nodes = static_cast<int>(fresh_.size());
   tasks_.clear();
   for (int k = 0; k < num_nodes; ++k) {
@@ -65,16 +52,18 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
   const int num_tasks = static_cast<int>(tasks_.size()), size = problem.getBatchSize();
   const int num_batches = (num_tasks + size - 1) / size;
   ParallelErrors errors;
-  double seconds = 0;
-#pragma omp parallel for num_threads(std::min(threads, num_batches)) schedule(dynamic) reduction(+ : seconds)
-  for (int batch = 0; batch < num_batches; ++batch) {
+  std::atomic<int> next{0};
+  std::atomic<double> seconds{seconds_};
+  team.run(std::min(threads, num_batches), [&](int thread) {
     const Clock::time_point start = Clock::now();
-    const int begin = batch * size, count = std::min(size, num_tasks - begin);
-    errors.run(batch, [&] { problem.evaluate(&tasks_[begin], count, getScratch()); });
-    seconds += calcSecondsSince(start);
-  }
+    for (int batch; (batch = next.fetch_add(1, std::memory_order_relaxed)) < num_batches;) {
+      const int begin = batch * size, count = std::min(size, num_tasks - begin);
+      errors.run(batch, [&] { problem.evaluate(&tasks_[begin], count, getScratch(thread)); });
+    }
+    add(calcSecondsSince(start), seconds);
+  });
   errors.rethrow();
-  seconds_ += seconds;
+  seconds_ = seconds;
   const auto isOk = [](const std::unique_ptr<NodeEvaluation>& e) { return e->status == StepStatus::Ok; };
   const auto end = iterate_.begin() + num_nodes, failed = std::find_if_not(iterate_.begin(), end, isOk);
   return failed == end ? -1 : static_cast<int>(failed - iterate_.begin());
@@ -93,7 +82,5 @@ void NodeEvaluations::swapTrial() {
   iterate_.swap(trial_);
   std::fill(fresh_.begin(), fresh_.end(), true);
 }
-
-ProblemScratch* NodeEvaluations::getScratch() const { return scratch_[omp_get_thread_num()].get(); }
 
 }  // namespace bielle

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "bielle/solve/shooting_problem.h"
+#include "solve/team.h"
 
 namespace bielle {
 
@@ -14,10 +15,10 @@ class NodeEvaluations {
   /// That of another problem is dropped. The evaluations of the iterate become outdated, unless advance() moved them.
   void resize(const ShootingProblem& problem, int num_rolling, int threads);
 
-  /// Evaluates the outdated nodes of the current iterate, in batches shared among threads. Returns the first node whose
+  /// Evaluates the outdated nodes of the current iterate, in batches shared among the team. Returns the first node whose
   /// status is not Ok, or -1.
   /// \throws std::invalid_argument when a node that is not outdated has another state or control
-  int update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int threads);
+  int update(const ShootingProblem& problem, const ShootingTrajectory& nodes, Team& team, int threads);
   /// Marks all evaluations of the iterate as outdated.
   void outdate() { std::fill(fresh_.begin(), fresh_.end(), false); }
   /// Node k takes the place of node k + 1; nodes 0, N - 1 and N become outdated.
@@ -29,15 +30,13 @@ class NodeEvaluations {
   void swapTrial();
   /// For trials whose evaluations are not kept.
   const EvaluationList& getRolling() const { return rolling_; }
-  /// Scratch of the calling thread.
-  ProblemScratch* getScratch() const;
+  /// Scratch of a thread of the team.
+  ProblemScratch* getScratch(int thread) const { return scratch_[thread].get(); }
 
   /// Time of all updates since resize(), summed over the threads.
   double getSeconds() const { return seconds_; }
 
  private:
-  void makeScratch(const ShootingProblem& problem, int threads);
-
   std::uint64_t problem_ = 0;  // id
   EvaluationList iterate_, trial_, rolling_;
   std::vector<std::unique_ptr<ProblemScratch>> scratch_;  // by thread

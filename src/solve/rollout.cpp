@@ -1,6 +1,7 @@
 #include "solve/rollout.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "solve/parallel_errors.h"
@@ -28,9 +29,9 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments, int num_t
     trial.nodes.us.resize(N_);
     trial.deviations.resize(N_ + 1);
     for (int k = 0; k <= N_; ++k) {
-      trial.nodes.xs[k].setZero(problem.stateSize());
-      trial.deviations[k].setZero(problem.tangentSize(k));
-      if (k < N_) trial.nodes.us[k].setZero(problem.controlSize(k));
+      trial.nodes.xs[k].resize(problem.stateSize());
+      trial.deviations[k].resize(problem.tangentSize(k));
+      if (k < N_) trial.nodes.us[k].resize(problem.controlSize(k));
     }
   }
   const int num_tracks = std::max(max_segments, num_trials), size = problem.getBatchSize();
@@ -108,15 +109,20 @@ void Rollout::search(const RolloutInput& input, double alpha, int num) {
 void Rollout::rollOut(const RolloutInput& input, int num_tracks) {
   const int size = input.problem.getBatchSize(), num_groups = (num_tracks + size - 1) / size;
   ParallelErrors errors;
-#pragma omp parallel for num_threads(std::min(input.threads, num_groups)) schedule(dynamic)
-  for (int g = 0; g < num_groups; ++g) {
+  std::atomic<int> next{0};
+  std::atomic<double> seconds{seconds_};
+  input.team.run(std::min(input.threads, num_groups), [&](int thread) {
     const Clock::time_point start = Clock::now();
-    groups_[g].begin = g * size;
-    groups_[g].end = std::min(num_tracks, (g + 1) * size);
-    errors.run(g, [&] { rollOut(input, groups_[g]); });
-    groups_[g].seconds = calcSecondsSince(start);
-  }
-  for (int g = 0; g < num_groups; ++g) seconds_ += groups_[g].seconds;
+    for (int g; (g = next.fetch_add(1, std::memory_order_relaxed)) < num_groups;) {
+      Group& group = groups_[g];
+      group.begin = g * size;
+      group.end = std::min(num_tracks, (g + 1) * size);
+      group.scratch = input.evaluations.getScratch(thread);
+      errors.run(g, [&] { rollOut(input, group); });
+    }
+    add(calcSecondsSince(start), seconds);
+  });
+  seconds_ = seconds;
   errors.rethrow();
   for (Trial& trial : trials_) {
     trial.ok = true;
@@ -188,7 +194,7 @@ void Rollout::evaluateNodes(const RolloutInput& input, int step, Group& group) {
   }
   if (group.active.empty()) return;
   const int count = static_cast<int>(group.active.size());
-  input.problem.evaluate(group.evaluations.data(), count, input.evaluations.getScratch());
+  input.problem.evaluate(group.evaluations.data(), count, group.scratch);
   for (int i = 0; i < count; ++i) {
     Track& track = *group.active[i];
     const NodeEvaluation& out = *group.evaluations[i].out;
@@ -227,8 +233,7 @@ void Rollout::findDeviations(const RolloutInput& input, Group& group) {
     group.moved.push_back(&track);
   }
   if (group.moved.empty()) return;
-  input.problem.difference(group.differences.data(), static_cast<int>(group.differences.size()),
-                           input.evaluations.getScratch());
+  input.problem.difference(group.differences.data(), static_cast<int>(group.differences.size()), group.scratch);
   for (size_t i = 0; i < group.moved.size(); ++i)
     if (!group.differences[i].dx->allFinite()) group.moved[i]->fail(group.differences[i].node, {});
 }
@@ -253,7 +258,7 @@ void Rollout::contractGaps(const RolloutInput& input, Group& group) {
 
 void Rollout::integrate(const RolloutInput& input, Group& group) {
   if (group.moved.empty()) return;
-  input.problem.integrate(group.states.data(), static_cast<int>(group.states.size()), input.evaluations.getScratch());
+  input.problem.integrate(group.states.data(), static_cast<int>(group.states.size()), group.scratch);
   for (size_t i = 0; i < group.moved.size(); ++i)
     if (!group.states[i].x_out->allFinite()) group.moved[i]->fail(group.states[i].node, {});
 }

@@ -16,6 +16,7 @@ struct RolloutInput {
   const std::vector<VectorXd>& dx;        ///< N + 1, of the full step
   const std::vector<ControlBox>& bounds;  ///< of u, N or none
   const std::vector<char>& open;          ///< N: whether the gap after a stage counts as open
+  Team& team;
   int threads;
 };
 
@@ -73,12 +74,12 @@ class Rollout {
   // Tracks processed together, one node of each at a time.
   struct Group {
     int begin = 0, end = 0;  // its tracks
+    ProblemScratch* scratch = nullptr;
     std::vector<Track*> active;
     std::vector<EvaluateTask> evaluations;  // of the active ones
     std::vector<DifferenceTask> differences;
     std::vector<IntegrateTask> states;
     std::vector<Track*> moved;  // tracks of the differences or of the states
-    double seconds = 0;
   };
   void rollOut(const RolloutInput& input, int num_tracks);
   void rollOut(const RolloutInput& input, Group& group);

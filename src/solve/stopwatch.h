@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <chrono>
 
 namespace bielle {
@@ -6,6 +7,12 @@ namespace bielle {
 using Clock = std::chrono::steady_clock;
 inline double calcSecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// To the time of several threads.
+inline void add(double seconds, std::atomic<double>& sum) {
+  for (double before = sum.load(); !sum.compare_exchange_weak(before, before + seconds);) {
+  }
 }
 
 }  // namespace bielle
