@@ -26,6 +26,7 @@ RecedingOptions makeSolverOptions(const PredictiveOptions& options, int iteratio
   out.threads = options.threads;
   out.iterations = iterations;
   out.initial_regularization = out.min_regularization = options.regularization;
+  out.gradient_tolerance = 0;  // steps near the optimum are like others
   // One penalty for all solves: each takes a few iterations only, and multipliers are moved on from one to the next.
   out.constraints.initial_penalty = options.penalty;
   out.constraints.penalty_increase = 1;

@@ -1,6 +1,7 @@
 #include "bielle/solve/receding.h"
 
 #include <stdexcept>
+#include <utility>
 
 #include "solve/fddp_checks.h"
 #include "solve/fddp_iterations.h"
@@ -16,8 +17,17 @@ class RecedingStep : private FddpIterations {
                const FddpObserver& observer, FddpMemory& memory)
       : FddpIterations(options, options.iterations, problem, trajectory, observer, memory) {}
 
-  FddpSummary run() {
+  /// \param regularization  of the first sweep, at least the initial one; then that with which the next step starts
+  FddpSummary run(double& regularization) {
     start();
+    regularization_ = std::max(regularization_, regularization);
+    const FddpSummary summary = iterate();
+    regularization = regularization_;
+    return summary;
+  }
+
+ private:
+  FddpSummary iterate() {
     while (true) {
       if (const End end = linearize()) return finish(*end);
       if (const End end = findStep()) return finish(*end);
@@ -27,7 +37,6 @@ class RecedingStep : private FddpIterations {
     }
   }
 
- private:
   // New multipliers come before, so that no iteration linearizes twice.
   End linearize() {
     if (const End end = evaluate()) return end;
@@ -50,7 +59,13 @@ class RecedingStep : private FddpIterations {
         continue;
       }
       if (searchLine() && (accepted_->alpha == 1 || !isRounding())) return {};
+      const bool rounding = isRounding();
       if (const End end = raiseRegularizationOrStall()) return end;
+      // The search took the time of an iteration.
+      if (!rounding && summary_.iterations + ++rejected_ >= max_iterations_) {
+        summary_.message = "no step is acceptable: the iterate is kept";
+        return FddpTermination::MaxIterations;
+      }
     }
   }
 
@@ -63,16 +78,18 @@ class RecedingStep : private FddpIterations {
     return (last_step_ == 1 && first_step_ == 1 && tryClosed(input, segments)) || searchInOnePiece(input);
   }
 
-  // Steps of all lengths.
+  // Steps of length 1, 1/4, 1/16, ...
   bool searchInSegments(const RolloutInput& input, int segments) {
     double alpha = 1;
-    for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
+    for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.25) {
       if (isInterrupted()) return false;
       memory_.rollout.cut(input, alpha, segments);
       if (accept(memory_.rollout.getTrial(0))) return true;
     }
     return false;
   }
+
+  int rejected_ = 0;  // searches without an acceptable step
 };
 
 }  // namespace
@@ -86,7 +103,8 @@ Receding::Receding(Receding&&) noexcept = default;
 Receding& Receding::operator=(Receding&&) noexcept = default;
 
 FddpSummary Receding::step(ShootingTrajectory& trajectory, const FddpObserver& observer) {
-  return RecedingStep(options_, *problem_, trajectory, observer, *memory_).run();
+  if (!std::exchange(advanced_, false)) regularization_ = 0;
+  return RecedingStep(options_, *problem_, trajectory, observer, *memory_).run(regularization_);
 }
 
 void Receding::advance(ShootingTrajectory& trajectory) {
@@ -96,6 +114,7 @@ void Receding::advance(ShootingTrajectory& trajectory) {
   for (size_t k = 0; k + 1 < N; ++k) trajectory.us[k].swap(trajectory.us[k + 1]);
   trajectory.xs[N] = trajectory.xs[N - 1];
   if (N > 1) trajectory.us[N - 1] = trajectory.us[N - 2];
+  advanced_ = true;
   memory_->evaluations.advance();
   memory_->lagrangian.advance();
 }

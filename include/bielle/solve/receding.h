@@ -1,7 +1,8 @@
 #pragma once
 /// \file FDDP for a receding horizon: a few iterations per step, each about as long as the last, on a window that moves.
 ///
-/// Iterations are those of fddp.h, with three differences. None closes the gaps for its own sake: steps of all lengths are
+/// Iterations are those of fddp.h, with four differences. Each searches few lengths, 1, 1/4, ...; if none is acceptable, the
+/// trajectory stays as it is, and the next iteration, in this step or after advance(), regularizes more. None closes the gaps for its own sake: steps of all lengths are
 /// rolled out in segments, which run at the same time, and what they leave open is left to the next step. Multipliers are new,
 /// fddp.h Eq. (12), before every linearization, which is made once. And since Eq. (10) is not at its minimum there, rows with
 /// y_k != 0 are then held at their bounds, like equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal
@@ -20,6 +21,7 @@ struct FddpMemory;
 /// For a constant penalty set constraints.penalty_increase to 1, for a constant regularization the least one to the initial.
 struct RecedingOptions : IterationOptions {
   int iterations = 1;  ///< per step, at most 1000000; fewer if it converges
+  RecedingOptions() { num_step_lengths = 2; }
 };
 
 /// Keeps its memory and multipliers from step to step: an iteration after the first allocates nothing.
@@ -54,6 +56,8 @@ class Receding {
   const ShootingProblem* problem_;
   RecedingOptions options_;
   std::unique_ptr<FddpMemory> memory_;
+  double regularization_ = 0;  // that the last step ended with
+  bool advanced_ = false;      // since then
 };
 
 }  // namespace bielle
