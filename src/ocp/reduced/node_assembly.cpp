@@ -37,9 +37,12 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
   dlambda_.setZero(padded * layout.most_contact_rows);
   dspeeds_.setZero(padded * nu);
   by_velocity_.setZero(nr * std::max(nr, layout.most_contact_rows));
-  int largest = 6;
+  int largest = 0;
   for (const ReducedCluster& cluster : reduction.clusters) largest = std::max(largest, cluster.size);
   column_.setZero(2 * largest);
+  constexpr int kMost = 6;  // dofs of a joint
+  turn_.setZero(roundUpToLane(2 * kMost) * kMost);
+  turned_.setZero(roundUpToLane(2 * kMost) * std::max({nr, nu, layout.most_contact_rows}));
 }
 
 namespace {
@@ -165,29 +168,47 @@ void NodeAssembly::addFirstDrift(double h, const ReducedEvaluation& at, const La
   if (isFree(at))
     for (int k = 0; k < nr; ++k)
       rows.row(leading - 1) += y_s_[k] * rows.row(leading + k) + y_v_s_[k] * rows.row(leading + nr + k);
-  const auto turn = [&](int offset, const auto& q_y, const auto& q_v, const auto& v_y, const auto& v_v) {
-    const Eigen::Index r = q_y.rows();
+  for (const FreeJoint& free : free_joints_) {
+    const Eigen::Index n = free.size, o = leading + free.offset;
+    if (!free.curved) {
+      rows.middleRows(nr + o, n) += h * rows.middleRows(o, n);
+      continue;
+    }
+    // Its velocity does not change, v_y = 0 and v_v = 1.
+    PaddedMap turn = shapePadded(turn_, 2 * n, n), turned = shapePadded(turned_, 2 * n, rows.cols());
+    turn.topRows(n) = free.first_q_y.transpose();
+    turn.bottomRows(n) = free.first_q_v.transpose();
+    clearPadding(turn);
+    setProduct(2 * n, rows.cols(), n, pad(turn), {rows.data() + o, 1, rows.outerStride()}, pad(turned));
+    rows.middleRows(o, n) = turned.topRows(n);
+    rows.middleRows(nr + o, n) += turned.bottomRows(n);
+  }
+  // (q_y^T q + v_y^T v, q_v^T q + v_v^T v) of the rows q and v of a cluster, by columns.
+  const auto turn = [&](auto fixed, const LaneView::Drift& drift, Eigen::Index offset) {
+    constexpr int n = fixed;
+    using Derivative = Eigen::Map<const Eigen::Matrix<double, n, n>>;
+    const Eigen::Index r = drift.q_y.rows();
+    const Derivative q_y(drift.q_y.data(), r, r), q_v(drift.q_v.data(), r, r), v_y(drift.v_y.data(), r, r),
+        v_v(drift.v_v.data(), r, r);
     for (Eigen::Index c = 0; c < rows.cols(); ++c) {
-      auto by_q = rows.col(c).segment(leading + offset, r), by_v = rows.col(c).segment(leading + nr + offset, r);
-      auto before_q = column_.head(r), before_v = column_.segment(r, r);
-      before_q = by_q;
-      before_v = by_v;
-      by_q = q_y.transpose().lazyProduct(before_q) + v_y.transpose().lazyProduct(before_v);
-      by_v = q_v.transpose().lazyProduct(before_q) + v_v.transpose().lazyProduct(before_v);
+      auto q = rows.col(c).template segment<n>(leading + offset, r),
+           v = rows.col(c).template segment<n>(leading + nr + offset, r);
+      auto before_q = column_.segment<n>(0, r), before_v = column_.segment<n>(r, r);
+      before_q = q;
+      before_v = v;
+      q = q_y.transpose().lazyProduct(before_q) + v_y.transpose().lazyProduct(before_v);
+      v = q_v.transpose().lazyProduct(before_q) + v_v.transpose().lazyProduct(before_v);
     }
   };
-  for (const FreeJoint& free : free_joints_) {
-    const Eigen::Index n = free.size, o = free.offset;
-    if (free.curved) {
-      turn(free.offset, free.first_q_y, free.first_q_v, JointMatrix(JointMatrix::Zero(n, n)),
-           JointMatrix(JointMatrix::Identity(n, n)));
-    } else {
-      rows.middleRows(leading + nr + o, n) += h * rows.middleRows(leading + o, n);
-    }
-  }
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
+    const ReducedCluster& cluster = reduction_.clusters[i];
     const LaneView::Drift& drift = view.clusters[i].first;
-    turn(reduction_.clusters[i].offset, drift.q_y, drift.q_v, drift.v_y, drift.v_v);
+    if (cluster.size == 1)
+      turn(std::integral_constant<int, 1>(), drift, cluster.offset);
+    else if (cluster.size == 2)
+      turn(std::integral_constant<int, 2>(), drift, cluster.offset);
+    else
+      turn(std::integral_constant<int, Eigen::Dynamic>(), drift, cluster.offset);
   }
 }
 

@@ -82,15 +82,16 @@ class NodeAssembly {
   ResidualJacobians jacobians_;
   CountedRows counted_;
   VectorXd Rt_, Rt_scaled_, gradient_;  // large enough for any node
-  VectorXd dlambda_;      // (nu + 2 size) x contact rows, padded: derivatives of contact forces by (u, dy, dy_v)
-  VectorXd dspeeds_;      // (nu + 1 + 2 size) x nu, padded: those of the speeds of the motors
-  VectorXd room_;         // of solveDerivatives()
-  VectorXd by_velocity_;  // of addForeseenVelocity(): rows by dy_v
-  VectorXd column_;       // of addFirstDrift(): 2 r of the largest reduced joint
-  VectorXd y_;            // of node_scale.cpp: size
-  VectorXd y_s_, y_v_s_;  // likewise: how the point half way moves with s
-  VectorXd velocity_;     // likewise: nv
-  VectorXd no_squares_;   // nu + 1 + 2 size
+  VectorXd dlambda_;        // (nu + 2 size) x contact rows, padded: derivatives of contact forces by (u, dy, dy_v)
+  VectorXd dspeeds_;        // (nu + 1 + 2 size) x nu, padded: those of the speeds of the motors
+  VectorXd room_;           // of solveDerivatives()
+  VectorXd by_velocity_;    // of addForeseenVelocity(): rows by dy_v
+  VectorXd column_;         // of addFirstDrift(): 2 r of the largest cluster
+  VectorXd turn_, turned_;  // likewise: derivatives of a joint outside all clusters, and its rows, padded
+  VectorXd y_;              // of node_scale.cpp: size
+  VectorXd y_s_, y_v_s_;    // likewise: how the point half way moves with s
+  VectorXd velocity_;       // likewise: nv
+  VectorXd no_squares_;     // nu + 1 + 2 size
 };
 
 }  // namespace bielle
