@@ -13,7 +13,8 @@ inline Model loadBipetto() { return loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto
 inline DesignMotion makeSquat(double depth, double duration = 0.8, double settle = 0.1, double time_step = 0.02) {
   SquatOptions options;
   options.depth = depth, options.duration = duration, options.settle = settle, options.time_step = time_step;
-  return {"squat", [options](const Model& model, const VectorXd& q0) { return planSquat(model, options, q0); }};
+  return {"squat",
+          [options](const Model& model, const StandingRobot& standing) { return planSquat(model, options, standing); }};
 }
 
 inline double square(double x) { return x * x; }

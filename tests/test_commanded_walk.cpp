@@ -18,7 +18,7 @@ CommandedWalk makeCommandedWalk(const std::vector<TimedCommand>& commands) {
           {},
           {},
           [commands](double time) { return findCommand(commands, time); },
-          makeStandingPosture(getBipetto())};
+          makeStandingRobot(getBipetto())};
 }
 
 // A placement of the middle of the feet over time, and the stages.

@@ -196,8 +196,9 @@ constraints: [{measure: rms_torque, motors: ["*hip*"], at_most: 10}]
   const Parametrization robot = makeParametrization(spec);
   WalkOptions options;
   options.speed = 0.4, options.steps = 2;
-  const DesignMotion walk = {
-      "walk", [options](const Model& model, const VectorXd& q0) { return planWalk(model, options, q0); }};
+  const DesignMotion walk = {"walk", [options](const Model& model, const StandingRobot& standing) {
+                               return planWalk(model, options, standing);
+                             }};
   for (const MotionMode mode : {MotionMode::Kept, MotionMode::Reoptimized}) {
     CAPTURE(getName(mode));
     checkSlopes(calcSlopes(DesignEvaluator(robot, {walk}, spec.objective, makeExactOptions(mode, spec.constraints))),

@@ -24,8 +24,8 @@ DesignMotion makeAskedSquat(double requested, double tolerance, double com_weigh
   SquatOptions options;
   options.depth = 0.8, options.duration = 0.6, options.settle = 0.06, options.time_step = 0.03;
   options.com_weight = com_weight;
-  return {"squat", [=](const Model& model, const VectorXd& q0) {
-            MotionPlan plan = planSquat(model, options, q0);
+  return {"squat", [=](const Model& model, const StandingRobot& standing) {
+            MotionPlan plan = planSquat(model, options, standing);
             plan.goals.at(0).requested = requested, plan.goals[0].tolerance = tolerance;
             return plan;
           }};

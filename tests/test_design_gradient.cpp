@@ -24,7 +24,8 @@ namespace {
 DesignMotion makeShortWalk() {
   WalkOptions options;
   options.speed = 0.4, options.steps = 2;
-  return {"walk", [options](const Model& model, const VectorXd& q0) { return planWalk(model, options, q0); }};
+  return {"walk",
+          [options](const Model& model, const StandingRobot& standing) { return planWalk(model, options, standing); }};
 }
 
 Eigen::Index findActive(const MeasurePieces& term) {

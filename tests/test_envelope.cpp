@@ -20,7 +20,7 @@ namespace {
 constexpr double kTolerance = 1e-5;      // relative
 constexpr double kBetweenOptima = 4e-3;  // step, over the width of the bounds
 
-using MakeMotion = std::function<Motion(const Model&)>;
+using MakeMotion = std::function<Motion(const Model&, const StandingRobot&)>;
 
 // Costs are then exact to ten digits or more.
 FddpOptions makeTightOptions() {
@@ -39,7 +39,7 @@ struct Optimum {
     SolveOptions how;
     how.solver = options;
     if (guess) how.start = StartingPoint{*guess};
-    solution = solve(make(model), how);
+    solution = solve(make(model, makeStandingRobot(model)), how);
     CAPTURE(solution.summary.message, solution.summary.iterations);
     REQUIRE(solution.converged());
   }
@@ -113,18 +113,18 @@ Parametrization makeCleobot() {
 }
 
 MakeMotion makeSquatMaker(const ProblemOptions& problem) {
-  return [=](const Model& model) {
+  return [=](const Model& model, const StandingRobot& standing) {
     SquatOptions options;
     options.depth = 0.8, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.02;
-    return makeSquat(model, options, problem);
+    return makeMotion(model, planSquat(model, options, standing), problem);
   };
 }
 
 MakeMotion makeWalkMaker(const ProblemOptions& problem) {
-  return [=](const Model& model) {
+  return [=](const Model& model, const StandingRobot& standing) {
     WalkOptions options;
     options.speed = 0.4, options.steps = 2;
-    return makeWalk(model, options, problem);
+    return makeMotion(model, planWalk(model, options, standing), problem);
   };
 }
 
@@ -292,15 +292,15 @@ TEST_CASE("envelope: where Gauss-Newton Hessians point the wrong way, second-ord
     Measure measure;
     int motor;
   };
-  const MakeMotion jump = [](const Model& model) {
+  const MakeMotion jump = [](const Model& model, const StandingRobot& standing) {
     JumpOptions options;
     options.flight = 0.3, options.time_step = 0.01;
-    return makeJump(model, options);
+    return makeMotion(model, planJump(model, options, standing), ProblemOptions());
   };
-  const MakeMotion squat = [](const Model& model) {
+  const MakeMotion squat = [](const Model& model, const StandingRobot& standing) {
     SquatOptions options;
     options.depth = 0.5, options.duration = 0.4, options.settle = 0.1, options.time_step = 0.02;
-    return makeSquat(model, options);
+    return makeMotion(model, planSquat(model, options, standing), ProblemOptions());
   };
   const std::vector<Case> cases = {
       {"five-bar leg jumps", makeFivebar(), jump, 2, Measure::RmsTorque, 0},
@@ -355,7 +355,9 @@ TEST_CASE("envelope: time of twenty parameters", "[.table]") {
                   gradient / solve);
     }
   };
-  const auto make = [&](const Model& model) { return makeWalk(model); };
+  const auto make = [&](const Model& model, const StandingRobot& standing) {
+    return makeMotion(model, planWalk(model, {}, standing), ProblemOptions());
+  };
   run("Bipetto walks", makeBipetto(), make);
   run("Cleobot walks", makeCleobot(), make);
 }

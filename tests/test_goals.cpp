@@ -201,15 +201,17 @@ TEST_CASE("goals: a sequence has those of its motions, at their nodes") {
   SquatOptions squat;
   WalkOptions walk;
   walk.gait.rigid_landing = true;  // its impacts are stages too
-  const auto planBoth = [&](const Model& model, const VectorXd& q0) {
-    return planSequence(model,
-                        {{"squat", [&](const Model& m, const VectorXd& q) { return planSquat(m, squat, q); }},
-                         {"walk", [&](const Model& m, const VectorXd& q) { return planWalk(m, walk, q); }}},
-                        q0);
+  const auto planBoth = [&](const Model& model, const StandingRobot& standing) {
+    return planSequence(
+        model,
+        {{"squat", [&](const Model& m, const StandingRobot& from) { return planSquat(m, squat, from); }},
+         {"walk", [&](const Model& m, const StandingRobot& from) { return planWalk(m, walk, from); }}},
+        standing);
   };
-  const VectorXd q0 = makeStandingPosture(getBipetto());
-  const MotionPlan both = planBoth(getBipetto(), q0);
-  const MotionPlan first = planSquat(getBipetto(), squat, q0), second = planWalk(getBipetto(), walk, first.q_end);
+  const Model& model = getBipetto();
+  const StandingRobot standing = makeStandingRobot(model);
+  const MotionPlan both = planBoth(model, standing), first = planSquat(model, squat, standing),
+                   second = planWalk(model, walk, makeStandingRobot(model, first.q_end));
   REQUIRE(both.goals.size() == 3);
   CHECK(both.goals[0].name == "squat.depth");
   CHECK(both.goals[1].name == "walk.speed");

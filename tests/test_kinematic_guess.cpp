@@ -39,7 +39,7 @@ Errors measureErrors(const Motion& motion) {
   return worst;
 }
 
-Stance makeStance() { return bielle::makeStance(getBipetto(), LocomotionOptions(), makeStandingPosture(getBipetto())); }
+Stance makeStance() { return bielle::makeStance(getBipetto(), LocomotionOptions(), makeStandingRobot(getBipetto())); }
 
 double measureTransmissions(const VectorXd& q) {
   const Model& model = getBipetto();

@@ -208,7 +208,7 @@ TEST_CASE("limits: a range without width, or without the starting posture, is re
 
 TEST_CASE("costs: bounds of a barrier that do not have the size of its residual are refused") {
   const auto expectRefusal = [](const std::function<void(Activation&)>& poison) {
-    MotionPlan plan = planSquat(getBipetto(), {}, makeStandingPosture(getBipetto()));
+    MotionPlan plan = planSquat(getBipetto(), {}, makeStandingRobot(getBipetto()));
     Activation barrier = Activation::makeBarrier(Vector3d::Ones(), Vector3d::Zero(), Vector3d::Ones());
     poison(barrier);
     plan.stages[3].costs.push_back({"box", 1, barrier, makeComPosition(Vector3d::Zero())});

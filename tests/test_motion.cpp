@@ -166,9 +166,10 @@ TEST_CASE("contact gains and wrench cones follow one rule in all motions") {
   WalkOptions walk;
   squat.contact_kp = squat.contact_kd = jump.contact_kp = jump.contact_kd = 1e9;
   walk.gait.contact_kp = walk.gait.contact_kd = 1e9;
-  const VectorXd q0 = makeStandingPosture(model);
+  const StandingRobot standing = makeStandingRobot(model);
   const auto rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
-  MotionPlan plans[] = {planSquat(model, squat, q0), planJump(model, jump, q0), planWalk(model, walk, q0)};
+  MotionPlan plans[] = {planSquat(model, squat, standing), planJump(model, jump, standing),
+                        planWalk(model, walk, standing)};
   for (MotionPlan& plan : plans) {
     CAPTURE(plan.name, getName(rule));
     plan.stages.resize(1);

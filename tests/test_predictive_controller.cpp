@@ -27,24 +27,24 @@ struct Solved {
   std::unique_ptr<Policy> gains;
 };
 template <typename Options>
-Solved solve(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&), const Options& options) {
+Solved solve(MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&), const Options& options) {
   const Model& model = getBipetto();
   SolveOptions how;
   how.solver = FddpOptions();
-  Solved out{solve(makeMotion(model, plan(model, options, makeStandingPosture(model)), ProblemOptions()), how),
-             nullptr};
+  Solved out{solve(makeMotion(model, plan(model, options, makeStandingRobot(model)), ProblemOptions()), how), nullptr};
   REQUIRE(out.solution.converged());
   out.gains = std::make_unique<Policy>(makePolicy(out.solution));
   return out;
 }
 
 template <typename Options>
-std::unique_ptr<PredictiveController> makeController(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&),
+std::unique_ptr<PredictiveController> makeController(MotionPlan (*plan)(const Model&, const Options&,
+                                                                        const StandingRobot&),
                                                      const Options& options, const Solved& solved,
                                                      const PredictiveOptions& predictive) {
   const Model& model = getBipetto();
   return std::make_unique<PredictiveController>(
-      makePredictiveMotion(model, plan(model, options, makeStandingPosture(model)), ProblemOptions(), predictive),
+      makePredictiveMotion(model, plan(model, options, makeStandingRobot(model)), ProblemOptions(), predictive),
       solved.solution.trajectory, predictive);
 }
 
@@ -142,7 +142,7 @@ TEST_CASE("predictive control: a walk by command is made on the way, to the same
   gait.cone_margin = 0.2;
   const auto makeWalk = [&] {
     return CommandedWalk(
-        model, gait, {}, [&](double time) { return findCommand(commands, time); }, makeStandingPosture(model));
+        model, gait, {}, [&](double time) { return findCommand(commands, time); }, makeStandingRobot(model));
   };
   ExecutionOptions options;
   options.duration = 1.5;
@@ -192,7 +192,8 @@ struct Standing {
       gate.pass();
       return VelocityCommand{};
     };
-    controller = std::make_unique<PredictiveController>(CommandedWalk(getBipetto(), {}, {}, source, q), options);
+    controller = std::make_unique<PredictiveController>(
+        CommandedWalk(getBipetto(), {}, {}, source, makeStandingRobot(getBipetto())), options);
     u.setZero(getBipetto().nu());
     at = {0, q, VectorXd::Zero(getBipetto().nv())};
     at.q[0] += 0.002;  // not on the plan
@@ -321,7 +322,7 @@ TEST_CASE("predictive control: it refuses a plan that is not one of its motion")
   shorter.xs.pop_back();
   shorter.us.pop_back();
   CHECK_THROWS_AS(
-      PredictiveController(makePredictiveMotion(model, planSquat(model, makeShortSquat(), makeStandingPosture(model)),
+      PredictiveController(makePredictiveMotion(model, planSquat(model, makeShortSquat(), makeStandingRobot(model)),
                                                 ProblemOptions(), options),
                            shorter, options),
       std::invalid_argument);
@@ -329,7 +330,7 @@ TEST_CASE("predictive control: it refuses a plan that is not one of its motion")
 
 TEST_CASE("predictive control: windows, threads and iterations without sense are refused by name") {
   const Model& model = getBipetto();
-  const MotionPlan plan = planSquat(model, makeShortSquat(), makeStandingPosture(model));
+  const MotionPlan plan = planSquat(model, makeShortSquat(), makeStandingRobot(model));
   const auto make = [&](const PredictiveOptions& options) {
     PredictiveController(makePredictiveMotion(model, plan, ProblemOptions(), options),
                          getShortSquat().solution.trajectory, options);

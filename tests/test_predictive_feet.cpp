@@ -25,7 +25,7 @@ struct Walking {
     options.nodes = 60;
     options.look_ahead = look_ahead;
     const VectorXd q = makeStandingPosture(model);
-    CommandedWalk walk(model, gait, {}, source, q);
+    CommandedWalk walk(model, gait, {}, source, makeStandingRobot(model));
     CommandedWalk plan = walk;
     for (int k = 0; k < 200; ++k) planned.push_back(plan.makeNext().spec.constraints.contacts);
     controller = std::make_unique<PredictiveController>(std::move(walk), options);

@@ -140,17 +140,17 @@ TEST_CASE("quintic: position, velocity and acceleration of both ends, by differe
 TEST_CASE("run, hop: which foot stands when") {
   RunOptions run;
   run.steps = 4;
-  const MotionPlan plan = planRun(getBipetto(), run, makeStandingPosture(getBipetto()));
+  const MotionPlan plan = planRun(getBipetto(), run, makeStandingRobot(getBipetto()));
   CHECK(describe(plan.schedule) == "LR L - R - L - R LR");
   CHECK(calcAirTime(plan.schedule) == Approx(3 * run.flight));
   CHECK(plan.goals.front().kind == GoalKind::FlightTime);  // too short for its speed
   run.steps = 8;
-  CHECK(planRun(getBipetto(), run, makeStandingPosture(getBipetto())).goals.front().kind == GoalKind::Speed);
+  CHECK(planRun(getBipetto(), run, makeStandingRobot(getBipetto())).goals.front().kind == GoalKind::Speed);
   HopOptions hop;
   hop.foot = Side::Right;
   hop.hops = 2;
   hop.length = 0.1;
-  const MotionPlan hops = planHop(getBipetto(), hop, makeStandingPosture(getBipetto()));
+  const MotionPlan hops = planHop(getBipetto(), hop, makeStandingRobot(getBipetto()));
   CHECK(describe(hops.schedule) == "LR R - R - R LR");
   CHECK(calcAirTime(hops.schedule) == Approx(2 * hop.flight));
   const std::vector<ContactPhase>& phases = hops.schedule.phases;
@@ -203,7 +203,7 @@ TEST_CASE("run: stages are as short as the fastest swing needs") {
   const auto getStep = [](double speed) {
     RunOptions options;
     options.speed = speed;
-    return planRun(getBipetto(), options, makeStandingPosture(getBipetto())).schedule.phases.front().dt;
+    return planRun(getBipetto(), options, makeStandingRobot(getBipetto())).schedule.phases.front().dt;
   };
   CHECK(getStep(1) == 0.005);
   CHECK(getStep(1.5) == Approx(0.004));

@@ -21,9 +21,9 @@ using namespace bielle::testing;
 namespace {
 
 template <typename Options>
-SequencePart makePart(const std::string& name, MotionPlan (*plan)(const Model&, const Options&, const VectorXd&),
+SequencePart makePart(const std::string& name, MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&),
                       const Options& options = {}) {
-  return {name, [=](const Model& model, const VectorXd& q0) { return plan(model, options, q0); }};
+  return {name, [=](const Model& model, const StandingRobot& standing) { return plan(model, options, standing); }};
 }
 
 SquatOptions makeShortSquat() {
@@ -79,7 +79,7 @@ TEST_CASE("sequence: each motion goes on from where the one before ends") {
                    {makePart("squat", planSquat, makeShortSquat()), makePart("turn", planTurn, turn),
                     makePart("jump", planJump, jump), makePart("stairs", planStairs, makeStairsOf(0.05)),
                     makePart("walk", planWalk, WalkOptions()), makePart("squat2", planSquat, makeShortSquat())},
-                   makeStandingPosture(getBipetto()));
+                   makeStandingRobot(getBipetto()));
   const size_t stages = plan.schedule.numStages();
   CHECK(plan.stages.size() == stages + 1);
   CHECK(plan.guess.xs.size() == stages + 1);
@@ -117,12 +117,12 @@ TEST_CASE("sequence: up, over the top and down again, on one ground") {
   const std::vector<SequencePart> parts = {makePart("stairs", planStairs, makeStairsOf(0.06)),
                                            makePart("walk", planWalk, walk),
                                            makePart("stairs2", planStairs, makeStairsOf(-0.06))};
-  const MotionPlan plan = planSequence(getBipetto(), parts, makeStandingPosture(getBipetto()));
+  const MotionPlan plan = planSequence(getBipetto(), parts, makeStandingRobot(getBipetto()));
   CHECK(plan.ground.height == Approx(0).margin(1e-9));
   CHECK(calcMiddle(plan.q_end).p.z() == Approx(0).margin(1e-9));
   checkWholeSoles(plan);
   // Down first: what was the ground is now higher than the plane.
-  const MotionPlan down = planSequence(getBipetto(), {parts[1], parts[2]}, makeStandingPosture(getBipetto()));
+  const MotionPlan down = planSequence(getBipetto(), {parts[1], parts[2]}, makeStandingRobot(getBipetto()));
   CHECK(down.ground.height == Approx(-0.12));
   checkWholeSoles(down);
 }
@@ -150,7 +150,7 @@ TEST_CASE("sequence: unlike motions are solved as one problem") {
     solved.push_back(part);
     CHECK(summary.termination == FddpTermination::Converged);
   };
-  motion.guess = solveParts(model, parts, makeStandingPosture(model), {}, {}, {}, report);
+  motion.guess = solveParts(model, parts, makeStandingRobot(model), {}, {}, {}, report);
   CHECK(solved == std::vector<std::string>{"squat", "turn", "walk", "stairs", "jump"});
   FddpOptions options;
   options.max_iterations = 100;

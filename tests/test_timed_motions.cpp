@@ -41,7 +41,7 @@ WalkOptions makeTwoSteps() {
 
 // A walk with all durations free or, given a solution, one of them at a multiple of what was chosen, from that solution.
 Motion makeTimedWalk(const Model& model, const TimedSolution* solution = nullptr, size_t fixed = 0, double factor = 1) {
-  MotionPlan plan = planWalk(model, makeTwoSteps(), makeStandingPosture(model));
+  MotionPlan plan = planWalk(model, makeTwoSteps(), makeStandingRobot(model));
   const ContactSchedule schedule = plan.schedule;
   freeTimings(kAll, schedule, plan.stages);
   double scale = 1;
@@ -129,7 +129,7 @@ TEST_CASE("a result has the final durations, and a warm start goes on from them"
 TEST_CASE("a plan with the final durations makes the same steps") {
   const Model model = loadRobot("bipetto").model;
   const TimedSolution walk = solveTimed(makeTimedWalk(model));
-  MotionPlan plan = planWalk(model, makeTwoSteps(), makeStandingPosture(model));
+  MotionPlan plan = planWalk(model, makeTwoSteps(), makeStandingRobot(model));
   fixTimings(walk.timings, StepRule::Midpoint, plan.schedule, plan.stages);
   const Motion fixed = makeMotion(model, std::move(plan), {Formulation::Reduced, StepRule::Midpoint});
   CHECK(!fixed.problem->hasFreeTimings());

@@ -172,7 +172,7 @@ TEST_CASE("walk: a fast one with short stages, whose contacts are stiff, is foun
 
 TEST_CASE("walk: stages are as short as the fastest swing needs, unless their length is given") {
   const Model& model = getBipetto();
-  const VectorXd q0 = makeStandingPosture(model);
+  const StandingRobot standing = makeStandingRobot(model);
   const auto getStep = [&](double speed, double single, double height, double time_step) {
     WalkOptions options;
     options.speed = speed;
@@ -180,7 +180,7 @@ TEST_CASE("walk: stages are as short as the fastest swing needs, unless their le
     options.gait.timing.single = single;
     options.gait.timing.time_step = time_step;
     options.gait.swing.height = height;
-    return planWalk(model, options, q0).schedule.phases.front().dt;
+    return planWalk(model, options, standing).schedule.phases.front().dt;
   };
   CHECK(getStep(0.5, 0.36, 0.04, 0) == 0.012);
   CHECK(getStep(-0.8, 0.36, 0.04, 0) == 0.012);
@@ -196,9 +196,9 @@ TEST_CASE("walk: stages are as short as the fastest swing needs, unless their le
 TEST_CASE("walk: the first double support is as long as the soles need to set off") {
   const Model& model = getBipetto();
   const ContactFrame& sole = model.contacts()[0];
-  const VectorXd q0 = makeStandingPosture(model);
+  const StandingRobot standing = makeStandingRobot(model);
   const auto count = [&](const WalkOptions& options) {
-    return planWalk(model, options, q0).schedule.phases.front().nodes;
+    return planWalk(model, options, standing).schedule.phases.front().nodes;
   };
   WalkOptions options;
   const double h = options.gait.timing.time_step = 0.012;
@@ -209,7 +209,7 @@ TEST_CASE("walk: the first double support is as long as the soles need to set of
   CHECK(nodes > std::lround(options.gait.timing.start / h));
   // Simulates a pendulum at rest whose centre of pressure is held back by d: the distance by which it ends ahead of the
   // path (the growing part of its error).
-  const Stance stance = makeStance(model, options.gait, q0);
+  const Stance stance = makeStance(model, options.gait, standing);
   const double d = options.gait.start_pressure * sole.half_length, g = 9.81, height = stance.com.z();
   const FootstepPlan plan = planFootsteps(stance.feet[0], stance.feet[1],
                                           {options.speed * options.gait.timing.stepDuration(), 0, 0}, 6, Side::Right);
@@ -283,7 +283,7 @@ TEST_CASE("walk: feet that come down strike within the cone of friction") {
   walk.gait.landing_speed = 0.05;
   walk.gait.friction = 0.35;
   const Model& model = getBipetto();
-  const MotionPlan plan = planWalk(model, walk, makeStandingPosture(model));
+  const MotionPlan plan = planWalk(model, walk, makeStandingRobot(model));
   // The largest tangential impulse over the normal one of a foot that lands.
   const auto strike = [&](const MotionPlan& solved, Formulation formulation) {
     Motion motion = makeMotion(model, solved, ProblemOptions(formulation));
@@ -330,7 +330,7 @@ TEST_CASE("walk: feet that come down strike within the cone of friction") {
   CHECK(strike(slippery, Formulation::Reduced) > 0.35);
 
   walk.gait.rigid_landing = false;
-  CHECK_THROWS_WITH(planWalk(model, walk, makeStandingPosture(model)), Catch::Contains("landing_speed"));
+  CHECK_THROWS_WITH(planWalk(model, walk, makeStandingRobot(model)), Catch::Contains("landing_speed"));
 }
 
 namespace {
@@ -340,7 +340,7 @@ Motion makeFarLanding(int& landing) {
   WalkOptions options;
   options.steps = 2;
   options.gait.timing.time_step = 0.03;
-  MotionPlan plan = planWalk(getBipetto(), options, makeStandingPosture(getBipetto()));
+  MotionPlan plan = planWalk(getBipetto(), options, makeStandingRobot(getBipetto()));
   landing = -1;
   for (size_t k = 0; k < plan.stages.size() && landing < 0; ++k)
     for (PathConstraint& constraint : plan.stages[k].path_constraints)

@@ -41,9 +41,11 @@ py::array costGradient(const HeldSolution& solved, const HeldParametrization& ro
   {
     const py::gil_scoped_release release;
     const MotionEnvelope envelope(solved.solution);
-    gradient = calcCostGradient(robot.robot, point, envelope, [&held](const Model& model) {
-      return makeMotion(model, held.request->make(), held.options);
-    });
+    const MotionRequest request = held.request->make();
+    const auto make = [&](const Model& model, const StandingRobot& standing) {
+      return makeMotion(model, request.plan(model, standing), held.options);
+    };
+    gradient = calcCostGradient(robot.robot, point, envelope, make);
   }
   return makeArray(gradient);
 }

@@ -100,7 +100,7 @@ py::object makeRecipe(const py::object& model, const py::object& made_of, const 
 
 MotionPlan plan(const std::shared_ptr<Model>& model, const Request& request) {
   const py::gil_scoped_release release;
-  return request.make().plan(*model, makeStandingPosture(*model));
+  return request.make().plan(*model, makeStandingRobot(*model));
 }
 
 std::vector<LibraryResidual> rememberStages(const HeldMotion& held, const py::object& recipe) {
@@ -155,7 +155,8 @@ StartingPoint readStart(const HeldMotion& held, const py::object& start) {
     requireFit(*held.motion.problem, solution.trajectory, "warm_start");
     return {solution.trajectory, solution.multipliers};
   }
-  if (!py::isinstance<ShootingTrajectory>(start)) return makeStart(read<MotionRecord>(start, "warm_start"), held.motion);
+  if (!py::isinstance<ShootingTrajectory>(start))
+    return makeStart(read<MotionRecord>(start, "warm_start"), held.motion);
   StartingPoint out{start.cast<const ShootingTrajectory&>()};
   requireFit(*held.motion.problem, out.trajectory, "warm_start");
   return out;
@@ -267,13 +268,14 @@ void bindHeldMotion(py::module_& module) {
            "Stage of a node, 0 to N, including the constraints from the robot's limits.")
       .def("costs", &getCosts, py::arg("node"), py::arg("trajectory") = py::none(),
            "Costs of a node of a Trajectory, or of the guess, by name, before scaling by the time step.")
-      .def("solve", &solve, py::arg("options") = makeMotionSolverOptions(), py::arg("callback") = py::none(),
-           py::arg("warm_start") = py::none(), py::arg("refine") = true,
-           "Solves it as `bielle solve` does. Returns a Solution; the motion stays as it is.\n\n"
-           "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve.\n"
-           "warm_start: a Trajectory or a Solution of as many stages, or a Record of any motion of the robot; None: the "
-           "guess\n"
-           "refine: whether the motion of a Request may be made again, e.g. with shorter stages");
+      .def(
+          "solve", &solve, py::arg("options") = makeMotionSolverOptions(), py::arg("callback") = py::none(),
+          py::arg("warm_start") = py::none(), py::arg("refine") = true,
+          "Solves it as `bielle solve` does. Returns a Solution; the motion stays as it is.\n\n"
+          "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve.\n"
+          "warm_start: a Trajectory or a Solution of as many stages, or a Record of any motion of the robot; None: the "
+          "guess\n"
+          "refine: whether the motion of a Request may be made again, e.g. with shorter stages");
   type.def(py::pickle(
       [](const HeldMotion& h) {
         return py::make_tuple(h.model, h.request ? py::cast(*h.request) : py::none(),

@@ -32,7 +32,8 @@ DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion)
     request.options.set(name, value);
     if (name != "time_step") usual.options.set(name, value);
   }
-  return {motion.motion, [request](const Model& model, const VectorXd& q0) { return request.plan(model, q0); },
+  return {motion.motion,
+          [request](const Model& model, const StandingRobot& standing) { return request.plan(model, standing); },
           motion.weight, motion.payload, usual};
 }
 

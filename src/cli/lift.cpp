@@ -77,7 +77,7 @@ int run(const LiftArguments& arguments) {
   const LoadedRobot robot = robot_argument.load();
   const SerialModel serial =
       makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.serial_armature));
-  MotionPlan plan = remakeRequest(summary).plan(serial.model, makeStandingPosture(serial.model));
+  MotionPlan plan = remakeRequest(summary).plan(serial.model, makeStandingRobot(serial.model));
   fixTimings(summary.timings, StepRule::Euler, plan.schedule, plan.stages);
   const Motion motion = makeMotion(serial.model, std::move(plan), {summary.formulation, StepRule::Euler});
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, record);

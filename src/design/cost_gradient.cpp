@@ -8,13 +8,10 @@
 namespace bielle {
 
 VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
-                          const std::function<Motion(const Model&)>& make) {
+                          const std::function<Motion(const Model&, const StandingRobot&)>& make) {
   VectorXd gradient = VectorXd::Zero(x.size());
   NeighbourPlans plans;
-  const auto plan = [&](const Model& model) {
-    const NeighbourPlans::Use use(plans);
-    return make(model);
-  };
+  const auto plan = [&](const Model& model) { return make(model, plans.stand(model)); };
   for (Eigen::Index i : robot.listContinuous()) {
     const double step = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
     const VectorXd dx = step * VectorXd::Unit(x.size(), i);

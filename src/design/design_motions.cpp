@@ -28,8 +28,8 @@ std::vector<size_t> groupByPayload(const std::vector<DesignMotion>& motions) {
   return groups;
 }
 
-Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const VectorXd& posture) {
-  return makeMotion(model, motion.plan(model, posture), {Formulation::Reduced, StepRule::Euler});
+Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const StandingRobot& standing) {
+  return makeMotion(model, motion.plan(model, standing), {Formulation::Reduced, StepRule::Euler});
 }
 
 namespace {
@@ -127,7 +127,7 @@ MotionRecord restrictRecord(const Model& closed, const Model& serial, const Moti
 
 void addKeptMotion(const Model& closed, const DesignMotion& motion, SolvedMotion& solved) {
   const SerialModel serial = makeSerialModel(closed, makeStandingPosture(closed));
-  const Motion serial_motion = makeDesignMotion(serial.model, motion, makeStandingPosture(serial.model));
+  const Motion serial_motion = makeDesignMotion(serial.model, motion, makeStandingRobot(serial.model));
   solved.serial =
       makeSerialTrajectory(serial_motion, restrictRecord(closed, serial.model, serial_motion, solved.record));
   solved.kept_dofs = findRestrictedDofs(closed, serial.model);
@@ -155,7 +155,7 @@ ShootingTrajectory chooseStart(const Model& model, const SolvedMotion& solved, c
 SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, const FddpOptions& options, int postures,
                               bool must_keep) {
   MotionOutcome outcome = load(model, motion);
-  solve(makeDesignMotion(*outcome.loaded, motion, makeStandingPosture(*outcome.loaded)), nullptr, options, {}, outcome);
+  solve(makeDesignMotion(*outcome.loaded, motion, makeStandingRobot(*outcome.loaded)), nullptr, options, {}, outcome);
   if (outcome.missing > 0)
     throw InputError(model.name(), "start design", outcome.message, "request a motion that the robot can make");
   const ShootingTrajectory& solution = outcome.solution->trajectory;
@@ -175,7 +175,7 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
 MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion* start,
                            const FddpOptions& options, const std::vector<MotorConversion>& drives) {
   MotionOutcome out = load(model, motion);
-  const Motion made = makeDesignMotion(*out.loaded, motion, makeStandingPosture(*out.loaded));
+  const Motion made = makeDesignMotion(*out.loaded, motion, makeStandingRobot(*out.loaded));
   std::optional<ShootingTrajectory> from;
   if (start) from = chooseStart(*out.loaded, *start, made);
   solve(made, from ? &*from : nullptr, options, drives, out);
@@ -186,8 +186,8 @@ MotionOutcome solveUsually(const Model& model, const DesignMotion& motion, const
                            ShootingTrajectory& trajectory) {
   MotionOutcome out = load(model, motion);
   MotionRequest request;
-  request.planner = [plan = motion.plan](const Model& robot, const VectorXd& q0, const OptionSet&) {
-    return plan(robot, q0);
+  request.planner = [plan = motion.plan](const Model& robot, const StandingRobot& standing, const OptionSet&) {
+    return plan(robot, standing);
   };
   if (motion.request) request = *motion.request;
   const MotionResult result = makeResult({model.name(), "", {}}, bielle::solve(makeMotion(*out.loaded, request)));

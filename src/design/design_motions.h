@@ -15,7 +15,8 @@ namespace bielle {
 
 struct DesignMotion {
   std::string name;
-  std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;  ///< called by several threads; the model is loaded
+  /// Called by several threads; the model is loaded.
+  std::function<MotionPlan(const Model&, const StandingRobot&)> plan;
   double weight = 1;     ///< its share in objectives and in sums over motions, 0 or more
   Payload payload = {};  ///< that the robot carries in it
   /// As `bielle solve` makes it without being told the length of steps. None: of the plan alone.
@@ -28,9 +29,9 @@ std::string describeMotion(const DesignMotion& motion);
 /// For every motion the number of the first one with the same payload.
 std::vector<size_t> groupByPayload(const std::vector<DesignMotion>& motions);
 
-/// Its problem for a robot with its payload, from a standing posture. Motions that are kept are lifted, which Euler steps
+/// Its problem for a robot with its payload, from where it stands. Motions that are kept are lifted, which Euler steps
 /// alone can be; the others are comparable with them.
-Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const VectorXd& posture);
+Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const StandingRobot& standing);
 
 /// The goals of a motion, measured on states and schedule: a foot that stands counts as loaded.
 std::vector<GoalOutcome> measureGoals(const Model& model, const std::vector<Goal>& goals,
@@ -54,8 +55,8 @@ struct MotionOutcome {
   double missing = 1;             ///< share of the motion
   std::string message;
   MotionMeasures measures;
-  std::vector<GoalOutcome> goals;  ///< of the whole motion
-  LiftResult lifted;               ///< of a kept motion
+  std::vector<GoalOutcome> goals;    ///< of the whole motion
+  LiftResult lifted;                 ///< of a kept motion
   std::optional<Solution> solution;  ///< of one that was made anew, of the loaded robot
 };
 

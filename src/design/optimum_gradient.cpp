@@ -163,12 +163,11 @@ class NeighbourMotions {
     auto found = robot.loaded.find(group);
     if (found == robot.loaded.end()) {
       Model model = addPayload(robot.model, motions_[m].payload);
-      const NeighbourPlans::Use use(postures_[group]);
-      VectorXd posture = makeStandingPosture(model);
+      VectorXd posture = makeStandingPosture(model, &postures_[group]);
       found = robot.loaded.emplace(group, Robot::Loaded{std::move(model), std::move(posture)}).first;
     }
-    const NeighbourPlans::Use use(plans_[m]);
-    return makeDesignMotion(found->second.model, motions_[m], found->second.posture);
+    const auto& [model, posture] = found->second;
+    return makeDesignMotion(model, motions_[m], plans_[m].begin(model, posture));
   }
 
  private:

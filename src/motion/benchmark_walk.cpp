@@ -15,10 +15,9 @@ namespace {
 struct BenchmarkScene {
   const Model& model;
   const BenchmarkWalkOptions& options;
-  VectorXd q0;
+  StandingRobot standing;
   VectorXd state_weights;  ///< 2 nv
-  Vector3d com0;
-  int left, right;  ///< contacts
+  int left, right;         ///< contacts
 };
 
 enum class PhaseKind { Double, RightStance, LeftStance, Switch };
@@ -84,7 +83,7 @@ StageSpec makeRegularizedStage(const BenchmarkScene& scene, double state_weight,
   StageSpec stage;
   stage.dt = scene.options.time_step;
   stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
-  stage.state = {state_weight, scene.q0, VectorXd::Zero(model.nv()), scene.state_weights};
+  stage.state = {state_weight, scene.standing.q, VectorXd::Zero(model.nv()), scene.state_weights};
   stage.control = {control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
   return stage;
 }
@@ -108,7 +107,7 @@ StageSpec makeStage(const BenchmarkScene& scene, PhaseKind kind, const std::vect
   const BenchmarkWalkOptions& o = scene.options;
   StageSpec stage = makeRegularizedStage(scene, o.state_weight, o.control_weight);
   stage.constraints = makeConstraintSet(scene.model, contacts);
-  const Vector3d com = scene.com0 + Vector3d(o.speed * time, 0, 0);
+  const Vector3d com = scene.standing.com + Vector3d(o.speed * time, 0, 0);
   stage.costs.push_back(
       {"centre of mass", o.com_weight, Activation::makeQuadratic(Vector3d(1, 0, 1)), makeComPosition(com)});
   addForceCosts(scene, contacts, stage);
@@ -143,14 +142,10 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   const std::vector<BenchmarkPhase> phases = makePhases(model, o);
   BenchmarkScene scene{model,
                        o,
-                       makeStandingPosture(model),
+                       makeStandingRobot(model),
                        makeStateWeights(model).cwiseMax(o.importance_floor),
-                       {},
                        findFoot(model, o.left),
                        findFoot(model, o.right)};
-  Workspace ws(model);
-  updatePositions(model, ws, scene.q0);
-  scene.com0 = calcCom(model, ws);
 
   Motion motion;  // without limits of joints and gains, unlike those of makeMotion()
   motion.name = "benchmark walk";
@@ -158,9 +153,9 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   const int last_switch = o.start_nodes + 2 * o.cycles * (o.swing_nodes + o.switch_nodes);
   for (const BenchmarkPhase& phase : phases) {
     const std::vector<ContactTarget> contacts =
-        makeContactTargets(model, scene.q0, getStance(scene, phase.kind), o.contact_kp, o.contact_kd);
+        makeContactTargets(model, scene.standing.q, getStance(scene, phase.kind), o.contact_kp, o.contact_kd);
     motion.schedule.phases.push_back({getName(phase.kind), phase.nodes, o.time_step, contacts});
-    const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), scene.q0).u;
+    const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), scene.standing.q).u;
     for (int i = 0; i < phase.nodes; ++i) {
       const int node = static_cast<int>(stages.size());
       const double time = o.time_step * (std::clamp(node, o.start_nodes, last_switch) - o.start_nodes);
@@ -170,11 +165,11 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   }
   stages.push_back(makeTerminalStage(scene));
   VectorXd x0 = VectorXd::Zero(model.nq() + model.nv());
-  x0.head(model.nq()) = scene.q0;
+  x0.head(model.nq()) = scene.standing.q;
   motion.guess.xs.assign(stages.size(), x0);
   motion.options = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", o.total_nodes}};
-  motion.problem =
-      std::make_unique<RobotProblem>(model, scene.q0, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  motion.problem = std::make_unique<RobotProblem>(model, scene.standing.q, VectorXd::Zero(model.nv()),
+                                                  std::move(stages), formulation);
   return motion;
 }
 

@@ -68,7 +68,7 @@ void checkCommand(const Model& model, const LocomotionOptions& options, const Ve
   if (!(std::abs(step.yaw) <= kPi))
     throw InputError(model.name(), element, "it turns by more than half a turn in a step",
                      "give a lower rate of turning, e.g. 0.4 rad/s");
-  const Stance stance = makeStance(model, options, makeStandingPosture(model));
+  const Stance stance = makeStance(model, options, makeStandingRobot(model));
   for (const Side first : {Side::Left, Side::Right}) {
     LocomotionTask task;
     task.name = element;

@@ -42,12 +42,12 @@ struct CommandedWalk::Segment {
 };
 
 CommandedWalk::CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits,
-                             CommandSource command, const VectorXd& q0)
+                             CommandSource command, const StandingRobot& standing)
     : model_(model),
       options_(complete(options)),
       limits_(limits),
       command_(std::move(command)),
-      standing_(makeStance(model, options_, q0)),
+      standing_(makeStance(model, options_, standing)),
       start_(calcMiddle(standing_.feet[0], standing_.feet[1])),
       feet_(standing_.feet),
       middle_(start_),

@@ -126,11 +126,11 @@ std::vector<Footstep> readFootholds(const std::string& path) {
   return footholds;
 }
 
-MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const VectorXd& q0) {
+MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const StandingRobot& standing) {
   if (o.footholds.empty())
     throw InputError("", "footholds", "none are given", "give a file with footholds (`--footholds FILE.yaml`)");
   listOptions(o).check();
-  const Stance stance = makeStance(model, o.gait, q0);
+  const Stance stance = makeStance(model, o.gait, standing);
   Course course{"footholds", makeSteps(stance, o.footholds), {}};
   course.ground = makeGround(model, stance, course.steps, o.rim);
   MotionPlan plan = planCourse(model, stance, course, o.gait);
@@ -139,7 +139,7 @@ MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const Ve
 }
 
 Motion makeFootholds(const Model& model, const FootholdsOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planFootholds(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planFootholds(model, options, makeStandingRobot(model)), problem);
 }
 
 }  // namespace bielle

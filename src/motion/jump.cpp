@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "motion/foot_tasks.h"
 #include "motion/motor_scale.h"
@@ -16,10 +15,9 @@ struct JumpScene {
   const Model& model;
   const JumpOptions& options;
   JumpFigures figures;
-  VectorXd q0;                        // posture at the start
+  const StandingRobot& standing;      // at the start
   VectorXd state_weights;             // 2 nv
-  ContactGains gains;                 // of contacts and closures
-  Vector3d com, forward, shift;       // CoM at the start; unit vector ahead; displacement of the jump
+  Vector3d forward, shift;            // unit vector ahead; displacement of the jump
   std::vector<ContactTarget> before;  // feet at the start and
   std::vector<ContactTarget> after;   // at the landing
 };
@@ -68,8 +66,8 @@ StageSpec makeStage(const JumpScene& scene, const std::vector<ContactTarget>& co
   StageSpec stage;
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
-  setClosureGains(scene.gains, stage.constraints);
-  stage.state = {o.state_weight, scene.q0, VectorXd::Zero(model.nv()), scene.state_weights};
+  setClosureGains({o.contact_kp, o.contact_kd}, stage.constraints);
+  stage.state = {o.state_weight, scene.standing.q, VectorXd::Zero(model.nv()), scene.state_weights};
   stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
   return stage;
 }
@@ -93,7 +91,7 @@ void addSwingCosts(const JumpScene& scene, double s, StageSpec& stage) {
 void addHeightCost(const JumpScene& scene, const std::string& name, double weight, double height, bool defines,
                    StageSpec& stage) {
   stage.costs.push_back({name, weight, Activation::makeQuadratic(Vector3d::UnitZ()),
-                         makeComPosition(scene.com + height * Vector3d::UnitZ()), defines});
+                         makeComPosition(scene.standing.com + height * Vector3d::UnitZ()), defines});
 }
 
 // Node i of n in flight. The first one is where the feet stood.
@@ -115,30 +113,22 @@ StageSpec makeTerminalStage(const JumpScene& scene) {
   stage.constraints = {};
   stage.control.weight = 0;
   stage.costs.push_back({"com", o.terminal_weight, Activation::makeQuadratic(Vector3d::Ones()),
-                         makeComPosition(scene.com + scene.shift), true});
+                         makeComPosition(scene.standing.com + scene.shift), true});
   addRest(scene.model, stage);
   return stage;
 }
 
-JumpScene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
-  JumpScene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {},
-                  {},    {}};
+JumpScene makeScene(const Model& model, const JumpOptions& o, const StandingRobot& standing) {
+  const std::vector<ContactTarget> feet = makeContactTargets(standing, o.contact_kp, o.contact_kd);
+  const JumpFigures figures = calcJumpFigures(o, model.gravity().norm());
+  JumpScene scene{model, o, figures, standing, makeStateWeights(model), {}, {}, feet, feet};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, scene.state_weights);
-  std::vector<int> feet;
-  for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-  ContactGains& gains = scene.gains;
-  gains = {o.contact_kp, o.contact_kd};
-  scene.before = makeContactTargets(model, scene.q0, feet, gains.kp, gains.kd);
-  scene.after = scene.before;
   Vector3d forward = Vector3d::Zero();
-  for (const ContactTarget& foot : scene.before) forward += foot.X_WT.R.col(0);
+  for (const SE3& foot : standing.contacts) forward += foot.R.col(0);
   scene.forward = Vector3d(forward.x(), forward.y(), 0).normalized();
   scene.shift = o.length * scene.forward;
   for (ContactTarget& foot : scene.after) foot.X_WT.p += scene.shift;
-  Workspace ws(model);
-  updatePositions(model, ws, scene.q0);
-  scene.com = calcCom(model, ws);
   return scene;
 }
 
@@ -146,7 +136,7 @@ JumpScene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0
 VectorXd makeGuess(const JumpScene& scene, JumpPhase phase, double t) {
   const Model& model = scene.model;
   VectorXd x(model.nq() + model.nv());
-  x << scene.q0, VectorXd::Zero(model.nv());
+  x << scene.standing.q, VectorXd::Zero(model.nv());
   if (!model.hasFreeFlyer()) return x;
   const JumpFigures& f = scene.figures;
   if (phase == JumpPhase::Land || phase == JumpPhase::Settle) x.head<3>() += scene.shift;
@@ -154,7 +144,8 @@ VectorXd makeGuess(const JumpScene& scene, JumpPhase phase, double t) {
   const double g = model.gravity().norm();
   x.head<3>() += scene.shift * t / f.flight + (f.take_off * t - 0.5 * g * t * t) * Vector3d::UnitZ();
   const Vector3d velocity = scene.shift / f.flight + (f.take_off - g * t) * Vector3d::UnitZ();
-  x.segment<3>(model.nq()) = Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(&scene.q0[3])).conjugate() * velocity;
+  x.segment<3>(model.nq()) =
+      Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(&scene.standing.q[3])).conjugate() * velocity;
   return x;
 }
 
@@ -240,9 +231,9 @@ void describe(OptionFields& f, JumpOptions& o) {
            "velocity gain of the stabilisation of contacts and closures (at most 1/h)");
 }
 
-MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0) {
+MotionPlan planJump(const Model& model, const JumpOptions& options, const StandingRobot& standing) {
   check(model, options);
-  const JumpScene scene = makeScene(model, options, q0);
+  const JumpScene scene = makeScene(model, options, standing);
   MotionPlan plan;
   plan.name = "jump";
   plan.ground.height = scene.before.front().X_WT.p.z();
@@ -257,8 +248,9 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
     const int nodes = countStages(options, phase);
     if (nodes == 0) continue;
     plan.schedule.phases.push_back({getName(phase), nodes, options.time_step, contacts});
-    const VectorXd u = contacts.empty() ? VectorXd::Zero(model.nu()).eval()
-                                        : calcStaticTorques(model, makeConstraintSet(model, contacts), scene.q0).u;
+    const VectorXd u = contacts.empty()
+                           ? VectorXd::Zero(model.nu()).eval()
+                           : calcStaticTorques(model, makeConstraintSet(model, contacts), scene.standing.q).u;
     for (int i = 0; i < nodes; ++i) {
       const JumpHeight com = calcJumpHeight(options, g, stages.size() * options.time_step);
       stages.push_back(makeStage(scene, contacts));
@@ -278,15 +270,15 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   }
   stages.push_back(makeTerminalStage(scene));
   plan.guess.xs.push_back(makeGuess(scene, JumpPhase::Settle, 0));
-  plan.q_start = q0;
-  plan.q_end = carryPosture(model, q0, {Matrix3d::Identity(), scene.shift});
+  plan.q_start = standing.q;
+  plan.q_end = carryPosture(model, standing.q, {Matrix3d::Identity(), scene.shift});
   plan.options = listOptions(options).listValues();
   plan.goals = makeGoals(scene, plan.schedule.numStages());
   return plan;
 }
 
 Motion makeJump(const Model& model, const JumpOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planJump(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planJump(model, options, makeStandingRobot(model)), problem);
 }
 
 }  // namespace bielle

@@ -5,7 +5,6 @@
 #include <limits>
 #include <optional>
 
-#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "math/so3.h"
 #include "model/number_text.h"
@@ -77,8 +76,7 @@ constexpr double kReachMargin = 0.02;
 // between two legs that cannot both be helped it stays in the middle.
 void keepReach(Scene& scene) {
   const Stance& stance = scene.stance;
-  NeighbourPlans* neighbours = NeighbourPlans::get();
-  std::optional<bool>* reaches = neighbours ? &neighbours->getReach() : nullptr;
+  std::optional<bool>* reaches = stance.neighbours ? &stance.neighbours->getReach() : nullptr;
   if (reaches && reaches->value_or(false)) return;
   bool all = true;
   LegReach reach(scene.model, stance);
@@ -120,7 +118,7 @@ std::vector<VectorXd> makeGuesses(const Scene& scene) {
                         getFeet(scene, node),
                         {phase.stands(Side::Left), phase.stands(Side::Right)}});
   }
-  if (NeighbourPlans::get()) return xs;
+  if (scene.stance.neighbours) return xs;
   const std::vector<VectorXd> qs = placeFeet(scene.model, scene.stance, postures);
   for (size_t k = 0; k < xs.size(); ++k) xs[k].head(scene.model.nq()) = qs[k];
   return xs;
@@ -157,24 +155,19 @@ std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, 
   return {goal};
 }
 
-Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0) {
+Stance makeStance(const Model& model, const LocomotionOptions& options, const StandingRobot& standing) {
   if (!model.hasFreeFlyer())
     throw InputError(model.name(), "root joint",
                      "its base is fixed, or moves on a rail, but a motion with steps needs a free one over two feet",
                      "take `squat` or `jump`, which need no steps, or a robot with a free base");
-  Stance stance;
-  stance.q = q0;
-  Workspace ws(model);
-  updatePositions(model, ws, stance.q);
-  stance.com = calcCom(model, ws);
+  Stance stance{standing.q, standing.com, {}, {}, standing.neighbours};
   for (int i = 0; i < 2; ++i) {
     const std::string& name = i == 0 ? options.left : options.right;
     stance.contacts[i] = model.findContact(name);
     if (stance.contacts[i] < 0)
       throw InputError(model.name(), "contact '" + name + "'", "a walk needs it, but the robot has no such contact",
                        "name the contacts of its left and right foot");
-    const ContactFrame& contact = model.contacts()[stance.contacts[i]];
-    stance.feet[i] = getPlacement(ws, contact.body, contact.X_BF);
+    stance.feet[i] = standing.contacts[static_cast<size_t>(stance.contacts[i])];
   }
   return stance;
 }
@@ -200,7 +193,7 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     const std::vector<ContactTarget> contacts = makeTargets(scene, phase);
-    const VectorXd u = phase.flies() || NeighbourPlans::get()
+    const VectorXd u = phase.flies() || stance.neighbours
                            ? VectorXd::Zero(model.nu()).eval()
                            : calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
     if (scene.gait.nodes[node].landed >= 0 && options.rigid_landing) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -102,9 +101,8 @@ VectorXd settleSprings(const Model& model, const Reference& reference, const Vec
         reference.joints.count(model.joints()[force.joint].name) == 0)
       springs.push_back(&force);
   if (springs.empty()) return unloaded;
-  std::vector<int> contacts(model.contacts().size());
-  std::iota(contacts.begin(), contacts.end(), 0);
-  const ConstraintSet constraints = makeConstraintSet(model, makeContactTargets(model, unloaded, contacts, 0, 0));
+  const ConstraintSet constraints =
+      makeConstraintSet(model, makeContactTargets(makeStandingRobot(model, unloaded), 0, 0));
   const double tolerance = 1e-9 * std::max(1.0, model.mass() * model.gravity().norm());  // N m or N
   if (calcStaticHold(model, constraints, unloaded, dofs).residual < tolerance) return unloaded;
   for (const JointForce* spring : springs) dofs.push_back(spring->dof);
@@ -138,14 +136,15 @@ StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constra
   return {hold.tau, hold.residual};
 }
 
-VectorXd makeStandingPosture(const Model& model) {
+VectorXd makeStandingPosture(const Model& model) { return makeStandingPosture(model, nullptr); }
+
+VectorXd makeStandingPosture(const Model& model, NeighbourPlans* neighbours) {
   if (model.references().empty())
     throw InputError(model.name(), "references", "the robot has no reference posture to start from",
                      "add `references: {half_sitting: ...}` to its YAML file");
   const Reference* standing = &model.references().front();
   for (const Reference& reference : model.references())
     if (reference.name == "half_sitting") standing = &reference;
-  NeighbourPlans* neighbours = NeighbourPlans::get();
   AssemblyResult result;
   if (neighbours && neighbours->posture.size() == model.nq())
     result = refineAssembly(model, makeReferenceProblem(model, *standing), neighbours->posture);
@@ -160,6 +159,17 @@ VectorXd makeStandingPosture(const Model& model) {
   if (result.status != AssemblyStatus::Closed)
     throw InputError(model.name(), "reference '" + standing->name + "'", result.message, "correct its targets");
   return settleSprings(model, *standing, result.q);
+}
+
+StandingRobot makeStandingRobot(const Model& model) { return makeStandingRobot(model, makeStandingPosture(model)); }
+
+StandingRobot makeStandingRobot(const Model& model, const VectorXd& q, NeighbourPlans* neighbours) {
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  StandingRobot standing{q, calcCom(model, ws), {}, neighbours};
+  for (const ContactFrame& contact : model.contacts())
+    standing.contacts.push_back(getPlacement(ws, contact.body, contact.X_BF));
+  return standing;
 }
 
 VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X) {
@@ -193,6 +203,12 @@ std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef
   std::vector<ContactTarget> targets;
   for (int c : contacts)
     targets.push_back({c, getPlacement(ws, model.contacts()[c].body, model.contacts()[c].X_BF), kp, kd});
+  return targets;
+}
+
+std::vector<ContactTarget> makeContactTargets(const StandingRobot& standing, double kp, double kd) {
+  std::vector<ContactTarget> targets;
+  for (const SE3& X : standing.contacts) targets.push_back({static_cast<int>(targets.size()), X, kp, kd});
   return targets;
 }
 

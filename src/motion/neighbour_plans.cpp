@@ -1,20 +1,13 @@
 #include "motion/neighbour_plans.h"
 
 namespace bielle {
-namespace {
 
-thread_local NeighbourPlans* in_use = nullptr;
+StandingRobot NeighbourPlans::stand(const Model& model) { return begin(model, makeStandingPosture(model, this)); }
 
-}  // namespace
-
-NeighbourPlans::Use::Use(NeighbourPlans& plans) : before_(in_use) {
-  in_use = &plans;
-  plans.next_ = 0;
+StandingRobot NeighbourPlans::begin(const Model& model, const VectorXd& q) {
+  next_ = 0;
+  return makeStandingRobot(model, q, this);
 }
-
-NeighbourPlans::Use::~Use() { in_use = before_; }
-
-NeighbourPlans* NeighbourPlans::get() { return in_use; }
 
 std::optional<bool>& NeighbourPlans::getReach() {
   if (next_ == reach_.size()) reach_.emplace_back();

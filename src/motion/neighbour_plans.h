@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "bielle/math/types.h"
+#include "bielle/motion/motion.h"
 
 namespace bielle {
 
@@ -16,20 +16,10 @@ class NeighbourPlans {
   NeighbourPlans(const NeighbourPlans&) = delete;
   NeighbourPlans& operator=(const NeighbourPlans&) = delete;
 
-  // While one lives, a plan that this thread makes is one of those. Steps are planned in the same order in each.
-  class Use {
-   public:
-    explicit Use(NeighbourPlans& plans);
-    ~Use();
-    Use(const Use&) = delete;
-    Use& operator=(const Use&) = delete;
-
-   private:
-    NeighbourPlans* before_;
-  };
-
-  // Those in use in this thread, or null.
-  static NeighbourPlans* get();
+  // The next of the robots, for one plan: those made of it are the plans here, and must not outlive this. Steps are planned in
+  // the same order in each.
+  StandingRobot stand(const Model& model);
+  StandingRobot begin(const Model& model, const VectorXd& q);
 
   // Whether legs reach everything of the next steps of a plan by a margin, for whom it is known.
   std::optional<bool>& getReach();
@@ -40,5 +30,8 @@ class NeighbourPlans {
   std::vector<std::optional<bool>> reach_;
   size_t next_ = 0;
 };
+
+// \param neighbours  null, or it begins from the posture of the first of them
+VectorXd makeStandingPosture(const Model& model, NeighbourPlans* neighbours);
 
 }  // namespace bielle

@@ -68,8 +68,8 @@ void describe(OptionFields& f, GapOptions& o) {
   describe(f, o.gait);
 }
 
-MotionPlan planBox(const Model& model, const BoxOptions& o, const VectorXd& q0) {
-  const Stance stance = makeStance(model, o.gait, q0);
+MotionPlan planBox(const Model& model, const BoxOptions& o, const StandingRobot& standing) {
+  const Stance stance = makeStance(model, o.gait, standing);
   checkBox(model, stance, o);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   const double stride = calcHalfLength(model, stance) + o.distance + o.length / 2;
@@ -86,8 +86,8 @@ MotionPlan planBox(const Model& model, const BoxOptions& o, const VectorXd& q0) 
   return plan;
 }
 
-MotionPlan planGap(const Model& model, const GapOptions& o, const VectorXd& q0) {
-  const Stance stance = makeStance(model, o.gait, q0);
+MotionPlan planGap(const Model& model, const GapOptions& o, const StandingRobot& standing) {
+  const Stance stance = makeStance(model, o.gait, standing);
   checkGap(o);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   const double half = calcHalfLength(model, stance), edge = half + o.distance, stride = o.width + 2 * edge;
@@ -103,11 +103,11 @@ MotionPlan planGap(const Model& model, const GapOptions& o, const VectorXd& q0) 
 }
 
 Motion makeBox(const Model& model, const BoxOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planBox(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planBox(model, options, makeStandingRobot(model)), problem);
 }
 
 Motion makeGap(const Model& model, const GapOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planGap(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planGap(model, options, makeStandingRobot(model)), problem);
 }
 
 }  // namespace bielle

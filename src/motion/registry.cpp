@@ -17,15 +17,16 @@ namespace bielle {
 namespace {
 
 template <typename Options>
-MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&), const Options& others) {
-  return [=](const Model& model, const VectorXd& q0, const OptionSet& options) {
-    return plan(model, readOptions(options, others), q0);
+MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&),
+                          const Options& others) {
+  return [=](const Model& model, const StandingRobot& standing, const OptionSet& options) {
+    return plan(model, readOptions(options, others), standing);
   };
 }
 
 // describe() is found by the type of the options.
 template <typename Options>
-MotionRequest makeRequest(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&)) {
+MotionRequest makeRequest(MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&)) {
   return {listOptions(Options()), {}, makePlanner(plan, Options()), {}};
 }
 
@@ -58,8 +59,10 @@ std::vector<SequencePart> listParts(const std::vector<std::pair<std::string, Mot
                                     const OptionSet& options) {
   std::vector<SequencePart> parts;
   for (const auto& [name, planner] : planners)
-    parts.push_back({name, [planner = planner, own = selectPart(options, name)](
-                               const Model& model, const VectorXd& q0) { return planner(model, q0, own); }});
+    parts.push_back(
+        {name, [planner = planner, own = selectPart(options, name)](const Model& model, const StandingRobot& standing) {
+           return planner(model, standing, own);
+         }});
   return parts;
 }
 
@@ -148,8 +151,9 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
     }
     request.parts.emplace_back(name, part.planner);
   }
-  request.planner = [parts = request.parts](const Model& model, const VectorXd& q0, const OptionSet& options) {
-    return planSequence(model, listParts(parts, options), q0);
+  request.planner = [parts = request.parts](const Model& model, const StandingRobot& standing,
+                                            const OptionSet& options) {
+    return planSequence(model, listParts(parts, options), standing);
   };
   return request;
 }
@@ -157,7 +161,7 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
 std::vector<SequencePart> listParts(const MotionRequest& request) { return listParts(request.parts, request.options); }
 
 Motion makeMotion(const Model& model, const MotionRequest& request, const ProblemOptions& problem) {
-  Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
+  Motion motion = makeMotion(model, request.plan(model, makeStandingRobot(model)), problem);
   motion.request = std::make_shared<const MotionRequest>(request);
   const LimitOptions& limits = problem.limits;
   for (const auto& [motor, value] : limits.efforts) motion.options.emplace_back(kEffortLimit + motor, value);

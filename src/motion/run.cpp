@@ -88,10 +88,10 @@ void describe(OptionFields& f, HopOptions& o) {
   describeGait(f, o.gait);
 }
 
-MotionPlan planRun(const Model& model, const RunOptions& o, const VectorXd& q0) {
+MotionPlan planRun(const Model& model, const RunOptions& o, const StandingRobot& standing) {
   listOptions(o).check();
   const int steps = o.steps;
-  const Stance stance = makeStance(model, o.gait, q0);
+  const Stance stance = makeStance(model, o.gait, standing);
   const double length = o.speed * (o.stance + o.flight);
   std::vector<std::pair<Side, double>> landings;
   for (int i = 1; i <= steps; ++i)
@@ -111,9 +111,9 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const VectorXd& q0) 
   return plan;
 }
 
-MotionPlan planHop(const Model& model, const HopOptions& o, const VectorXd& q0) {
+MotionPlan planHop(const Model& model, const HopOptions& o, const StandingRobot& standing) {
   listOptions(o).check();
-  const Stance stance = makeStance(model, o.gait, q0);
+  const Stance stance = makeStance(model, o.gait, standing);
   const Side side = o.foot;
   const int hops = o.hops;
   std::vector<std::pair<Side, double>> landings;
@@ -134,11 +134,11 @@ MotionPlan planHop(const Model& model, const HopOptions& o, const VectorXd& q0) 
 }
 
 Motion makeRun(const Model& model, const RunOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planRun(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planRun(model, options, makeStandingRobot(model)), problem);
 }
 
 Motion makeHop(const Model& model, const HopOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planHop(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planHop(model, options, makeStandingRobot(model)), problem);
 }
 
 }  // namespace bielle

@@ -76,19 +76,20 @@ void checkSoles(const Model& model, const MotionPlan& plan, const Ground& ground
 
 }  // namespace
 
-MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0) {
+MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const StandingRobot& standing) {
   if (parts.empty())
     throw InputError("", "sequence", "it has no motions", "give at least one, e.g. squat, walk, stairs or jump");
   std::vector<MotionPlan> plans;
   for (const SequencePart& part : parts) {
-    plans.push_back(part.plan(model, plans.empty() ? q0 : plans.back().q_end));
+    plans.push_back(
+        part.plan(model, plans.empty() ? standing : makeStandingRobot(model, plans.back().q_end, standing.neighbours)));
     plans.back().name = part.name;
   }
   MotionPlan sequence;
   sequence.name = "sequence";
   sequence.ground = joinGrounds(model, plans);
   for (const MotionPlan& plan : plans) checkSoles(model, plan, sequence.ground);
-  sequence.q_start = q0;
+  sequence.q_start = standing.q;
   sequence.q_end = plans.back().q_end;
   for (size_t i = 0; i < plans.size(); ++i) {
     MotionPlan& plan = plans[i];
@@ -113,7 +114,7 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
 }
 
 Motion makeSequence(const Model& model, const std::vector<SequencePart>& parts, const ProblemOptions& problem) {
-  return makeMotion(model, planSequence(model, parts, makeStandingPosture(model)), problem);
+  return makeMotion(model, planSequence(model, parts, makeStandingRobot(model)), problem);
 }
 
 }  // namespace bielle

@@ -30,7 +30,8 @@ Solution attempt(const Motion& motion, const FddpOptions& solver, const FddpObse
   // The penalty that a solve ended with is too stiff for another motion.
   Multipliers first;
   if (haveRows(problem, start.multipliers)) first = {start.multipliers.values, solver.constraints.initial_penalty};
-  FddpResult result = bielle::solve(problem, peak ? peak->wrap(start.trajectory) : start.trajectory, solver, observer, first);
+  FddpResult result =
+      bielle::solve(problem, peak ? peak->wrap(start.trajectory) : start.trajectory, solver, observer, first);
   Solution out{motion, peak ? peak->unwrap(result.trajectory) : std::move(result.trajectory), std::move(result.summary),
                std::move(result.multipliers)};
   if (!peak) out.gains = std::move(result.gains);
@@ -214,7 +215,7 @@ class RequestSolver {
     };
     SolveOptions options;
     options.solver = options_.solver;
-    ShootingTrajectory whole = solveParts(model, listParts(*motion_.request), makeStandingPosture(model), makeEffort(),
+    ShootingTrajectory whole = solveParts(model, listParts(*motion_.request), makeStandingRobot(model), makeEffort(),
                                           options, observer_.part, report);
     fitTimings(*motion_.problem, whole);
     return whole;
@@ -268,14 +269,13 @@ Solution solve(const Motion& motion, const SolveOptions& options, const SolveObs
   return solveAlone(motion, solver, observer.motion, options.start.value_or(StartingPoint{motion.guess}));
 }
 
-ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
+ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, StandingRobot standing,
                               const ProblemOptions& problem, const SolveOptions& options, const FddpObserver& observer,
                               const std::function<void(const std::string& part, const FddpSummary&)>& report) {
   ShootingTrajectory whole;
-  VectorXd q = q0;
   for (const SequencePart& part : parts) {
-    MotionPlan plan = part.plan(model, q);
-    q = plan.q_end;
+    MotionPlan plan = part.plan(model, standing);
+    standing = makeStandingRobot(model, plan.q_end);
     ProblemOptions own = problem;
     own.timings = selectTimings(problem.timings, plan.schedule);
     Solution solution = bielle::solve(makeMotion(model, std::move(plan), own), options, {observer, {}, {}, {}});

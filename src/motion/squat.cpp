@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "math/constants.h"
 #include "motion/foot_tasks.h"
@@ -77,15 +76,11 @@ double calcSquatHeight(const SquatOptions& o, double t) {
   return 1 - (1 - o.depth) * 0.5 * (1 - std::cos(2 * kPi * s));
 }
 
-MotionPlan planSquat(const Model& model, const SquatOptions& options, const VectorXd& q0) {
+MotionPlan planSquat(const Model& model, const SquatOptions& options, const StandingRobot& standing) {
   check(model, options);
-  std::vector<int> feet;
-  for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-  const std::vector<ContactTarget> contacts =
-      makeContactTargets(model, q0, feet, options.contact_kp, options.contact_kd);
-  Workspace ws(model);
-  updatePositions(model, ws, q0);
-  const Vector3d com0 = calcCom(model, ws);
+  const VectorXd& q0 = standing.q;
+  const Vector3d& com0 = standing.com;
+  const std::vector<ContactTarget> contacts = makeContactTargets(standing, options.contact_kp, options.contact_kd);
   double level = 0;  // of the soles
   for (const ContactTarget& contact : contacts) level += contact.X_WT.p.z() / static_cast<double>(contacts.size());
 
@@ -120,7 +115,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Vect
 }
 
 Motion makeSquat(const Model& model, const SquatOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planSquat(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planSquat(model, options, makeStandingRobot(model)), problem);
 }
 
 }  // namespace bielle

@@ -71,10 +71,10 @@ Ground makeStairsGround(const StairsOptions& o, const SE3& X_WP) {
   return ground;
 }
 
-MotionPlan planStairs(const Model& model, const StairsOptions& options, const VectorXd& q0) {
+MotionPlan planStairs(const Model& model, const StairsOptions& options, const StandingRobot& standing) {
   StairsOptions o = options;
   if (o.slope != 0) o.height = o.slope * o.depth;
-  const Stance stance = makeStance(model, o.gait, q0);
+  const Stance stance = makeStance(model, o.gait, standing);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   check(model, stance, o);
   o.gait.timing.single = o.depth / o.speed - o.gait.timing.both;
@@ -93,7 +93,7 @@ MotionPlan planStairs(const Model& model, const StairsOptions& options, const Ve
 }
 
 Motion makeStairs(const Model& model, const StairsOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planStairs(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planStairs(model, options, makeStandingRobot(model)), problem);
 }
 
 }  // namespace bielle

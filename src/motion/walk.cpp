@@ -17,9 +17,9 @@ struct StepsPlan {
 // \param direction  in the axes of the feet at the start
 template <typename Options>
 StepsPlan planSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& direction,
-                    double speed, Side first, const Options& options, const VectorXd& q0) {
+                    double speed, Side first, const Options& options, const StandingRobot& standing) {
   listOptions(options).check();
-  const Stance stance = makeStance(model, options.gait, q0);
+  const Stance stance = makeStance(model, options.gait, standing);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   LocomotionTask task;
   task.name = name;
@@ -57,42 +57,42 @@ void describe(OptionFields& f, TurnOptions& o) {
   describe(f, o.gait);
 }
 
-MotionPlan planWalk(const Model& model, const WalkOptions& o, const VectorXd& q0) {
+MotionPlan planWalk(const Model& model, const WalkOptions& o, const StandingRobot& standing) {
   StepsPlan plan = planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d::UnitX(), o.speed,
-                             Side::Right, o, q0);
+                             Side::Right, o, standing);
   addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(0)), plan.motion);
   return std::move(plan.motion);
 }
 
-MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const VectorXd& q0) {
+MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const StandingRobot& standing) {
   const Side opening = o.speed > 0 ? Side::Left : Side::Right;
   StepsPlan plan = planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d::UnitY(),
-                             o.speed, opening, o, q0);
+                             o.speed, opening, o, standing);
   addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(1), 2), plan.motion);
   return std::move(plan.motion);
 }
 
-MotionPlan planTurn(const Model& model, const TurnOptions& o, const VectorXd& q0) {
+MotionPlan planTurn(const Model& model, const TurnOptions& o, const StandingRobot& standing) {
   const double yaw = o.angle / std::max(1, o.steps - 1);
   requireOption(std::abs(yaw) <= kPi, "angle", "it is more than half a turn per step",
                 "give a smaller one, or more steps");
   StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(), 0,
-                             yaw > 0 ? Side::Left : Side::Right, o, q0);
+                             yaw > 0 ? Side::Left : Side::Right, o, standing);
   const int nodes = plan.motion.schedule.numStages();
   addGoals({{GoalKind::Turn, "angle", o.angle, calcTolerance(o.angle, 0.02), 0, nodes}}, plan.motion);
   return std::move(plan.motion);
 }
 
 Motion makeWalk(const Model& model, const WalkOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planWalk(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planWalk(model, options, makeStandingRobot(model)), problem);
 }
 
 Motion makeSideWalk(const Model& model, const SideWalkOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planSideWalk(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planSideWalk(model, options, makeStandingRobot(model)), problem);
 }
 
 Motion makeTurn(const Model& model, const TurnOptions& options, const ProblemOptions& problem) {
-  return makeMotion(model, planTurn(model, options, makeStandingPosture(model)), problem);
+  return makeMotion(model, planTurn(model, options, makeStandingRobot(model)), problem);
 }
 
 }  // namespace bielle

@@ -68,9 +68,10 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   summary.step = StepRule::Midpoint;
   summary.options = listOptions(options).listValues();
   const CommandSource source = [commands = plan->commands](double time) { return findCommand(commands, time); };
-  const CommandedWalk walk(model, options, {}, source, makeStandingPosture(model));
+  const StandingRobot standing = makeStandingRobot(model);
+  const CommandedWalk walk(model, options, {}, source, standing);
   foresee(walk, request.duration > 0 ? request.duration : plan->commands.back().time, *plan);
-  plan->ground.height = makeStance(model, options, makeStandingPosture(model)).feet[0].p.z();
+  plan->ground.height = makeStance(model, options, standing).feet[0].p.z();
   plan->ground.friction = options.friction;
   plan->predictive = std::make_unique<PredictiveController>(walk, predictive);
   return plan;

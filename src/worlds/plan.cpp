@@ -105,8 +105,8 @@ void checkControl(const MotionSummary& summary, PlanControl control) {
 // The request with the durations that a solve has chosen.
 MotionRequest fixDurations(const MotionSummary& summary, MotionRequest request) {
   request.planner = [planner = request.planner, timings = summary.timings, step = summary.step](
-                        const Model& model, const VectorXd& q0, const OptionSet& options) {
-    MotionPlan plan = planner(model, q0, options);
+                        const Model& model, const StandingRobot& standing, const OptionSet& options) {
+    MotionPlan plan = planner(model, standing, options);
     fixTimings(timings, step, plan.schedule, plan.stages);
     return plan;
   };
@@ -145,8 +145,8 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
   PredictiveOptions stopping = predictive;
   stopping.dead_point_stop = std::min(stopping.dead_point_stop, kStopShare * problem.limits.dead_point_margin);
   plan.predictive = std::make_unique<PredictiveController>(
-      makePredictiveMotion(model, freed.plan(model, makeStandingPosture(model)), problem, stopping),
-      solution.trajectory, stopping);
+      makePredictiveMotion(model, freed.plan(model, makeStandingRobot(model)), problem, stopping), solution.trajectory,
+      stopping);
 }
 
 void setModel(Belief belief, MotionSummary& summary) {

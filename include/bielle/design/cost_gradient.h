@@ -14,7 +14,7 @@ namespace bielle {
 /// \return (variables), zero for choices
 /// \throws InputError when a neighbour of x has no such motion
 VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
-                          const std::function<Motion(const Model&)>& make);
+                          const std::function<Motion(const Model&, const StandingRobot&)>& make);
 
 /// Half the step of a central difference, relative to the width of the bounds: its error grows with the square,
 /// rounding with the inverse.

@@ -32,12 +32,12 @@ class CommandedWalk {
     std::vector<ContactTarget> contacts{};  ///< feet on the ground, with their places
   };
 
-  /// From the standing posture q0, at time 0.
+  /// From where the robot stands, at time 0.
   /// \param options  `flight`, `rigid_landing` and `landing_speed` are
   /// ignored; a time step of 0 is 12 ms
   /// \throws InputError as planLocomotion() and addLimits() do
   CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits, CommandSource command,
-                const VectorXd& q0);
+                const StandingRobot& standing);
 
   const Model& getModel() const { return model_; }
   /// The next stage.

@@ -29,9 +29,9 @@ void describe(OptionFields& fields, FootholdsOptions& options);
 /// \throws InputError naming file, entry and line
 std::vector<Footstep> readFootholds(const std::string& path);
 
-/// From the standing posture q0. \throws InputError naming the step that is impossible: a sole on the edge of another
+/// From where the robot stands. \throws InputError naming the step that is impossible: a sole on the edge of another
 /// stone or in it, a swing that would touch the ground, and see locomotion.h
-MotionPlan planFootholds(const Model& model, const FootholdsOptions& options, const VectorXd& q0);
+MotionPlan planFootholds(const Model& model, const FootholdsOptions& options, const StandingRobot& standing);
 Motion makeFootholds(const Model& model, const FootholdsOptions& options, const ProblemOptions& problem = {});
 
 }  // namespace bielle

@@ -51,8 +51,8 @@ struct JumpOptions {
   double swing_weight = 1e5;           ///< of the feet's path in flight, 1/m^2
   double swing_rotation_weight = 1e2;  ///< of their orientation, 1
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
-  double contact_kp = 1e4;  ///< stabilisation of contacts and closures, 1/s^2; limited (limitGains)
-  double contact_kd = 200;  ///< 1/s; likewise
+  double contact_kp = 1e4;             ///< stabilisation of contacts and closures, 1/s^2; limited (limitGains)
+  double contact_kd = 200;             ///< 1/s; likewise
 };
 
 void describe(OptionFields& fields, JumpOptions& options);
@@ -71,9 +71,9 @@ struct JumpHeight {
 };
 JumpHeight calcJumpHeight(const JumpOptions& options, double gravity, double t);
 
-/// A jump off all contacts of the robot at once, from the standing posture q0.
+/// A jump off all contacts of the robot at once, from where it stands.
 /// \throws InputError when the request is impossible (durations, lengths, no contact)
-MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0);
+MotionPlan planJump(const Model& model, const JumpOptions& options, const StandingRobot& standing);
 Motion makeJump(const Model& model, const JumpOptions& options = {}, const ProblemOptions& problem = {});
 
 }  // namespace bielle

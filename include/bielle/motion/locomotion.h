@@ -80,8 +80,8 @@ struct LocomotionOptions {
   double pressure_weight = 10;         ///< of the centre of pressure, over the half size of the sole squared
   double feet_distance = 0.01;         ///< least distance of the soles, or what the footholds leave if less, m
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
-  double contact_kp = 2e3;  ///< stabilisation of the contacts, 1/s^2; limited (limitGains)
-  double contact_kd = 100;  ///< 1/s; likewise
+  double contact_kp = 2e3;             ///< stabilisation of the contacts, 1/s^2; limited (limitGains)
+  double contact_kd = 100;             ///< 1/s; likewise
   double closure_kp = 1e4;  ///< stabilisation of the closures, limited like that of the contacts; used only by
   double closure_kd = 100;  ///< the full formulation
 
@@ -92,13 +92,14 @@ void describe(OptionFields& fields, LocomotionOptions& options);
 
 /// The robot as it stands before the first step.
 struct Stance {
-  VectorXd q;                     ///< nq, standing posture
-  Vector3d com;                   ///< m
-  std::array<int, 2> contacts{};  ///< indices of the left and right foot
-  std::array<SE3, 2> feet;        ///< their placements
+  VectorXd q;                            ///< nq, standing posture
+  Vector3d com;                          ///< m
+  std::array<int, 2> contacts{};         ///< indices of the left and right foot
+  std::array<SE3, 2> feet;               ///< their placements
+  NeighbourPlans* neighbours = nullptr;  ///< of the standing robot
 };
-/// The stance in a closed posture q0. \throws InputError when the robot lacks a foot
-Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0);
+/// \throws InputError when the robot lacks a foot
+Stance makeStance(const Model& model, const LocomotionOptions& options, const StandingRobot& standing);
 
 /// The steps to take and the ground to take them on.
 struct LocomotionTask {

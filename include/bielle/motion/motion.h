@@ -55,9 +55,9 @@ struct Motion {
   ContactSchedule schedule;
   Ground ground;
   std::shared_ptr<RobotProblem> problem;
-  ShootingTrajectory guess;  ///< quasi-static: where a solve begins unless told otherwise
-  OptionValues options;      ///< every option of the motion by name
-  std::vector<Goal> goals;   ///< requested quantities, to be measured on the trajectory
+  ShootingTrajectory guess;          ///< quasi-static: where a solve begins unless told otherwise
+  OptionValues options;              ///< every option of the motion by name
+  std::vector<Goal> goals;           ///< requested quantities, to be measured on the trajectory
   ProblemOptions problem_options{};  ///< that the problem was made with
   std::shared_ptr<const MotionRequest>
       request{};               ///< that it was made of, if it was (registry.h): how to make another one like it
@@ -103,6 +103,20 @@ StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constra
 /// cannot be closed
 VectorXd makeStandingPosture(const Model& model);
 
+class NeighbourPlans;
+
+/// The robot as it stands at the start of a motion: made once, for everything that a plan asks of it.
+struct StandingRobot {
+  VectorXd q;                 ///< nq, closed
+  Vector3d com;               ///< m
+  std::vector<SE3> contacts;  ///< placements of the model's contacts, in their order
+  /// Those beside which it is one of many, whose plans are not solved and stay rough; mostly null.
+  NeighbourPlans* neighbours = nullptr;
+};
+/// In its starting posture. \throws InputError as makeStandingPosture() does
+StandingRobot makeStandingRobot(const Model& model);
+StandingRobot makeStandingRobot(const Model& model, const VectorXd& q, NeighbourPlans* neighbours = nullptr);
+
 /// The posture q moved over the ground by X, a displacement and a rotation about the vertical. A robot without a
 /// free-flyer stays in place.
 VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X);
@@ -124,6 +138,9 @@ void setClosureGains(const ContactGains& gains, ConstraintSet& constraints);
 /// Contacts of the robot held at their places in q.
 std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef q, const std::vector<int>& contacts,
                                               double kp, double kd);
+
+/// All contacts of the robot, held where it stands.
+std::vector<ContactTarget> makeContactTargets(const StandingRobot& standing, double kp, double kd);
 
 /// Names of the contacts of the targets, in their order.
 std::vector<std::string> getContactNames(const Model& model, const std::vector<ContactTarget>& targets);

@@ -29,10 +29,10 @@ struct GapOptions {
 void describe(OptionFields& fields, BoxOptions& options);
 void describe(OptionFields& fields, GapOptions& options);
 
-/// From the standing posture q0. \throws InputError when the request is impossible: sizes, a swing that would touch the
+/// From where the robot stands. \throws InputError when the request is impossible: sizes, a swing that would touch the
 /// box, and see locomotion.h
-MotionPlan planBox(const Model& model, const BoxOptions& options, const VectorXd& q0);
-MotionPlan planGap(const Model& model, const GapOptions& options, const VectorXd& q0);
+MotionPlan planBox(const Model& model, const BoxOptions& options, const StandingRobot& standing);
+MotionPlan planGap(const Model& model, const GapOptions& options, const StandingRobot& standing);
 
 Motion makeBox(const Model& model, const BoxOptions& options = {}, const ProblemOptions& problem = {});
 Motion makeGap(const Model& model, const GapOptions& options = {}, const ProblemOptions& problem = {});

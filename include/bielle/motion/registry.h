@@ -16,7 +16,7 @@ struct MotionFile {
   std::function<void(const std::string& path, MotionRequest&)> read;  ///< throws InputError
 };
 
-using MotionPlanner = std::function<MotionPlan(const Model&, const VectorXd& q0, const OptionSet& options)>;
+using MotionPlanner = std::function<MotionPlan(const Model&, const StandingRobot&, const OptionSet& options)>;
 
 /// A motion by name with its options, a value.
 struct MotionRequest {
@@ -25,7 +25,7 @@ struct MotionRequest {
   MotionPlanner planner;
   std::vector<std::pair<std::string, MotionPlanner>> parts;  ///< of a sequence, by name
 
-  MotionPlan plan(const Model& model, const VectorXd& q0) const { return planner(model, q0, options); }
+  MotionPlan plan(const Model& model, const StandingRobot& standing) const { return planner(model, standing, options); }
 };
 
 struct MotionEntry {

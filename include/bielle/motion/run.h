@@ -40,9 +40,9 @@ struct HopOptions {
 void describe(OptionFields& fields, RunOptions& options);
 void describe(OptionFields& fields, HopOptions& options);
 
-/// From the standing posture q0. \throws InputError when the request is impossible (see locomotion.h)
-MotionPlan planRun(const Model& model, const RunOptions& options, const VectorXd& q0);
-MotionPlan planHop(const Model& model, const HopOptions& options, const VectorXd& q0);
+/// From where the robot stands. \throws InputError when the request is impossible (see locomotion.h)
+MotionPlan planRun(const Model& model, const RunOptions& options, const StandingRobot& standing);
+MotionPlan planHop(const Model& model, const HopOptions& options, const StandingRobot& standing);
 
 /// The same, as problems from the robot's standing posture.
 Motion makeRun(const Model& model, const RunOptions& options = {}, const ProblemOptions& problem = {});

@@ -12,12 +12,12 @@ namespace bielle {
 
 struct SequencePart {
   std::string name;  ///< prefix of its phases and options: "NAME.depth"
-  std::function<MotionPlan(const Model&, const VectorXd& q_start)> plan;  ///< e.g. planSquat with its options
+  std::function<MotionPlan(const Model&, const StandingRobot&)> plan;  ///< e.g. planSquat with its options
 };
 
 /// \throws InputError when there is no part, when one is impossible, or when they differ in friction or do not fit on
 /// one ground
-MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0);
+MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const StandingRobot& standing);
 
 /// From the robot's standing posture.
 Motion makeSequence(const Model& model, const std::vector<SequencePart>& parts, const ProblemOptions& problem = {});

@@ -53,7 +53,7 @@ Solution solve(const Motion& motion, const SolveOptions& options = {}, const Sol
 /// long sequence may fail to converge, because all motions share one step length, and the hardest one slows the closing of all
 /// gaps. Parts that do not converge contribute their last iterate.
 /// \param report  receives the outcome of each; may be null
-ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
+ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, StandingRobot standing,
                               const ProblemOptions& problem = {}, const SolveOptions& options = {},
                               const FddpObserver& observer = {},
                               const std::function<void(const std::string& part, const FddpSummary&)>& report = {});

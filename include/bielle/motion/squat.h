@@ -27,9 +27,9 @@ struct SquatOptions {
 
 void describe(OptionFields& fields, SquatOptions& options);
 
-/// A squat on all contacts of the robot, from the standing posture q0.
+/// A squat on all contacts of the robot, from where it stands.
 /// \throws InputError when the request is impossible (depth, durations, no contact)
-MotionPlan planSquat(const Model& model, const SquatOptions& options, const VectorXd& q0);
+MotionPlan planSquat(const Model& model, const SquatOptions& options, const StandingRobot& standing);
 Motion makeSquat(const Model& model, const SquatOptions& options = {}, const ProblemOptions& problem = {});
 
 /// Height of the CoM at time t over its initial height: 1 at rest, `depth` at mid-motion.

@@ -26,8 +26,8 @@ void describe(OptionFields& fields, StairsOptions& options);
 /// The stairs in front of feet whose middle (calcMiddle) is initially X_WP.
 Ground makeStairsGround(const StairsOptions& options, const SE3& X_WP);
 
-/// From the standing posture q0. \throws InputError when the request is impossible (see locomotion.h)
-MotionPlan planStairs(const Model& model, const StairsOptions& options, const VectorXd& q0);
+/// From where the robot stands. \throws InputError when the request is impossible (see locomotion.h)
+MotionPlan planStairs(const Model& model, const StairsOptions& options, const StandingRobot& standing);
 Motion makeStairs(const Model& model, const StairsOptions& options = {}, const ProblemOptions& problem = {});
 
 }  // namespace bielle

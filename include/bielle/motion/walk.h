@@ -29,10 +29,10 @@ void describe(OptionFields& fields, WalkOptions& options);
 void describe(OptionFields& fields, SideWalkOptions& options);
 void describe(OptionFields& fields, TurnOptions& options);
 
-/// From the standing posture q0. \throws InputError when the request is impossible (see locomotion.h)
-MotionPlan planWalk(const Model& model, const WalkOptions& options, const VectorXd& q0);
-MotionPlan planSideWalk(const Model& model, const SideWalkOptions& options, const VectorXd& q0);
-MotionPlan planTurn(const Model& model, const TurnOptions& options, const VectorXd& q0);
+/// From where the robot stands. \throws InputError when the request is impossible (see locomotion.h)
+MotionPlan planWalk(const Model& model, const WalkOptions& options, const StandingRobot& standing);
+MotionPlan planSideWalk(const Model& model, const SideWalkOptions& options, const StandingRobot& standing);
+MotionPlan planTurn(const Model& model, const TurnOptions& options, const StandingRobot& standing);
 
 /// The same, as problems from the robot's standing posture.
 Motion makeWalk(const Model& model, const WalkOptions& options = {}, const ProblemOptions& problem = {});
