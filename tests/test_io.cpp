@@ -384,7 +384,7 @@ TEST_CASE("a summary reads back: phases, stances, ground; what is none is refuse
   writeResult(directory / "", result);
   const MotionSummary summary = readSummary(directory / "");
   CHECK(summary.motion == "squat");
-  CHECK(summary.robot_file == "/r.urdf");
+  CHECK(summary.run.robot_file == "/r.urdf");
   CHECK(summary.formulation == result.formulation);
   CHECK(summary.step == result.step);
   CHECK_FALSE(summary.converged);

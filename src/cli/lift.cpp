@@ -63,8 +63,8 @@ void printOutcome(const LiftArguments& arguments, const LiftResult& lifted, cons
 int run(const LiftArguments& arguments) {
   requireApart(arguments.directory, {arguments.serial_directory});
   const MotionSummary summary = readSummary(arguments.serial_directory);
-  if (summary.model != "serial")
-    throw InputError(summary.file, "model '" + summary.model + "'", "it is not a motion of the serial model",
+  if (summary.run.model != "serial")
+    throw InputError(summary.file, "model '" + summary.run.model + "'", "it is not a motion of the serial model",
                      "make one with `bielle solve " + summary.motion + " --model serial`");
   if (summary.step != StepRule::Euler)
     throw InputError(summary.file, std::string("step '") + getName(summary.step) + "'",
@@ -73,10 +73,10 @@ int run(const LiftArguments& arguments) {
   const MotionRecord record = readResultRecord(arguments.serial_directory);
   RobotArgument robot_argument;
   std::error_code error;
-  robot_argument.name = fs::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot;
+  robot_argument.name = fs::is_regular_file(summary.run.robot_file, error) ? summary.run.robot_file : summary.run.robot;
   const LoadedRobot robot = robot_argument.load();
   const SerialModel serial =
-      makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.serial_armature));
+      makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.run.serial_armature));
   MotionPlan plan = remakeRequest(summary).plan(serial.model, makeStandingRobot(serial.model));
   fixTimings(summary.timings, StepRule::Euler, plan.schedule, plan.stages);
   const Motion motion = makeMotion(serial.model, std::move(plan), {summary.formulation, StepRule::Euler});
@@ -88,8 +88,8 @@ int run(const LiftArguments& arguments) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::optional<MotionResult> result;
   if (!lifted.trajectory.us.empty())
-    result = makeLiftedResult({summary.robot, robot.file, getCommandLine(), "closed", ""}, robot.model, motion, lifted,
-                              seconds);
+    result = makeLiftedResult({summary.run.robot, robot.file, getCommandLine(), "closed", ""}, robot.model, motion,
+                              lifted, seconds);
   const MotionResult* written = result ? &*result : nullptr;
   printOutcome(arguments, lifted, written, static_cast<int>(trajectory.a.size()));
   for (const std::string& path : writeLift(arguments.directory, arguments.options.method, lifted, written))

@@ -43,15 +43,10 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
   setObjective(model, options.objective, plan.stages);
   motion.problem_options = options;
   if (!motion.within_limits) leaveTorquesFree(model, plan.stages);
-  motion.name = std::move(plan.name);
-  motion.schedule = std::move(plan.schedule);
-  motion.ground = std::move(plan.ground);
   motion.problem = std::make_shared<RobotProblem>(model, plan.q_start, VectorXd::Zero(model.nv()),
                                                   std::move(plan.stages), options.formulation);
-  motion.guess = std::move(plan.guess);
+  static_cast<MotionOutline&>(motion) = std::move(plan);
   fitTimings(*motion.problem, motion.guess);
-  motion.options = std::move(plan.options);
-  motion.goals = std::move(plan.goals);
   return motion;
 }
 

@@ -80,10 +80,7 @@ ObjectiveOptions readObjective(const Json& json) {
 MotionSummary read(const Json& json) {
   MotionSummary summary;
   summary.motion = json.at("motion");
-  summary.robot = json.at("robot");
-  summary.robot_file = json.at("robot_file");
-  summary.model = json.at("model");
-  summary.serial_armature = json.at("serial_armature");
+  summary.run = {json.at("robot"), json.at("robot_file"), {}, json.at("model"), json.at("serial_armature")};
   const std::string formulation = json.at("formulation");
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
   const std::string step = json.at("step");

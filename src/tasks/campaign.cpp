@@ -66,7 +66,7 @@ std::string identifyMotion(const std::string& directory) {
   std::vector<fs::path> files;
   for (const char* name : {"summary.json", "trajectory.csv", "trajectory.npz"})
     if (fs::exists(fs::path(directory) / name)) files.push_back(fs::path(directory) / name);
-  const fs::path robot = readSummary(directory).robot_file;
+  const fs::path robot = readSummary(directory).run.robot_file;
   if (fs::is_regular_file(robot)) {
     const std::vector<fs::path> parts = listRobotFiles(robot.parent_path());
     files.insert(files.end(), parts.begin(), parts.end());

@@ -38,7 +38,7 @@ tasks::Task shipMotion(const std::string& motion, const std::string& place, bool
     return task;
   }
   const MotionSummary summary = readSummary(motion);
-  const std::string robot = fs::is_regular_file(summary.robot_file) ? summary.robot_file : summary.robot;
+  const std::string robot = fs::is_regular_file(summary.run.robot_file) ? summary.run.robot_file : summary.run.robot;
   task.robots = listRobotDirectories(robot);
   makeOutputDirectory(place);
   readJsonFile(summary.file, "solve the motion again", [&](const Json& json) {

@@ -61,9 +61,7 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   freeFeet(options);
   MotionSummary& summary = plan->summary;
   summary.motion = request.motion;
-  summary.robot = request.robot;
-  summary.robot_file = plan->robot.file;
-  summary.model = "closed";
+  summary.run = {request.robot, plan->robot.file, {}};
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;
   summary.options = listOptions(options).listValues();

@@ -60,7 +60,8 @@ MotionRequest freeFeet(const Ground& ground, MotionRequest request) {
 
 LoadedRobot loadRobotOf(const MotionSummary& summary) {
   std::error_code error;
-  return loadRobot(std::filesystem::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot);
+  return loadRobot(std::filesystem::is_regular_file(summary.run.robot_file, error) ? summary.run.robot_file
+                                                                                   : summary.run.robot);
 }
 
 Solution solveUnlessInterrupted(const Motion& motion, const SolveOptions& options) {
@@ -150,8 +151,8 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
 }
 
 void setModel(Belief belief, MotionSummary& summary) {
-  summary.model = belief == Belief::Closed ? "closed" : "serial";
-  summary.serial_armature = belief == Belief::Ratio ? "reflected" : "";
+  summary.run.model = belief == Belief::Closed ? "closed" : "serial";
+  summary.run.serial_armature = belief == Belief::Ratio ? "reflected" : "";
 }
 
 // The serial model of a plan that believes in it. Summaries name its armature.
@@ -159,7 +160,7 @@ void makeBelief(Belief belief, Plan& plan) {
   plan.belief = belief;
   if (belief == Belief::Closed) return;
   const Model& closed = plan.robot.model;
-  const std::string& armature = plan.summary.serial_armature;
+  const std::string& armature = plan.summary.run.serial_armature;
   plan.serial = std::make_unique<SerialModel>(
       makeSerialModel(closed, makeStandingPosture(closed), parseSerialArmature(armature)));
 }
@@ -192,7 +193,7 @@ std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control
   auto plan = std::make_unique<Plan>();
   plan->summary = readSummary(directory);
   const MotionSummary& summary = plan->summary;
-  const bool serial = summary.model == "serial";
+  const bool serial = summary.run.model == "serial";
   const Belief believed = belief.value_or(serial ? Belief::Serial : Belief::Closed);
   const bool other = serial != (believed != Belief::Closed);
   if (other) setModel(believed, plan->summary);
@@ -211,8 +212,7 @@ std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control, 
   plan->robot = loadRobot(request.robot);
   MotionSummary& summary = plan->summary;
   summary.motion = request.motion;
-  summary.robot = request.robot;
-  summary.robot_file = plan->robot.file;
+  summary.run = {request.robot, plan->robot.file, {}};
   setModel(request.belief, summary);
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;

@@ -22,16 +22,20 @@ void requireOption(bool ok, const std::string& option, const std::string& proble
 /// \throws InputError when a motion of this duration has more than 100000 stages, which may exceed the memory
 void requireStages(double seconds, double time_step);
 
-/// A motion before it becomes a problem; a sequence joins several. It starts and ends standing.
-struct MotionPlan {
+/// What a motion is, before and after it becomes a problem.
+struct MotionOutline {
   std::string name;
   ContactSchedule schedule;
   Ground ground;
+  ShootingTrajectory guess;  ///< quasi-static: where a solve begins unless told otherwise
+  OptionValues options;      ///< every option of the motion by name
+  std::vector<Goal> goals;   ///< requested quantities, to be measured on the trajectory
+};
+
+/// A motion before it becomes a problem; a sequence joins several. It starts and ends standing.
+struct MotionPlan : MotionOutline {
   std::vector<StageSpec> stages;  ///< N running stages and the terminal stage
-  ShootingTrajectory guess;       ///< quasi-static
   VectorXd q_start, q_end;        ///< standing postures, nq
-  OptionValues options;           ///< every option of the motion by name
-  std::vector<Goal> goals;        ///< requested quantities, to be measured on the trajectory
 };
 
 /// Options of a problem besides those of the motion.
@@ -50,17 +54,11 @@ struct ProblemOptions {
 struct MotionRequest;
 
 /// A problem ready to be solved (solve.h), with the data that reports need. Solving it changes nothing; copies share the problem.
-struct Motion {
-  std::string name;
-  ContactSchedule schedule;
-  Ground ground;
+struct Motion : MotionOutline {
   std::shared_ptr<RobotProblem> problem;
-  ShootingTrajectory guess;          ///< quasi-static: where a solve begins unless told otherwise
-  OptionValues options;              ///< every option of the motion by name
-  std::vector<Goal> goals;           ///< requested quantities, to be measured on the trajectory
   ProblemOptions problem_options{};  ///< that the problem was made with
-  std::shared_ptr<const MotionRequest>
-      request{};               ///< that it was made of, if it was (registry.h): how to make another one like it
+  /// That it was made of, if it was (registry.h): how to make another one like it.
+  std::shared_ptr<const MotionRequest> request{};
   bool within_limits = false;  ///< whether torques are limited, at s = 1 of the peak torque
 };
 

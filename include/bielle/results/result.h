@@ -20,23 +20,27 @@ struct RunInfo {
   std::string serial_armature{};     ///< of the serial model, as requested (parseSerialArmature)
 };
 
-struct MotionResult {
+/// What the summary.json of a result tells, and another run reads.
+struct MotionFacts {
   RunInfo run;
   std::string motion;
   Formulation formulation = Formulation::Full;
   StepRule step = StepRule::Euler;
+  ObjectiveOptions objective;
   OptionValues options;              ///< every option of the motion by name
   std::vector<GoalOutcome> goals;    ///< requested and achieved values
-  ContactSchedule schedule;          ///< with the final time steps
   std::vector<PhaseTiming> timings;  ///< of the phases of free duration
   Ground ground;
+};
+
+struct MotionResult : MotionFacts {
+  ContactSchedule schedule;  ///< with the final time steps
   FddpSummary solver;
   MotionRecord record;
 
   std::vector<std::pair<std::string, double>> peak_torques;        ///< largest |u| by motor, largest first, N m or N
   std::vector<std::pair<std::string, double>> rms_torques;         ///< calcRmsEfforts() by motor, N m or N
   std::vector<std::pair<std::string, double>> continuous_torques;  ///< thermal limits, where known, N m or N
-  ObjectiveOptions objective;
   ElectricalEnergy energy;
   double gap_position = 0, gap_angle = 0;    ///< largest closing error of the motion, m and rad
   double slip_position = 0, slip_angle = 0;  ///< largest displacement of a foot from its touchdown, m and rad
@@ -53,8 +57,8 @@ void setFigures(const Model& model, MotionResult& result);
 
 MotionResult makeResult(const RunInfo& run, const Solution& solution);
 
-/// The motion as the summary.json of a result describes it.
-struct MotionSummary {
+/// The motion as the summary.json of a result describes it; without the command line of its run.
+struct MotionSummary : MotionFacts {
   struct Stance {
     std::string contact;
     SE3 X_WT;  ///< desired placement of its frame
@@ -66,18 +70,8 @@ struct MotionSummary {
     std::vector<Stance> stances;
   };
   std::string file;  ///< the file that was read
-  std::string motion, robot, robot_file;
-  std::string model = "closed";  ///< or "serial"
-  std::string serial_armature;   ///< of the serial model (parseSerialArmature)
-  Formulation formulation = Formulation::Full;
-  StepRule step = StepRule::Euler;
-  ObjectiveOptions objective;
   bool converged = false;
-  OptionValues options;
-  std::vector<GoalOutcome> goals;
   std::vector<Phase> phases;
-  std::vector<PhaseTiming> timings;  ///< of the phases of free duration
-  Ground ground;
 };
 
 /// \throws InputError naming the file, the entry and what is wrong with it: a motion carried out is no plan

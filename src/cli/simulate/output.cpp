@@ -21,7 +21,7 @@ namespace {
 MotionResult makeResult(const SimulateArguments& arguments, const Plan& plan, const Ground& ground,
                         const Execution& execution, const std::vector<std::string>& command) {
   MotionResult result;
-  result.run = {plan.summary.robot, plan.robot.file, command};
+  result.run = {plan.summary.run.robot, plan.robot.file, command};
   result.motion = plan.summary.motion;
   result.formulation = plan.summary.formulation;
   result.options = plan.summary.options;
@@ -220,8 +220,8 @@ std::vector<std::string> writeFiles(const SimulateArguments& arguments, const Pl
 }  // namespace
 
 void print(const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
-  std::cout << plan.summary.motion << " of " << plan.summary.robot << " in world " << arguments.world << ", control "
-            << arguments.control;
+  std::cout << plan.summary.motion << " of " << plan.summary.run.robot << " in world " << arguments.world
+            << ", control " << arguments.control;
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
   std::cout << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
