@@ -207,28 +207,13 @@ void describe(OptionFields& f, JumpOptions& o) {
   f.number("stretch", o.stretch, "m", kNotNegative,
            "height of the centre of mass at take-off and touchdown above that at the start");
   f.number("clearance", o.clearance, "m", kNotNegative, "least height of the soles at mid-flight");
-  f.number("friction", o.friction, "1", kPositive, "friction coefficient");
-  f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
   f.number("time_step", o.time_step, "s", kPositive, "length of a shooting stage");
   f.number("apex_weight", o.apex_weight, "1/m^2", kNotNegative, "height of the centre of mass at mid-flight");
   f.number("com_weight", o.com_weight, "1/m^2", kNotNegative, "height of the centre of mass on the ground");
-  f.number("state_weight", o.state_weight, "1", kNotNegative, "stay near the standing posture, at rest");
-  f.number("torso_weight", o.torso_weight, "1", kNotNegative,
-           "keep the torso upright, within the state regularization");
-  f.number("motor_weight", o.motor_weight, "1", kNotNegative, "keep motors slow, within the state regularization");
-  f.number("control_weight", o.control_weight, "1/(N m)^2", kNotNegative, "keep motor torques small");
-  f.number("force_weight", o.force_weight, "1", kNotNegative,
-           "share the load evenly between the feet and over time, relative to (m g)^2");
-  f.number("pressure_weight", o.pressure_weight, "1", kNotNegative,
-           "keep the centre of pressure in the middle of the sole");
   f.number("swing_weight", o.swing_weight, "1/m^2", kNotNegative, "follow the path of the feet in flight");
   f.number("swing_rotation_weight", o.swing_rotation_weight, "1", kNotNegative, "keep the soles level in flight");
   f.number("terminal_weight", o.terminal_weight, "1/m^2", kNotNegative, "position of the centre of mass at the end");
-  f.number("contact_kp", o.contact_kp, "1/s^2", kNotNegative,
-           "position gain of the stabilisation of contacts and closures (at most 1/(3 h^2) with the time step h; Euler "
-           "steps: 1/(2 h^2))");
-  f.number("contact_kd", o.contact_kd, "1/s", kNotNegative,
-           "velocity gain of the stabilisation of contacts and closures (at most 1/h)");
+  describe(f, static_cast<MotionOptions&>(o));
 }
 
 MotionPlan planJump(const Model& model, const JumpOptions& options, const StandingRobot& standing) {

@@ -21,20 +21,13 @@ void describe(OptionFields& f, LocomotionOptions& o) {
            "time at which the swing foot starts to move horizontally, from 0 to 1");
   f.number("swing_arrive", o.swing.arrive, "1", {0, 1},
            "time at which the swing foot is above its foothold, from 0 to 1");
-  f.number("friction", o.friction, "1", kPositive, "friction coefficient");
-  f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
   f.flag("rigid_landing", o.rigid_landing, "a rigid impact at every landing, as a separate stage");
   f.number("landing_speed", o.landing_speed, "m/s", kNotNegative,
            "with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest");
   f.number("foothold_room", o.foothold_room, "m", kNotNegative,
            "largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it");
-  f.number("state_weight", o.state_weight, "1", kNotNegative, "stay near the standing posture, at rest");
-  f.number("torso_weight", o.torso_weight, "1", kNotNegative,
-           "keep the torso upright, within the state regularization");
   f.number("heading_weight", o.heading_weight, "1", kNotNegative,
            "keep the heading of the feet, within the state regularization");
-  f.number("motor_weight", o.motor_weight, "1", kNotNegative, "keep motors slow, within the state regularization");
-  f.number("control_weight", o.control_weight, "1/(N m)^2", kNotNegative, "keep motor torques small");
   f.number("com_weight", o.com_weight, "1/m^2", kNotNegative, "horizontal position of the centre of mass");
   f.number("com_height_weight", o.com_height_weight, "1/m^2", kNotNegative, "height of the centre of mass");
   f.number("com_velocity_weight", o.com_velocity_weight, "s^2/m^2", kNotNegative,
@@ -45,17 +38,10 @@ void describe(OptionFields& f, LocomotionOptions& o) {
   f.number("swing_rotation_weight", o.swing_rotation_weight, "1", kNotNegative, "orientation of the swing foot");
   f.number("foothold_weight", o.foothold_weight, "1/m^2", kNotNegative,
            "with foothold_room: land near the foothold, swing near its horizontal path");
-  f.number("force_weight", o.force_weight, "1", kNotNegative,
-           "transfer the weight evenly between the feet, relative to (m g)^2");
-  f.number("pressure_weight", o.pressure_weight, "1", kNotNegative,
-           "keep the centre of pressure in the middle of the sole");
   f.number("feet_distance", o.feet_distance, "m", kNotNegative,
            "least distance between the soles, or that of the footholds if smaller");
   f.number("terminal_weight", o.terminal_weight, "1/m^2", kNotNegative, "position of the centre of mass at the end");
-  f.number("contact_kp", o.contact_kp, "1/s^2", kNotNegative,
-           "position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2))");
-  f.number("contact_kd", o.contact_kd, "1/s", kNotNegative,
-           "velocity gain of the stabilisation of contacts (at most 1/h)");
+  describe(f, static_cast<MotionOptions&>(o));
   f.number("closure_kp", o.closure_kp, "1/s^2", kNotNegative,
            "position gain of the stabilisation of closures (full formulation)");
   f.number("closure_kd", o.closure_kd, "1/s", kNotNegative,

@@ -238,6 +238,25 @@ VectorXd makeStateWeights(const Model& model) {
   return importance.cwiseAbs2();
 }
 
+void describe(OptionFields& f, MotionOptions& o) {
+  f.number("state_weight", o.state_weight, "1", kNotNegative, "stay near the standing posture, at rest");
+  f.number("torso_weight", o.torso_weight, "1", kNotNegative,
+           "keep the torso upright, within the state regularization");
+  f.number("motor_weight", o.motor_weight, "1", kNotNegative, "keep motors slow, within the state regularization");
+  f.number("control_weight", o.control_weight, "1/(N m)^2", kNotNegative, "keep motor torques small");
+  f.number("force_weight", o.force_weight, "1", kNotNegative,
+           "spread the load evenly over feet and time, relative to (m g)^2");
+  f.number("pressure_weight", o.pressure_weight, "1", kNotNegative,
+           "keep the centre of pressure in the middle of the sole");
+  f.number("friction", o.friction, "1", kPositive, "friction coefficient");
+  f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
+  f.number("contact_kp", o.contact_kp, "1/s^2", kNotNegative,
+           "position gain of the stabilisation of contacts, in jumps also of closures (at most 1/(3 h^2) with the time "
+           "step h; Euler: 1/(2 h^2))");
+  f.number("contact_kd", o.contact_kd, "1/s", kNotNegative,
+           "velocity gain of the stabilisation of contacts, in jumps also of closures (at most 1/h)");
+}
+
 void raiseMotorWeights(const Model& model, double weight, VectorXd& weights) {
   for (const Motor& motor : model.motors()) {
     double& w = weights[model.nv() + motor.dof];

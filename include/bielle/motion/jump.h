@@ -27,32 +27,24 @@
 
 namespace bielle {
 
-struct JumpOptions {
-  double flight = 0.3;               ///< time in the air, s; rounded to an even number of time steps
-  double length = 0;                 ///< distance ahead at which the feet land, m
-  double stand = 0.15;               ///< before the push, s
-  double push = 0.3;                 ///< D, s
-  double land = 0.3;                 ///< s
-  double settle = 0.4;               ///< until the end, s
-  double stretch = 0.02;             ///< height of the CoM at take-off and touchdown above that at the start, m
-  double clearance = 0.04;           ///< least height of the soles at mid-flight, m
-  double friction = 0.7;             ///< coefficient, 1
-  double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
-  double time_step = 0.002;          ///< s
+struct JumpOptions : MotionOptions {
+  JumpOptions() { state_weight = 0.02, torso_weight = 2000, control_weight = 3e-3, force_weight = 30; }
+
+  double flight = 0.3;       ///< time in the air, s; rounded to an even number of time steps
+  double length = 0;         ///< distance ahead at which the feet land, m
+  double stand = 0.15;       ///< before the push, s
+  double push = 0.3;         ///< D, s
+  double land = 0.3;         ///< s
+  double settle = 0.4;       ///< until the end, s
+  double stretch = 0.02;     ///< height of the CoM at take-off and touchdown above that at the start, m
+  double clearance = 0.04;   ///< least height of the soles at mid-flight, m
+  double time_step = 0.002;  ///< s
 
   double apex_weight = 1e4;            ///< of the CoM's height at mid-flight, over h, 1/m^2
   double com_weight = 1e3;             ///< of the CoM's height on the ground, 1/m^2
-  double state_weight = 0.02;          ///< of the state regularization
-  double torso_weight = 2000;          ///< of the torso's rotation within the state regularization
-  double motor_weight = 1;             ///< of motor velocities within the state regularization
-  double control_weight = 3e-3;        ///< of the motor torques, 1/(N m)^2
-  double force_weight = 30;            ///< of the contact force reference, over (m g)^2
-  double pressure_weight = 1;          ///< of the centre of pressure, over the half size of the sole squared
   double swing_weight = 1e5;           ///< of the feet's path in flight, 1/m^2
   double swing_rotation_weight = 1e2;  ///< of their orientation, 1
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
-  double contact_kp = 1e4;             ///< stabilisation of contacts and closures, 1/s^2; limited (limitGains)
-  double contact_kd = 200;             ///< 1/s; likewise
 };
 
 void describe(OptionFields& fields, JumpOptions& options);

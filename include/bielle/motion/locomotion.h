@@ -51,24 +51,20 @@ struct SwingShape {
   double leave = 0, arrive = 0.95;  ///< the horizontal motion takes place between these
 };
 
-struct LocomotionOptions {
+struct LocomotionOptions : MotionOptions {
+  LocomotionOptions() { torso_weight = 1e4, pressure_weight = 10, contact_kp = 2e3, contact_kd = 100; }
+
   GaitTiming timing;
   double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as given
   double stretch = 0;           ///< height of the CoM at take-off and touchdown over that at the start, m
   SwingShape swing;
-  double friction = 0.7;             ///< coefficient, 1
-  double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
   /// Every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. Otherwise the contact's
   /// stabilisation stops any remaining velocity of a foot.
   bool rigid_landing = false;
   double landing_speed = 0;  ///< with rigid_landing: at which a foot comes down, m/s; 0: at rest
   double foothold_room = 0;  ///< largest distance of a landing foot from its foothold along each of its axes, m
 
-  double state_weight = 0.1;           ///< of the state regularization
-  double torso_weight = 1e4;           ///< of the torso's roll and pitch within the state regularization
   double heading_weight = 1e3;         ///< of its heading within the state regularization
-  double motor_weight = 1;             ///< of motor velocities within the state regularization
-  double control_weight = 1e-3;        ///< of the motor torques, 1/(N m)^2
   double com_weight = 100;             ///< of the horizontal position of the CoM, 1/m^2
   double com_height_weight = 3e3;      ///< of its height, 1/m^2
   double com_velocity_weight = 0;      ///< of its horizontal velocity, s^2/m^2
@@ -76,12 +72,8 @@ struct LocomotionOptions {
   double swing_velocity_weight = 200;  ///< of its velocity, s^2/m^2 (and s^2)
   double swing_rotation_weight = 1e3;  ///< of its orientation, 1
   double foothold_weight = 20;         ///< of the distance from the foothold, and of the horizontal path, 1/m^2
-  double force_weight = 10;            ///< of the contact force reference, over (m g)^2
-  double pressure_weight = 10;         ///< of the centre of pressure, over the half size of the sole squared
   double feet_distance = 0.01;         ///< least distance of the soles, or what the footholds leave if less, m
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
-  double contact_kp = 2e3;             ///< stabilisation of the contacts, 1/s^2; limited (limitGains)
-  double contact_kd = 100;             ///< 1/s; likewise
   double closure_kp = 1e4;  ///< stabilisation of the closures, limited like that of the contacts; used only by
   double closure_kd = 100;  ///< the full formulation
 

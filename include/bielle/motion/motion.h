@@ -154,6 +154,24 @@ VectorXd selectMainJoints(const Model& model);
 /// oscillate.
 void raiseMotorWeights(const Model& model, double weight, VectorXd& weights);
 
+inline constexpr double kConeMargin = 0.01;
+
+/// The options that all motions have; motions set other defaults.
+struct MotionOptions {
+  double state_weight = 0.1;         ///< of the state regularization
+  double torso_weight = 10;          ///< of the torso's roll and pitch (in jumps its heading too) within it
+  double motor_weight = 1;           ///< of motor velocities within it
+  double control_weight = 1e-3;      ///< of the motor torques, 1/(N m)^2
+  double force_weight = 10;          ///< of the contact force reference, over (m g)^2
+  double pressure_weight = 1;        ///< of the centre of pressure, over the half size of the sole squared
+  double friction = 0.7;             ///< coefficient, 1
+  double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
+  double contact_kp =
+      1e4;  ///< stabilisation of the contacts (in jumps also of the closures), 1/s^2; limited (limitGains)
+  double contact_kd = 200;  ///< 1/s; likewise
+};
+void describe(OptionFields& fields, MotionOptions& options);
+
 /// Costs of the feet on the ground, the same for all motions.
 struct GroundCosts {
   double force_weight = 10;             ///< of the force reference, over (m g)^2
@@ -172,7 +190,6 @@ void addWrenchCones(const Model& model, double friction, double margin, StageSpe
 /// at its apex.
 /// \param landing  index of the contact that lands, not at rest
 void addImpulseCones(const Model& model, double friction, double margin, int landing, StageSpec& stage);
-inline constexpr double kConeMargin = 0.01;
 
 /// Adds the costs of every active contact of the stage. \param loads  vertical force of each, in their order, N
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage);

@@ -5,24 +5,14 @@
 
 namespace bielle {
 
-struct SquatOptions {
-  double depth = 0.7;                ///< lowest height of the CoM over its initial height, 1
-  double duration = 2.4;             ///< down and back, s
-  double settle = 0.3;               ///< at rest before and after, s
-  double time_step = 0.015;          ///< s
-  double com_weight = 1e5;           ///< of the CoM's height, 1/m^2
-  double state_weight = 0.1;         ///< of the state regularization
-  double torso_weight = 10;          ///< of the torso's roll and pitch within the state regularization
-  double motor_weight = 1;           ///< of motor velocities within the state regularization
-  double control_weight = 1e-3;      ///< of the motor torques, 1/(N m)^2
-  double force_weight = 10;          ///< of the contact force reference (half the weight per foot), over (m g)^2
-  double pressure_weight = 1;        ///< of the centre of pressure, over the half size of the sole squared
-  double friction = 0.7;             ///< friction coefficient, 1
-  double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
-  double contact_kp = 1e4;           ///< stabilisation of the contacts, 1/s^2; limited (limitGains)
-  double contact_kd = 200;           ///< 1/s; likewise
-  double closure_kp = 0;             ///< stabilisation of the closures, 1/s^2
-  double closure_kd = 0;             ///< 1/s
+struct SquatOptions : MotionOptions {
+  double depth = 0.7;        ///< lowest height of the CoM over its initial height, 1
+  double duration = 2.4;     ///< down and back, s
+  double settle = 0.3;       ///< at rest before and after, s
+  double time_step = 0.015;  ///< s
+  double com_weight = 1e5;   ///< of the CoM's height, 1/m^2
+  double closure_kp = 0;     ///< stabilisation of the closures, 1/s^2
+  double closure_kd = 0;     ///< 1/s
 };
 
 void describe(OptionFields& fields, SquatOptions& options);
