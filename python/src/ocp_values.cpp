@@ -88,6 +88,15 @@ void bindStages(py::module_& module) {
       .field("phase", &FreeTiming::phase, "the same for all steps of the phase; -1: the duration is fixed")
       .field("lower", &FreeTiming::lower, "bound of the time scale")
       .field("upper", &FreeTiming::upper, "bound of the time scale");
+  py::enum_<FootRole>(module, "FootRole").value("SWING", FootRole::Swing).value("LANDING", FootRole::Landing);
+  Value<FootTask>(module, "FootTask", "A foot that moves in a stage, and the residuals made of it.")
+      .field("contact", &FootTask::contact, "index of the contact")
+      .field("role", &FootTask::role, "FootRole")
+      .field("room", &FootTask::room, "of a landing: largest distance from its place along x and y of that, m")
+      .field("place", &FootTask::place,
+             "residual in the costs of a swing or the path constraints of a landing, or None")
+      .field("velocity", &FootTask::velocity, "likewise")
+      .field("clearance", &FootTask::clearance, "over the ground, or None");
   Value<StageSpec>(module, "Stage",
                    "One stage of the horizon, or the terminal node, which has neither dt nor constraints.")
       .field("kind", &StageSpec::kind, "StageKind")
@@ -100,7 +109,8 @@ void bindStages(py::module_& module) {
       .field("control", &StageSpec::control, "ControlCost")
       .field("costs", &StageSpec::costs, "Costs")
       .field("path_constraints", &StageSpec::path_constraints, "PathConstraints")
-      .field("effort_limits", &StageSpec::effort_limits, "bounds of |u| (nu,); empty: those of the motors");
+      .field("effort_limits", &StageSpec::effort_limits, "bounds of |u| (nu,); empty: those of the motors")
+      .field("feet", &StageSpec::feet, "FootTasks of the feet that move, for predictive control");
 }
 
 }  // namespace

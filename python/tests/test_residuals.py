@@ -220,6 +220,17 @@ def test_costs_pickle_with_their_residuals(height):
     assert own.residual is stage.costs[0].residual
 
 
+def test_stages_pickle_with_their_feet(model):
+    plan = bielle.Motion.plan(model, bielle.Request(motion="walk", options={"steps": 2}))
+    feet = [foot for stage in plan.stages for foot in stage.feet]
+    assert {foot.role for foot in feet} == {bielle.FootRole.SWING, bielle.FootRole.LANDING}
+    swing = next(stage for stage in plan.stages if stage.feet and stage.feet[0].clearance is not None)
+    twin = pickle.loads(pickle.dumps(swing))
+    assert twin == swing and twin.feet == swing.feet and twin != swing.replace(feet=[])
+    assert twin.feet[0].place in [cost.residual for cost in twin.costs]
+    assert twin.feet[0].clearance in [constraint.residual for constraint in twin.path_constraints]
+
+
 def test_nothing_keeps_a_residual(height):
     residual = ComHeight(height)
     alive = weakref.ref(residual)
