@@ -79,12 +79,13 @@ TEST_CASE("commands: a file is read, and errors name file, entry and remedy") {
 }
 
 TEST_CASE("commands: what legs cannot do is refused by name") {
-  checkCommand(getBipetto(), {}, {0.4, 0.1, 0.3}, "command 1");
-  CHECK(getError([] {
-          checkCommand(getBipetto(), {}, {5, 0, 0}, "command 7");
+  const StandingRobot standing = makeStandingRobot(getBipetto());
+  checkCommand(getBipetto(), standing, {}, {0.4, 0.1, 0.3}, "command 1");
+  CHECK(getError([&] {
+          checkCommand(getBipetto(), standing, {}, {5, 0, 0}, "command 7");
         }).find("command 7") != std::string::npos);
-  CHECK(getError([] {
-          checkCommand(getBipetto(), {}, {0, 0, 6}, "command 8");
+  CHECK(getError([&] {
+          checkCommand(getBipetto(), standing, {}, {0, 0, 6}, "command 8");
         }).find("command 8") != std::string::npos);
 }
 

@@ -125,23 +125,24 @@ MotionRecord restrictRecord(const Model& closed, const Model& serial, const Moti
   return record;
 }
 
-void addKeptMotion(const Model& closed, const DesignMotion& motion, SolvedMotion& solved) {
-  const SerialModel serial = makeSerialModel(closed, makeStandingPosture(closed));
+// \param q0  standing posture, here and below
+void addKeptMotion(const Model& closed, const VectorXd& q0, const DesignMotion& motion, SolvedMotion& solved) {
+  const SerialModel serial = makeSerialModel(closed, q0);
   const Motion serial_motion = makeDesignMotion(serial.model, motion, makeStandingRobot(serial.model));
   solved.serial =
       makeSerialTrajectory(serial_motion, restrictRecord(closed, serial.model, serial_motion, solved.record));
   solved.kept_dofs = findRestrictedDofs(closed, serial.model);
 }
 
-LiftResult liftMotion(const Model& model, const SerialTrajectory& kept) {
-  return lift(model, makeSerialModel(model, makeStandingPosture(model)), kept);
+LiftResult liftMotion(const Model& model, const VectorXd& q0, const SerialTrajectory& kept) {
+  return lift(model, makeSerialModel(model, q0), kept);
 }
 
 // Starts from the motion of the start design with the motors recomputed, which is nearly a motion of this design.
 // If that fails, starts from its postures and torques.
 ShootingTrajectory chooseStart(const Model& model, const SolvedMotion& solved, const Motion& motion) {
   if (solved.serial) {
-    LiftResult lifted = liftMotion(model, *solved.serial);
+    LiftResult lifted = liftMotion(model, motion.problem->initialState().head(model.nq()), *solved.serial);
     ShootingTrajectory& trajectory = lifted.trajectory;
     if (lifted.lifted() && trajectory.us.size() == motion.guess.us.size() &&
         trajectory.xs.size() == motion.guess.xs.size())
@@ -155,7 +156,8 @@ ShootingTrajectory chooseStart(const Model& model, const SolvedMotion& solved, c
 SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, const FddpOptions& options, int postures,
                               bool must_keep) {
   MotionOutcome outcome = load(model, motion);
-  solve(makeDesignMotion(*outcome.loaded, motion, makeStandingRobot(*outcome.loaded)), nullptr, options, {}, outcome);
+  const StandingRobot standing = makeStandingRobot(*outcome.loaded);
+  solve(makeDesignMotion(*outcome.loaded, motion, standing), nullptr, options, {}, outcome);
   if (outcome.missing > 0)
     throw InputError(model.name(), "start design", outcome.message, "request a motion that the robot can make");
   const ShootingTrajectory& solution = outcome.solution->trajectory;
@@ -165,7 +167,7 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
   for (int p = 0; p < postures; ++p)
     out.postures.push_back(solution.xs[p * last / std::max(1, postures - 1)].head(model.nq()));
   try {
-    addKeptMotion(*outcome.loaded, motion, out);
+    addKeptMotion(*outcome.loaded, standing.q, motion, out);
   } catch (const InputError&) {  // no serial chain, or impacts: motions can be solved but not kept
     if (must_keep) throw;
   }
@@ -215,7 +217,7 @@ MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const S
                          const std::vector<MotorConversion>& drives, double margin) {
   MotionOutcome out = load(model, motion);
   const SerialTrajectory& kept = *start.serial;
-  out.lifted = liftMotion(*out.loaded, kept);
+  out.lifted = liftMotion(*out.loaded, makeStandingPosture(*out.loaded), kept);
   const LiftResult& lifted = out.lifted;
   out.missing = 1 - static_cast<double>(lifted.dt.size()) / static_cast<double>(kept.dt.size() + 1);
   if (!lifted.lifted()) {

@@ -58,8 +58,8 @@ double calcMeanSpeed(const std::vector<TimedCommand>& commands, double duration)
   return duration > 0 ? way / duration : 0;
 }
 
-void checkCommand(const Model& model, const LocomotionOptions& options, const VelocityCommand& command,
-                  const std::string& element) {
+void checkCommand(const Model& model, const StandingRobot& standing, const LocomotionOptions& options,
+                  const VelocityCommand& command, const std::string& element) {
   constexpr int kSteps = 6;
   if (command.isRest()) return;
   const double T = options.timing.stepDuration();
@@ -68,7 +68,7 @@ void checkCommand(const Model& model, const LocomotionOptions& options, const Ve
   if (!(std::abs(step.yaw) <= kPi))
     throw InputError(model.name(), element, "it turns by more than half a turn in a step",
                      "give a lower rate of turning, e.g. 0.4 rad/s");
-  const Stance stance = makeStance(model, options, makeStandingRobot(model));
+  const Stance stance = makeStance(model, options, standing);
   for (const Side first : {Side::Left, Side::Right}) {
     LocomotionTask task;
     task.name = element;

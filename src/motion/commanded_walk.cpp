@@ -48,9 +48,8 @@ CommandedWalk::CommandedWalk(const Model& model, const LocomotionOptions& option
       limits_(limits),
       command_(std::move(command)),
       standing_(makeStance(model, options_, standing)),
-      start_(calcMiddle(standing_.feet[0], standing_.feet[1])),
       feet_(standing_.feet),
-      middle_(start_),
+      middle_(standing_.middle),
       com_(standing_.com) {
   makeStages();
 }
@@ -81,18 +80,19 @@ std::vector<Footstep> CommandedWalk::planSteps(const VelocityCommand& command, i
   Side side = swing_;
   for (int i = 0; i <= count; ++i, side = getOther(side)) {
     if (i < count) P = calcNextMiddle(P, step, side);
-    steps.push_back({side, P * start_.inverseTimes(standing_.feet[static_cast<int>(side)])});
+    steps.push_back({side, P * standing_.middle.inverseTimes(standing_.feet[static_cast<int>(side)])});
   }
   return steps;
 }
 
 // The posture in which the robot would stand on its feet where they are.
 Stance CommandedWalk::makeStanceHere() const {
-  const SE3 X = calcMiddle(feet_[0], feet_[1]) * start_.inverse();
   Stance stance = standing_;
+  stance.feet = feet_;
+  stance.middle = calcMiddle(feet_[0], feet_[1]);
+  const SE3 X = stance.middle * standing_.middle.inverse();
   stance.q = carryPosture(model_, standing_.q, X);
   stance.com = X.act(standing_.com);
-  stance.feet = feet_;
   return stance;
 }
 
@@ -101,7 +101,7 @@ CommandedWalk::Segment CommandedWalk::planSegment(const Stance& stance) {
   const VelocityCommand command = command_(made_ * timing.time_step);
   Segment segment;
   segment.task.plan = {feet_, {}};
-  segment.task.ground.height = start_.p.z();
+  segment.task.ground.height = standing_.middle.p.z();
   const auto makeGaitHere = [&](std::vector<GaitPhase> phases) {
     segment.gait = makeGait(segment.task, std::move(phases), timing, options_.swing, options_.stretch,
                             {com_, stance.com}, model_.gravity().norm());

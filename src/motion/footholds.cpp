@@ -41,14 +41,13 @@ Footstep readFoothold(const YamlEntry& entry) {
 
 // The footholds in the world, and the step that brings the feet together.
 std::vector<Footstep> makeSteps(const Stance& stance, const std::vector<Footstep>& footholds) {
-  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   std::vector<Footstep> steps;
   for (const Footstep& foothold : footholds) {
     if (!steps.empty() && steps.back().side == foothold.side)
       throw InputError("", "foothold " + std::to_string(steps.size() + 1),
                        std::string("the ") + getName(foothold.side) + " steps twice in a row",
                        "let the feet step alternately");
-    steps.push_back({foothold.side, start * foothold.X_WF});
+    steps.push_back({foothold.side, stance.middle * foothold.X_WF});
   }
   const Footstep& last = steps.back();
   const SE3& foot = stance.feet[static_cast<int>(last.side)];
@@ -68,9 +67,8 @@ std::vector<Footstep> makeSteps(const Stance& stance, const std::vector<Footstep
 // Stones under all footholds. If all of them rise over the level of the start it is that of the plane; otherwise the plane
 // lies under the lowest stone, and the robot starts from a platform.
 Ground makeGround(const Model& model, const Stance& stance, const std::vector<Footstep>& steps, double rim) {
-  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   Ground ground;
-  double lowest = start.p.z();
+  double lowest = stance.middle.p.z();
   for (const Footstep& step : steps) {
     const ContactFrame& sole = model.contacts()[stance.contacts[static_cast<int>(step.side)]];
     const GroundStep stone = makeStone(sole, step.X_WF, rim);
@@ -82,17 +80,17 @@ Ground makeGround(const Model& model, const Stance& stance, const std::vector<Fo
         lowest = std::min(lowest, stone.calcHeight(stone.top.x() + corner.x(), stone.top.y() + corner.y()));
       }
   }
-  ground.height = start.p.z();
-  if (lowest >= start.p.z() - kSamePlace) return ground;
+  ground.height = stance.middle.p.z();
+  if (lowest >= stance.middle.p.z() - kSamePlace) return ground;
   ground.height = lowest - kSunken;
   double width = 0, length = 0;
   for (int i = 0; i < 2; ++i) {
     const ContactFrame& sole = model.contacts()[stance.contacts[i]];
-    const Vector3d place = start.inverseTimes(stance.feet[i]).p;
+    const Vector3d place = stance.middle.inverseTimes(stance.feet[i]).p;
     width = std::max(width, 2 * (std::abs(place.y()) + sole.half_width + rim));
     length = std::max(length, 2 * (std::abs(place.x()) + sole.half_length + rim));
   }
-  ground.steps.push_back({start.p, length, width, calcHeading(start)});
+  ground.steps.push_back({stance.middle.p, length, width, calcHeading(stance.middle)});
   return ground;
 }
 

@@ -87,7 +87,7 @@ void keepReach(Scene& scene) {
     const GaitNode& node = gait.nodes[k];
     const std::array<SE3, 2> feet = getFeet(scene, node);
     const Matrix3d turn = makeAxisRotation(Vector3d::UnitZ(), node.heading);
-    const Matrix3d axes = turn * calcMiddle(stance.feet[0], stance.feet[1]).R;
+    const Matrix3d axes = turn * stance.middle.R;
     double lower = -std::numeric_limits<double>::infinity(), upper = -lower;
     for (int i = 0; i < 2; ++i) {
       const Vector3d apart = axes.transpose() * (node.com + turn * (stance.feet[i].p - stance.com) - feet[i].p);
@@ -133,7 +133,7 @@ Gait makeStartingGait(const Model& model, const Stance& stance, const Locomotion
   const double tau = std::sqrt(height / gravity);
   const double half =
       std::min(model.contacts()[stance.contacts[0]].half_length, model.contacts()[stance.contacts[1]].half_length);
-  const Vector3d forward = calcMiddle(stance.feet[0], stance.feet[1]).R.col(0);
+  const Vector3d forward = stance.middle.R.col(0);
   GaitTiming timing = options.timing;
   for (;; timing.start += kStep) {
     Gait gait = makeGait(task, timing, options.swing, options.stretch, stance.com, gravity);
@@ -160,7 +160,7 @@ Stance makeStance(const Model& model, const LocomotionOptions& options, const St
     throw InputError(model.name(), "root joint",
                      "its base is fixed, or moves on a rail, but a motion with steps needs a free one over two feet",
                      "take `squat` or `jump`, which need no steps, or a robot with a free base");
-  Stance stance{standing.q, standing.com, {}, {}, standing.neighbours};
+  Stance stance{standing.q, standing.com, {}, {}, {}, standing.neighbours};
   for (int i = 0; i < 2; ++i) {
     const std::string& name = i == 0 ? options.left : options.right;
     stance.contacts[i] = model.findContact(name);
@@ -169,6 +169,7 @@ Stance makeStance(const Model& model, const LocomotionOptions& options, const St
                        "name the contacts of its left and right foot");
     stance.feet[i] = standing.contacts[static_cast<size_t>(stance.contacts[i])];
   }
+  stance.middle = calcMiddle(stance.feet[0], stance.feet[1]);
   return stance;
 }
 
@@ -212,10 +213,9 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   plan.stages.push_back(makeTerminalStage(scene));
   plan.guess.xs.push_back(guess.back());
   const auto end = task.plan.getStance(static_cast<int>(task.plan.steps.size()));
-  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   plan.goals = makeFootholdGoals(scene, plan.schedule);
   plan.q_start = stance.q;
-  plan.q_end = carryPosture(model, stance.q, calcMiddle(end[0], end[1]) * start.inverse());
+  plan.q_end = carryPosture(model, stance.q, calcMiddle(end[0], end[1]) * stance.middle.inverse());
   return plan;
 }
 

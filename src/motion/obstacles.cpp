@@ -17,7 +17,7 @@ double calcHalfLength(const Model& model, const Stance& stance) {
 
 // Both feet, moved by each displacement in turn; displacements are from the start, in the axes of its middle frame.
 std::vector<Footstep> moveTogether(const Stance& stance, const std::vector<Vector3d>& displacements) {
-  const Matrix3d R = calcMiddle(stance.feet[0], stance.feet[1]).R;
+  const Matrix3d R = stance.middle.R;
   std::vector<Footstep> steps;
   for (const Vector3d& displacement : displacements)
     for (Side side : {Side::Right, Side::Left}) {
@@ -71,13 +71,12 @@ void describe(OptionFields& f, GapOptions& o) {
 MotionPlan planBox(const Model& model, const BoxOptions& o, const StandingRobot& standing) {
   const Stance stance = makeStance(model, o.gait, standing);
   checkBox(model, stance, o);
-  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   const double stride = calcHalfLength(model, stance) + o.distance + o.length / 2;
   const Vector3d top(stride, 0, o.height), behind(2 * stride, 0, 0);
   Course course{"box", moveTogether(stance, {top}), {}};
   if (o.down) course.steps = moveTogether(stance, {top, behind});
-  course.ground.height = start.p.z();
-  course.ground.steps = {{start.act(top), o.length, o.width, calcHeading(start)}};
+  course.ground.height = stance.middle.p.z();
+  course.ground.steps = {{stance.middle.act(top), o.length, o.width, calcHeading(stance.middle)}};
   MotionPlan plan = planCourse(model, stance, course, o.gait);
   plan.options = listOptions(o).listValues();
   const Goal height =
@@ -89,15 +88,16 @@ MotionPlan planBox(const Model& model, const BoxOptions& o, const StandingRobot&
 MotionPlan planGap(const Model& model, const GapOptions& o, const StandingRobot& standing) {
   const Stance stance = makeStance(model, o.gait, standing);
   checkGap(o);
-  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   const double half = calcHalfLength(model, stance), edge = half + o.distance, stride = o.width + 2 * edge;
   Course course{"gap", moveTogether(stance, {Vector3d(stride, 0, 0)}), {}};
-  course.ground.height = start.p.z() - o.depth;
+  course.ground.height = stance.middle.p.z() - o.depth;
   for (double middle : {edge - kBank / 2, edge + o.width + kBank / 2})
-    course.ground.steps.push_back({start.act(Vector3d(middle, 0, 0)), kBank, kBankWidth, calcHeading(start)});
+    course.ground.steps.push_back(
+        {stance.middle.act(Vector3d(middle, 0, 0)), kBank, kBankWidth, calcHeading(stance.middle)});
   MotionPlan plan = planCourse(model, stance, course, o.gait);
   plan.options = listOptions(o).listValues();
-  const Goal across = makeCourseGoal(model, stance, "across", stride, start.R.col(0), plan.schedule.numStages());
+  const Goal across =
+      makeCourseGoal(model, stance, "across", stride, stance.middle.R.col(0), plan.schedule.numStages());
   plan.goals.insert(plan.goals.begin(), across);
   return plan;
 }

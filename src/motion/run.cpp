@@ -20,7 +20,7 @@ void describeGait(OptionFields& f, LocomotionOptions& gait) {
 
 // Every foot lands by `displacements` ahead of where it stood at the start, along x of the feet.
 std::vector<Footstep> moveAhead(const Stance& stance, const std::vector<std::pair<Side, double>>& displacements) {
-  const Vector3d forward = calcMiddle(stance.feet[0], stance.feet[1]).R.col(0);
+  const Vector3d forward = stance.middle.R.col(0);
   std::vector<Footstep> steps;
   for (const auto& [side, displacement] : displacements) {
     SE3 X = stance.feet[static_cast<int>(side)];
@@ -39,9 +39,8 @@ MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask 
   if (gait.timing.time_step == 0) gait.timing.time_step = chooseTimeStep(task, gait.timing, gait.swing);
   requireOption(options.stance >= 4 * gait.timing.time_step, "stance", "it is shorter than four time steps",
                 "give seconds, e.g. 0.25");
-  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
-  task.ground.height = start.p.z();
-  task.direction = start.R.col(0);
+  task.ground.height = stance.middle.p.z();
+  task.direction = stance.middle.R.col(0);
   MotionPlan plan = planLocomotion(model, stance, task, gait);
   plan.options = listOptions(options).listValues();
   return plan;
@@ -104,8 +103,7 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const StandingRobot&
   task.speed = o.speed;
   MotionPlan plan = planFlights(model, stance, task, o);
   std::vector<Goal> goals;
-  if (steps >= kSteadySteps)
-    goals = makeSpeedGoals(plan.schedule, o.speed, calcMiddle(stance.feet[0], stance.feet[1]).R.col(0));
+  if (steps >= kSteadySteps) goals = makeSpeedGoals(plan.schedule, o.speed, stance.middle.R.col(0));
   goals.push_back(makeFlightGoal(plan.schedule, steps - 1, o.flight));
   plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
   return plan;
@@ -126,7 +124,7 @@ MotionPlan planHop(const Model& model, const HopOptions& o, const StandingRobot&
   MotionPlan plan = planFlights(model, stance, task, o);
   Goal length{GoalKind::Displacement,   "length", hops * o.length, calcTolerance(hops * o.length, 0.01), 0,
               plan.schedule.numStages()};
-  length.direction = calcMiddle(stance.feet[0], stance.feet[1]).R.col(0);
+  length.direction = stance.middle.R.col(0);
   for (int contact : stance.contacts) length.contacts.push_back(model.contacts()[contact].name);
   const Goal flight = makeFlightGoal(plan.schedule, hops, o.flight);
   plan.goals.insert(plan.goals.begin(), {flight, length});

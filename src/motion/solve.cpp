@@ -215,8 +215,9 @@ class RequestSolver {
     };
     SolveOptions options;
     options.solver = options_.solver;
-    ShootingTrajectory whole = solveParts(model, listParts(*motion_.request), makeStandingRobot(model), makeEffort(),
-                                          options, observer_.part, report);
+    ShootingTrajectory whole = solveParts(model, listParts(*motion_.request),
+                                          makeStandingRobot(model, motion_.problem->initialState().head(model.nq())),
+                                          makeEffort(), options, observer_.part, report);
     fitTimings(*motion_.problem, whole);
     return whole;
   }

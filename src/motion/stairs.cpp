@@ -22,7 +22,7 @@ void check(const Model& model, const Stance& stance, const StairsOptions& o) {
 // Foot i on step i; both end on the last one.
 FootstepPlan planFootholds(const Stance& stance, const StairsOptions& o) {
   FootstepPlan plan{stance.feet, {}};
-  const Vector3d up = calcMiddle(stance.feet[0], stance.feet[1]).R * Vector3d(o.depth, 0, o.height);
+  const Vector3d up = stance.middle.R * Vector3d(o.depth, 0, o.height);
   Side side = Side::Right;
   for (int i = 1; i <= o.stairs + 1; ++i, side = getOther(side)) {
     SE3 X = stance.feet[static_cast<int>(side)];
@@ -75,18 +75,17 @@ MotionPlan planStairs(const Model& model, const StairsOptions& options, const St
   StairsOptions o = options;
   if (o.slope != 0) o.height = o.slope * o.depth;
   const Stance stance = makeStance(model, o.gait, standing);
-  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   check(model, stance, o);
   o.gait.timing.single = o.depth / o.speed - o.gait.timing.both;
   LocomotionTask task;
   task.name = "stairs";
   task.plan = planFootholds(stance, o);
-  task.ground = makeStairsGround(o, start);
-  task.direction = start.R * Vector3d::UnitX();
+  task.ground = makeStairsGround(o, stance.middle);
+  task.direction = stance.middle.R * Vector3d::UnitX();
   task.speed = o.speed;
   MotionPlan plan = planLocomotion(model, stance, task, o.gait);
   plan.options = listOptions(o).listValues();
-  const std::vector<Goal> speed = makeSpeedGoals(plan.schedule, o.speed, start.R.col(0));
+  const std::vector<Goal> speed = makeSpeedGoals(plan.schedule, o.speed, stance.middle.R.col(0));
   plan.goals.insert(plan.goals.begin(), speed.begin(), speed.end());
   plan.goals.insert(plan.goals.begin(), makeClimbGoal(model, stance, o.stairs * o.height, plan.schedule.numStages()));
   return plan;

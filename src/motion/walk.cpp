@@ -20,16 +20,15 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
                     double speed, Side first, const Options& options, const StandingRobot& standing) {
   listOptions(options).check();
   const Stance stance = makeStance(model, options.gait, standing);
-  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   LocomotionTask task;
   task.name = name;
   task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, options.steps, first);
-  task.ground.height = start.p.z();
-  task.direction = start.R * direction;
+  task.ground.height = stance.middle.p.z();
+  task.direction = stance.middle.R * direction;
   task.speed = speed;
   MotionPlan plan = planLocomotion(model, stance, task, options.gait);
   plan.options = listOptions(options).listValues();
-  return {std::move(plan), start};
+  return {std::move(plan), stance.middle};
 }
 
 void addGoals(std::vector<Goal> goals, MotionPlan& plan) {

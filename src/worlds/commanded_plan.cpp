@@ -56,8 +56,9 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   OptionSet set = listOptions(LocomotionOptions());
   for (const auto& [name, value] : request.settings) set.set(name, value);
   auto options = readOptions<LocomotionOptions>(set);
+  const StandingRobot standing = makeStandingRobot(model);
   for (size_t i = 0; i < plan->commands.size(); ++i)
-    checkCommand(model, options, plan->commands[i].velocity, file + ", command " + std::to_string(i + 1));
+    checkCommand(model, standing, options, plan->commands[i].velocity, file + ", command " + std::to_string(i + 1));
   freeFeet(options);
   MotionSummary& summary = plan->summary;
   summary.motion = request.motion;
@@ -66,7 +67,6 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   summary.step = StepRule::Midpoint;
   summary.options = listOptions(options).listValues();
   const CommandSource source = [commands = plan->commands](double time) { return findCommand(commands, time); };
-  const StandingRobot standing = makeStandingRobot(model);
   const CommandedWalk walk(model, options, {}, source, standing);
   foresee(walk, request.duration > 0 ? request.duration : plan->commands.back().time, *plan);
   plan->ground.height = makeStance(model, options, standing).feet[0].p.z();

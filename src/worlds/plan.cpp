@@ -146,8 +146,10 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
   PredictiveOptions stopping = predictive;
   stopping.dead_point_stop = std::min(stopping.dead_point_stop, kStopShare * problem.limits.dead_point_margin);
   plan.predictive = std::make_unique<PredictiveController>(
-      makePredictiveMotion(model, freed.plan(model, makeStandingRobot(model)), problem, stopping), solution.trajectory,
-      stopping);
+      makePredictiveMotion(model,
+                           freed.plan(model, makeStandingRobot(model, motion.problem->initialState().head(model.nq()))),
+                           problem, stopping),
+      solution.trajectory, stopping);
 }
 
 void setModel(Belief belief, MotionSummary& summary) {

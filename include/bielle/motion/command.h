@@ -42,7 +42,7 @@ double calcMeanSpeed(const std::vector<TimedCommand>& commands, double duration)
 /// Checks that legs reach the footholds of steps at this velocity, that none turns by more than half a turn, and that soles do
 /// not collide.
 /// \param element  names the command in messages   \throws InputError unless they do
-void checkCommand(const Model& model, const LocomotionOptions& options, const VelocityCommand& command,
-                  const std::string& element);
+void checkCommand(const Model& model, const StandingRobot& standing, const LocomotionOptions& options,
+                  const VelocityCommand& command, const std::string& element);
 
 }  // namespace bielle

@@ -60,7 +60,6 @@ class CommandedWalk {
   const LimitOptions limits_;
   const CommandSource command_;
   const Stance standing_;                   // at the start
-  const SE3 start_;                         // middle of the feet there
   std::array<VectorXd, 4> static_torques_;  // by the feet that stand
   enum class State { Standing, Starting, Walking };
   State state_ = State::Standing;

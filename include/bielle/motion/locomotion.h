@@ -88,6 +88,7 @@ struct Stance {
   Vector3d com;                          ///< m
   std::array<int, 2> contacts{};         ///< indices of the left and right foot
   std::array<SE3, 2> feet;               ///< their placements
+  SE3 middle;                            ///< of the feet (calcMiddle)
   NeighbourPlans* neighbours = nullptr;  ///< of the standing robot
 };
 /// \throws InputError when the robot lacks a foot

@@ -166,9 +166,8 @@ struct MotionOptions {
   double pressure_weight = 1;        ///< of the centre of pressure, over the half size of the sole squared
   double friction = 0.7;             ///< coefficient, 1
   double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
-  double contact_kp =
-      1e4;  ///< stabilisation of the contacts (in jumps also of the closures), 1/s^2; limited (limitGains)
-  double contact_kd = 200;  ///< 1/s; likewise
+  double contact_kp = 1e4;           ///< stabilisation of contacts, in jumps also of closures, 1/s^2 (limitGains)
+  double contact_kd = 200;           ///< 1/s; likewise
 };
 void describe(OptionFields& fields, MotionOptions& options);
 
