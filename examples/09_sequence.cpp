@@ -32,9 +32,10 @@ int main(int argc, char** argv) {
   JumpOptions jump;
   jump.flight = 0.24;
   const std::vector<SequencePart> parts = {
-      {"walk", [&](const Model& model, const VectorXd& q0) { return planWalk(model, walk, q0); }},
-      {"stairs", [&](const Model& model, const VectorXd& q0) { return planStairs(model, stairs, q0); }},
-      {"jump", [&](const Model& model, const VectorXd& q0) { return planJump(model, jump, q0); }}};
+      {"walk", [&](const Model& model, const StandingRobot& standing) { return planWalk(model, walk, standing); }},
+      {"stairs",
+       [&](const Model& model, const StandingRobot& standing) { return planStairs(model, stairs, standing); }},
+      {"jump", [&](const Model& model, const StandingRobot& standing) { return planJump(model, jump, standing); }}};
 
   const LoadedRobot robot = loadRobot("bipetto");
   const Motion motion = makeSequence(robot.model, parts);

@@ -124,7 +124,7 @@ TEST_CASE("design goals: the log has what was requested and achieved, and why a 
   CHECK(stopped.missing == 1);
   DesignMotion odd = makeAskedSquat(0.8, 0.02);
   odd.request.emplace();
-  odd.request->planner = [](const Model&, const VectorXd&, const OptionSet&) -> MotionPlan {
+  odd.request->planner = [](const Model&, const StandingRobot&, const OptionSet&) -> MotionPlan {
     throw InputError("leg", "depth", "it is too large");
   };
   const DesignEvaluator impossible(robot, {odd}, kPeak);
