@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
     alone += summary.cost;
   };
   SolveOptions options;
-  options.start = StartingPoint{solveParts(robot.model, parts, makeStandingPosture(robot.model), {}, {}, {}, report)};
+  options.start = StartingPoint{solveParts(robot.model, parts, makeStandingRobot(robot.model), {}, {}, {}, report)};
   SolveObserver observer;
   observer.motion.callback = makeFddpPrinter(std::cout);
   const Solution solution = solve(motion, options, observer);

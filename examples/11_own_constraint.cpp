@@ -29,7 +29,7 @@ struct Squat {
 
 // Without a bound when x_max is infinite.
 Squat solve(const Model& model, double x_max) {
-  MotionPlan plan = planSquat(model, {}, makeStandingPosture(model));
+  MotionPlan plan = planSquat(model, {}, makeStandingRobot(model));
   const double scale = 0.01;  // m
   for (StageSpec& stage : plan.stages)
     for (const char* shin : {"shin_left", "shin_right"})

@@ -84,7 +84,7 @@ int main() {
   options.gait.contact_kp = 0;       // and stands where it landed
   const PredictiveOptions predictive;
   PredictiveController controller(
-      makePredictiveMotion(model, planWalk(model, options, makeStandingPosture(model)), {}, predictive),
+      makePredictiveMotion(model, planWalk(model, options, makeStandingRobot(model)), {}, predictive),
       solution.trajectory, predictive);
 
   const double start = solution.trajectory.xs[0][2];

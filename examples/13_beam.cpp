@@ -30,8 +30,8 @@ struct BeamOptions {
   LocomotionOptions gait;
 };
 
-MotionPlan planBeam(const Model& model, const BeamOptions& o, const VectorXd& q0) {
-  const Stance stance = makeStance(model, o.gait, q0);
+MotionPlan planBeam(const Model& model, const BeamOptions& o, const StandingRobot& standing) {
+  const Stance stance = makeStance(model, o.gait, standing);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   const double half = model.contacts()[stance.contacts[0]].half_length;
   const Vector3d stride = start.R.col(0) * (o.thickness + 2 * (half + o.distance));  // Eq. (1)
@@ -78,7 +78,7 @@ int main(int argc, char** argv) {
   BeamOptions options;
   if (argc > 2) options.height = std::atof(argv[2]);
   const Solution solution =
-      solve(makeMotion(robot.model, planBeam(robot.model, options, makeStandingPosture(robot.model)), {}));
+      solve(makeMotion(robot.model, planBeam(robot.model, options, makeStandingRobot(robot.model)), {}));
   const double clearance = calcClearance(solution.motion, solution.trajectory);
   std::printf("%s after %d iterations; soles stay %.1f mm over ground and beam\n",
               getName(solution.summary.termination), solution.summary.iterations, 1e3 * clearance);

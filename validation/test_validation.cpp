@@ -196,7 +196,7 @@ TEST_CASE("closed chains move freely for two seconds with Simbody, at the order 
     Workspace ws(model);
     const ConstraintSet set = makeConstraintSet(model);
     const VectorXd v = projectVelocity(model, ws, set, mechanism.q_closed, randomVector(rng, model.nv(), 1));
-    MotionOptions options;
+    validation::MotionOptions options;
     options.step = 1e-2;
     const MotionReport coarse = compareMotion(model, mechanism.q_closed, v, options);
     options.step = 5e-3;
