@@ -98,7 +98,7 @@ CheckBounds makeBounds(StepRule rule) {
 CheckReport checkMotion(const CheckedMotion& motion) {
   const CheckBounds bounds = makeBounds(motion.summary.step);
   checkConsistency(motion);
-  CheckReport report{motion.summary.motion, motion.summary.robot, static_cast<int>(motion.record.time.size()), {}};
+  CheckReport report{motion.summary.motion, motion.summary.run.robot, static_cast<int>(motion.record.time.size()), {}};
   const Worst not_finite = findNotFinite(motion);
   CheckRow numbers = not_finite.makeRow("numbers not finite", "", 0, motion);
   if (not_finite.empty())

@@ -102,11 +102,11 @@ CheckedMotion readMotion(const std::string& directory) {
   motion.summary = readSummary(directory);
   motion.record = readResultRecord(directory);
   std::error_code error;
-  const bool file_exists = std::filesystem::exists(motion.summary.robot_file, error);
-  motion.model = loadRobot(file_exists ? motion.summary.robot_file : motion.summary.robot).model;
-  if (motion.summary.model == "serial")
+  const bool file_exists = std::filesystem::exists(motion.summary.run.robot_file, error);
+  motion.model = loadRobot(file_exists ? motion.summary.run.robot_file : motion.summary.run.robot).model;
+  if (motion.summary.run.model == "serial")
     motion.model = makeSerialModel(motion.model, makeStandingPosture(motion.model),
-                                   parseSerialArmature(motion.summary.serial_armature))
+                                   parseSerialArmature(motion.summary.run.serial_armature))
                        .model;
   checkConsistency(motion);
   return motion;

@@ -73,7 +73,7 @@ inline CheckedMotion makeFreeMotion(const Model& model, double h, Formulation fo
   motion.model = model;
   motion.summary.file = "memory";
   motion.summary.motion = "free motion";
-  motion.summary.robot = model.name();
+  motion.summary.run.robot = model.name();
   motion.summary.formulation = formulation;
   motion.summary.phases = {{"free", 0, stages, h, {}}};
   MotionRecord& record = motion.record;

@@ -56,13 +56,13 @@ struct LiftArguments {
 
 int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   const MotionSummary summary = readSummary(arguments.serial_directory);
-  if (summary.motion != "paper-walk" || summary.model != "serial")
-    throw InputError(summary.file, "motion '" + summary.motion + "' of the " + summary.model + " model",
+  if (summary.motion != "paper-walk" || summary.run.model != "serial")
+    throw InputError(summary.file, "motion '" + summary.motion + "' of the " + summary.run.model + " model",
                      "it is not the paper's walk of the serial model", "make one with `bielle-paper walk --serial`");
   WalkOptions walk;
   for (const auto& [name, value] : summary.options)
     if (name == "speed") walk.speed = std::get<double>(value);
-  const LoadedRobot robot = loadRobot(summary.robot);
+  const LoadedRobot robot = loadRobot(summary.run.robot);
   const SerialModel serial = makeSerial(robot.model);
   const Motion motion = makeWalk(serial.model, walk, makeStandingPosture(serial.model));
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, readResultRecord(arguments.serial_directory));
@@ -72,7 +72,7 @@ int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::optional<MotionResult> result;
   if (!lifted.trajectory.us.empty())
-    result = makeLiftedResult({summary.robot, robot.file, command, "closed", ""}, robot.model, motion, lifted, seconds);
+    result = makeLiftedResult({summary.run.robot, robot.file, command, "closed", ""}, robot.model, motion, lifted, seconds);
   print(writeLift(arguments.directory, arguments.options.method, lifted, result ? &*result : nullptr));
   return lifted.lifted() ? 0 : 1;
 }

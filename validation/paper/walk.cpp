@@ -75,7 +75,7 @@ StageSpec makeWalkEnd(const WalkScene& scene) {
 }  // namespace
 
 Motion makeWalk(const Model& model, const WalkOptions& o, const VectorXd& q0, Formulation formulation) {
-  const Stance stance = makeStance(model, {}, q0);
+  const Stance stance = makeStance(model, {}, makeStandingRobot(model, q0));
   const double length = o.speed * (kSingle + kDouble) * kTimeStep;
   WalkScene scene{model,
                   o,
