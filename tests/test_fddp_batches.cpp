@@ -133,8 +133,13 @@ TEST_CASE("in a receding horizon steps of all lengths are rolled out in segments
   const BatchedProblem problem(cart_pole, 8);
   ShootingTrajectory t = makeLine(cart_pole);
   int num_short = 0;
-  for (int i = 0; i < 8; ++i) {  // one iteration per step, each from where the last one ended
-    const FddpSummary summary = Receding(problem).step(t);
+  RecedingOptions options;
+  options.num_step_lengths = 5;
+  options.iterations = 20;  // with those of searches in vain
+  FddpObserver once;
+  once.callback = [](const FddpIteration&, const ShootingTrajectory&) { return FddpAction::Stop; };
+  for (int i = 0; i < 8; ++i) {  // one accepted step each, from where the last one ended
+    const FddpSummary summary = Receding(problem, options).step(t, once);
     REQUIRE(summary.iterations == 1);
     num_short += summary.log[0].step < 1;
     CHECK(calcLargestGap(problem, t) == Approx(summary.gap).epsilon(1e-6).margin(1e-12));
@@ -142,7 +147,6 @@ TEST_CASE("in a receding horizon steps of all lengths are rolled out in segments
   CHECK(num_short > 2);
   CHECK(problem.most_alike == 1);  // never in one piece, where step lengths go side by side
 
-  RecedingOptions options;
   options.gradient_tolerance = makeTightOptions().gradient_tolerance;
   options.iterations = 300;
   checkOptimal(problem, Receding(problem, options).step(t), t);
@@ -154,6 +158,8 @@ TEST_CASE("a horizon that advances evaluates only what is new, with the same byt
   const int N = cart_pole.stages;
   RecedingOptions options;
   options.threads = 2;
+  options.initial_regularization = options.min_regularization = 1;  // each finds a step: else the one that advances would
+  // regularize more from then on
   Receding advancing(problem, options), plain(problem, options);
   ShootingTrajectory t = makeLine(cart_pole), other = t;
   const auto count = [&](Receding& receding, ShootingTrajectory& trajectory) {
@@ -245,4 +251,35 @@ TEST_CASE("an iteration after the first allocates nothing, in batches") {
   REQUIRE(counts.size() > 10);
   REQUIRE(problem.most_alike > 1);
   CHECK(counts.back() == counts.front());
+}
+
+TEST_CASE("a receding horizon that finds no acceptable step keeps its trajectory and damps the next one") {
+  auto cart_pole = makeCartPole();
+  BatchedProblem problem(cart_pole, 8);
+  RecedingOptions options;
+  options.num_step_lengths = 1;
+  Receding receding(problem, options);
+  ShootingTrajectory t = makeLine(cart_pole);
+  t.xs[0] = problem.initialState();
+  int kept = 0, moved = 0;
+  for (int i = 0; i < 40; ++i) {
+    const ShootingTrajectory before = t;
+    const FddpSummary summary = receding.step(t);
+    REQUIRE(summary.termination == FddpTermination::MaxIterations);
+    if (summary.iterations == 0) {
+      CHECK(t.xs == before.xs);
+      CHECK(t.us == before.us);
+      CHECK_THAT(summary.message, Catch::Contains("the iterate is kept"));
+      ++kept;
+    } else {
+      if (moved == 0) CHECK(summary.log[0].regularization == Approx(std::pow(10., kept) * options.initial_regularization));
+      ++moved;
+    }
+    receding.advance(t);
+    cart_pole.start = t.xs[0];
+    ++problem.first;
+    if (moved > 3) break;
+  }
+  CHECK(kept > 0);
+  CHECK(moved > 0);
 }

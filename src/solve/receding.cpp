@@ -17,12 +17,13 @@ class RecedingStep : private FddpIterations {
                const FddpObserver& observer, FddpMemory& memory)
       : FddpIterations(options, options.iterations, problem, trajectory, observer, memory) {}
 
-  /// \param regularization  of the first sweep, at least the initial one; then that with which the next step starts
+  /// \param regularization  of the first sweep, if the initial one is less; then what the next step starts with: more after a
+  /// search in vain, else less
   FddpSummary run(double& regularization) {
     start();
     regularization_ = std::max(regularization_, regularization);
     const FddpSummary summary = iterate();
-    regularization = regularization_;
+    regularization = rejected_ > 0 ? regularization_ : regularization / options_.regularization_decrease;
     return summary;
   }
 
