@@ -158,8 +158,8 @@ TEST_CASE("a horizon that advances evaluates only what is new, with the same byt
   const int N = cart_pole.stages;
   RecedingOptions options;
   options.threads = 2;
-  options.initial_regularization = options.min_regularization = 1;  // each finds a step: else the one that advances would
-  // regularize more from then on
+  // Both then find a step each time; else the one that advances would be regularized more.
+  options.initial_regularization = options.min_regularization = 1;
   Receding advancing(problem, options), plain(problem, options);
   ShootingTrajectory t = makeLine(cart_pole), other = t;
   const auto count = [&](Receding& receding, ShootingTrajectory& trajectory) {
@@ -272,7 +272,8 @@ TEST_CASE("a receding horizon that finds no acceptable step keeps its trajectory
       CHECK_THAT(summary.message, Catch::Contains("the iterate is kept"));
       ++kept;
     } else {
-      if (moved == 0) CHECK(summary.log[0].regularization == Approx(std::pow(10., kept) * options.initial_regularization));
+      if (moved == 0)
+        CHECK(summary.log[0].regularization == Approx(std::pow(10., kept) * options.initial_regularization));
       ++moved;
     }
     receding.advance(t);

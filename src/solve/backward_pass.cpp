@@ -47,11 +47,11 @@ int BackwardPass::update(const BackwardInput& input) {
     for (int i; (i = next.fetch_sub(1, std::memory_order_relaxed)) >= 0;) {
       const Clock::time_point start = Clock::now();
       errors.run(i, [&] { linearize(input, thread, i * size, std::min(N + 1, (i + 1) * size)); });
-      add(calcSecondsSince(start), linearize_seconds);
+      addSeconds(calcSecondsSince(start), linearize_seconds);
       if (sweeping.test_and_set(std::memory_order_acquire)) continue;
       const Clock::time_point start_sweep = Clock::now();
       sweepReadyNodes(input);
-      add(calcSecondsSince(start_sweep), sweep_seconds);
+      addSeconds(calcSecondsSince(start_sweep), sweep_seconds);
       sweeping.clear(std::memory_order_release);
     }
   });

@@ -60,7 +60,7 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
       const int begin = batch * size, count = std::min(size, num_tasks - begin);
       errors.run(batch, [&] { problem.evaluate(&tasks_[begin], count, getScratch(thread)); });
     }
-    add(calcSecondsSince(start), seconds);
+    addSeconds(calcSecondsSince(start), seconds);
   });
   errors.rethrow();
   seconds_ = seconds;

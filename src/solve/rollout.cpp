@@ -120,7 +120,7 @@ void Rollout::rollOut(const RolloutInput& input, int num_tracks) {
       group.scratch = input.evaluations.getScratch(thread);
       errors.run(g, [&] { rollOut(input, group); });
     }
-    add(calcSecondsSince(start), seconds);
+    addSeconds(calcSecondsSince(start), seconds);
   });
   seconds_ = seconds;
   errors.rethrow();

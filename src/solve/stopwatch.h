@@ -9,8 +9,8 @@ inline double calcSecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// To the time of several threads.
-inline void add(double seconds, std::atomic<double>& sum) {
+// Adds to a sum that several threads share.
+inline void addSeconds(double seconds, std::atomic<double>& sum) {
   for (double before = sum.load(); !sum.compare_exchange_weak(before, before + seconds);) {
   }
 }

@@ -11,13 +11,13 @@
 
 namespace bielle {
 
-// As many threads as OMP_NUM_THREADS says, or as this process may use processors.
+// The number of threads that OMP_NUM_THREADS asks for, or else of processors that this process may use.
 int getDefaultThreads();
 
-// The thread that calls run() works itself, helped by threads of the team. These start at the first run() that wants them. A
-// predictive controller calls run() several times per millisecond, so that they look for work without sleeping while a Shift
-// lives; and nobody waits for a helper that has not begun, because another program holds its processor: work is shared out by
-// whoever is there. One thread at a time may call it.
+// The thread that calls run() works itself, helped by the threads of the team, which start when they are first wanted. A
+// predictive controller calls run() several times per millisecond: while a Shift lives, helpers look for work without sleeping.
+// Nobody waits for a helper that has not begun, for instance because another program holds its processor; the others do its
+// share. One thread at a time may call run().
 class Team {
  public:
   Team() = default;
@@ -34,7 +34,7 @@ class Team {
         threads, [](const void* data, int i) { (*static_cast<Type*>(const_cast<void*>(data)))(i); }, &work);
   }
 
-  // A time in which run() is called often.
+  // A time in which run() is called often: helpers stay awake.
   class Shift {
    public:
     Shift(Team& team, int threads);

@@ -72,7 +72,8 @@ int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::optional<MotionResult> result;
   if (!lifted.trajectory.us.empty())
-    result = makeLiftedResult({summary.run.robot, robot.file, command, "closed", ""}, robot.model, motion, lifted, seconds);
+    result =
+        makeLiftedResult({summary.run.robot, robot.file, command, "closed", ""}, robot.model, motion, lifted, seconds);
   print(writeLift(arguments.directory, arguments.options.method, lifted, result ? &*result : nullptr));
   return lifted.lifted() ? 0 : 1;
 }

@@ -68,7 +68,7 @@ struct IterationOptions {
   double long_step = 0.5;                 ///< alpha is long above this
   double short_step = 0.01;               ///< alpha is short up to this
 
-  int num_step_lengths = 10;  ///< alpha = 1, 1/2, ..., 2^(1 - num_step_lengths)
+  int num_step_lengths = 10;  ///< alpha = 1, 1/2, ..., 2^(1 - num_step_lengths); Receding: 1, 1/4, ...
   double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must actually fall, in (0, 1)
 
   ConstraintOptions constraints;

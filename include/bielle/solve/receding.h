@@ -1,12 +1,13 @@
 #pragma once
 /// \file FDDP for a receding horizon: a few iterations per step, each about as long as the last, on a window that moves.
 ///
-/// Iterations are those of fddp.h, with four differences. Each searches few lengths, 1, 1/4, ...; if none is acceptable, the
-/// trajectory stays as it is, and the next iteration, in this step or after advance(), regularizes more. None closes the gaps for its own sake: steps of all lengths are
-/// rolled out in segments, which run at the same time, and what they leave open is left to the next step. Multipliers are new,
-/// fddp.h Eq. (12), before every linearization, which is made once. And since Eq. (10) is not at its minimum there, rows with
-/// y_k != 0 are then held at their bounds, like equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal
-/// on Optimization 13, 2002): in Eq. (10) they have
+/// Iterations are those of fddp.h, with four differences. Each tries only a few step lengths, 1, 1/4, ...; if none is
+/// acceptable, the trajectory stays as it is, and the next iteration, in this step() or after advance(), is regularized more.
+/// None closes the gaps for its own sake: steps of all lengths are rolled out in segments, which run at the same time, and
+/// what they leave open is left to the next step. Multipliers are new, fddp.h Eq. (12), before every linearization, which is
+/// made once. And since Eq. (10) is not at its minimum there, rows with y_k != 0 are then held at their bounds, like
+/// equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal on Optimization 13, 2002): in Eq. (10) they
+/// have
 ///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (14)
 /// With Eq. (10) alone a violated row moves inside by as much as it was violated. There it is free, since it is farther from
 /// its bound than y_k / rho, and is then violated again: in a walk's window, wrench cones by 0.5 in every other iteration.
@@ -20,8 +21,9 @@ struct FddpMemory;
 
 /// For a constant penalty set constraints.penalty_increase to 1, for a constant regularization the least one to the initial.
 struct RecedingOptions : IterationOptions {
-  int iterations = 1;  ///< per step, at most 1000000; fewer if it converges
-  RecedingOptions() { num_step_lengths = 2; }
+  int iterations = 1;  ///< per step, at most 1000000, those without an acceptable step included; fewer if it converges
+
+  RecedingOptions() { num_step_lengths = 2; }  // 1 and 1/4
 };
 
 /// Keeps its memory and multipliers from step to step: an iteration after the first allocates nothing.
