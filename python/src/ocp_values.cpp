@@ -1,3 +1,4 @@
+#include "bielle/ocp/contact_schedule.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bind.h"
 #include "residual.h"
