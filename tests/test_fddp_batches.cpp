@@ -194,6 +194,54 @@ TEST_CASE("a horizon that advances evaluates only what is new, with the same byt
   }
 }
 
+TEST_CASE("a window moves on to any other, and evaluates the nodes that are not the same") {
+  auto cart_pole = makeCartPole();
+  BatchedProblem problem(cart_pole, 8);
+  const int N = cart_pole.stages;
+  RecedingOptions options;
+  options.threads = 2;
+  options.initial_regularization = options.min_regularization = 1;
+  Receding moving(problem, options), plain(problem, options);
+  ShootingTrajectory t = makeLine(cart_pole), other = t;
+  const auto count = [&](Receding& receding, ShootingTrajectory& trajectory) {
+    const int before = problem.num_evaluated;
+    receding.step(trajectory);
+    return problem.num_evaluated - before;
+  };
+  count(moving, t);
+  count(plain, other);
+  std::vector<NodeSource> sources(N + 1);
+  for (int shift : {3, 0, 7}) {
+    CAPTURE(shift);
+    for (int i = 0; i < shift; ++i) {
+      t.xs.erase(t.xs.begin());
+      t.xs.push_back(t.xs.back());
+      t.us.erase(t.us.begin());
+      t.us.push_back(t.us.back());
+    }
+    cart_pole.start = t.xs[0] + VectorXd::Constant(4, 1e-3);
+    problem.first += shift;
+    int num_same = 0;
+    for (int k = 0; k <= N; ++k) {
+      sources[k] = {std::min(k + shift, N), 1, k > 0 && k + shift < N};
+      num_same += sources[k].same;
+    }
+    moving.move(sources);
+    other = t;
+    const int num_new = count(moving, t), num_all = count(plain, other);
+    CHECK(num_new == num_all - num_same);
+    CHECK(t.xs == other.xs);
+    CHECK(t.us == other.us);
+    for (int k = 0; k <= N; ++k) {
+      REQUIRE(moving.getEvaluation(k));
+      CHECK(moving.getEvaluation(k)->x == t.xs[k]);
+    }
+  }
+  CHECK_THROWS_WITH(moving.move(std::vector<NodeSource>(N)), Catch::Contains("one source per node"));
+  sources[4] = sources[3];
+  CHECK_THROWS_WITH(moving.move(sources), Catch::Contains("two nodes are the same as node 10"));
+}
+
 TEST_CASE("evaluations are kept for a problem, and made anew for another one") {
   const auto cart_pole = makeCartPole();
   const int size = GENERATE(1, 3);

@@ -61,6 +61,11 @@ TEST_CASE("a horizon that advances takes its multipliers along") {
   CHECK(largest > 0);
   CHECK(after.values[N - 1] == before[N - 1]);
   CHECK(after.values[N] == before[N]);
+
+  std::vector<NodeSource> halves(N + 1);
+  for (size_t k = 0; k <= N; ++k) halves[k] = {static_cast<int>(k / 2), 0.5};
+  solver.move(halves);
+  for (size_t k = 0; k <= N; ++k) CHECK(solver.getMultipliers().values[k] == 0.5 * after.values[k / 2]);
 }
 
 TEST_CASE("solves of one iteration, for receding horizons, linearize once each and reach the optimum together") {

@@ -202,11 +202,12 @@ void AugmentedLagrangian::setMultipliers(const Multipliers& multipliers) {
   kept_ = true;
 }
 
-void AugmentedLagrangian::advance() {
+void AugmentedLagrangian::move(const std::vector<NodeSource>& sources) {
   const size_t num_nodes = nodes_.size();
-  if (num_nodes < 3) return;
-  for (size_t k = 0; k + 2 < num_nodes; ++k) nodes_[k].multipliers.swap(nodes_[k + 1].multipliers);
-  nodes_[num_nodes - 2].multipliers = nodes_[num_nodes - 3].multipliers;
+  if (num_nodes != sources.size()) return;  // no solve so far
+  moved_.resize(num_nodes);
+  for (size_t k = 0; k < num_nodes; ++k) moved_[k] = sources[k].share * nodes_.at(sources[k].node).multipliers;
+  for (size_t k = 0; k < num_nodes; ++k) nodes_[k].multipliers.swap(moved_[k]);
   kept_ = true;
 }
 

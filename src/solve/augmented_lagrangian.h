@@ -8,7 +8,7 @@ namespace bielle {
 class AugmentedLagrangian {
  public:
   /// Reads the bounds of the problem. Starts with the initial penalty and zero multipliers, unless setMultipliers() or
-  /// advance() has provided others since the last call.
+  /// move() has provided others since the last call.
   /// \throws std::invalid_argument if a lower bound exceeds the upper one
   void resize(const ShootingProblem& problem, const ConstraintOptions& options);
   bool isEmpty() const { return rows_ == 0; }
@@ -54,8 +54,8 @@ class AugmentedLagrangian {
   double getLargestMultiplier() const;
   Multipliers getMultipliers() const;
   void setMultipliers(const Multipliers& multipliers);
-  /// Shifts the horizon by one stage: node k takes the multipliers of node k + 1.
-  void advance();
+  /// Multipliers of a window that has moved.
+  void move(const std::vector<NodeSource>& sources);
   /// The row with the largest violation, e.g. "wrench cone of foot_left at node 12 is violated by 0.05".
   std::string describeWorst(const ShootingProblem& problem) const;
 
@@ -79,6 +79,7 @@ class AugmentedLagrangian {
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;
+  std::vector<VectorXd> moved_;
   Eigen::Index rows_ = 0;   // of all nodes
   bool holds_ = false;      // by Eq. (14)
   bool restoring_ = false;  // minimizes the violations alone

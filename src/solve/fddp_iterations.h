@@ -70,7 +70,8 @@ class FddpIterations {
   double calcRounding() const;
 
   bool isInterrupted() const { return observer_.interrupt && observer_.interrupt->load(); }
-  int getNumSegments() const { return std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment)); }
+  // \param shortest  stages
+  int getNumSegments(int shortest = 6) const { return std::max(1, std::min(options_.rollout_segments, N_ / shortest)); }
   bool isClosed() const { return line_.gap <= options_.gap_tolerance; }
   bool isStationary() const { return isClosed() && (stalled_ || line_.gradient <= options_.gradient_tolerance); }
   const EvaluationList& getIterate() const { return memory_.evaluations.getIterate(); }
@@ -97,8 +98,6 @@ class FddpIterations {
   FddpSummary summary_;
 
  private:
-  static constexpr int kShortestSegment = 6;  // stages
-
   End linearizeAndSweep();
   void updateGaps();
   double calcGradient() const;

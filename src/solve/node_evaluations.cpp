@@ -69,12 +69,28 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
   return failed == end ? -1 : static_cast<int>(failed - iterate_.begin());
 }
 
-void NodeEvaluations::advance() {
+void NodeEvaluations::move(const std::vector<NodeSource>& sources) {
   const size_t num_nodes = fresh_.size();
   if (num_nodes == 0) return;  // no solve so far
-  std::rotate(iterate_.begin(), iterate_.begin() + 1, iterate_.begin() + num_nodes - 1);
-  std::rotate(fresh_.begin(), fresh_.begin() + 1, fresh_.end() - 1);
-  fresh_[0] = fresh_[num_nodes - 2] = fresh_[num_nodes - 1] = false;
+  if (sources.size() != num_nodes) throw std::invalid_argument("Receding: one source per node is needed");
+  moved_.resize(iterate_.size());
+  moved_fresh_.assign(num_nodes, false);
+  for (size_t k = 0; k < num_nodes; ++k) {
+    if (!sources[k].same) continue;
+    std::unique_ptr<NodeEvaluation>& from = iterate_.at(sources[k].node);
+    if (!from)
+      throw std::invalid_argument("Receding: two nodes are the same as node " + std::to_string(sources[k].node));
+    moved_[k] = std::move(from);
+    moved_fresh_[k] = fresh_[sources[k].node];
+  }
+  auto left = iterate_.begin();  // memory for the others
+  for (std::unique_ptr<NodeEvaluation>& to : moved_) {
+    if (to) continue;
+    while (!*left) ++left;
+    to = std::move(*left);
+  }
+  iterate_.swap(moved_);
+  fresh_.swap(moved_fresh_);
   advanced_ = true;
 }
 

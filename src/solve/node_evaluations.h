@@ -2,7 +2,7 @@
 // The evaluations of a problem's nodes that a solver keeps, and the scratch memory of the problem's functions.
 #include <algorithm>
 
-#include "bielle/solve/shooting_problem.h"
+#include "bielle/solve/receding.h"
 #include "solve/team.h"
 
 namespace bielle {
@@ -12,7 +12,7 @@ using EvaluationList = std::vector<std::unique_ptr<NodeEvaluation>>;
 class NodeEvaluations {
  public:
   /// Creates any missing memory: two sets of N + 1 evaluations, `num_rolling` single ones, scratch for each thread.
-  /// That of another problem is dropped. The evaluations of the iterate become outdated, unless advance() moved them.
+  /// That of another problem is dropped. The evaluations of the iterate become outdated, unless move() kept them.
   void resize(const ShootingProblem& problem, int num_rolling, int threads);
 
   /// Evaluates the outdated nodes of the current iterate, in batches shared among the team. Returns the first node whose
@@ -21,11 +21,14 @@ class NodeEvaluations {
   int update(const ShootingProblem& problem, const ShootingTrajectory& nodes, Team& team, int threads);
   /// Marks all evaluations of the iterate as outdated.
   void outdate() { std::fill(fresh_.begin(), fresh_.end(), false); }
-  /// Node k takes the place of node k + 1; nodes 0, N - 1 and N become outdated.
-  void advance();
+  /// Nodes that are the same as others of the last window keep their evaluations, the others become outdated.
+  /// \throws std::invalid_argument as Receding::move() does
+  void move(const std::vector<NodeSource>& sources);
 
   /// N + 1 each: of the current iterate, and of a trial that may become it by swapTrial().
   const EvaluationList& getIterate() const { return iterate_; }
+  /// Null if it is outdated.
+  const NodeEvaluation* getFresh(int node) const { return fresh_[node] ? iterate_[node].get() : nullptr; }
   const EvaluationList& getTrial() const { return trial_; }
   void swapTrial();
   /// For trials whose evaluations are not kept.
@@ -38,11 +41,12 @@ class NodeEvaluations {
 
  private:
   std::uint64_t problem_ = 0;  // id
-  EvaluationList iterate_, trial_, rolling_;
+  EvaluationList iterate_, trial_, rolling_, moved_;
   std::vector<std::unique_ptr<ProblemScratch>> scratch_;  // by thread
   std::vector<EvaluateTask> tasks_;
   std::vector<char> fresh_;  // N + 1: the evaluation is up to date with the iterate
-  bool advanced_ = false;    // since the last resize()
+  std::vector<char> moved_fresh_;
+  bool advanced_ = false;  // since the last resize()
   double seconds_ = 0;
 };
 

@@ -73,7 +73,7 @@ class RecedingStep : private FddpIterations {
   // There is no time for rollouts in one piece, except at the end.
   bool searchLine() {
     const RolloutInput input = startSearch();
-    const int segments = getNumSegments();
+    const int segments = getNumSegments(kShortestSegment);
     if (segments == 1) return searchInOnePiece(input);
     if (!vanishesNext()) return searchInSegments(input, segments);
     return (last_step_ == 1 && first_step_ == 1 && tryClosed(input, segments)) || searchInOnePiece(input);
@@ -89,6 +89,8 @@ class RecedingStep : private FddpIterations {
     }
     return false;
   }
+
+  static constexpr int kShortestSegment = 3;  // stages; 48 then make two full batches of segments
 
   int rejected_ = 0;  // searches without an acceptable step
 };
@@ -115,9 +117,16 @@ void Receding::advance(ShootingTrajectory& trajectory) {
   for (size_t k = 0; k + 1 < N; ++k) trajectory.us[k].swap(trajectory.us[k + 1]);
   trajectory.xs[N] = trajectory.xs[N - 1];
   if (N > 1) trajectory.us[N - 1] = trajectory.us[N - 2];
+  sources_.resize(N + 1);
+  for (size_t k = 0; k + 1 < N; ++k) sources_[k] = {static_cast<int>(k) + 1, 1, k > 0};
+  for (size_t k : {N - 1, N}) sources_[k] = {static_cast<int>(k), 1, false};
+  move(sources_);
+}
+
+void Receding::move(const std::vector<NodeSource>& sources) {
   advanced_ = true;
-  memory_->evaluations.advance();
-  memory_->lagrangian.advance();
+  memory_->evaluations.move(sources);
+  memory_->lagrangian.move(sources);
 }
 
 Multipliers Receding::getMultipliers() const { return memory_->lagrangian.getMultipliers(); }
@@ -127,5 +136,6 @@ void Receding::setMultipliers(const Multipliers& multipliers) {
 }
 
 const Gains& Receding::getGains(int stage) const { return memory_->backward.getSweep().getNodes()[stage]; }
+const NodeEvaluation* Receding::getEvaluation(int node) const { return memory_->evaluations.getFresh(node); }
 
 }  // namespace bielle

@@ -1,21 +1,30 @@
 #pragma once
 // The part of a problem that a receding horizon sees.
+#include <numeric>
+
 #include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
 
-// Stages [first, first + nodes) of a longer problem, from its own initial state, with the terminal costs of that
-// problem. They are counted modulo the number of its stages: a problem may be a ring, whose stages are replaced.
+// Some stages of a longer problem, from its own initial state, with the terminal costs of that problem.
 class Window : public ShootingProblem {
  public:
-  Window(const ShootingProblem& whole, int nodes) : whole_(whole), nodes_(nodes), x0_(whole.initialState()) {}
-  // \param first  a stage of the whole problem, which must have more stages than the window
+  // Shows the first stages.
+  Window(const ShootingProblem& whole, int nodes) : whole_(whole), stages_(nodes), x0_(whole.initialState()) {
+    std::iota(stages_.begin(), stages_.end(), 0);
+  }
+  // Those from one on, which the whole problem must have.
   void move(int first, const VectorXd& x0) {
-    first_ = first;
+    std::iota(stages_.begin(), stages_.end(), first);
+    x0_ = x0;
+  }
+  // \param stages  of the whole problem, as many as the window has
+  void move(const std::vector<int>& stages, const VectorXd& x0) {
+    stages_ = stages;
     x0_ = x0;
   }
 
-  int numStages() const override { return nodes_; }
+  int numStages() const override { return static_cast<int>(stages_.size()); }
   int stateSize() const override { return whole_.stateSize(); }
   int tangentSize(int node) const override { return whole_.tangentSize(getNode(node)); }
   int controlSize(int stage) const override { return whole_.controlSize(getNode(stage)); }
@@ -37,10 +46,12 @@ class Window : public ShootingProblem {
     return out;
   }
   void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override {
-    renumber(tasks, count, [&] { whole_.evaluate(tasks, count, getScratch(scratch).whole.get()); });
+    Scratch& own = getScratch(scratch);
+    renumber(tasks, count, own, [&] { whole_.evaluate(tasks, count, own.whole.get()); });
   }
   void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override {
-    renumber(tasks, count, [&] { whole_.linearize(tasks, count, getScratch(scratch).whole.get()); });
+    Scratch& own = getScratch(scratch);
+    renumber(tasks, count, own, [&] { whole_.linearize(tasks, count, own.whole.get()); });
   }
   void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override {
     Scratch& own = getScratch(scratch);
@@ -61,22 +72,24 @@ class Window : public ShootingProblem {
     std::unique_ptr<ProblemScratch> whole;
     std::vector<IntegrateTask> integrations;
     std::vector<DifferenceTask> differences;
+    std::vector<int> numbers;
   };
   static Scratch& getScratch(ProblemScratch* scratch) { return static_cast<Scratch&>(*scratch); }
-  int getNode(int node) const { return node < nodes_ ? (first_ + node) % whole_.numStages() : whole_.numStages(); }
+  int getNode(int node) const { return node < numStages() ? stages_[node] : whole_.numStages(); }
   // Calls `work` with tasks numbered by their nodes in the whole problem.
   template <typename Task, typename Work>
-  void renumber(Task* tasks, int count, const Work& work) const {
-    const int size = whole_.numStages();
-    for (int i = 0; i < count; ++i) tasks[i].node = getNode(tasks[i].node);
+  void renumber(Task* tasks, int count, Scratch& own, const Work& work) const {
+    own.numbers.resize(count);
+    for (int i = 0; i < count; ++i) {
+      own.numbers[i] = tasks[i].node;
+      tasks[i].node = getNode(tasks[i].node);
+    }
     work();
-    for (int i = 0; i < count; ++i)
-      tasks[i].node = tasks[i].node == size ? nodes_ : (tasks[i].node - first_ + size) % size;
+    for (int i = 0; i < count; ++i) tasks[i].node = own.numbers[i];
   }
 
   const ShootingProblem& whole_;
-  const int nodes_;
-  int first_ = 0;
+  std::vector<int> stages_;
   VectorXd x0_;
 };
 

@@ -26,6 +26,13 @@ struct RecedingOptions : IterationOptions {
   RecedingOptions() { num_step_lengths = 2; }  // 1 and 1/4
 };
 
+/// What a node of a window that has moved takes over from a node of the last window.
+struct NodeSource {
+  int node = 0;       ///< of the last window
+  double share = 1;   ///< of its multipliers; none where the numbers of constraints differ
+  bool same = false;  ///< its evaluation, too: problem, state and control are what they were
+};
+
 /// Keeps its memory and multipliers from step to step: an iteration after the first allocates nothing.
 class Receding {
  public:
@@ -45,21 +52,29 @@ class Receding {
   /// the problem must now be the previous node k + 1; the next step() evaluates only nodes 0, N - 1 and N. Until then no
   /// other node of the trajectory may change, or it throws std::invalid_argument. The last state and control are repeated.
   void advance(ShootingTrajectory& trajectory);
+  /// Moves on to any other window of as many stages, whose trajectory is the caller's to make. Nodes that are the same must not
+  /// change until the next step(), or it throws std::invalid_argument; the others are evaluated.
+  /// \param sources  for each node, the terminal one included; none of two nodes that are both the same
+  /// \throws std::invalid_argument when their number is not that of the last window's nodes, or a node appears twice
+  void move(const std::vector<NodeSource>& sources);
 
-  /// Those at the end of the last step(), moved on by advance(); and those from which the next one starts, with all its nodes
+  /// Those at the end of the last step(), moved on by advance() or move(); and those from which the next one starts, with all its nodes
   /// evaluated again. \throws std::invalid_argument when the penalty is not positive
   Multipliers getMultipliers() const;
   void setMultipliers(const Multipliers& multipliers);
 
   /// Of a stage of the last sweep, about the iterate linearized last; valid until the next step().
   const Gains& getGains(int stage) const;
+  /// Of a node of the trajectory that the last step() ended with, or null if it was not evaluated last; valid likewise.
+  const NodeEvaluation* getEvaluation(int node) const;
 
  private:
   const ShootingProblem* problem_;
   RecedingOptions options_;
   std::unique_ptr<FddpMemory> memory_;
-  double regularization_ = 0;  // that the last step ended with
-  bool advanced_ = false;      // since then
+  std::vector<NodeSource> sources_;  // of advance()
+  double regularization_ = 0;        // that the last step ended with
+  bool advanced_ = false;            // since then
 };
 
 }  // namespace bielle
