@@ -340,6 +340,9 @@ TEST_CASE("predictive control: windows, threads and iterations without sense are
     options.nodes = nodes;
     CHECK_THROWS_WITH(make(options), Catch::Contains("nodes must lie between 10 and 1000"));
   }
+  PredictiveOptions coarse = makeShortWindow(1);
+  coarse.fine_nodes = 9;
+  CHECK_THROWS_WITH(make(coarse), Catch::Contains("at least 10 fine_nodes"));
   for (int threads : {-1, 20000}) CHECK_THROWS_WITH(make(makeShortWindow(threads)), Catch::Contains("threads"));
   PredictiveOptions options = makeShortWindow(1);
   options.iterations = 0;

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "bielle/model/error.h"
+#include "control/window_grid.h"
 
 namespace bielle {
 namespace {
@@ -13,6 +14,8 @@ constexpr int kLeastNodes = 10, kMostNodes = 1000;
 void checkNodes(const PredictiveOptions& options) {
   if (options.nodes < kLeastNodes || options.nodes > kMostNodes)
     throw std::invalid_argument("PredictiveOptions: nodes must lie between 10 and 1000");
+  if (options.fine_nodes < kLeastNodes)
+    throw std::invalid_argument("PredictiveOptions: there must be at least 10 fine_nodes");
 }
 
 // Of the weights of joints at the end of a walk's window, whose postures are not foreseen: without any, the last stages would
@@ -36,7 +39,7 @@ class MotionHorizon : public Horizon {
   MotionHorizon(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options)
       : motion_(std::move(motion)),
         problem_(*motion_.problem),
-        last_(problem_.numStages() - options.nodes),
+        last_(problem_.numStages() - countMostStages(options)),
         plan_(plan) {
     if (problem_.formulation() != Formulation::Reduced || problem_.hasFreeTimings())
       throw std::invalid_argument("PredictiveController: the problem is not reduced, or its durations are free");
@@ -70,9 +73,9 @@ class MotionHorizon : public Horizon {
   const VectorXd& getState(int stage) const override { return plan_.xs[stage]; }
   VectorXd makeGuess(int stage) const override { return plan_.xs[stage]; }
   const VectorXd& getControl(int stage) const override { return plan_.us[stage]; }
-  void extend(int stage, ShootingTrajectory& trajectory) const override {
-    trajectory.xs.back() = plan_.xs[stage + 1];
-    trajectory.us.back() = plan_.us[stage];
+  void extend(int stage, int end, VectorXd& x, VectorXd& u) const override {
+    x = plan_.xs[end];
+    u = plan_.us[stage];
   }
   bool isSolved() const override { return true; }
 
@@ -89,11 +92,12 @@ class MotionHorizon : public Horizon {
 // foot that lands early began to swing.
 class WalkHorizon : public Horizon {
  public:
-  WalkHorizon(CommandedWalk walk, const PredictiveOptions& options) : nodes_(options.nodes), walk_(std::move(walk)) {
+  WalkHorizon(CommandedWalk walk, const PredictiveOptions& options)
+      : stages_(countMostStages(options)), walk_(std::move(walk)) {
     checkNodes(options);
     const Model& model = walk_.getModel();
     std::vector<StageSpec> specs;
-    for (int s = 0; s <= nodes_; ++s) specs.push_back(keep(walk_.makeNext()));
+    for (int s = 0; s <= stages_; ++s) specs.push_back(keep(walk_.makeNext()));
     for (StageSpec& spec : walk_.makeExamples()) specs.push_back(std::move(spec));
     size_ = static_cast<int>(specs.size());
     states_.resize(size_);
@@ -110,7 +114,7 @@ class WalkHorizon : public Horizon {
   RobotProblem& getProblem() override { return *problem_; }
   int getFirst(int stage) const override { return stage; }
   void prepare(int first) override {
-    while (made_ <= first + nodes_) {
+    while (made_ <= first + stages_) {
       const int node = made_ % size_;
       problem_->replaceStage(node, keep(walk_.makeNext()));
     }
@@ -129,8 +133,8 @@ class WalkHorizon : public Horizon {
   }
   const VectorXd& getControl(int stage) const override { return controls_[getNode(stage)]; }
   // State and control before, which are nearer than the posture that stands. Only a foot that takes off must not push.
-  void extend(int stage, ShootingTrajectory& trajectory) const override {
-    if (countFeet(stage) < countFeet(stage - 1)) trajectory.us.back() = getControl(stage);
+  void extend(int stage, int, VectorXd&, VectorXd& u) const override {
+    if (countFeet(stage) < countFeet(stage - 1)) u = getControl(stage);
   }
   bool isSolved() const override { return false; }
 
@@ -151,7 +155,7 @@ class WalkHorizon : public Horizon {
     return std::move(stage.spec);
   }
 
-  const int nodes_;
+  const int stages_;  // of the longest window
   CommandedWalk walk_;
   int size_ = 0;                             // of the ring
   int made_ = 0;                             // stages
@@ -168,13 +172,13 @@ Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOp
   if (plan.stages.size() < 2 || plan.schedule.phases.empty() || plan.guess.us.empty() || plan.guess.xs.empty())
     throw InputError(model.name(), "motion '" + plan.name + "'", "its plan has no stage, phase or guess",
                      "fill them in, e.g. by planSquat()");
-  const size_t copies = static_cast<size_t>(options.nodes);
+  const size_t copies = static_cast<size_t>(countMostStages(options));
   const StageSpec last = *(plan.stages.end() - 2);
   if (last.kind != StageKind::Dynamics)
     throw InputError(model.name(), "motion '" + plan.name + "'", "it ends with an impact",
                      "let it end with the robot standing");
   plan.stages.insert(plan.stages.end() - 1, copies, last);
-  plan.schedule.phases.back().nodes += options.nodes;
+  plan.schedule.phases.back().nodes += countMostStages(options);
   plan.guess.xs.insert(plan.guess.xs.end(), copies, VectorXd(plan.guess.xs.back()));
   plan.guess.us.insert(plan.guess.us.end(), copies, VectorXd(plan.guess.us.back()));
   plan.stages.back() = StageSpec();

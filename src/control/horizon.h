@@ -4,8 +4,8 @@
 
 namespace bielle {
 
-// Stages are numbered from the start on, without end. The problem holds those of a window that begins at getFirst() of the
-// stage given to prepare() last, and those from getBegin() to getEnd().
+// Stages are numbered from the start on, without end. The problem holds those of the longest window that begins at getFirst()
+// of the stage given to prepare() last, and those from getBegin() to getEnd().
 class Horizon {
  public:
   virtual ~Horizon() = default;
@@ -24,8 +24,9 @@ class Horizon {
   // A first guess of the state and the controls.
   virtual VectorXd makeGuess(int stage) const = 0;
   virtual const VectorXd& getControl(int stage) const = 0;
-  // After the trajectory of a window has been moved on: a guess of its last control, at this stage, and of the state after it.
-  virtual void extend(int stage, ShootingTrajectory& trajectory) const = 0;
+  // A guess for a node from this stage to `end` that follows the others: of its control, and of the state after it. They hold
+  // those of the node before.
+  virtual void extend(int stage, int end, VectorXd& x, VectorXd& u) const = 0;
   // Whether the guess of the first window is a solution.
   virtual bool isSolved() const = 0;
 };

@@ -51,6 +51,7 @@ WindowPlanner::WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveO
       horizon_(std::move(horizon)),
       problem_(horizon_->getProblem()),
       model_(problem_.model()),
+      grid_(*horizon_, options_),
       window_(problem_, options.nodes),
       evaluator_(problem_),
       impact_(model_),
@@ -176,6 +177,7 @@ void WindowPlanner::lower(int foot, int landing) {
     lowerFoot(model_, foot, kLoweringSpeed, spec);
     problem_.replaceStage(horizon_->getNode(k), std::move(spec));
   }
+  lowered_ = true;
 }
 
 // The stage that follows, by the feet that stand: the next one; that with which an early foot stands; or, while a foot is late,
@@ -232,16 +234,9 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
 }
 
 bool WindowPlanner::solveWindow(Solution& solution) {
-  const int first = horizon_->getFirst(solution.target), nodes = options_.nodes;
+  const int first = horizon_->getFirst(solution.target);
   horizon_->prepare(first);
-  if (late_.foot >= 0) retreat(first);
-  for (; first_ < first; ++first_) {
-    past_us_.push_back(trajectory_.us.front());
-    if (past_us_.size() > static_cast<size_t>(kLowering + kLate + 1)) past_us_.pop_front();
-    solver_.advance(trajectory_);
-    horizon_->extend(first_ + nodes, trajectory_);
-  }
-  moveWindow();
+  if (!move(first)) return false;
   const FddpSummary summary = solver_.step(trajectory_);
   recordSolve(summary, solution.took);
   if (summary.termination == FddpTermination::Failed) return false;
@@ -252,41 +247,91 @@ bool WindowPlanner::solveWindow(Solution& solution) {
   return true;
 }
 
-// The window begins earlier, or at the same stage again, from where the robot is now. Stages may have been replaced: all
-// are evaluated anew.
-void WindowPlanner::retreat(int first) {
-  Multipliers multipliers = solver_.getMultipliers();
-  const bool known = !multipliers.values.empty();
-  for (; first_ > first; --first_) {
-    trajectory_.xs.insert(trajectory_.xs.begin(), x_);
-    trajectory_.xs.pop_back();
-    trajectory_.us.insert(trajectory_.us.begin(), past_us_.empty() ? trajectory_.us.front() : past_us_.back());
-    trajectory_.us.pop_back();
-    if (!past_us_.empty()) past_us_.pop_back();
-    if (!known) continue;
-    multipliers.values.insert(multipliers.values.begin(), VectorXd());
-    multipliers.values.erase(multipliers.values.end() - 2);  // before those of the end
+// The window begins with this stage, and with the state that was predicted for it; earlier than before if a foot is late.
+bool WindowPlanner::move(int first) {
+  for (const WindowGrid::Node& node : grid_.getNodes()) {
+    if (node.begin >= first) break;
+    past_us_.push_back(trajectory_.us[&node - grid_.getNodes().data()]);
+    if (past_us_.size() > static_cast<size_t>(kLowering + kLate + 1)) past_us_.pop_front();
   }
-  if (known) solver_.setMultipliers(multipliers);
+  const int end = grid_.getEnd();
+  if (lowered_)
+    grid_.move(first, late_.landing - kLowering, late_.landing + 1);
+  else
+    grid_.move(first);
+  lowered_ = false;
+  std::swap(before_, trajectory_);
+  trajectory_.xs.clear();
+  trajectory_.us.clear();
+  for (const WindowGrid::Node& node : grid_.getNodes())
+    if (!continueNode(node)) return false;
+  if (grid_.getEnd() == end) trajectory_.xs.push_back(before_.xs.back());
+  if (const WindowGrid::Node* next = grid_.getNext())
+    if (!continueNode(*next)) return false;
+  trajectory_.us.resize(options_.nodes);
+  solver_.move(grid_.getSources());
+  setWindow();
+  return true;
 }
 
-void WindowPlanner::moveWindow() {
-  window_.move(horizon_->getNode(first_), x_);
-  const VectorXd& end = horizon_->getState(first_ + options_.nodes);
+// Adds a node to the trajectory, from that of the window before. An appended one brings the state at its end along.
+bool WindowPlanner::continueNode(const WindowGrid::Node& node) {
+  auto& [xs, us] = trajectory_;
+  using Origin = WindowGrid::Origin;
+  const bool has_state = xs.size() > us.size();
+  switch (node.origin) {
+    case Origin::Kept:
+      xs.push_back(before_.xs[node.source]);
+      us.push_back(before_.us[node.source]);
+      break;
+    case Origin::Cut: {
+      if (xs.empty()) {
+        xs.push_back(x_);
+      } else {
+        const int stage = grid_.getStages()[us.size() - 1];
+        const RobotEvaluation& step = evaluator_.evaluate(stage, VectorXd(xs.back()), us.back());
+        if (step.status != StepStatus::Ok) return false;
+        xs.push_back(step.x_next);
+      }
+      us.push_back(before_.us[node.source]);
+      break;
+    }
+    case Origin::Earlier:
+      xs.push_back(x_);
+      us.push_back(past_us_.empty() ? before_.us.front() : past_us_.back());
+      if (!past_us_.empty()) past_us_.pop_back();
+      break;
+    case Origin::Appended:
+      if (!has_state) xs.push_back(before_.xs.back());
+      us.push_back(us.empty() ? before_.us.back() : us.back());
+      xs.push_back(xs.back());
+      horizon_->extend(node.begin, node.getEnd(), xs.back(), us.back());
+      break;
+  }
+  return true;
+}
+
+void WindowPlanner::setWindow() {
+  window_.move(grid_.getStages(), x_);
+  const VectorXd& end = horizon_->getState(grid_.getEnd());
   problem_.setTerminalReference(end.head(model_.nq()), end.tail(model_.nv()));
 }
 
 // A first guess for the window that begins with a stage.
 void WindowPlanner::startFromGuess(int stage) {
-  first_ = horizon_->getFirst(stage);
-  horizon_->prepare(first_);
-  const int nodes = options_.nodes;
-  trajectory_.xs.resize(nodes + 1);
-  trajectory_.us.resize(nodes);
-  for (int k = 0; k <= nodes; ++k) trajectory_.xs[k] = horizon_->makeGuess(first_ + k);
-  for (int k = 0; k < nodes; ++k) trajectory_.us[k] = horizon_->getControl(first_ + k);
+  const int first = horizon_->getFirst(stage);
+  horizon_->prepare(first);
+  grid_.clear();
+  grid_.move(first);
+  trajectory_.xs.clear();
+  trajectory_.us.clear();
+  for (const WindowGrid::Node& node : grid_.getNodes()) {
+    trajectory_.xs.push_back(horizon_->makeGuess(node.begin));
+    trajectory_.us.push_back(horizon_->getControl(node.begin));
+  }
+  trajectory_.xs.push_back(horizon_->makeGuess(grid_.getEnd()));
   x_ = trajectory_.xs[0];
-  moveWindow();
+  setWindow();
 }
 
 // Less than the look-ahead is left of its phase.
@@ -317,16 +362,14 @@ void WindowPlanner::makePolicy(const Receding& solver, int stage, Solution& solu
   const Policy::Stage* before = nullptr;
   for (Policy::Stage& out : solution.stages) {
     while (isImpact(stage)) ++stage, ++node;
-    const int k = horizon_->getNode(stage);
-    fillStage(problem_, k, horizon_->getStart(stage) - advance_, trajectory_.xs[node], trajectory_.us[node],
-              trajectory_.xs[node + 1], out);
+    fillStage(problem_, grid_.getStages()[node], horizon_->getStart(stage) - advance_, trajectory_.xs[node],
+              trajectory_.us[node], trajectory_.xs[node + 1], out);
     out.phase = horizon_->getPhase(stage);
     const RowMatrixXd* earlier = isNearEnd(stage) ? findEarlierGains(before, out.phase) : nullptr;
     if (earlier) {
       out.K = *earlier;
     } else {
-      problem_.mapGains(evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]), solver.getGains(node).K,
-                        out.K);
+      problem_.mapGains(getEvaluation(solver, node), solver.getGains(node).K, out.K);
       if (out.phase == solution.stages.front().phase) keepGains(out.phase, out.K);
     }
     solution.u_hold = out.u;
@@ -335,19 +378,27 @@ void WindowPlanner::makePolicy(const Receding& solver, int stage, Solution& solu
   }
 }
 
+// Of a node of the trajectory: the solver's, or one of its own.
+const RobotEvaluation& WindowPlanner::getEvaluation(const Receding& solver, int node) {
+  if (const NodeEvaluation* evaluation = solver.getEvaluation(node))
+    return static_cast<const RobotEvaluation&>(*evaluation);
+  return evaluator_.evaluate(grid_.getStages()[node], trajectory_.xs[node], trajectory_.us[node]);
+}
+
 // Where feet that are in the air at some stage of the window, which begins with this one, first stand after it.
 void WindowPlanner::predictFootholds(int stage, Solution& solution) {
   solution.footholds.clear();
-  const int contacts = static_cast<int>(model_.contacts().size());
-  const int end = std::min(stage + options_.nodes, horizon_->getEnd());
+  const int contacts = static_cast<int>(model_.contacts().size()), shift = stage - grid_.getBegin();
+  const std::vector<WindowGrid::Node>& nodes = grid_.getNodes();
   for (int contact = 0; contact < contacts; ++contact) {
-    int landing = stage + 1;
-    while (landing < end && (stands(landing - 1, contact) || !stands(landing, contact))) ++landing;
-    if (landing >= end) continue;
+    size_t k = 1;
+    const auto standsAt = [&](size_t node) { return stands(nodes[node].begin + shift, contact); };
+    while (k < nodes.size() && (standsAt(k - 1) || !standsAt(k))) ++k;
+    if (k == nodes.size()) continue;
     const ContactFrame& foot = model_.contacts()[contact];
-    updatePlacements<double>(model_, feet_, trajectory_.xs[landing - stage].head(model_.nq()));
+    updatePlacements<double>(model_, feet_, trajectory_.xs[k].head(model_.nq()));
     solution.footholds.push_back(
-        {contact, horizon_->getStart(landing) - advance_, getPlacement(feet_, foot.body, foot.X_BF)});
+        {contact, horizon_->getStart(nodes[k].begin + shift) - advance_, getPlacement(feet_, foot.body, foot.X_BF)});
   }
 }
 

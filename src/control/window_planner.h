@@ -4,7 +4,7 @@
 
 #include "bielle/dynamics/impact.h"
 #include "bielle/solve/receding.h"
-#include "control/horizon.h"
+#include "control/window_grid.h"
 #include "solve/window.h"
 
 namespace bielle {
@@ -59,8 +59,9 @@ class WindowPlanner {
   int chooseNext(const Request& request, Solution& solution);
   bool predict(const Request& request, Solution& solution);
   bool solveWindow(Solution& solution);
-  void retreat(int first);
-  void moveWindow();
+  bool move(int first);
+  bool continueNode(const WindowGrid::Node& node);
+  void setWindow();
   void startFromGuess(int stage);
   struct KeptGains {
     int phase = -1;
@@ -70,19 +71,21 @@ class WindowPlanner {
   const RowMatrixXd* findEarlierGains(const Policy::Stage* before, int phase) const;
   void keepGains(int phase, const RowMatrixXd& K);
   void makePolicy(const Receding& solver, int stage, Solution& solution);
+  const RobotEvaluation& getEvaluation(const Receding& solver, int node);
   void predictFootholds(int stage, Solution& solution);
 
   const PredictiveOptions options_;
   const std::unique_ptr<Horizon> horizon_;
   RobotProblem& problem_;
   Model model_;
+  WindowGrid grid_;
   Window window_;
   RobotEvaluator evaluator_;
   ImpactWorkspace impact_;
   Workspace feet_;
   Receding solver_;
-  ShootingTrajectory trajectory_;  // of the window
-  std::deque<VectorXd> past_us_;   // of the stages before the window, as many as it may go back
+  ShootingTrajectory trajectory_, before_;  // of the window, and of that before it
+  std::deque<VectorXd> past_us_;            // of the stages before the window, as many as it may go back
   double advance_ = 0;  // how far feet that landed early or late have brought the motion ahead of its plan, s
   int checked_ = 0;     // the last stage whose feet were looked for
   // A foot that is waited for, or -1; the stage with which it is to stand; for how long, s.
@@ -90,7 +93,7 @@ class WindowPlanner {
     int foot = -1, landing = -1;
     double waited = 0;
   } late_;
-  int first_ = 0;  // stage with which the window begins
+  bool lowered_ = false;  // stages before the landing of the late foot have been replaced since the window last moved
   // Gains of the last stage of a phase that was far enough from its end; of the present phase and the one before, to which a
   // late foot leads back.
   KeptGains kept_[2];

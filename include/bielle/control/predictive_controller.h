@@ -1,16 +1,17 @@
 #pragma once
 /// \file Predictive control: at every stage a new plan of about the next second, from the measured state.
 ///
-/// The problem is the motion's, through a window of N of its stages. Let stage k begin at t_k. From what is measured at t_k
-/// and the torques of that instant the model predicts the state at the next stage,
+/// The problem is the motion's, through a window of N nodes. The first nodes are stages of the motion. Later ones stand for up
+/// to two, then four stages that are alike, with the costs and constraints of the first of them and a step as long as all
+/// of them (src/control/window_grid.h). Let stage k begin at t_k. From what is measured at t_k and the torques of that instant
+/// the model predicts the state at the next stage,
 ///
 ///     x_{k+1} = f_k(x(t_k) projected on the closures, u(t_k))                                                       (1)
 ///
-/// and while stage k lasts, the window from k+1 on is solved from there, in a few iterations that start from the last
-/// solution, its multipliers moved on by a stage. The window ends near the state that the motion passes at t_{k+1+N}. From
-/// t_{k+1} on the first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes effect one stage
-/// later, however fast it is found. If none is found, the previous policy, which extends some stages farther, remains
-/// in force.
+/// and while stage k lasts, the window from k+1 on is solved from there, in one or a few iterations that start from the last
+/// solution and its multipliers. The window ends near the state that the motion passes at that time. From t_{k+1} on the
+/// first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes effect one stage later, however fast
+/// it is found. If none is found, the previous policy, which extends some stages farther, remains in force.
 ///
 /// Either update() waits for the solve at the beginning of a stage: the same measurements then give the same torques, on any
 /// machine. Or, for a robot, solves run in a separate thread, and update() never waits: a solution found after t_{k+1}
@@ -24,7 +25,7 @@
 ///
 /// Motors brake before dead points of their linkages, at every instant of control (src/control/dead_point_stop.h).
 ///
-/// The motion is extended by copies of its last stage, as many as the window is long: the robot stands there.
+/// The motion is extended by copies of its last stage, as many as the longest window is long: the robot stands there.
 ///
 /// Instead of a solved motion, a commanded walk (commanded_walk.h) may be given. Its stages are made when the window
 /// reaches them; only the first window is solved beforehand. A window ends near the pose and velocity of the trunk on
@@ -37,8 +38,9 @@
 namespace bielle {
 
 struct PredictiveOptions {
-  int nodes = 100;               ///< N, 10 to 1000
-  int iterations = 2;            ///< of the solver, at every stage
+  int nodes = 48;                ///< N, 10 to 1000
+  int fine_nodes = 16;           ///< at the beginning that are one stage long, at least 10; N or more: all are
+  int iterations = 1;            ///< of the solver, at every stage
   double regularization = 1e-5;  ///< of its sweeps
   double penalty = 1;            ///< of violated constraints (solve/fddp.h, Eq. 10)
   /// Near the end of a contact phase, reuse the last gains computed at least this long before it, if necessary from an
@@ -80,7 +82,7 @@ struct PredictiveCounts {
   double calcQuantile(double share, double PredictiveSolve::*value = &PredictiveSolve::seconds) const;
 };
 
-/// The motion that predictive control solves: `plan`, followed by copies of its last stage, as many as the window is
+/// The motion that predictive control solves: `plan`, followed by copies of its last stage, as many as the longest window is
 /// long, with terminal weights from PredictiveOptions.
 /// \throws InputError as makeMotion() does
 Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,

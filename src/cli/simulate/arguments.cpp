@@ -132,7 +132,11 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
                  "on its joints, converted by the linkages' ratios in the current posture; ratio: the same, with the "
                  "constant ratios of the standing posture (default: the motion's model)")
       ->check(CLI::IsMember({"closed", "serial", "ratio"}));
-  app.add_option("--nodes", a.predictive.nodes, "number of stages in the horizon of predictive control")
+  app.add_option("--nodes", a.predictive.nodes, "number of nodes in the window of predictive control")
+      ->check(CLI::Range(10, 1000))
+      ->capture_default_str();
+  app.add_option("--fine-nodes", a.predictive.fine_nodes,
+                 "number of nodes at its beginning that are one stage long; later ones are up to two, then four")
       ->check(CLI::Range(10, 1000))
       ->capture_default_str();
   app.add_option("--iterations", a.predictive.iterations, "solver iterations of predictive control at every stage")

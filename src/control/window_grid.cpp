@@ -1,0 +1,129 @@
+#include "control/window_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bielle/motion/motion.h"
+
+namespace bielle {
+namespace {
+
+// Eq. (1).
+int getMostStages(int distance, int fine) { return distance < fine ? 1 : distance < 3 * fine ? 2 : 4; }
+
+template <typename Terms>
+bool haveSameNames(const Terms& a, const Terms& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const auto& one, const auto& other) { return one.name == other.name; });
+}
+
+StageSpec stretch(const StageSpec& first, int length) {
+  StageSpec spec = first;
+  spec.dt *= length;
+  limitGains(spec.step, spec.dt, spec.constraints);
+  // Costs grow with the length, and penalties, which are of squares, likewise.
+  for (PathConstraint& constraint : spec.path_constraints) constraint.scale /= std::sqrt(length);
+  return spec;
+}
+
+}  // namespace
+
+int countMostStages(const PredictiveOptions& options) {
+  int stages = 0;
+  for (int k = 0; k < options.nodes; ++k) stages += getMostStages(stages, options.fine_nodes);
+  return stages;
+}
+
+void WindowGrid::clear() {
+  for (const Node& node : nodes_) restore(node);
+  nodes_.clear();
+}
+
+void WindowGrid::move(int first, int changed, int changed_end) {
+  first_ = first;
+  before_.swap(nodes_);
+  nodes_.clear();
+  next_.reset();
+  const int count = options_.nodes, begin = before_.empty() ? first : before_.front().begin;
+  for (int stage = first; stage < begin; ++stage) add({stage, 1, nullptr, Origin::Earlier, 0});
+  for (size_t i = 0; i < before_.size(); ++i) {
+    Node node = before_[i];
+    node.source = static_cast<int>(i);
+    node.origin = Origin::Kept;
+    const int end = node.getEnd();
+    if (node.begin < first) {
+      restore(node);
+      if (end <= first) continue;
+      node = {first, end - first, nullptr, Origin::Cut, node.source};
+    }
+    add(std::move(node));
+  }
+  while (static_cast<int>(nodes_.size()) < count) append();
+  for (; static_cast<int>(nodes_.size()) > count; nodes_.pop_back()) {
+    restore(nodes_.back());
+    next_ = nodes_.back();
+  }
+
+  stages_.clear();
+  sources_.clear();
+  for (const Node& node : nodes_) {
+    stages_.push_back(getStage(node.begin));
+    const bool is_new = before_.empty() || node.origin == Origin::Earlier;
+    const int length = is_new ? 1 : before_[node.source].length;
+    const bool replaced = node.begin >= changed && node.begin < changed_end;
+    sources_.push_back({node.source, is_new ? 0 : std::sqrt(static_cast<double>(node.length) / length),
+                        node.origin == Origin::Kept && node.length == length && !replaced});
+  }
+  sources_.front().same = false;  // it has a new state
+  sources_.push_back({count, 1, false});
+}
+
+int WindowGrid::getStage(int stage) const {
+  const int size = horizon_.getProblem().numStages();
+  return (horizon_.getNode(first_) + stage - first_ + size) % size;
+}
+
+bool WindowGrid::areAlike(int stage, int next) const {
+  const RobotProblem& problem = horizon_.getProblem();
+  const StageSpec &a = problem.spec(getStage(stage)), &b = problem.spec(getStage(next));
+  return a.kind == StageKind::Dynamics && b.kind == StageKind::Dynamics && a.dt == b.dt && a.step == b.step &&
+         horizon_.getPhase(stage) == horizon_.getPhase(next) && haveSameNames(a.costs, b.costs) &&
+         haveSameNames(a.path_constraints, b.path_constraints);
+}
+
+void WindowGrid::restore(const Node& node) {
+  if (node.first) horizon_.getProblem().replaceStage(getStage(node.begin), *node.first);
+}
+
+// Adds a node, in parts if it is too long; the problem has its stage as it was.
+void WindowGrid::add(Node node) {
+  const int most = getMostStages(node.begin - first_, options_.fine_nodes);
+  if (node.length > most) {
+    const int half = (node.length + 1) / 2;
+    restore(node);
+    Node rest{node.begin + half, node.length - half, nullptr, Origin::Cut, node.source};
+    node.first = nullptr;
+    node.length = half;
+    add(std::move(node));
+    add(std::move(rest));
+    return;
+  }
+  if (node.length > 1 && !node.first) {
+    RobotProblem& problem = horizon_.getProblem();
+    const int stage = getStage(node.begin);
+    node.first = std::make_shared<StageSpec>(problem.spec(stage));
+    problem.replaceStage(stage, stretch(*node.first, node.length));
+  }
+  nodes_.push_back(std::move(node));
+}
+
+void WindowGrid::append() {
+  Node node;
+  node.begin = nodes_.empty() ? first_ : getEnd();
+  node.source = std::max(0, static_cast<int>(before_.size()) - 1);
+  const int most = getMostStages(node.begin - first_, options_.fine_nodes);
+  while (node.length < most && areAlike(node.begin, node.begin + node.length)) ++node.length;
+  add(std::move(node));
+}
+
+}  // namespace bielle

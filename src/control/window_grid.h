@@ -1,0 +1,69 @@
+#pragma once
+// Which stages of a horizon the nodes of a window stand for: near ones for one each, far ones for several.
+#include <memory>
+#include <optional>
+
+#include "bielle/solve/receding.h"
+#include "control/horizon.h"
+
+namespace bielle {
+
+// A node that stands for several stages has the costs, the constraints and the place in the problem of the first of them, and
+// a step as long as all of them. It joins stages that are alike: of one phase, with costs and constraints of the same names.
+// Nodes keep their place in time while the window moves, and are cut in two when they are too near. Their length is at most
+//     1 stage within the first `fine` stages of the window, 2 within the next 2 fine, 4 beyond.                           (1)
+class WindowGrid {
+ public:
+  // What a node was in the window before.
+  enum class Origin {
+    Kept,      // it began at the same stage
+    Cut,       // a later part of a node
+    Earlier,   // not part of it, the window has moved back
+    Appended,  // not part of it
+  };
+  struct Node {
+    int begin = 0, length = 1;               // stages
+    std::shared_ptr<const StageSpec> first;  // that of the horizon; null if the node is that stage
+    Origin origin = Origin::Appended;
+    int source = 0;  // Kept and Cut: this node of the window before
+    int getEnd() const { return begin + length; }
+  };
+
+  WindowGrid(Horizon& horizon, const PredictiveOptions& options) : horizon_(horizon), options_(options) {}
+
+  // Gives all stages their own place again.
+  void clear();
+  // The window begins at a stage for which the horizon is prepared.
+  // \param changed, changed_end  stages in this range, each a node of its own, have been replaced
+  void move(int first, int changed = 0, int changed_end = 0);
+
+  const std::vector<Node>& getNodes() const { return nodes_; }
+  int getBegin() const { return nodes_.front().begin; }
+  int getEnd() const { return nodes_.back().getEnd(); }
+  // The stages of the problem that the nodes are.
+  const std::vector<int>& getStages() const { return stages_; }
+  // What the solver needs to move on, terminal node included.
+  const std::vector<NodeSource>& getSources() const { return sources_; }
+  // What now follows the window if that ends earlier than before, else null.
+  const Node* getNext() const { return next_ ? &*next_ : nullptr; }
+
+ private:
+  int getStage(int stage) const;
+  bool areAlike(int stage, int next) const;
+  void restore(const Node& node);
+  void add(Node node);
+  void append();
+
+  Horizon& horizon_;
+  const PredictiveOptions& options_;
+  std::vector<Node> nodes_, before_;
+  int first_ = 0;
+  std::vector<int> stages_;
+  std::vector<NodeSource> sources_;
+  std::optional<Node> next_;
+};
+
+// The most stages that a window may stand for.
+int countMostStages(const PredictiveOptions& options);
+
+}  // namespace bielle

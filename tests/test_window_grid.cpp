@@ -1,0 +1,178 @@
+// The nodes of a window of predictive control that stand for several stages.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bielle/motion/jump.h"
+#include "bielle/motion/squat.h"
+#include "control/window_grid.h"
+#include "own_robots.h"
+
+namespace bielle {
+namespace {
+
+using bielle::testing::getBipetto;
+using Node = WindowGrid::Node;
+using Origin = WindowGrid::Origin;
+
+// A window over a walk by command, and what every window must be.
+struct Walk {
+  explicit Walk(int fine_nodes) {
+    options.fine_nodes = fine_nodes;
+    LocomotionOptions gait;
+    gait.foothold_room = 0.4;
+    gait.contact_kp = 0;
+    const CommandSource source = [](double) { return VelocityCommand{0.4, 0, 0}; };
+    CommandedWalk walk(getBipetto(), gait, {}, source, makeStandingRobot(getBipetto()));
+    CommandedWalk plan = walk;
+    for (int k = 0; k < 400; ++k) planned.push_back(plan.makeNext());
+    horizon = makeWalkHorizon(std::move(walk), options);
+    grid.emplace(*horizon, options);
+  }
+  void move(int first, int changed = 0, int changed_end = 0) {
+    horizon->prepare(first);
+    grid->move(first, changed, changed_end);
+    check(first);
+  }
+  const StageSpec& getSpec(size_t k) const { return horizon->getProblem().spec(grid->getStages()[k]); }
+
+  void check(int first) const {
+    const std::vector<Node>& nodes = grid->getNodes();
+    REQUIRE(static_cast<int>(nodes.size()) == options.nodes);
+    REQUIRE(grid->getBegin() == first);
+    CHECK(grid->getEnd() - first <= countMostStages(options));
+    for (size_t k = 0; k < nodes.size(); ++k) {
+      const Node& node = nodes[k];
+      const int distance = node.begin - first;
+      CAPTURE(first, k, node.begin, node.length);
+      if (k > 0) REQUIRE(node.begin == nodes[k - 1].getEnd());
+      REQUIRE(node.length >= 1);
+      REQUIRE(node.length <= (distance < options.fine_nodes ? 1 : distance < 3 * options.fine_nodes ? 2 : 4));
+      // It is its first stage but for its length, and feet stand or swing through all of it.
+      const CommandedWalk::Stage& stage = planned[node.begin];
+      CHECK(getSpec(k).dt == Approx(node.length * stage.spec.dt));
+      CHECK(getSpec(k).costs.size() == stage.spec.costs.size());
+      CHECK(getSpec(k).path_constraints.size() == stage.spec.path_constraints.size());
+      for (int s = node.begin; s < node.getEnd(); ++s) {
+        CHECK(planned[s].spec.constraints.contacts == stage.spec.constraints.contacts);
+        CHECK(planned[s].spec.costs.size() == stage.spec.costs.size());
+      }
+      for (const Closure& closure : getSpec(k).constraints.closures) CHECK(closure.kd * getSpec(k).dt <= 1 + 1e-12);
+    }
+  }
+  // Each node takes over what it was, or a part of that.
+  void checkSources(const std::vector<Node>& before) const {
+    const std::vector<NodeSource>& sources = grid->getSources();
+    REQUIRE(sources.size() == grid->getNodes().size() + 1);
+    CHECK_FALSE(sources.front().same);
+    CHECK_FALSE(sources.back().same);
+    CHECK(sources.back().node == options.nodes);
+    for (size_t k = 0; k + 1 < sources.size(); ++k) {
+      const Node& node = grid->getNodes()[k];
+      if (node.origin == Origin::Appended || node.origin == Origin::Earlier) continue;
+      const Node& source = before[sources[k].node];
+      CHECK(source.begin <= node.begin);
+      CHECK(node.getEnd() <= source.getEnd());
+      CHECK((node.origin == Origin::Kept) == (node.begin == source.begin));
+      CHECK(sources[k].share == Approx(std::sqrt(static_cast<double>(node.length) / source.length)));
+      CHECK(sources[k].same == (k > 0 && node.begin == source.begin && node.length == source.length));
+    }
+  }
+
+  PredictiveOptions options;
+  std::vector<CommandedWalk::Stage> planned;
+  std::unique_ptr<Horizon> horizon;
+  std::optional<WindowGrid> grid;
+};
+
+}  // namespace
+
+TEST_CASE("window grid: far nodes stand for several stages, and are cut in two as they come nearer") {
+  Walk walk(16);
+  walk.move(0);
+  CHECK(walk.grid->getEnd() > 80);
+  int cut = 0, same = 0, moves = 0;
+  for (int first = 1; first < 150; ++first, ++moves) {
+    const std::vector<Node> before = walk.grid->getNodes();
+    walk.move(first);
+    walk.checkSources(before);
+    for (const Node& node : walk.grid->getNodes()) cut += node.origin == Origin::Cut;
+    for (const NodeSource& source : walk.grid->getSources()) same += source.same;
+  }
+  CHECK(cut > moves / 2);
+  CHECK(same > 40 * moves);  // of 48
+}
+
+TEST_CASE("window grid: a window may leap ahead, through the middle of nodes, and move back") {
+  Walk walk(12);
+  int first = 0;
+  walk.move(first);
+  for (int step : {7, -2, 1, 15, -2, 31, 0, 22, 40}) {
+    const std::vector<Node> before = walk.grid->getNodes();
+    CAPTURE(step);
+    walk.move(first += step);
+    walk.checkSources(before);
+    const std::vector<Node>& nodes = walk.grid->getNodes();
+    for (int k = 0; k < -step; ++k) CHECK(nodes[k].origin == Origin::Earlier);
+    // The state at the end, if that has come nearer.
+    const Node* next = walk.grid->getNext();
+    CHECK((next != nullptr) == (nodes.back().getEnd() < before.back().getEnd()));
+    if (next) CHECK(next->begin == nodes.back().getEnd());
+  }
+}
+
+TEST_CASE("window grid: stages have their own length again when nodes no longer stand for them") {
+  Walk walk(10);
+  walk.move(0);
+  for (int first : {3, 40, 90}) walk.move(first);
+  walk.grid->clear();
+  CHECK(walk.grid->getNodes().empty());
+  const RobotProblem& problem = walk.horizon->getProblem();
+  for (int k = 0; k < problem.numStages(); ++k) CHECK(problem.spec(k).dt == walk.planned[0].spec.dt);
+}
+
+TEST_CASE("window grid: stages that were replaced are not the same") {
+  Walk walk(16);
+  walk.move(0);
+  walk.move(5, 8, 11);
+  const std::vector<NodeSource>& sources = walk.grid->getSources();
+  for (int k = 1; k < 11; ++k) CHECK(sources[k].same == (k + 5 < 8 || k + 5 >= 11));
+}
+
+TEST_CASE("window grid: with as many fine nodes as there are nodes, each is a stage") {
+  Walk walk(48);
+  for (int first : {0, 1, 2, 30}) {
+    walk.move(first);
+    CHECK(walk.grid->getEnd() == first + 48);
+  }
+}
+
+TEST_CASE("window grid: a squat's bottom and a jump's impact are nodes of their own") {
+  const Model& model = getBipetto();
+  PredictiveOptions options;
+  options.fine_nodes = 10;
+  const StandingRobot standing = makeStandingRobot(model);
+  for (MotionPlan plan : {planSquat(model, {}, standing), planJump(model, {}, standing)}) {
+    const Motion motion = makePredictiveMotion(model, std::move(plan), {}, options);
+    const int stages = motion.problem->numStages() - countMostStages(options);
+    ShootingTrajectory solved = motion.guess;
+    solved.xs.resize(stages + 1);
+    solved.us.resize(stages);
+    std::vector<StageSpec> specs;
+    for (int k = 0; k < motion.problem->numStages(); ++k) specs.push_back(motion.problem->spec(k));
+    const auto horizon = makeMotionHorizon(Motion(motion), solved, options);
+    WindowGrid grid(*horizon, options);
+    for (int first = 0; first <= stages; first += 5) {
+      grid.move(first);
+      CHECK(grid.getEnd() <= static_cast<int>(specs.size()));
+      for (const Node& node : grid.getNodes()) {
+        for (int s = node.begin + 1; s < node.getEnd(); ++s) {
+          CHECK(specs[s].kind == StageKind::Dynamics);
+          CHECK(specs[s].costs.size() == specs[node.begin].costs.size());
+          CHECK(specs[s].path_constraints.size() == specs[node.begin].path_constraints.size());
+        }
+      }
+    }
+  }
+}
+
+}  // namespace bielle
