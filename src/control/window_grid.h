@@ -38,6 +38,8 @@ class WindowGrid {
   void move(int first, int changed = 0, int changed_end = 0);
 
   const std::vector<Node>& getNodes() const { return nodes_; }
+  // Those before the last move().
+  const std::vector<Node>& getBefore() const { return before_; }
   int getBegin() const { return nodes_.front().begin; }
   int getEnd() const { return nodes_.back().getEnd(); }
   // The stages of the problem that the nodes are.

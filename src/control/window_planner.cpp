@@ -54,6 +54,7 @@ WindowPlanner::WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveO
       grid_(*horizon_, options_),
       window_(problem_, options.nodes),
       evaluator_(problem_),
+      scratch_(problem_.makeScratch()),
       impact_(model_),
       feet_(model_),
       solver_(makeSolver(options.iterations)) {
@@ -212,8 +213,10 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   measured_.resize(problem_.stateSize());
   measured_ << request.measurement.q, request.measurement.v;
   // About the state that was predicted: there the last window began.
-  if (evaluator_.evaluate(node, x_, u_).status != StepStatus::Ok) return false;
-  measured_ = evaluator_.integrate(evaluator_.difference(measured_));
+  const NodeEvaluation* predicted = solver_.getEvaluation(0);
+  if (!predicted || predicted->x != x_) predicted = &evaluator_.evaluate(node, x_, u_);
+  if (predicted->status != StepStatus::Ok) return false;
+  measured_ = interpolate(node, *predicted, measured_, 1);
   if (updateImpact(model_, impact_, problem_.spec(node).constraints, measured_.head(model_.nq()),
                    measured_.tail(model_.nv())) == DynamicsStatus::Ok)
     measured_.tail(model_.nv()) = impact_.v_plus;
@@ -231,6 +234,17 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   }
   solution.target = target;
   return true;
+}
+
+// From the state of an evaluation a share of the way to another, with loops closed.
+VectorXd WindowPlanner::interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share) {
+  VectorXd dx(problem_.tangentSize(node)), moved(problem_.stateSize());
+  const DifferenceTask difference{node, &at, &x, &dx};
+  problem_.difference(&difference, 1, scratch_.get());
+  dx *= share;
+  const IntegrateTask integrate{node, &at, &dx, &moved};
+  problem_.integrate(&integrate, 1, scratch_.get());
+  return moved;
 }
 
 bool WindowPlanner::solveWindow(Solution& solution) {
@@ -284,18 +298,20 @@ bool WindowPlanner::continueNode(const WindowGrid::Node& node) {
       xs.push_back(before_.xs[node.source]);
       us.push_back(before_.us[node.source]);
       break;
-    case Origin::Cut: {
+    case Origin::Cut:
       if (xs.empty()) {
         xs.push_back(x_);
       } else {
-        const int stage = grid_.getStages()[us.size() - 1];
-        const RobotEvaluation& step = evaluator_.evaluate(stage, VectorXd(xs.back()), us.back());
-        if (step.status != StepStatus::Ok) return false;
-        xs.push_back(step.x_next);
+        const WindowGrid::Node& whole = grid_.getBefore()[node.source];
+        const int stage = grid_.getStages()[us.size() - 1];  // any: states are alike
+        const NodeEvaluation* at = solver_.getEvaluation(node.source);
+        if (!at) at = &evaluator_.evaluate(stage, before_.xs[node.source], before_.us[node.source]);
+        const double share = static_cast<double>(node.begin - whole.begin) / whole.length;
+        xs.push_back(interpolate(stage, *at, before_.xs[node.source + 1], share));
+        if (!xs.back().allFinite()) return false;
       }
       us.push_back(before_.us[node.source]);
       break;
-    }
     case Origin::Earlier:
       xs.push_back(x_);
       us.push_back(past_us_.empty() ? before_.us.front() : past_us_.back());

@@ -60,6 +60,7 @@ class WindowPlanner {
   bool predict(const Request& request, Solution& solution);
   bool solveWindow(Solution& solution);
   bool move(int first);
+  VectorXd interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share);
   bool continueNode(const WindowGrid::Node& node);
   void setWindow();
   void startFromGuess(int stage);
@@ -81,6 +82,7 @@ class WindowPlanner {
   WindowGrid grid_;
   Window window_;
   RobotEvaluator evaluator_;
+  std::unique_ptr<ProblemScratch> scratch_;
   ImpactWorkspace impact_;
   Workspace feet_;
   Receding solver_;

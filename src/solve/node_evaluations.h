@@ -28,7 +28,9 @@ class NodeEvaluations {
   /// N + 1 each: of the current iterate, and of a trial that may become it by swapTrial().
   const EvaluationList& getIterate() const { return iterate_; }
   /// Null if it is outdated.
-  const NodeEvaluation* getFresh(int node) const { return fresh_[node] ? iterate_[node].get() : nullptr; }
+  const NodeEvaluation* getFresh(size_t node) const {
+    return node < fresh_.size() && fresh_[node] ? iterate_[node].get() : nullptr;
+  }
   const EvaluationList& getTrial() const { return trial_; }
   void swapTrial();
   /// For trials whose evaluations are not kept.

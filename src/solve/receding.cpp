@@ -136,6 +136,8 @@ void Receding::setMultipliers(const Multipliers& multipliers) {
 }
 
 const Gains& Receding::getGains(int stage) const { return memory_->backward.getSweep().getNodes()[stage]; }
-const NodeEvaluation* Receding::getEvaluation(int node) const { return memory_->evaluations.getFresh(node); }
+const NodeEvaluation* Receding::getEvaluation(int node) const {
+  return memory_->evaluations.getFresh(static_cast<size_t>(node));
+}
 
 }  // namespace bielle
