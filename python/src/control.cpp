@@ -66,7 +66,9 @@ std::vector<PredictedFoothold> getFootholds(HeldController& self) {
 
 void bindControllers(py::module_& module) {
   Value<PredictiveOptions>(module, "PredictiveOptions", "Options of predictive control.")
-      .field("nodes", &PredictiveOptions::nodes, "number of stages of a window, 10 to 1000")
+      .field("nodes", &PredictiveOptions::nodes, "nodes of a window, 10 to 1000")
+      .field("fine_nodes", &PredictiveOptions::fine_nodes,
+             "nodes at the beginning that are one stage long; later ones are up to two, then four")
       .field("iterations", &PredictiveOptions::iterations, "solver iterations at every stage")
       .field("regularization", &PredictiveOptions::regularization, "regularization of its sweeps")
       .field("penalty", &PredictiveOptions::penalty, "penalty of violated constraints")
