@@ -270,6 +270,7 @@ void printTimes(const PredictiveCounts& counts, const Execution& e) {
 void print(const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
   std::cout << plan.summary.motion << " of " << plan.summary.run.robot << " in world " << arguments.world
             << ", control " << arguments.control;
+  if (!arguments.reason.empty()) std::cout << " (" << arguments.reason << ")";
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
   std::cout << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
