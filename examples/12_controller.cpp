@@ -7,7 +7,14 @@
 /// acts. Someone pushes the robot while it walks. With (2) about the first solution it falls; with predictive control, a foot
 /// that lands elsewhere catches the push. So does a law of our own, which holds each motor m stiffly on the solution,
 ///     u_m = u_m*(t) + k_p (q_m*(t) - q_m) + k_d (v_m*(t) - v_m).                                                  (3)
+/// So far the world waits for the solver. In the end it does not: solves have a thread of their own, torques follow the
+/// clock.
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
+#include <memory>
+#include <thread>
+#include <vector>
 
 #include "bielle/control/predictive_controller.h"
 #include "bielle/motion/walk.h"
@@ -18,7 +25,7 @@ using namespace bielle;
 
 namespace {
 
-constexpr double kPeriod = 1e-3;                    // of the loop, s
+constexpr std::chrono::milliseconds kPeriod(1);     // of the loop
 constexpr double kPushStart = 1.5, kPushEnd = 1.6;  // s
 const Vector3d kPush(-70, 0, 0);                    // N, from the front: 7 N s
 
@@ -47,24 +54,72 @@ class MotorFeedback : public Controller {
   VectorXd q_, e_, v_;  // nq, nv, nv: q*, q* (-) q, v*
 };
 
-// Height of the trunk over the ground at the end, or when it fell below 0.2 m.
-double run(const Model& model, const Policy& plan, Controller& controller) {
-  const auto world = worlds::makeWorld("bielle", model, {});
-  Measurement measured{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
-  plan.getReference(0, measured.q, measured.v);
-  world->reset(measured.q, measured.v);
-  VectorXd u(model.nu());
-  while (world->getTime() < plan.getDuration() + 1 && world->getConfiguration()[2] > 0.2) {
-    measured.time = world->getTime();
-    measured.q = world->getConfiguration();
-    measured.v = world->getVelocity();
-    controller.update(measured, u);
-    world->setTorques(u);
-    const bool pushed = measured.time >= kPushStart && measured.time < kPushEnd;
-    world->setPush(pushed ? kPush : Vector3d::Zero());
-    if (!world->advance(kPeriod)) break;
+// A simulated one, which is pushed. A real one has a driver in its place.
+class Robot {
+ public:
+  Robot(const Model& model, const Policy& plan)
+      : world_(worlds::makeWorld("bielle", model, {})), duration_(plan.getDuration() + 1) {
+    VectorXd q = model.makeNeutral(), v = VectorXd::Zero(model.nv());
+    plan.getReference(0, q, v);
+    world_->reset(q, v);
   }
-  return world->getConfiguration()[2];
+
+  void read(Measurement& measured) const {
+    measured.time = world_->getTime();
+    measured.q = world_->getConfiguration();
+    measured.v = world_->getVelocity();
+  }
+  void send(const VectorXd& u) { world_->setTorques(u); }
+  void await() {  // the next instant: only a world must be asked to go on
+    const bool is_pushed = world_->getTime() >= kPushStart && world_->getTime() < kPushEnd;
+    world_->setPush(is_pushed ? kPush : Vector3d::Zero());
+    moves_ = world_->advance(std::chrono::duration<double>(kPeriod).count());
+  }
+  double getHeight() const { return world_->getConfiguration()[2]; }  // of the trunk over the ground
+  bool isWalking() const { return moves_ && getHeight() > 0.2 && world_->getTime() < duration_; }
+
+ private:
+  const std::unique_ptr<worlds::World> world_;
+  const double duration_;
+  bool moves_ = true;
+};
+
+struct Outcome {
+  double height = 0;              // of the trunk at the end, or when it fell, m
+  std::vector<double> latencies;  // from each measurement to its torques, s
+};
+
+// Carries a plan out, by the clock or as fast as it goes.
+Outcome run(const Model& model, const Policy& plan, Controller& controller, bool by_clock = false) {
+  using Clock = std::chrono::steady_clock;
+  Robot robot(model, plan);
+  Outcome out;
+  Measurement measured;
+  VectorXd u(model.nu());
+  Clock::time_point next = Clock::now();
+  while (robot.isWalking()) {
+    if (by_clock) std::this_thread::sleep_until(next);
+    next += kPeriod;
+    const Clock::time_point begin = Clock::now();
+    robot.read(measured);
+    controller.update(measured, u);
+    robot.send(u);
+    out.latencies.push_back(std::chrono::duration<double>(Clock::now() - begin).count());
+    robot.await();
+  }
+  out.height = robot.getHeight();
+  return out;
+}
+
+void printTimes(const PredictiveCounts& counts, Outcome of) {
+  std::printf("in real time: trunk at the end %.3f m; %d of %d stages began without a new policy\n", of.height,
+              counts.missed, counts.stages);
+  std::printf("  solves: median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n", 1e3 * counts.calcQuantile(0.5),
+              1e3 * counts.calcQuantile(0.99), 1e3 * counts.calcQuantile(1));
+  std::sort(of.latencies.begin(), of.latencies.end());
+  std::printf("  from a measurement to its torques: median %.3f ms, worst %.3f ms; to its policy: median %.0f ms\n",
+              1e3 * of.latencies[of.latencies.size() / 2], 1e3 * of.latencies.back(),
+              1e3 * counts.calcQuantile(0.5, &PredictiveSolve::latency));
 }
 
 }  // namespace
@@ -82,18 +137,24 @@ int main() {
   options.gait.foothold_room = 0.4;  // a foot may land elsewhere
   options.gait.cone_margin = 0.2;    // wrenches leave room for feedback
   options.gait.contact_kp = 0;       // and stands where it landed
-  const PredictiveOptions predictive;
-  PredictiveController controller(
-      makePredictiveMotion(model, planWalk(model, options, makeStandingRobot(model)), {}, predictive),
-      solution.trajectory, predictive);
+  PredictiveOptions predictive;
+  const auto makeController = [&] {
+    const MotionPlan plan = planWalk(model, options, makeStandingRobot(model));
+    return PredictiveController(makePredictiveMotion(model, plan, {}, predictive), solution.trajectory, predictive);
+  };
+  PredictiveController controller = makeController();
 
   const double start = solution.trajectory.xs[0][2];
-  const double with_gains = run(model, gains, gains), with_stiff = run(model, gains, stiff),
-               with_prediction = run(model, gains, controller);
+  const double with_gains = run(model, gains, gains).height, with_stiff = run(model, gains, stiff).height,
+               with_prediction = run(model, gains, controller).height;
   std::printf(
       "trunk at the start %.3f m; after the push with gains %.3f m, with stiff motors %.3f m, "
       "with predictive control %.3f m\n",
       start, with_gains, with_stiff, with_prediction);
   std::printf("%d solves, %d failed\n", controller.getCounts().solves, controller.getCounts().failed);
+
+  predictive.own_thread = true;
+  PredictiveController beside = makeController();
+  printTimes(beside.getCounts(), run(model, gains, beside, true));  // of this machine: no part of the verdict
   return with_gains < 0.9 * start && with_stiff > 0.9 * start && with_prediction > 0.9 * start ? 0 : 1;
 }

@@ -31,7 +31,7 @@ const char* const kMotion =
 // Eight short runs.
 std::string makeGrid() {
   return std::string("motions: [") + kMotion +
-         "]\noptions:\n  friction: [0.7, 0.1]\n  duration: 0.9\n"
+         "]\noptions:\n  control: gains\n  friction: [0.7, 0.1]\n  duration: 0.9\n"
          "push: {phase: 1.5, direction: [0, 90], impulse: [1, 60]}\n";
 }
 
@@ -95,15 +95,17 @@ TEST_CASE("campaign: a grid of runs, the same bytes with one process or several,
   // A run by itself: phase 1 of the plan, the first step, lasts from 0.3 to 0.66 s.
   const std::string alone = directory.path() + "/alone";
   const CommandResult simulated =
-      runCommand({BIELLE_COMMAND, "simulate", out + "/motions/walk/motion", "-o", alone, "--summary-only", "--friction",
-                  "0.7", "--duration", "0.9", "--push", "t=0.48,direction=90,impulse=1"});
+      runCommand({BIELLE_COMMAND, "simulate", out + "/motions/walk/motion", "-o", alone, "--summary-only", "--control",
+                  "gains", "--friction", "0.7", "--duration", "0.9", "--push", "t=0.48,direction=90,impulse=1"});
   REQUIRE(simulated.status < 2);
   const json one = json::parse(readFile(alone + "/summary.json"));
   std::istringstream log(readFile(out + "/runs.jsonl"));
   int found = 0;
   for (std::string line; std::getline(log, line);) {
     const json entry = json::parse(line);
-    if (entry.value("run", "") != "walk --friction 0.7 --duration 0.9 --push t=0.48,direction=90,impulse=1") continue;
+    if (entry.value("run", "") !=
+        "walk --control gains --friction 0.7 --duration 0.9 --push t=0.48,direction=90,impulse=1")
+      continue;
     ++found;
     for (const auto& [name, value] : entry["result"].items()) CHECK(value == one[name]);
   }
@@ -122,9 +124,9 @@ TEST_CASE("campaign: after an interruption only what is missing is done") {
   // A squat of 40 stages, whose gains are found at once; twelve runs.
   const std::string head = "motions: [{name: squat, solve: squat, robot: " BIELLE_SOURCE_DIR
                            "/robots/bipetto, set: {depth: 0.9, duration: 0.6, settle: 0.1, time_step: 0.02}}]\n";
-  const std::string spec = directory.write(
-      "spec.yaml",
-      head + "options: {friction: [0.7, 0.1]}\npush: {time: 0.3, direction: [0, 90, 180], impulse: [1, 60]}\n");
+  const std::string spec = directory.write("spec.yaml", head +
+                                                            "options: {control: gains, friction: [0.7, 0.1]}\npush: "
+                                                            "{time: 0.3, direction: [0, 90, 180], impulse: [1, 60]}\n");
   const std::string out = directory.path() + "/out", log = out + "/runs.jsonl";
   {
     Command command({BIELLE_COMMAND, "campaign", spec, "-o", out, "--jobs", "2"});
@@ -139,14 +141,14 @@ TEST_CASE("campaign: after an interruption only what is missing is done") {
   const int done = countLines(log) - 1;
   REQUIRE(done >= 3);
   REQUIRE(done < 12);
-  std::ofstream(log, std::ios::app) << "{\"run\": \"squat --fri";  // cut off by a crash
+  std::ofstream(log, std::ios::app) << "{\"run\": \"squat --con";  // cut off by a crash
   const CommandResult rest = runCampaign(spec, out);
   REQUIRE(rest.status == 0);
   CHECK(countProgress(rest) == 12 - done);
   CHECK(countLines(log) == 13);
   // One of these runs: it is in the log, unless its motion changes.
-  const std::string other =
-      directory.write("other.yaml", head + "options: {friction: 0.7}\npush: {time: 0.3, direction: 0, impulse: 1}\n");
+  const std::string other = directory.write(
+      "other.yaml", head + "options: {control: gains, friction: 0.7}\npush: {time: 0.3, direction: 0, impulse: 1}\n");
   CHECK(countProgress(runCampaign(other, out)) == 0);
   std::ofstream(out + "/motions/squat/motion/summary.json", std::ios::app) << "\n";
   CHECK(countProgress(runCampaign(other, out)) == 1);
@@ -217,10 +219,10 @@ TEST_CASE("campaign: dry runs stop at once when the user asks for it, and equal 
 
 TEST_CASE("campaign: the largest impulse that is survived, by bisection") {
   const RobotDirectory directory;
-  const std::string spec = directory.write(
-      "spec.yaml",
-      std::string("motions: [") + kMotion +
-          "]\noptions: {duration: 1.2}\npush: {time: 0.4, direction: 90, largest_impulse: {up_to: 32, step: 1}}\n");
+  const std::string spec =
+      directory.write("spec.yaml", std::string("motions: [") + kMotion +
+                                       "]\noptions: {control: gains, duration: 1.2}\npush: {time: 0.4, direction: 90, "
+                                       "largest_impulse: {up_to: 32, step: 1}}\n");
   const std::string out = makeOutput(directory);
   const CommandResult result = runCampaign(spec, out);
   CAPTURE(result.err);
@@ -233,7 +235,7 @@ TEST_CASE("campaign: the largest impulse that is survived, by bisection") {
   REQUIRE(survived < 32);
   for (const int impulse : {survived, survived + 1})
     CHECK(runCommand({BIELLE_COMMAND, "simulate", out + "/motions/walk/motion", "-o", directory.path() + "/one",
-                      "--summary-only", "--duration", "1.2", "--push",
+                      "--summary-only", "--control", "gains", "--duration", "1.2", "--push",
                       "t=0.4,direction=90,impulse=" + std::to_string(impulse)})
               .status == (impulse > survived));
 }

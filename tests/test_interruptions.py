@@ -213,7 +213,7 @@ def test_motions_carried_out():
         with open("carried_out/trajectory.csv") as file:
             times = [float(row["time"]) for row in csv.DictReader(file)]
         assert times[0] == 0 and abs(times[-1] - summary["duration"]) < 1e-9 and times[-1] < 100
-    run(*command, "--live", "--real-time", "--control", "mpc", status=2, error="leave out --real-time")
+    run(*command, "--live", "--real-time", status=2, error="leave out --real-time")
 
 
 def await_(condition, child):
@@ -233,7 +233,7 @@ def test_stopped_at_once():
     if not os.access(os.path.join(os.path.dirname(program), "bielle-simulate"), os.X_OK):
         return
     run(*SQUAT, "--quiet", "--no-report", "-o", "planned", status=0)
-    child = subprocess.Popen([program, "simulate", "planned", "-o", "early"], stdout=subprocess.PIPE,
+    child = subprocess.Popen([program, "simulate", "planned", "--control", "gains", "-o", "early"], stdout=subprocess.PIPE,
                              stderr=subprocess.PIPE, text=True)
     await_(lambda: catches(child, signal.SIGINT), child)
     child.send_signal(signal.SIGINT)
@@ -248,8 +248,8 @@ def test_stopped_at_once():
     for world in worlds:
         for options in (["--time-step", "1e-12"], ["--record-period", "100", "--hold", "1000", "--summary-only"]):
             shutil.rmtree("tiny", ignore_errors=True)
-            child = subprocess.Popen([program, "simulate", "planned", "--world", world, *options, "-o", "tiny"],
-                                     stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            child = subprocess.Popen([program, "simulate", "planned", "--control", "gains", "--world", world, *options,
+                                      "-o", "tiny"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             await_(lambda: os.path.exists("tiny"), child)
             time.sleep(1)
             child.send_signal(signal.SIGINT)
@@ -275,8 +275,8 @@ def test_live_on_a_full_disk():
         print("  (no file system can be mounted here)")
         return
     try:
-        child = subprocess.Popen([program, "simulate", "planned", "--hold", "1000", "--live", "-o", "tight/out"],
-                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        child = subprocess.Popen([program, "simulate", "planned", "--control", "gains", "--hold", "1000", "--live", "-o",
+                                  "tight/out"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         await_(lambda: os.path.exists("tight/out/report.html"), child)
         assert read_summary("tight/out")["outcome"] == "running"
         lines = []

@@ -284,6 +284,10 @@ TEST_CASE(
   CHECK(num_allocations_here == before);  // to take solutions and ask for the next, none either
   CHECK(controller.getCounts().missed == 3);
   CHECK(controller.getCounts().solves == asking + 5);  // the late one, and one for each stage since
+  CHECK(controller.getCounts().stages == asking + 8);
+  const std::vector<PredictiveSolve>& solves = controller.getCounts().last;
+  for (const PredictiveSolve& solve : solves)
+    CHECK((solve.latency > 0) == (&solve != &solves.back()));  // not yet in force
   CHECK(controller.getCounts().failed == 0);
 }
 

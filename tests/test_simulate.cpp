@@ -1,4 +1,5 @@
 // The command `bielle simulate`: what it writes, its exit statuses, and that it repeats itself to the byte.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
@@ -65,10 +66,11 @@ struct Scratch {
 TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
   const Scratch scratch;
   const std::string output = (scratch.path / "walk").string();
-  const CommandResult result = simulate(output, {});
+  const CommandResult result = simulate(output, {"--control", "gains"});
   CAPTURE(result.out, result.err);
   REQUIRE(result.status == 0);
   const nlohmann::json summary = parseSummary(output);
+  CHECK(summary["control"] == "gains");
   CHECK(summary["fell"] == false);
   CHECK(summary["fall_time"].is_null());
   CHECK(summary["distance"].get<double>() > 0.1);
@@ -101,8 +103,8 @@ TEST_CASE("simulate: the speed in steady steps is told beside that of the whole;
   REQUIRE(runCommand({BIELLE_COMMAND, "solve", "walk", "--robot", robot, "--speed", "0.4", "--steps", "4", "-o", plan,
                       "--quiet", "--no-report", "--no-check"})
               .status == 0);
-  const CommandResult walked = runCommand({BIELLE_COMMAND, "simulate", plan, "-o", output, "--summary-only", "--push",
-                                           "t=0.5,impulse=0.25,direction=90,duration=0.2"});
+  const CommandResult walked = runCommand({BIELLE_COMMAND, "simulate", plan, "--control", "gains", "-o", output,
+                                           "--summary-only", "--push", "t=0.5,impulse=0.25,direction=90,duration=0.2"});
   CAPTURE(walked.out, walked.err);
   REQUIRE(walked.status == 0);
   CHECK_THAT(walked.out, Catch::Contains("with the time that it stands, 0."));
@@ -151,7 +153,7 @@ TEST_CASE("simulate: a controller may believe in another model than that of the 
   const Scratch scratch;
   const std::string output = (scratch.path / "serial").string();
   for (const std::string model : {"serial", "ratio"}) {
-    const CommandResult result = simulate(output, {"--model", model, "--summary-only"});
+    const CommandResult result = simulate(output, {"--model", model, "--control", "gains", "--summary-only"});
     CAPTURE(model, result.out, result.err);
     CHECK(result.status <= 1);  // it may well fall
     CHECK(result.err.empty());
@@ -168,7 +170,9 @@ TEST_CASE("simulate: a controller may believe in another model than that of the 
 TEST_CASE("simulate: the plan lies beside what happened, and the page shows both") {
   const Scratch scratch;
   const std::string output = (scratch.path / "shown").string();
-  REQUIRE(simulate(output, {"--push", "t=0.2,impulse=1,direction=90", "--duration", "0.5"}).status == 0);
+  REQUIRE(
+      simulate(output, {"--control", "gains", "--push", "t=0.2,impulse=1,direction=90", "--duration", "0.5"}).status ==
+      0);
   const MotionRecord record = readRecord(output + "/trajectory.npz"), plan = readRecord(output + "/plan.npz");
   REQUIRE(plan.time == record.time);
   CHECK(plan.q.row(0) == record.q.row(0));
@@ -191,8 +195,14 @@ TEST_CASE("simulate: the plan lies beside what happened, and the page shows both
 TEST_CASE("simulate: the summary alone is that of the whole result; a dry run only checks") {
   const Scratch scratch;
   const std::string whole = (scratch.path / "whole").string(), alone = (scratch.path / "alone").string();
-  REQUIRE(simulate(whole, {"--duration", "0.3", "--no-report"}).status == 0);
-  REQUIRE(simulate(alone, {"--duration", "0.3", "--summary-only"}).status == 0);
+  const std::vector<std::string> options = {"--control", "gains", "--duration", "0.3"};
+  const auto simulateWith = [&options](const std::string& output, const std::string& files) {
+    std::vector<std::string> all = options;
+    all.push_back(files);
+    return simulate(output, all).status;
+  };
+  REQUIRE(simulateWith(whole, "--no-report") == 0);
+  REQUIRE(simulateWith(alone, "--summary-only") == 0);
   CHECK(std::distance(fs::directory_iterator(alone), fs::directory_iterator()) == 1);
   nlohmann::json summaries[] = {parseSummary(whole), parseSummary(alone)};
   for (nlohmann::json& summary : summaries)
@@ -228,7 +238,8 @@ TEST_CASE("simulate: with real sensors a walk stands on flat and on uneven groun
   for (const std::string terrain : {"flat", "tiles=0.003"})
     for (const std::string seed : {"1", "2"}) {
       CAPTURE(terrain, seed);
-      const CommandResult result = simulate(output, {"--sensors", "real", "--terrain", terrain, "--seed", seed});
+      const CommandResult result =
+          simulate(output, {"--control", "gains", "--sensors", "real", "--terrain", terrain, "--seed", seed});
       CAPTURE(result.out, result.err);
       CHECK(result.status == 0);
       CHECK(result.out.find("estimated trunk") != std::string::npos);
@@ -250,6 +261,8 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, robot, push
   const auto record = [&](const std::string& name, std::vector<std::string> options,
                           const std::string& motion = getSquat()) {
     const std::string output = (scratch.path / name).string();
+    if (std::find(options.begin(), options.end(), "--control") == options.end())
+      options.insert(options.end(), {"--control", "gains"});
     options.insert(options.end(), {"--no-report"});
     const CommandResult result = simulate(output, options, motion);
     REQUIRE(result.status < 2);
@@ -273,6 +286,10 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, robot, push
   CHECK(record("heavy again", {"--mass-error", "0.02"}) == heavy);
   CHECK(record("heavy otherwise", {"--mass-error", "0.02", "--seed", "2"}) != heavy);
   CHECK(record("crooked", {"--rod-error", "0.0002"}) != first);
+  const auto predict = [&](const std::string& name, const std::string& threads) {
+    return record(name, {"--control", "mpc", "--threads", threads, "--duration", "0.4"});
+  };
+  CHECK(predict("predicted", "1") == predict("predicted again", "2"));
   // Around the start every ground is level.
   const auto walk = [&](const std::string& terrain, const std::string& seed) {
     return record(terrain + seed, {"--terrain", terrain, "--seed", seed, "--duration", "0.9"}, getWalk());
@@ -302,13 +319,13 @@ TEST_CASE("simulate: a motion of least energy is carried out as such; one of lea
     return parseSummary(directory)["electrical_energy"]["total_J"].get<double>();
   };
   const std::string least = solve("energy");
-  REQUIRE(simulate(least, {"--hold", "0"}).status == 0);
+  REQUIRE(simulate(least, {"--control", "gains", "--hold", "0"}).status == 0);
   CHECK(parseSummary(least + "/carried-out")["objective"]["kind"] == "energy");
   CHECK(getEnergy(least + "/carried-out") == Approx(getEnergy(least)).epsilon(0.02));
   const std::string peak = solve("peak-torque");
   const CommandResult refused = simulate(peak, {});
   CHECK(refused.status == 2);
-  CHECK(refused.err.find("peak-torque") != std::string::npos);
+  CHECK_THAT(refused.err, Catch::Contains("peak-torque") && Catch::Contains("give --control open"));
   CHECK(simulate(peak, {"--control", "open"}).status < 2);
 }
 
@@ -360,6 +377,62 @@ TEST_CASE("simulate: predictive control survives a push that gains do not") {
   CHECK(solves["regularization"]["median"].get<double>() > 0);
 }
 
+TEST_CASE("simulate: predictive control is the default, and gains where it cannot carry a motion out") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "out").string(), full = (scratch.path / "full").string();
+  const CommandResult predicted = simulate(output, {"--summary-only"}, getSquat());
+  CAPTURE(predicted.out, predicted.err);
+  REQUIRE(predicted.status == 0);
+  CHECK_THAT(predicted.out, Catch::Contains("control mpc: it stood"));
+  const nlohmann::json summary = parseSummary(output), &solves = summary["solves"];
+  CHECK(summary["control"] == "mpc");
+  CHECK(summary["largest_deviation"].get<double>() < 5e-3);
+  CHECK(solves["stages"] == 90);  // 0.8 s of the squat and 1 s more, in stages of 20 ms
+  CHECK(solves["count"] == 90);
+  CHECK(solves["failed"] == 0);
+  CHECK_FALSE(summary.contains("real_time"));
+
+  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--depth",
+                      "0.95", "--formulation", "full", "-o", full, "--quiet", "--no-report", "--no-check"})
+              .status == 0);
+  const CommandResult other = simulate(output, {"--summary-only", "--duration", "0.1"}, full);
+  CAPTURE(other.out, other.err);
+  CHECK(other.status == 0);
+  CHECK_THAT(other.out, Catch::Contains("control gains (mpc cannot carry out motions solved with --formulation full)"));
+  CHECK(parseSummary(output)["control"] == "gains");
+  for (const std::vector<std::string>& wanted : {std::vector<std::string>{"--control", "mpc"}, {"--real-time"}}) {
+    const CommandResult refused = simulate(output, wanted, full);
+    CAPTURE(refused.err);
+    CHECK(refused.status == 2);
+    CHECK_THAT(refused.err, Catch::Contains("formulation 'full'") && Catch::Contains("--control gains"));
+  }
+}
+
+// Sizes and relations only: how fast a machine is under what load is not known.
+TEST_CASE("simulate: in real time the times of solves, stages without one and latencies are told") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "live").string();
+  const CommandResult result = simulate(
+      output, {"--real-time", "--nodes", "10", "--iterations", "1", "--duration", "1", "--summary-only"}, getSquat());
+  CAPTURE(result.out, result.err);
+  REQUIRE(result.status < 2);
+  const nlohmann::json summary = parseSummary(output), &solves = summary["solves"], &clock = summary["real_time"];
+  const int stages = solves["stages"], count = solves["count"], missed = solves["missed"];
+  CHECK((stages > 0 && stages <= 50));
+  CHECK(count > 0);
+  CHECK((count + missed == stages || count + missed == stages - 1));  // the last solve may not be over
+  for (const nlohmann::json* times : {&solves, &clock["update"], &clock["new_policy"]}) {
+    const double median = (*times)["median_ms"], most = (*times)["p99_ms"], worst = (*times)["worst_ms"];
+    CHECK((0 < median && median <= most && most <= worst));
+  }
+  CHECK(clock["largest_lag_ms"].get<double>() > 0);
+  CHECK((clock["peak_memory_MB"].get<double>() > 1 && clock["peak_memory_MB"].get<double>() < 4000));
+  CHECK_THAT(result.out, Catch::Contains(std::to_string(missed) + " of " + std::to_string(stages) +
+                                         " stages began without a new policy\n") &&
+                             Catch::Contains("until torques       median ") &&
+                             Catch::Contains("until a new policy  median ") && Catch::Contains("MB at most"));
+}
+
 TEST_CASE("simulate: a walk follows commands, turns on the way and stops") {
   const Scratch scratch;
   const std::string commands = (scratch.path / "commands.yaml").string(), output = (scratch.path / "walked").string();
@@ -372,7 +445,7 @@ TEST_CASE("simulate: a walk follows commands, turns on the way and stops") {
     arguments.insert(arguments.end(), options.begin(), options.end());
     return runCommand(arguments);
   };
-  const CommandResult result = walk({"--command", commands, "--duration", "4.2", "--control", "mpc"});
+  const CommandResult result = walk({"--command", commands, "--duration", "4.2"});
   CAPTURE(result.out, result.err);
   REQUIRE(result.status == 0);
   const auto summary = parseSummary(output);
@@ -443,13 +516,6 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
       CHECK_THAT(result.err, Catch::Contains("--" + number) && Catch::Contains("'" + value + "' is not a "));
       CHECK(result.err.size() < 200);
     }
-  const std::string full = (scratch.path / "full").string();
-  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--depth",
-                      "0.95", "--formulation", "full", "-o", full, "--quiet", "--no-report", "--no-check"})
-              .status == 0);
-  const CommandResult open_states = runCommand({BIELLE_COMMAND, "simulate", full, "--control", "mpc", "-o", output});
-  CHECK(open_states.status == 2);
-  CHECK(open_states.err.find("formulation") != std::string::npos);
   const CommandResult none = runCommand({BIELLE_COMMAND, "simulate", "/nowhere", "-o", output});
   CHECK(none.status == 2);
   CHECK(none.err.find("/nowhere") != std::string::npos);

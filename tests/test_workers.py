@@ -230,7 +230,7 @@ def test_real():
     port = find_port()
     with open("real.yaml", "w") as file:
         file.write("motions: [{name: walk, solve: walk, robot: bipetto, set: {speed: 0.4, steps: 2}}]\n"
-                   "options: {friction: [0.7, 0.1], duration: 0.6}\npush: {time: 0.4, impulse: [1, 40]}\n")
+                   "options: {control: gains, friction: [0.7, 0.1], duration: 0.6}\npush: {time: 0.4, impulse: [1, 40]}\n")
     subprocess.run([built, "campaign", "real.yaml", "-o", "alone"], check=True, stderr=subprocess.DEVNULL,
                    stdout=subprocess.DEVNULL)
     manager = start([built, "campaign", "real.yaml", "-o", "together", "--workers", str(port), "--password", "password"],

@@ -98,6 +98,7 @@ MOTIONS = [(f"{robot}: {title}", robot, motion, options)
                *((f"walk at {speed} m/s", "walk", ["--speed", speed]) for speed in (0.2, 0.4, 0.6, 0.8)),
                ("stairs of 5 cm", "stairs", ["--height", 0.05]), ("jump, 0.3 s in the air", "jump", ["--flight", 0.3])]]
 WALK = ("walk", "bipetto", ["--speed", 0.4])
+GAINS = ("--control", "gains")
 
 
 def simulate(runner, target, *options):
@@ -117,7 +118,7 @@ def measure_gains(runner):
     for title, robot, motion, options in MOTIONS:
         result = runner.solve(motion, robot, options)
         for world in WORLDS[:2]:
-            s = simulate(runner, result.directory, "--world", world)
+            s = simulate(runner, result.directory, *GAINS, "--world", world)
             rows.append([title, world, tell_fall(s), f"{1e3 * s['largest_deviation']:.1f}",
                          f"{1e3 * s['largest_slip']:.2f}", f"{1e6 * s['largest_gap']:.1g}"])
     return ["motion", "world", "outcome", "trunk off its plan [mm]", "slip [mm]", "closures open by [µm]"], rows
@@ -128,7 +129,7 @@ def measure_sensors(runner):
     for title, robot, motion, options in MOTIONS:
         result = runner.solve(motion, robot, options)
         for world in WORLDS[:2]:
-            s = simulate(runner, result.directory, "--world", world, "--sensors", "real")
+            s = simulate(runner, result.directory, *GAINS, "--world", world, "--sensors", "real")
             e = s["estimator"]
             rows.append([title, world, tell_fall(s), f"{1e3 * e['position_error']['rms']:.1f}",
                          f"{1e3 * e['velocity_error']['rms']:.1f}", show(e["drift_share"], "{:.2f}", 100),
@@ -144,7 +145,7 @@ def measure_errors(runner):
     for error in (["--mass-error", 0.1], ["--rod-error", 0.0005]):
         counts = []
         for more in ([], ["--look-ahead", 36]):
-            runs = [simulate(runner, plan, *error, *more, "--seed", seed) for seed in range(1, 6)]
+            runs = [simulate(runner, plan, *GAINS, *error, *more, "--seed", seed) for seed in range(1, 6)]
             counts.append(sum(run["outcome"] == STOOD for run in runs))
         rows.append([f"`{' '.join(map(str, error))}`", *counts])
     return ["error", "gains", "gains, look-ahead 36"], rows
@@ -158,7 +159,8 @@ def measure_delays(runner):
                                        ("squat to 0.8", "squat", ["--depth", 0.8])):
             plan = runner.solve(motion, robot, options).directory
             rows.append([f"{robot}: {title}",
-                         *(tell_fall(simulate(runner, plan, "--delay", delay, "--jitter", 1)) for delay in delays)])
+                         *(tell_fall(simulate(runner, plan, *GAINS, "--delay", delay, "--jitter", 1))
+                           for delay in delays)])
     return ["motion", *map(str, delays)], rows
 
 

@@ -87,7 +87,7 @@ def simulate(
 
     result: a Result, or the directory of one; for a commanded walk, the name of the motion
     directory: for the trajectory, the summary and the report; None: nothing is kept
-    options: those of the command, e.g. world="mujoco", control="mpc", push="t=1,impulse=5,direction=90,duration=0.1"
+    options: those of the command, e.g. world="mujoco", control="gains", push="t=1,impulse=5,direction=90,duration=0.1"
     """
     if isinstance(result, Result):
         with tempfile.TemporaryDirectory() as plan:

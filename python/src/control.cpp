@@ -113,6 +113,7 @@ void bindControllers(py::module_& module) {
             py::dict out;
             if (!self.predictive) return out;
             const PredictiveCounts& counts = self.predictive->getCounts();
+            out["stages"] = counts.stages;
             out["solves"] = counts.solves;
             out["failed"] = counts.failed;
             out["early"] = counts.early;
@@ -120,7 +121,8 @@ void bindControllers(py::module_& module) {
             out["missed"] = counts.missed;
             return out;
           },
-          "counts of predictive control: solves, failed solves, early and late landings, solves longer than a stage")
+          "counts of predictive control: stages, solves, failed solves, early and late landings, solves longer than a "
+          "stage")
       .def_property_readonly(
           "footholds", &getFootholds,
           "predictive control only: a PredictedFoothold for each contact that lands within the window");

@@ -1,14 +1,17 @@
 #include "bielle/control/predictive_controller.h"
 
-#include <algorithm>
-#include <cmath>
+#include <chrono>
+#include <utility>
 
 #include "control/clock.h"
 #include "control/dead_point_stop.h"
 #include "control/solving_thread.h"
+#include "math/quantile.h"
 
 namespace bielle {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 constexpr size_t kSolves = 100000;  // that are kept
 
@@ -41,6 +44,7 @@ class PredictiveController::Loop {
     if (ready_ && measurement.getActionTime() + kClockTolerance >= getStart(solution_.target)) {
       policy_->exchange(solution_.stages, solution_.u_hold);
       ready_ = false;
+      counts_.last[newest_].latency = std::chrono::duration<double>(Clock::now() - measured_).count();
     }
     policy_->update(measurement, u);
     dead_point_stop_.add(measurement, u);
@@ -60,6 +64,7 @@ class PredictiveController::Loop {
   double getStart(int stage) const { return planner_.getStart(stage) - advance_; }
 
   void enter(const Measurement& measurement, ConstVectorRef u) {
+    ++counts_.stages;
     if (thread_ && thread_->getState() != SolvingThread::State::Idle) {
       ++counts_.missed;
       return;
@@ -67,6 +72,7 @@ class PredictiveController::Loop {
     request_.stage = stage_;
     request_.measurement = measurement;
     request_.u = u;
+    requested_ = Clock::now();
     if (thread_) return thread_->begin();
     const double available = getStart(stage_ + 1) - getStart(stage_) - measurement.delay;
     planner_.solve(request_, solution_);
@@ -83,10 +89,12 @@ class PredictiveController::Loop {
     counts_.failed += !solution_.solved;
     counts_.early += solution_.early;
     counts_.late += solution_.late;
+    measured_ = requested_;
+    newest_ = static_cast<size_t>(counts_.solves) % kSolves;
     if (counts_.last.size() < kSolves)
       counts_.last.push_back(solution_.took);
     else
-      counts_.last[static_cast<size_t>(counts_.solves) % kSolves] = solution_.took;
+      counts_.last[newest_] = solution_.took;
     ++counts_.solves;
   }
 
@@ -101,15 +109,16 @@ class PredictiveController::Loop {
   double advance_ = 0;   // of the clock of the motion, s
   double awaited_ = -1;  // the landing of a late foot, s of the motion; negative: none is late
   PredictiveCounts counts_;
-  std::unique_ptr<SolvingThread> thread_;  // last: it ends first
+  size_t newest_ = 0;                       // the solution's place in the counts
+  Clock::time_point requested_, measured_;  // when the measurements of request and solution were taken
+  std::unique_ptr<SolvingThread> thread_;   // last: it ends first
 };
 
 double PredictiveCounts::calcQuantile(double share, double PredictiveSolve::*value) const {
-  if (last.empty()) return 0;
-  std::vector<double> sorted;
-  for (const PredictiveSolve& solve : last) sorted.push_back(solve.*value);
-  std::sort(sorted.begin(), sorted.end());
-  return sorted[static_cast<size_t>(std::ceil(share * static_cast<double>(sorted.size() - 1)))];
+  std::vector<double> values;
+  for (const PredictiveSolve& solve : last)
+    if (solve.*value >= 0) values.push_back(solve.*value);
+  return bielle::calcQuantile(std::move(values), share);
 }
 
 PredictiveController::PredictiveController(Motion motion, const ShootingTrajectory& plan,

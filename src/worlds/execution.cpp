@@ -183,6 +183,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   FallDetector detector(model, plan, world.getConfiguration(), o.fall, o.ground, o.planned_ground);
   perception.reset(world, measurement.q, measurement.v);
   out.start = out.end = world.getBooks();
+  out.update_seconds.reserve(static_cast<size_t>(ticks));
   recorder.addNode(world, controller.getFootholds());
   const Vector3d com_start = recorder.getCom();
   int cut = 0, tick = 0;
@@ -208,7 +209,9 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     const double start = pace.getElapsed();
     measurement = perception.update(world, controller.getPlanTime(world.getTime()));
     measurement.delay = o.delay.delay;
+    const double perceived = pace.getElapsed();
     controller.update(measurement, u);
+    out.update_seconds.push_back(pace.getElapsed() - perceived);
     delay.send(measurement.time, u);
     world.setPush(calcPush(o.pushes, measurement.time));
     const double controlled = pace.getElapsed();

@@ -56,7 +56,8 @@ struct Execution {
   double saturated_share = 0;  ///< of motors and time: torques that were cut at their limits
   /// Time on the clock, s: all in all, of which in the world, and in the controller with its sensors.
   double whole_seconds = 0, world_seconds = 0, control_seconds = 0;
-  double largest_lag = 0;  ///< with `real_time`: of an instant of control behind the clock, s
+  std::vector<double> update_seconds;  ///< of each call of Controller::update()
+  double largest_lag = 0;              ///< with `real_time`: of an instant of control behind the clock, s
   EstimationErrors estimation;
   Books start, end;
   MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means

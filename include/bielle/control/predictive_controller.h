@@ -64,10 +64,12 @@ struct PredictiveSolve {
   double predict = 0, evaluate = 0, linearize = 0, sweep = 0, rollout = 0, policy = 0;
   double step = 1;            ///< its shortest, alpha
   double regularization = 0;  ///< the largest of its sweeps
+  double latency = -1;  ///< from the measurement until its policy came into force, s; negative: it did not, or not yet
 };
 
 /// Solves since the start.
 struct PredictiveCounts {
+  int stages = 0;  ///< that began
   int solves = 0;
   int failed = 0;  ///< the last policy stayed in force
   int early = 0;   ///< feet that landed in the second half of their swing
@@ -78,7 +80,7 @@ struct PredictiveCounts {
   int missed = 0;
   std::vector<PredictiveSolve> last;  ///< 100000 solves
 
-  /// The value that this share of the last solves did not exceed (a quantile); 0 without solves.
+  /// The value that this share of the last solves did not exceed (a quantile), of those that have it; 0 if none has.
   double calcQuantile(double share, double PredictiveSolve::*value = &PredictiveSolve::seconds) const;
 };
 

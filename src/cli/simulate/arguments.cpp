@@ -77,8 +77,9 @@ Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
 void parseOptions(SimulateArguments& arguments) {
   for (const std::string& push : arguments.pushes)
     arguments.execution.pushes.push_back(parsePush(push, arguments.execution.control_period));
+  const bool is_predictive = arguments.control.empty() || arguments.control == "mpc";
   if (!arguments.commands.empty()) {
-    if (arguments.robot.empty() || arguments.control != "mpc")
+    if (arguments.robot.empty() || !is_predictive)
       throw InputError("", "--command", "only predictive control can follow commands, with a walk that it plans itself",
                        "give the motion walk, --robot and --control mpc");
     if (arguments.speed) throw InputError("", "--speed", "the commands already set the speed", "leave it out");
@@ -88,7 +89,7 @@ void parseOptions(SimulateArguments& arguments) {
   }
   if (arguments.execution.real_time && arguments.live)
     throw InputError("", "--live", "writing files would delay the world in real time", "leave out --real-time");
-  if (arguments.execution.real_time && arguments.control != "mpc")
+  if (arguments.execution.real_time && !is_predictive)
     throw InputError("", "--real-time", "only predictive control solves while the motion runs", "give --control mpc");
   arguments.predictive.own_thread = arguments.execution.real_time;
   if (arguments.jitter > arguments.delay)
@@ -122,11 +123,11 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
       ->check(CLI::IsMember(listWorlds()))
       ->capture_default_str();
   app.add_option("--control", a.control,
-                 "open: the planned torques; gains: the planned torques and linear feedback with the solver's gains, "
-                 "for which the motion is solved again; mpc: predictive control, which solves the next second again at "
-                 "every stage from the measured state")
-      ->check(CLI::IsMember({"open", "gains", "mpc"}))
-      ->capture_default_str();
+                 "mpc: predictive control, which solves the next second again at every stage from the measured state; "
+                 "gains: the planned torques and linear feedback with the solver's gains, for which the motion is "
+                 "solved again; open: the planned torques (default: mpc; gains for motions solved with --formulation "
+                 "full, which mpc cannot carry out)")
+      ->check(CLI::IsMember({"mpc", "gains", "open"}));
   app.add_option("--model", a.model,
                  "the controller's model of the robot. closed: with its linkages; serial: a serial chain with motors "
                  "on its joints, converted by the linkages' ratios in the current posture; ratio: the same, with the "

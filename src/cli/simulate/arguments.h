@@ -12,7 +12,9 @@
 namespace bielle::worlds {
 
 struct SimulateArguments {
-  std::string directory, output, world = "bielle", control = "gains", terrain = "planned";
+  std::string directory, output, world = "bielle", terrain = "planned";
+  std::string control;   // empty: chosen for the motion, "mpc" where it can carry it out
+  std::string reason;    // of a choice other than "mpc"; empty: there is none
   std::string robot;     // of a motion that is to be solved; empty: `directory` holds one
   std::string commands;  // file; empty: none
   std::optional<double> speed;

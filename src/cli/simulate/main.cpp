@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "cli/simulate/output.h"
 #include "cli/simulate/watch.h"
 #include "model/number_text.h"
@@ -21,6 +22,17 @@ namespace {
 
 constexpr double kRealLookAhead = 36;  // ms
 constexpr int kStood = 0, kFell = 1, kBadInput = 2;
+
+// Predictive control needs states with closed loops, which other formulations do not have.
+void chooseControl(SimulateArguments& arguments) {
+  if (!arguments.control.empty()) return;
+  arguments.control = "mpc";
+  if (!arguments.robot.empty() || arguments.execution.real_time ||
+      readSummary(arguments.directory).formulation == Formulation::Reduced)
+    return;
+  arguments.control = "gains";
+  arguments.reason = "mpc cannot carry out motions solved with --formulation full";
+}
 
 // The motion solved before or, where a robot is given, the motion of that name.
 std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
@@ -74,6 +86,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   watchInterrupts();
   const double look_ahead = 1e-3 * arguments.look_ahead.value_or(arguments.sensors == "real" ? kRealLookAhead : 0);
   arguments.predictive.look_ahead = look_ahead;
+  chooseControl(arguments);
   const auto plan = obtainPlan(arguments);
   const Model& model = plan->robot.model;
   plan->policy->setLookAhead(look_ahead);
@@ -129,9 +142,10 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"
-      "  bielle simulate walk -o pushed --control mpc --push t=1.5,impulse=7,direction=90\n"
-      "  bielle simulate walk --robot cleobot --speed 0.3 --duration 10 --control mpc -o long\n"
-      "  bielle simulate walk --robot bipetto --command tour.yaml --duration 20 --control mpc -o tour");
+      "  bielle simulate walk -o fixed --control gains\n"
+      "  bielle simulate walk -o pushed --push t=1.5,impulse=7,direction=90\n"
+      "  bielle simulate walk --robot cleobot --speed 0.3 --duration 10 -o long\n"
+      "  bielle simulate walk --robot bipetto --command tour.yaml --duration 20 -o tour");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -9,6 +9,7 @@
 
 #include "bielle/report/report.h"
 #include "control/clock.h"
+#include "math/quantile.h"
 #include "model/number_text.h"
 #include "results/npz.h"
 #include "results/result_files.h"
@@ -69,8 +70,23 @@ Json listParts(const PredictiveCounts& counts) {
   return parts;
 }
 
+// Of times, ms.
+struct Quantiles {
+  double median = 0, p99 = 0, worst = 0;
+};
+Quantiles calcUpdateTimes(const Execution& e) {
+  const std::vector<double>& times = e.update_seconds;
+  return {1e3 * calcQuantile(times, 0.5), 1e3 * calcQuantile(times, 0.99), 1e3 * calcQuantile(times, 1)};
+}
+Quantiles calcPolicyLatencies(const PredictiveCounts& counts) {
+  constexpr auto kLatency = &PredictiveSolve::latency;
+  return {1e3 * counts.calcQuantile(0.5, kLatency), 1e3 * counts.calcQuantile(0.99, kLatency),
+          1e3 * counts.calcQuantile(1, kLatency)};
+}
+
 Json listSolves(const PredictiveCounts& counts) {
-  return {{"count", counts.solves},
+  return {{"stages", counts.stages},
+          {"count", counts.solves},
           {"missed", counts.missed},
           {"failed", counts.failed},
           {"early_landings", counts.early},
@@ -85,6 +101,24 @@ Json listSolves(const PredictiveCounts& counts) {
           {"regularization",
            {{"median", counts.calcQuantile(0.5, &PredictiveSolve::regularization)},
             {"p99", counts.calcQuantile(0.99, &PredictiveSolve::regularization)}}}};
+}
+
+// Of this process alone, MB: that of getrusage() may be that of the process it comes from.
+double readPeakMemory() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.rfind("VmHWM:", 0) == 0) return std::stod(line.substr(6)) / 1024;  // kB
+  return 0;
+}
+
+Json listTimes(const PredictiveCounts& counts, const Execution& e) {
+  const auto list = [](const Quantiles& q) {
+    return Json{{"median_ms", q.median}, {"p99_ms", q.p99}, {"worst_ms", q.worst}};
+  };
+  return {{"update", list(calcUpdateTimes(e))},
+          {"new_policy", list(calcPolicyLatencies(counts))},
+          {"largest_lag_ms", 1e3 * e.largest_lag},
+          {"peak_memory_MB", readPeakMemory()}};
 }
 
 Json listCommands(const std::vector<TimedCommand>& commands) {
@@ -179,7 +213,7 @@ Json makeSummary(const MotionResult& result, const SimulateArguments& arguments,
   summary["saturated_share"] = e.saturated_share;
   summary["real_time_factor"] = e.getRealTimeFactor();
   summary["seconds"] = {{"whole", e.whole_seconds}, {"world", e.world_seconds}, {"control", e.control_seconds}};
-  if (arguments.execution.real_time) summary["largest_lag_ms"] = 1e3 * e.largest_lag;
+  if (arguments.execution.real_time) summary["real_time"] = listTimes(plan.predictive->getCounts(), e);
   return summary;
 }
 
@@ -217,11 +251,26 @@ std::vector<std::string> writeFiles(const SimulateArguments& arguments, const Pl
   return paths;
 }
 
+// From a measurement to its torques, and to the first ones by the policy that is solved from it.
+void printTimes(const PredictiveCounts& counts, const Execution& e) {
+  char text[500];
+  const Quantiles update = calcUpdateTimes(e), policy = calcPolicyLatencies(counts);
+  std::snprintf(text, sizeof text,
+                "  until torques       median %.3f ms, 99 %% %.3f ms, worst %.3f ms\n"
+                "  until a new policy  median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
+                "  behind the clock    %.1f ms at most\n"
+                "  memory              %.0f MB at most\n",
+                update.median, update.p99, update.worst, policy.median, policy.p99, policy.worst, 1e3 * e.largest_lag,
+                readPeakMemory());
+  std::cout << text;
+}
+
 }  // namespace
 
 void print(const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
   std::cout << plan.summary.motion << " of " << plan.summary.run.robot << " in world " << arguments.world
             << ", control " << arguments.control;
+  if (!arguments.reason.empty()) std::cout << " (" << arguments.reason << ")";
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
   std::cout << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
@@ -251,10 +300,11 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
     const PredictiveCounts& c = plan.predictive->getCounts();
     std::snprintf(text, sizeof text,
                   "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
-                  "                      %d stages began without a new policy%s\n",
+                  "                      %d of %d stages began without a new policy%s\n",
                   c.solves, c.failed, 1e3 * c.calcQuantile(0.5), 1e3 * c.calcQuantile(0.99), 1e3 * c.calcQuantile(1),
-                  c.missed, arguments.execution.real_time ? "" : " (if run in real time)");
+                  c.missed, c.stages, arguments.execution.real_time ? "" : " (if run in real time)");
     std::cout << text;
+    if (arguments.execution.real_time) printTimes(c, e);
   }
   if (arguments.sensors != "real") return;
   const EstimationErrors& s = e.estimation;
