@@ -1,8 +1,10 @@
 // Oracle: central differences on the group, and the group axioms.
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <random>
 
 #include "bielle/math/se3.h"
+#include "math/direction.h"
 #include "math/small_dense.h"
 #include "model/joint.h"
 
@@ -63,6 +65,23 @@ TEST_CASE("spatial cross products are the derivative of the adjoint actions") {
   const SE3 X = exp6(v);
   CHECK(X.actMotion(m).dot(X.actForce(f)) == Approx(m.dot(f)));
   CHECK((X.toActionMatrix() * m - X.actMotion(m)).norm() < 1e-14);
+}
+
+TEST_CASE("z turns to a direction by the smallest rotation, where that is nearly opposite as well") {
+  const auto check = [](const Vector3d& direction) {
+    CAPTURE(direction.transpose());
+    const Matrix3d R = calcRotationOfZ(direction);
+    CHECK((R * Vector3d::UnitZ() - direction.normalized()).norm() < 1e-9);
+    CHECK((R.transpose() * R - Matrix3d::Identity()).norm() < 1e-9);
+    CHECK(R.determinant() == Approx(1));
+    CHECK(std::abs(R(0, 1) - R(1, 0)) < 1e-9);  // about an axis across z
+  };
+  for (int i = 0; i < 100; ++i) check(random(3, 2));
+  for (double tilt = 1; tilt > 1e-20; tilt /= 10)
+    for (const double z : {1, -1}) check({0.6 * tilt, -0.8 * tilt, z});
+  check(Vector3d::UnitZ());
+  check(-Vector3d::UnitZ());
+  CHECK(calcRotationOfZ({0, 0, -3}) == Vector3d(1, -1, -1).asDiagonal().toDenseMatrix());
 }
 
 TEST_CASE("every joint kind: integrate, difference, their Jacobians and the motion subspace are consistent") {

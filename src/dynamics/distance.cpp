@@ -12,6 +12,7 @@ namespace bielle {
 namespace {
 
 using Matrix36d = Eigen::Matrix<double, 3, 6>;
+using UpToThreeColumns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 3>;
 
 // Below this a sine or cosine counts as zero.
 constexpr double kTiny = 1e-10;
@@ -52,12 +53,31 @@ class NearestPoint {
     return chosen;
   }
 
+  // Of the free coordinates to their optimum: least squares. The reflections are applied one by one here; Eigen's solve compiles
+  // those of blocks as well, which takes longer than the rest of this file.
+  Vector3d calcStep() const {
+    UpToThreeColumns columns(3, n_);
+    for (int i = 0; i < n_; ++i) columns.col(i) = G_.col(free_[i]);
+    const Eigen::ColPivHouseholderQR<UpToThreeColumns> qr(columns);
+    const UpToThreeColumns& QR = qr.matrixQR();
+    Vector3d y = -(c_ + G_ * x_), step = Vector3d::Zero();
+    const int rank = static_cast<int>(qr.nonzeroPivots());
+    for (int k = 0; k < rank; ++k) {
+      Vector3d v = Vector3d::Unit(k);
+      for (int i = k + 1; i < 3; ++i) v[i] = QR(i, k);
+      y -= qr.hCoeffs()[k] * v.dot(y) * v;
+    }
+    for (int k = rank - 1; k >= 0; --k) {
+      for (int i = k + 1; i < rank; ++i) y[k] -= QR(k, i) * y[i];
+      y[k] /= QR(k, k);
+      step[qr.colsPermutation().indices()[k]] = y[k];
+    }
+    return step;
+  }
+
   // Moves the free coordinates to their optimum, and true, or until the first one reaches its bound, where it stays.
   bool descend() {
-    Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 3> columns(3, n_);
-    for (int i = 0; i < n_; ++i) columns.col(i) = G_.col(free_[i]);
-    const Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 3, 1> step =
-        columns.colPivHouseholderQr().solve(-(c_ + G_ * x_));
+    const Vector3d step = calcStep();
     double share = 1;
     int first = -1;
     for (int i = 0; i < n_; ++i) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "math/direction.h"
 #include "math/so3.h"
 #include "model/number_text.h"
 
@@ -178,8 +179,7 @@ Matrix3d MjcfElement::getRotation() {
     return Eigen::Quaterniond(q / norm).toRotationMatrix();
   }
   if (!turn.empty()) return makeAxisRotation(normalize({turn[0], turn[1], turn[2]}), getAngle(turn[3]));
-  if (!z.empty())
-    return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normalize({z[0], z[1], z[2]})).toRotationMatrix();
+  if (!z.empty()) return calcRotationOfZ(normalize({z[0], z[1], z[2]}));
   Matrix3d R = Matrix3d::Identity();
   if (!axes.empty()) {
     R.col(0) = normalize({axes[0], axes[1], axes[2]});

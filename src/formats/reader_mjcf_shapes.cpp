@@ -6,6 +6,7 @@
 #include "bielle/model/error.h"
 #include "formats/mesh.h"
 #include "formats/reader_mjcf.h"
+#include "math/direction.h"
 
 namespace bielle {
 namespace {
@@ -79,7 +80,7 @@ MjcfReader::Shape MjcfReader::readShape(MjcfElement& e, const SE3& X_BF) {
     const double length = along.stableNorm();
     if (!(length > 1e-12) || !std::isfinite(length)) e.fail("the two points of its fromto coincide", "move one");
     X.p = (from + to) / 2;
-    X.R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along / length).toRotationMatrix();
+    X.R = calcRotationOfZ(along / length);
     const bool is_round = out.type == "capsule" || out.type == "cylinder";
     if (!is_round) out.size[1] = out.size[0];
     out.size[is_round ? 1 : 2] = length / 2;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "math/direction.h"
 #include "model/joint.h"
 
 namespace bielle {
@@ -38,8 +39,7 @@ Shape makeCapsule(int body, const Vector3d& from, const Vector3d& to, double rad
   Shape shape;
   shape.body = body;
   shape.X_BS.p = (from + to) / 2;
-  if (length > 0)
-    shape.X_BS.R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), (to - from) / length).toRotationMatrix();
+  if (length > 0) shape.X_BS.R = calcRotationOfZ((to - from) / length);
   shape.half.z() = length / 2;
   shape.radius = radius;
   return shape;

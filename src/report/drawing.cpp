@@ -9,6 +9,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "formats/fastenings.h"
 #include "formats/mesh.h"
+#include "math/direction.h"
 #include "report/pack.h"
 
 namespace fs = std::filesystem;
@@ -75,7 +76,7 @@ void addRods(int body, const std::vector<Vector3d>& points, double radius, Json&
   for (const Vector3d& point : points) {
     if (point.norm() < radius) continue;
     SE3 X;
-    X.R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), point).toRotationMatrix();
+    X.R = calcRotationOfZ(point);
     X.p = point / 2;
     visuals.push_back(describeShape("cylinder", body, X, {radius, point.norm(), 0}, kRod));
   }

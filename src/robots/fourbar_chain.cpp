@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/builder.h"
+#include "math/direction.h"
 
 namespace bielle {
 namespace {
@@ -23,8 +24,7 @@ void addRod(const std::string& link, const std::string& parent, const Joint& joi
   if (o.radius == 0) return;
   Visual visual;
   visual.shape = Visual::Shape::Cylinder;
-  visual.X_BV = {Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d::UnitX()).toRotationMatrix(),
-                 {length / 2, 0, 0}};
+  visual.X_BV = {calcRotationOfZ(Vector3d::UnitX()), {length / 2, 0, 0}};
   visual.size = {o.radius, length, 0};
   builder.addVisual(link, visual);
 }

@@ -1,5 +1,7 @@
 #include "robots/solid.h"
 
+#include "math/direction.h"
+
 namespace bielle {
 namespace {
 
@@ -23,7 +25,7 @@ Solid makeSphere(const Vector3d& center, double radius, double mass, const Eigen
 
 Solid makeCylinder(const Vector3d& center, const Vector3d& axis, double radius, double length, double mass,
                    const Eigen::Vector4d& rgba) {
-  const Matrix3d R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
+  const Matrix3d R = calcRotationOfZ(axis);
   return {Visual::Shape::Cylinder, {radius, length, 0}, {R, center}, mass, rgba};
 }
 

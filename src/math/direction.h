@@ -1,0 +1,12 @@
+#pragma once
+/// \file Rotations that are given by a direction alone.
+#include "bielle/math/types.h"
+
+namespace bielle {
+
+/// The smallest rotation that takes z to the direction of a vector, which has a length; by pi about x where that is -z. Eigen's
+/// Quaternion::FromTwoVectors, too, but this decomposes two rows where they are opposite, and takes every file that calls it a
+/// third of a minute to compile.
+Matrix3d calcRotationOfZ(const Vector3d& direction);
+
+}  // namespace bielle
