@@ -287,8 +287,10 @@ TEST_CASE("simulate: a motion of least energy is carried out as such; one of lea
   const auto solve = [&](const std::string& objective) {
     const std::string directory = (scratch.path / objective).string();
     const CommandResult solved =
-        runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--depth", "0.9",
-                    "--objective", objective, "-o", directory, "--quiet", "--no-report", "--no-check"});
+        runCommand({BIELLE_COMMAND, "solve",   "squat",          "--robot",      BIELLE_SOURCE_DIR "/robots/bipetto",
+                    "--depth",      "0.9",     "--set",          "duration=0.6", "--set",
+                    "settle=0.1",   "--set",   "time_step=0.02", "--objective",  objective,
+                    "-o",           directory, "--quiet",        "--no-report",  "--no-check"});
     CAPTURE(solved.err);
     REQUIRE(solved.status == 0);
     return directory;
@@ -444,8 +446,10 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
       CHECK(result.err.size() < 200);
     }
   const std::string full = (scratch.path / "full").string();
-  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--depth",
-                      "0.95", "--formulation", "full", "-o", full, "--quiet", "--no-report", "--no-check"})
+  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat",          "--robot",       BIELLE_SOURCE_DIR "/robots/bipetto",
+                      "--depth",      "0.95",  "--set",          "duration=0.6",  "--set",
+                      "settle=0.1",   "--set", "time_step=0.02", "--formulation", "full",
+                      "-o",           full,    "--quiet",        "--no-report",   "--no-check"})
               .status == 0);
   const CommandResult open_states = runCommand({BIELLE_COMMAND, "simulate", full, "--control", "mpc", "-o", output});
   CHECK(open_states.status == 2);
