@@ -23,7 +23,7 @@ namespace {
 
 DesignMotion makeShortWalk() {
   WalkOptions options;
-  options.speed = 0.4, options.steps = 2;
+  options.speed = 0.4, options.steps = 2, options.gait.timing.time_step = 0.024;
   return {"walk",
           [options](const Model& model, const StandingRobot& standing) { return planWalk(model, options, standing); }};
 }
@@ -42,7 +42,7 @@ TEST_CASE("design gradient: Bipetto's knee, torques and energy of kept motions")
   const std::vector<std::string> knees = {"motor_knee_left", "motor_knee_right"};
   EvaluationOptions options;
   options.mode = MotionMode::Kept;
-  const DesignEvaluator evaluator(robot, {makeSquat(0.9), makeShortWalk()},
+  const DesignEvaluator evaluator(robot, {makeSquat(0.9, 0.8, 0.1, 0.04), makeShortWalk()},
                                   {{Measure::PeakTorque, knees, 1},
                                    {Measure::RmsTorque, knees, 2},
                                    {Measure::Energy, knees, 0.5},
@@ -230,7 +230,7 @@ namespace {
 std::string makeKneeSpec(const std::string& algorithm) {
   std::string text = readFile(kKnee);
   text = replaceOnce(text, "robot: bipetto", "robot: " + std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
-  text = replaceOnce(text, "{depth: 0.6}", "{depth: 0.8, duration: 0.6, settle: 0.1, time_step: 0.02}");
+  text = replaceOnce(text, "{depth: 0.6}", "{depth: 0.8, duration: 0.6, settle: 0.1, time_step: 0.04}");
   text = replaceOnce(text, "  - {motion: walk, set: {speed: 0.5}}\n", "");
   text = replaceOnce(text, "mode: reoptimized\nmargin: 0.1 ", "mode: kept\nmargin: 0.15 ");
   const size_t search = text.find("search:");
@@ -307,7 +307,7 @@ TEST_CASE("design gradient: motions made anew, against motions made anew for nei
   EvaluationOptions options;
   options.solver.gradient_tolerance = 1e-13;
   options.solver.cost_tolerance = 0;
-  const DesignEvaluator evaluator(robot, {makeSquat(0.9), makeShortWalk()},
+  const DesignEvaluator evaluator(robot, {makeSquat(0.9, 0.8, 0.1, 0.04), makeShortWalk()},
                                   {{Measure::Cost, {}, 1},
                                    {Measure::PeakTorque, knees, 1},
                                    {Measure::RmsTorque, knees, 2},

@@ -6,12 +6,13 @@ import tempfile
 import time
 
 program = os.path.abspath(sys.argv[1])
+SHORT = ["--set", "duration=0.6", "--set", "settle=0.1", "--set", "time_step=0.02"]
 COMMANDS = {
     "squat": ["squat", "--depth", "0.7"],
-    "squat full": ["squat", "--depth", "0.8", "--formulation", "full"],
+    "squat full": ["squat", "--depth", "0.8", "--formulation", "full", *SHORT],
     "walk": ["walk", "--speed", "0.4", "--steps", "3"],
-    "limited": ["squat", "--depth", "0.8", "--limit", "motor_knee_left=22", "--velocity-limit", "motor_knee_left=3"],
-    "serial": ["squat", "--depth", "0.8", "--model", "serial"],
+    "limited": ["squat", "--depth", "0.8", "--limit", "motor_knee_left=22", "--velocity-limit", "motor_knee_left=3", *SHORT],
+    "serial": ["squat", "--depth", "0.8", "--model", "serial", *SHORT],
     "jump": ["jump", "--flight", "0.2", "--set", "time_step=0.01"],
     "stairs stopped": ["stairs", "--height", "0.04", "--stairs", "1", "--max-iterations", "3"],
 }

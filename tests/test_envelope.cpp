@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <map>
+#include <memory>
+#include <optional>
 
 #include "bielle/design/cost_gradient.h"
 #include "bielle/motion/jump.h"
@@ -33,17 +36,18 @@ FddpOptions makeTightOptions() {
 }
 
 struct Optimum {
-  Optimum(Model robot, const MakeMotion& make, const ShootingTrajectory* guess = nullptr,
+  Optimum(Model robot, const MakeMotion& make, const std::optional<StartingPoint>& start = {},
           const FddpOptions& options = makeTightOptions())
       : model(std::move(robot)) {
     SolveOptions how;
     how.solver = options;
-    if (guess) how.start = StartingPoint{*guess};
+    how.start = start;
     solution = solve(make(model, makeStandingRobot(model)), how);
     CAPTURE(solution.summary.message, solution.summary.iterations);
     REQUIRE(solution.converged());
   }
   double cost() const { return solution.summary.cost; }
+  StartingPoint asStart() const { return {solution.trajectory, solution.multipliers}; }
   Model model;
   Solution solution;
 };
@@ -52,26 +56,27 @@ VectorXd calcGradient(const Parametrization& robot, const Optimum& optimum, cons
   return calcCostGradient(robot, robot.start(), MotionEnvelope(optimum.solution), make);
 }
 
-double differentiateOptima(const Parametrization& robot, const MakeMotion& make, const ShootingTrajectory* guess, int i,
+// \param start  of the motions solved again: that of the robot they are of is a few iterations away
+double differentiateOptima(const Parametrization& robot, const MakeMotion& make, const StartingPoint& start, int i,
                            double step) {
   double out = 0;
   for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
     const VectorXd dx = steps * step * VectorXd::Unit(robot.start().size(), i);
-    out += weight * Optimum(robot.make(robot.start() + dx), make, guess).cost() / (12 * step);
+    out += weight * Optimum(robot.make(robot.start() + dx), make, start).cost() / (12 * step);
   }
   return out;
 }
 
-// \param guess  of all solves; null: that of the motion   \param between  as kBetweenOptima
+// \param start  of the first solve; none: the guess of the motion   \param between  as kBetweenOptima
 void check(const std::string& name, const Parametrization& robot, const MakeMotion& make,
-           const ShootingTrajectory* guess = nullptr, double between = kBetweenOptima) {
+           const std::optional<StartingPoint>& start = {}, double between = kBetweenOptima) {
   CAPTURE(name);
-  const Optimum optimum(robot.startModel(), make, guess);
+  const Optimum optimum(robot.startModel(), make, start);
   CHECK(MotionEnvelope(optimum.solution).cost() == Approx(optimum.cost()).epsilon(1e-12));
   const VectorXd gradient = calcGradient(robot, optimum, make);
   for (Eigen::Index i = 0; i < gradient.size(); ++i) {
     const double step = between * (robot.upper()[i] - robot.lower()[i]);
-    const double expected = differentiateOptima(robot, make, guess, static_cast<int>(i), step);
+    const double expected = differentiateOptima(robot, make, optimum.asStart(), static_cast<int>(i), step);
     // Optimal costs are known to twelve digits, which shows in the derivative by an inertia that hardly counts: the four of a
     // difference are off by (1 + 8 + 8 + 1) / 12 as much at worst.
     // The gradient is a difference as well, over steps much smaller, of costs evaluated once, which are known to 14 digits.
@@ -117,7 +122,7 @@ Parametrization makeCleobot() {
 MakeMotion makeSquatMaker(const ProblemOptions& problem) {
   return [=](const Model& model, const StandingRobot& standing) {
     SquatOptions options;
-    options.depth = 0.8, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.02;
+    options.depth = 0.8, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.04;
     return makeMotion(model, planSquat(model, options, standing), problem);
   };
 }
@@ -125,7 +130,7 @@ MakeMotion makeSquatMaker(const ProblemOptions& problem) {
 MakeMotion makeWalkMaker(const ProblemOptions& problem) {
   return [=](const Model& model, const StandingRobot& standing) {
     WalkOptions options;
-    options.speed = 0.4, options.steps = 2;
+    options.speed = 0.4, options.steps = 2, options.gait.timing.time_step = 0.024;
     return makeMotion(model, planWalk(model, options, standing), problem);
   };
 }
@@ -161,7 +166,7 @@ TEST_CASE("envelope: controls at bounds, free durations, the least peak torque")
   for (const VectorXd& u : at_bounds.solution.trajectory.us) touching += u.lpNorm<Eigen::Infinity>() == 0.95 * most;
   CHECK(touching > 0);
   // Where a torque reaches its bound the second derivative jumps, so that differences have to stay on one side.
-  check("bounded torques", robot, makeSquatMaker(bounded), nullptr, 1e-4);
+  check("bounded torques", robot, makeSquatMaker(bounded), {}, 1e-4);
 
   ProblemOptions timed(Formulation::Reduced);
   timed.timings.phases = {{kAllPhases, {}}};
@@ -170,7 +175,7 @@ TEST_CASE("envelope: controls at bounds, free durations, the least peak torque")
   ProblemOptions peak(Formulation::Reduced);
   peak.objective.objective = Objective::PeakTorque;
   peak.objective = scaleObjective(free.solution.motion, free.solution.trajectory, peak.objective);
-  check("least peak torque", robot, makeSquatMaker(peak), &free.solution.trajectory);
+  check("least peak torque", robot, makeSquatMaker(peak), StartingPoint{free.solution.trajectory});
 }
 
 namespace {
@@ -191,8 +196,8 @@ class FollowedMotors {
       : step_(1e-3 * (robot.upper()[variable] - robot.lower()[variable])),
         dx_(step_ * VectorXd::Unit(robot.start().size(), variable)),
         here_(robot.startModel(), make),
-        ahead_(robot.make(robot.start() + dx_), make, &here_.solution.trajectory),
-        behind_(robot.make(robot.start() - dx_), make, &here_.solution.trajectory) {
+        ahead_(robot.make(robot.start() + dx_), make, StartingPoint{here_.solution.trajectory}),
+        behind_(robot.make(robot.start() - dx_), make, StartingPoint{here_.solution.trajectory}) {
     const RobotProblem& problem = *here_.solution.motion.problem;
     for (int k = 0; k < problem.numStages(); ++k) dt_.push_back(problem.spec(k).dt);
     solved_ = differ(ahead_.solution.trajectory, behind_.solution.trajectory);
@@ -346,7 +351,7 @@ TEST_CASE("envelope: time of twenty parameters", "[.table]") {
   const auto run = [&](const std::string& name, const Parametrization& robot, const MakeMotion& make) {
     for (int turn = 0; turn < 5; ++turn) {
       const double begin = getSeconds();
-      const Optimum optimum(robot.startModel(), make, nullptr, options);
+      const Optimum optimum(robot.startModel(), make, {}, options);
       const double solved = getSeconds();
       // By those there are, several times over: what a variable costs does not depend on what it is.
       Eigen::Index count = 0;

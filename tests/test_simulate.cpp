@@ -304,8 +304,10 @@ TEST_CASE("simulate: a motion of least energy is carried out as such; one of lea
   const auto solve = [&](const std::string& objective) {
     const std::string directory = (scratch.path / objective).string();
     const CommandResult solved =
-        runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--depth", "0.9",
-                    "--objective", objective, "-o", directory, "--quiet", "--no-report", "--no-check"});
+        runCommand({BIELLE_COMMAND, "solve",   "squat",          "--robot",      BIELLE_SOURCE_DIR "/robots/bipetto",
+                    "--depth",      "0.9",     "--set",          "duration=0.6", "--set",
+                    "settle=0.1",   "--set",   "time_step=0.02", "--objective",  objective,
+                    "-o",           directory, "--quiet",        "--no-report",  "--no-check"});
     CAPTURE(solved.err);
     REQUIRE(solved.status == 0);
     return directory;

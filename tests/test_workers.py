@@ -229,7 +229,8 @@ def test_real():
     """The real program: robot and motion go with the task, and the bytes are those of a run here."""
     port = find_port()
     with open("real.yaml", "w") as file:
-        file.write("motions: [{name: walk, solve: walk, robot: bipetto, set: {speed: 0.4, steps: 2}}]\n"
+        file.write("motions: [{name: squat, solve: squat, robot: bipetto, "
+                   "set: {depth: 0.9, duration: 0.4, settle: 0.1, time_step: 0.02}}]\n"
                    "options: {control: gains, friction: [0.7, 0.1], duration: 0.6}\npush: {time: 0.4, impulse: [1, 40]}\n")
     subprocess.run([built, "campaign", "real.yaml", "-o", "alone"], check=True, stderr=subprocess.DEVNULL,
                    stdout=subprocess.DEVNULL)
@@ -304,7 +305,7 @@ def test_front():
 variables:
   - {name: upper, parameter: upper_length, bounds: [0.06, 0.14]}
   - {name: lower, parameter: lower_length, bounds: [0.15, 0.25]}
-motions: [{motion: squat, set: {depth: 0.8}}]
+motions: [{motion: squat, set: {depth: 0.8, duration: 0.6, settle: 0.06, time_step: 0.03}}]
 objective: [{measure: peak_torque}, {measure: cost}]
 search: {pareto: {population: 8, generations: 2, refine: {algorithm: slsqp, evaluations: 2}}}
 """)
