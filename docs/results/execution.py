@@ -207,9 +207,8 @@ def measure_real_time(runner):
     for robot in ROBOTS:
         for walk, options in walks:
             add(robot, walk, options, "two cores")
-        add(robot, *walks[0], "one thread", "--threads", 1)
         add(robot, *walks[0], "beside two busy processes", busy=2)
-    add("bipetto", *walks[0], "96 nodes, each a stage", "--nodes", 96, "--fine-nodes", 96)
+    add("bipetto", *walks[0], "one thread", "--threads", 1)
     return ["robot", "walk", "on", "outcome", "stages without a solve", "of", "median [ms (units)]",
             "99 %", "worst", "`update` 99 % [ms]", "to a new policy [ms]", "memory [MB]"], rows
 
