@@ -202,8 +202,12 @@ def measure_real_time(runner):
                      f"{update['p99_ms']:.2f}", f"{policy['median_ms']:.1f}",
                      f"{s['real_time']['peak_memory_MB']:.0f}"])
 
-    walks = [("0.4 m/s", ["--speed", 0.4]), ("0.8 m/s", ["--speed", 0.8]),
-             ("by command", ["--command", common.SOURCE / "examples/tour.yaml"])]
+    def walk_at(speed):
+        commands = pathlib.Path(runner.place() + ".yaml")
+        commands.write_text(f"commands: [{{time: 0.5, forward: {speed}}}]\n", encoding="utf-8")
+        return f"{speed} m/s", ["--command", commands]
+
+    walks = [walk_at(0.4), walk_at(0.8), ("tour", ["--command", common.SOURCE / "examples/tour.yaml"])]
     for robot in ROBOTS:
         for walk, options in walks:
             add(robot, walk, options, "two cores")
@@ -270,8 +274,9 @@ and below the planned ground, with masses off by up to 10 %, rods by up to 0.5 m
 plan assumes 0.4. {share("unknown")}. A run takes 15 to 20 s of one core."""),
     ("Minutes", "minutes", lambda: """`bielle simulate walk --duration 60 --control mpc`, true state, largest slip of
 a sole since its touchdown. Takes hours, most of them in Simbody's world."""),
-    ("Real time", "real_time", lambda: """`bielle simulate walk --speed 0.4 --duration 60 --control mpc --real-time`,
-world and controller on the same two cores: 5000 stages of 12 ms. A stage without a solve of its own acts by the policy
+    ("Real time", "real_time", lambda: """`bielle simulate walk --command FILE --duration 60 --control mpc
+--real-time`, at a constant speed or by `examples/tour.yaml`, world and controller on the same two cores: 5000 stages of
+12 ms. A stage without a solve of its own acts by the policy
 of an earlier one. Units are those of [`bielle bench`](../speed.md). `update` is what computes torques every millisecond;
 the time to a new policy counts from the measurement that it was solved for."""),
 ]
