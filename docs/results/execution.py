@@ -189,7 +189,7 @@ def run_busily(count):
 
 
 def measure_real_time(runner):
-    unit = 1e-3 * json.loads(runner.run("bench", "bipetto", "--quick", "--json").stdout)["unit [us]"]  # ms
+    unit = 1e-3 * json.loads(runner.run("bench", "--quick", "--json").stdout)["unit [us]"]  # ms
     rows = []
 
     def add(robot, walk, options, condition, *more, busy=0):
