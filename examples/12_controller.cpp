@@ -112,7 +112,7 @@ Outcome run(const Model& model, const Policy& plan, Controller& controller, bool
 }
 
 void printTimes(const PredictiveCounts& counts, Outcome of) {
-  std::printf("in real time: trunk at the end %.3f m; %d of %d stages began without a new policy\n", of.height,
+  std::printf("in real time: trunk at the end %.3f m; %d of %d stages had no solve of their own\n", of.height,
               counts.missed, counts.stages);
   std::printf("  solves: median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n", 1e3 * counts.calcQuantile(0.5),
               1e3 * counts.calcQuantile(0.99), 1e3 * counts.calcQuantile(1));

@@ -430,7 +430,7 @@ TEST_CASE("simulate: in real time the times of solves, stages without one and la
   CHECK(clock["largest_lag_ms"].get<double>() > 0);
   CHECK((clock["peak_memory_MB"].get<double>() > 1 && clock["peak_memory_MB"].get<double>() < 4000));
   CHECK_THAT(result.out, Catch::Contains(std::to_string(missed) + " of " + std::to_string(stages) +
-                                         " stages began without a new policy\n") &&
+                                         " stages had no solve of their own\n") &&
                              Catch::Contains("until torques       median ") &&
                              Catch::Contains("until a new policy  median ") && Catch::Contains("MB at most"));
 }

@@ -50,7 +50,12 @@ class PredictiveController::Loop {
     dead_point_stop_.add(measurement, u);
     const int before = stage_;
     while (measurement.time + kClockTolerance >= getStart(stage_ + 1)) ++stage_;  // an impact takes no time
-    if (stage_ != before) enter(measurement, u);
+    if (stage_ != before) {
+      counts_.missed += waits_;
+      ++counts_.stages;
+      waits_ = true;
+    }
+    if (waits_ && !(thread_ && thread_->getState() != SolvingThread::State::Idle)) solve(measurement, u);
   }
   double getPlanTime(double time) const { return awaited_ >= 0 ? awaited_ : time + advance_; }
   const PredictiveCounts& getCounts() const { return counts_; }
@@ -63,20 +68,17 @@ class PredictiveController::Loop {
  private:
   double getStart(int stage) const { return planner_.getStart(stage) - advance_; }
 
-  void enter(const Measurement& measurement, ConstVectorRef u) {
-    ++counts_.stages;
-    if (thread_ && thread_->getState() != SolvingThread::State::Idle) {
-      ++counts_.missed;
-      return;
-    }
+  void solve(const Measurement& measurement, ConstVectorRef u) {
+    const double begin = getStart(stage_), end = getStart(stage_ + 1);
+    waits_ = false;
     request_.stage = stage_;
+    request_.progress = std::clamp((measurement.time - begin) / (end - begin), 0.0, 1.0);
     request_.measurement = measurement;
     request_.u = u;
     requested_ = Clock::now();
     if (thread_) return thread_->begin();
-    const double available = getStart(stage_ + 1) - getStart(stage_) - measurement.delay;
     planner_.solve(request_, solution_);
-    counts_.missed += solution_.took.seconds > available;
+    counts_.missed += solution_.took.seconds > end - begin - measurement.delay;
     receive();
   }
 
@@ -105,6 +107,7 @@ class PredictiveController::Loop {
   std::unique_ptr<Policy> policy_;
   std::vector<PredictedFoothold> footholds_;
   int stage_ = -1;       // the present one
+  bool waits_ = false;   // it has no solve yet
   bool ready_ = false;   // the solution awaits the stage from which on it is in force
   double advance_ = 0;   // of the clock of the motion, s
   double awaited_ = -1;  // the landing of a late foot, s of the motion; negative: none is late

@@ -223,6 +223,7 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   const RobotEvaluation* step = &evaluator_.evaluate(node, measured_, u_);
   if (step->status != StepStatus::Ok) return false;
   x_ = step->x_next;
+  if (request.progress > 0) x_ = findRest(request, *step);
   int target = chooseNext(request, solution);
   solution.skipped = target - (request.stage + 1);
   advance_ += horizon_->getStart(target) - horizon_->getStart(request.stage + 1);
@@ -234,6 +235,16 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   }
   solution.target = target;
   return true;
+}
+
+// After the rest of the stage, of a step of the whole: with the same acceleration.
+VectorXd WindowPlanner::findRest(const Request& request, const RobotEvaluation& step) {
+  const double rest = 1 - request.progress;
+  VectorXd dx = evaluator_.difference(step.x_next);
+  const Eigen::Index n = dx.size() / 2;
+  dx.head(n) -= 0.5 * request.progress * step.dt * dx.tail(n);
+  dx *= rest;
+  return evaluator_.integrate(dx);
 }
 
 // From the state of an evaluation a share of the way to another, with loops closed.

@@ -11,9 +11,10 @@ namespace bielle {
 
 class WindowPlanner {
  public:
-  // What is known when a stage begins. update() of the controller copies into it and allocates nothing.
+  // What is known when a stage begins, or later in it. update() of the controller copies into it and allocates nothing.
   struct Request {
     int stage = 0;
+    double progress = 0;  // the share of the stage that has passed
     Measurement measurement;
     VectorXd u;  // nu, required at this instant
   };
@@ -57,6 +58,7 @@ class WindowPlanner {
   int findLateFoot(int landing, const std::vector<char>& contacts) const;
   void lower(int foot, int landing);
   int chooseNext(const Request& request, Solution& solution);
+  VectorXd findRest(const Request& request, const RobotEvaluation& step);
   bool predict(const Request& request, Solution& solution);
   bool solveWindow(Solution& solution);
   bool move(int first);

@@ -15,7 +15,8 @@
 ///
 /// Either update() waits for the solve at the beginning of a stage: the same measurements then give the same torques, on any
 /// machine. Or, for a robot, solves run in a separate thread, and update() never waits: a solution found after t_{k+1}
-/// takes effect on arrival, and stages that begin in the meantime are skipped.
+/// takes effect on arrival, and the next solve begins then, from what is measured in the middle of a stage. Eq. (1) is then
+/// for the rest of that stage, with the acceleration of the whole.
 ///
 /// Early landing: a foot on the ground in the second half of its swing (Measurement::contacts) has landed. The motion
 /// continues with the stage of its landing, and stays ahead of the plan by the time saved. Late landing: a foot still
@@ -74,9 +75,8 @@ struct PredictiveCounts {
   int failed = 0;  ///< the last policy stayed in force
   int early = 0;   ///< feet that landed in the second half of their swing
   int late = 0;    ///< feet that had not landed when they should have stood
-  /// Stages that would begin without a new policy in real time, because the solve took longer than the previous stage.
-  /// Without a separate thread the policy takes effect anyway; with one the previous policy stays, and this stage has
-  /// no solve.
+  /// Without a separate thread, solves that took longer than their stage: in real time, their policy would be late. With one,
+  /// stages that had no solve, because an earlier one lasted until their end.
   int missed = 0;
   std::vector<PredictiveSolve> last;  ///< 100000 solves
 

@@ -300,9 +300,10 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
     const PredictiveCounts& c = plan.predictive->getCounts();
     std::snprintf(text, sizeof text,
                   "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
-                  "                      %d of %d stages began without a new policy%s\n",
+                  "                      %d of %d stages %s\n",
                   c.solves, c.failed, 1e3 * c.calcQuantile(0.5), 1e3 * c.calcQuantile(0.99), 1e3 * c.calcQuantile(1),
-                  c.missed, c.stages, arguments.execution.real_time ? "" : " (if run in real time)");
+                  c.missed, c.stages,
+                  arguments.execution.real_time ? "had no solve of their own" : "are shorter than their solve");
     std::cout << text;
     if (arguments.execution.real_time) printTimes(c, e);
   }
