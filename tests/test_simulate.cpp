@@ -422,7 +422,8 @@ TEST_CASE("simulate: in real time the times of solves, stages without one and la
   const int stages = solves["stages"], count = solves["count"], missed = solves["missed"];
   CHECK((stages > 0 && stages <= 50));
   CHECK(count > 0);
-  CHECK((count + missed == stages || count + missed == stages - 1));  // the last solve may not be over
+  // The last solve may not be over, and the last stage still wait for its own.
+  CHECK((count + missed <= stages && count + missed >= stages - 2));
   for (const nlohmann::json* times : {&solves, &clock["update"], &clock["new_policy"]}) {
     const double median = (*times)["median_ms"], most = (*times)["p99_ms"], worst = (*times)["worst_ms"];
     CHECK((0 < median && median <= most && most <= worst));

@@ -27,8 +27,7 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
       Policy::Stage stage;
       fillStage(problem, node, time, x, trajectory.us[node], next, stage);
       stage.phase = phase_index;
-      if (!gains.empty())
-        problem.mapGains(evaluator.evaluate(node, x, trajectory.us[node]), gains[node].K, stage.K);
+      if (!gains.empty()) problem.mapGains(evaluator.evaluate(node, x, trajectory.us[node]), gains[node].K, stage.K);
       stages.push_back(std::move(stage));
       time += spec.dt;
     }
