@@ -22,7 +22,6 @@ struct Walking {
     const CommandSource source = [](double) { return VelocityCommand{0.4, 0, 0}; };
     PredictiveOptions options;
     options.threads = 1;
-    options.nodes = 60;
     options.look_ahead = look_ahead;
     const VectorXd q = makeStandingPosture(model);
     CommandedWalk walk(model, gait, {}, source, makeStandingRobot(model));
