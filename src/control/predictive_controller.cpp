@@ -72,7 +72,8 @@ class PredictiveController::Loop {
     const double begin = getStart(stage_), end = getStart(stage_ + 1);
     waits_ = false;
     request_.stage = stage_;
-    request_.progress = std::clamp((measurement.time - begin) / (end - begin), 0.0, 1.0);
+    const double passed = measurement.time - begin;
+    request_.progress = passed > kClockTolerance ? std::min(passed / (end - begin), 1.0) : 0;
     request_.measurement = measurement;
     request_.u = u;
     requested_ = Clock::now();

@@ -314,7 +314,7 @@ bool WindowPlanner::continueNode(const WindowGrid::Node& node) {
         xs.push_back(x_);
       } else {
         const WindowGrid::Node& whole = grid_.getBefore()[node.source];
-        const int stage = grid_.getStages()[us.size() - 1];  // any: states are alike
+        const int stage = grid_.getStages()[us.size() - 1];  // any: their tangent spaces are alike
         const NodeEvaluation* at = solver_.getEvaluation(node.source);
         if (!at) at = &evaluator_.evaluate(stage, before_.xs[node.source], before_.us[node.source]);
         const double share = static_cast<double>(node.begin - whole.begin) / whole.length;
