@@ -12,6 +12,7 @@ from .programs import campaign as campaign, check as check, design as design, si
 from .errors import InputError as InputError
 from .motions import *
 from .named import (
+    Books as Books,
     Dynamics as Dynamics,
     DynamicsDerivatives as DynamicsDerivatives,
     Impact as Impact,

@@ -61,3 +61,17 @@ class WorldState(NamedTuple):
     q: Array  #: (nq,)
     v: Array  #: (nv,)
     ok: Array  #: bool; False: the integration failed, and the state is the last finite one
+
+
+class Books(NamedTuple):
+    """Energies of a world at present, and work and losses since its reset, J. Their changes balance:
+    kinetic + potential + elastic = start + motor_work + push_work - contact_loss - stop_loss - other_loss."""
+
+    kinetic: float
+    potential: float  #: of gravity and of the springs of joints
+    elastic: float  #: of the springs of contacts and stops
+    motor_work: float
+    push_work: float
+    contact_loss: float
+    stop_loss: float
+    other_loss: float  #: dampers and friction of joints

@@ -12,6 +12,6 @@ using MakeWorld = std::unique_ptr<worlds::World> (*)(const std::string& name, co
                                                          const worlds::WorldOptions& options);
 
 /// The name of the capsule, which changes when its type does.
-inline constexpr char kEnginesCapsule[] = "bielle.make_world.1";
+inline constexpr char kEnginesCapsule[] = "bielle.make_world.2";
 
 }  // namespace bielle::python

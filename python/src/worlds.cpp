@@ -5,6 +5,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/worlds/bielle_world.h"
+#include "bielle/worlds/manifold_world.h"
 #include "bielle/worlds/sensors.h"
 #include "bind.h"
 #include "busy.h"
@@ -18,6 +19,7 @@ using worlds::BielleWorldOptions;
 using worlds::World;
 
 std::unique_ptr<World> makeOwnWorld(const std::string&, const Model& model, const worlds::WorldOptions& options) {
+  if (options.tolerance > 0) return worlds::makeManifoldWorld(model, {options, {}, options.tolerance});
   BielleWorldOptions own;
   own.world = options;
   return worlds::makeBielleWorld(model, own);
@@ -41,12 +43,14 @@ MakeWorld findEngine(const std::string& engine) {
 class HeldWorlds {
  public:
   HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step,
-             const std::string& engine)
+             double tolerance, const std::string& engine)
       : model_(std::move(model)), many_(count), engine_(engine) {
     if (count && *count < 1) throw py::value_error("count: at least one world");
     const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngine(engine);
+    worlds::WorldOptions options{ground, time_step};
+    options.tolerance = tolerance;
     const py::gil_scoped_release release;
-    for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(make(engine, *model_, {ground, time_step}));
+    for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(make(engine, *model_, options));
     ok_.assign(worlds_.size(), true);
   }
 
@@ -62,6 +66,21 @@ class HeldWorlds {
       ok_[i] = true;
     });
     return observe();
+  }
+
+  // Of a single world.
+  py::object getBooks() {
+    worlds::Books books;
+    observeOnly([&](const World& world) { books = world.getBooks(); });
+    return makeNamed("Books",
+                     {py::float_(books.kinetic), py::float_(books.potential), py::float_(books.elastic),
+                      py::float_(books.motor_work), py::float_(books.push_work), py::float_(books.contact_loss),
+                      py::float_(books.stop_loss), py::float_(books.other_loss)});
+  }
+  std::string getMessage() {
+    std::string message;
+    observeOnly([&](const World& world) { message = world.getMessage(); });
+    return message;
   }
 
   py::object step(const py::object& u, double duration, const py::object& push) {
@@ -214,15 +233,17 @@ void bindWorlds(py::module_& module) {
       module, "World",
       "Physics with contact, in which motors drive a robot and the ground pushes it.\n\n"
       "engine: 'bielle', its own, or 'simbody' and 'mujoco' where it was built with them.\n"
+      "tolerance: error per step of 'bielle' and 'simbody', rad, m and relative in velocities; with it, 'bielle' takes "
+      "steps of high order and controlled error, for mechanisms in motion; 0: fixed steps, the fastest on feet.\n"
       "With `count`, that many worlds are stepped together on all cores: arguments and results have a leading axis of "
       "worlds.")
       .def(py::init([](std::shared_ptr<Model> model, const py::object& count, const Ground& ground, double time_step,
-                       const std::string& engine) {
+                       double tolerance, const std::string& engine) {
              return std::make_shared<HeldWorlds>(std::move(model), read<std::optional<int>>(count, "count"), ground,
-                                                 time_step, engine);
+                                                 time_step, tolerance, engine);
            }),
            py::arg("model"), py::arg("count") = py::none(), py::arg("ground") = Ground(), py::arg("time_step") = 0.0,
-           py::arg("engine") = "bielle")
+           py::arg("tolerance") = 0.0, py::arg("engine") = "bielle")
       .def_property_readonly("model", &HeldWorlds::getModel, "Model")
       .def_property_readonly(
           "count", [](const HeldWorlds& self) { return show(self.getCount(), {}); }, "number of worlds, or None")
@@ -236,6 +257,10 @@ void bindWorlds(py::module_& module) {
            "Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), "
            "N.\n\n"
            "Returns the WorldState; its `ok` is False where the integration failed.")
+      .def_property_readonly("books", &HeldWorlds::getBooks,
+                             "energies now, and work and losses since reset, of a single world (Books), J")
+      .def_property_readonly("message", &HeldWorlds::getMessage,
+                             "why the integration of a single world failed; empty while it is sound")
       .def_property_readonly("wrenches", &HeldWorlds::calcWrenches,
                              "wrenches from the ground on the feet in their contact frames (contacts, 6), N and N m");
   bindSensors(module);

@@ -95,7 +95,7 @@ void requireOk(DynamicsStatus status) {
 
 int evaluate(const EvalArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
-  const EvalState state = readState(robot.model, arguments.state);
+  const EvalState state = readState(robot.model, arguments.state, robot.model.makeNeutral());
   Evaluation at(robot.model, state);
   requireOk(at.status);
   Json json = describe(robot.model, state, at);

@@ -37,8 +37,8 @@ constexpr int kDeepest = 20;  // elements of a state are not nested deeper; read
 
 class StateReader {
  public:
-  StateReader(const Model& model, const std::string& file) : model_(model), file_(file) {
-    state_.q = model.makeNeutral();
+  StateReader(const Model& model, const std::string& file, ConstVectorRef q) : model_(model), file_(file) {
+    state_.q = q;
     state_.v.setZero(model.nv());
     state_.u.setZero(model.nu());
   }
@@ -129,15 +129,18 @@ class StateReader {
     if (index <= 0) fail(element, "the robot has no such joint", "its joints are: " + listItems(listJoints()));
     checkKeys(value, element, {"q", "v"});
     const Joint& joint = model_.joints()[index];
-    if (value.contains("q"))
+    if (value.contains("q")) {
       state_.q.segment(joint.idx_q, joint.nq) =
           convertPosition(joint, readNumbers(value["q"], element + ": q"), element + ": q");
+      state_.placed.push_back(index);
+    }
     if (!value.contains("v")) return;
     const VectorXd v = readNumbers(value["v"], element + ": v");
     if (v.size() != joint.nv)
       fail(element + ": v", std::to_string(v.size()) + " numbers for a " + getName(joint.kind) + " joint",
            "give " + std::to_string(joint.nv));
     state_.v.segment(joint.idx_v, joint.nv) = v;
+    state_.moving.push_back(index);
   }
 
   std::vector<std::string> listJoints() const {
@@ -178,12 +181,12 @@ class StateReader {
 
 }  // namespace
 
-EvalState readState(const Model& model, const std::string& path) {
+EvalState readState(const Model& model, const std::string& path, ConstVectorRef q) {
   if (path == "-") {
     const std::string text{std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()};
-    return StateReader(model, "standard input").read(text);
+    return StateReader(model, "standard input", q).read(text);
   }
-  return StateReader(model, path).read(readTextFile(path));
+  return StateReader(model, path, q).read(readTextFile(path));
 }
 
 }  // namespace bielle::cli

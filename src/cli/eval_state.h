@@ -1,5 +1,5 @@
 #pragma once
-// The state of `bielle eval`: a JSON object of joints, torques and contacts, by name.
+// A state in a file, of `bielle eval` and `bielle simulate`: a JSON object of joints, torques and contacts, by name.
 #include <string>
 #include <vector>
 
@@ -8,12 +8,14 @@
 namespace bielle::cli {
 
 struct EvalState {
-  VectorXd q, v, u;           // nq, nv, nu
-  std::vector<int> contacts;  // indices of the contacts in force, as listed
+  VectorXd q, v, u;                 // nq, nv, nu
+  std::vector<int> contacts;        // indices of the contacts in force, as listed
+  std::vector<int> placed, moving;  // joints whose position is given, whose velocity is given
 };
 
 // Reads a file, or the standard input for "-". \throws InputError naming the file and the element
-EvalState readState(const Model& model, const std::string& path);
+// \param q  of the joints that the file does not give
+EvalState readState(const Model& model, const std::string& path, ConstVectorRef q);
 
 // The part of eval's help that describes the format of a state.
 extern const char* const kStateHelp;

@@ -74,6 +74,7 @@ struct NodeTables {
   RowMatrixXd tilt;        // roll, pitch, yaw of the first body since the first node, about the axes of the world
   RowMatrixXd feet;        // position (3) of every contact
   RowMatrixXd gaps;        // of every closure: norms of position and angle
+  RowMatrixXd energy;      // kinetic, potential with that of the springs, their sum
   Json footprints = Json::array();  // placement of each contact at touchdown
 };
 
@@ -84,10 +85,14 @@ NodeTables makeNodeTables(const Model& model, const MotionRecord& record) {
   tables.tilt.resize(nodes, model.numBodies() > 1 ? 3 : 0);
   tables.feet.resize(nodes, 3 * contacts);
   tables.gaps.resize(nodes, 2 * model.closures().size());
+  tables.energy.resize(nodes, 3);
   Workspace ws(model);
   Matrix3d R_start = Matrix3d::Identity();
   for (int k = 0; k < nodes; ++k) {
-    updatePlacements(model, ws, record.q.row(k).transpose());
+    updatePositions(model, ws, record.q.row(k).transpose());
+    updateVelocities<double>(model, ws, record.v.row(k).transpose());
+    const double kinetic = calcKineticEnergy(model, ws), potential = calcPotentialEnergy(model, ws);
+    tables.energy.row(k) << kinetic, potential, kinetic + potential;
     for (int i = 0; i < model.numBodies(); ++i) tables.placements.row(k).segment<7>(7 * i) = makePoseRow(ws.X_WB[i]);
     if (k == 0 && model.numBodies() > 1) R_start = ws.X_WB[1].R;
     if (model.numBodies() > 1) tables.tilt.row(k) = calcRollPitchYaw(ws.X_WB[1].R * R_start.transpose());
@@ -182,6 +187,7 @@ Json describeMotion(const ReportRun& run) {
                {"feet", packTable(tables.feet)},
                {"footprints", tables.footprints},
                {"gaps", packTable(tables.gaps)},
+               {"energy", packTable(tables.energy)},
                {"linkages", outputs},
                {"dead_points", packTable(makeDeadPointTable(linkages, record.q.rows()))},
                {"q", packTable(record.q)},

@@ -142,6 +142,11 @@ function listPlots(runs) {
       list: run => listJoints(run, run.v, joint => (hasSerial ? joint.serial : !isMotor(run, joint)), speed)
     },
     {
+      title: 'Energy',
+      unit: 'J',
+      list: run => ['kinetic', 'potential', 'sum'].map((name, i) => ({name, values: run.energy.getColumn(i)}))
+    },
+    {
       title: 'Distances from dead points',
       unit: 'rad',
       list: run => run.linkages.map((name, i) => ({name, values: run.dead_points.getColumn(i)}))

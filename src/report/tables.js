@@ -46,11 +46,13 @@ function describeOutcome(run) {
 function fillBadges(parent, runs) {
   for (const run of runs) {
     const text = (runs.length > 1 ? run.label + ': ' : '') + describeOutcome(run);
-    const {outcome, converged} = run.summary, isGood = outcome === undefined ? converged : outcome === 'stood';
+    const {outcome, converged} = run.summary, isGood = outcome === undefined ? converged : outcome === 'stood' || outcome === 'ended';
     const judgement = outcome === 'running' ? '' : isGood ? 'good' : 'bad';
     addElement(parent, 'span', 'badge ' + judgement, text);
     if (outcome !== undefined)
-      addElement(parent, 'span', 'badge', 'world ' + run.summary.world + ', control ' + run.summary.control);
+      addElement(
+          parent, 'span', 'badge',
+          'world ' + run.summary.world + (run.summary.control ? ', control ' + run.summary.control : ''));
     const missed = getGoals(run).filter(goal => !goal.met).map(goal => goal.name);
     if (missed.length) addElement(parent, 'span', 'badge bad', 'missed: ' + missed.join(', '));
     if (run.check)

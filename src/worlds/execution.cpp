@@ -3,100 +3,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <thread>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/kinematics.h"
-#include "bielle/model/names.h"
 #include "control/clock.h"
 #include "math/constants.h"
-#include "motion/record_tables.h"
+#include "worlds/motion_recorder.h"
 #include "worlds/robot_errors.h"
 
 namespace bielle::worlds {
 namespace {
-
-Vector3d calcPush(const std::vector<Push>& pushes, double time) {
-  Vector3d force = Vector3d::Zero();
-  for (const Push& push : pushes) {
-    if (time < push.time || time >= push.time + push.duration) continue;
-    const double angle = push.direction * kDegree;
-    force += push.impulse / push.duration * Vector3d(std::cos(angle), std::sin(angle), 0);
-  }
-  return force;
-}
-
-// Writes the rows of a record as the motion happens.
-class Recorder {
- public:
-  Recorder(const Model& model, int stages) : model_(model), ws_(model) {
-    record_.q_names = makePositionNames(model);
-    record_.v_names = makeVelocityNames(model);
-    record_.u_names = getNames(model.motors());
-    record_.closure_names = getNames(model.closures());
-    record_.contact_names = getNames(model.contacts());
-    resizeRecord(stages, record_);
-  }
-
-  // The state of the next node; forces and torques that acted on the way to it are added by addStage().
-  void addNode(const World& world, const std::vector<PredictedFoothold>& footholds) {
-    const VectorXd &q = world.getConfiguration(), &v = world.getVelocity();
-    record_.time[node_] = world.getTime();
-    record_.q.row(node_) = q;
-    record_.v.row(node_) = v;
-    updatePositions(model_, ws_, q);
-    record_.com.row(node_) = calcCom(model_, ws_);
-    record_.gap.row(node_).setZero();
-    for (const Closure& closure : model_.closures()) {
-      const ClosureGap gap = calcClosureGap(ws_, closure);
-      record_.gap(node_, 0) = std::max(record_.gap(node_, 0), gap.position);
-      record_.gap(node_, 1) = std::max(record_.gap(node_, 1), gap.angle);
-    }
-    if (node_ > 0)
-      record_.a.row(node_ - 1) =
-          (record_.v.row(node_) - record_.v.row(node_ - 1)) / (record_.time[node_] - record_.time[node_ - 1]);
-    addFootholds(footholds);
-    ++node_;
-  }
-  void addStage(const World& world) {
-    const int stage = node_ - 1;
-    record_.u.row(stage) = world.getTorques();
-    record_.closure_wrenches.row(stage).setConstant(std::numeric_limits<double>::quiet_NaN());
-    for (size_t c = 0; c < world.getFeet().size(); ++c)
-      record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world.getFeet()[c].wrench;
-  }
-  Vector3d getCom() const { return record_.com.row(node_ - 1); }
-  // What was recorded from an instant on, a stage at least.
-  MotionRecord getRecord(double since) const {
-    int first = 0;
-    while (first + 2 < node_ && record_.time[first] < since) ++first;
-    MotionRecord record = record_;
-    if (record.footholds.rows() > 0) record.footholds = record_.footholds.middleRows(first, node_ - first);
-    record.time = record_.time.segment(first, node_ - first);
-    for (const RecordTable& table : listTables(record))
-      record.*table.data =
-          (record_.*table.data).middleRows(first, node_ - first - (table.per == RecordTable::Per::Node ? 0 : 1));
-    return record;
-  }
-
- private:
-  void addFootholds(const std::vector<PredictedFoothold>& footholds) {
-    constexpr int kEntries = MotionRecord::kFootholdEntries;
-    RowMatrixXd& table = record_.footholds;
-    if (table.rows() == 0 && !footholds.empty())
-      table.setConstant(record_.time.size(), kEntries * static_cast<int>(model_.contacts().size()),
-                        std::numeric_limits<double>::quiet_NaN());
-    for (const PredictedFoothold& foothold : footholds)
-      table.row(node_).segment<kEntries>(kEntries * foothold.contact) << foothold.time, foothold.X_WF.p.transpose(),
-          Eigen::Quaterniond(foothold.X_WF.R).coeffs().transpose();
-  }
-
-  Model model_;
-  Workspace ws_;
-  MotionRecord record_;
-  int node_ = 0;
-};
 
 // The clock beside a world.
 class Pace {
@@ -129,20 +45,23 @@ bool advance(World& world, TorqueDelay& delay, double time, double period) {
   }
 }
 
-// Left less right side of Books' Eq. (1), J.
-double calcImbalance(const Books& start, const Books& end) {
-  return end.getEnergy() - start.getEnergy() - end.motor_work - end.push_work + end.contact_loss + end.stop_loss +
-         end.other_loss;
+}  // namespace
+
+Vector3d calcPush(const std::vector<Push>& pushes, double time) {
+  Vector3d force = Vector3d::Zero();
+  for (const Push& push : pushes) {
+    if (time < push.time || time >= push.time + push.duration) continue;
+    const double angle = push.direction * kDegree;
+    force += push.impulse / push.duration * Vector3d(std::cos(angle), std::sin(angle), 0);
+  }
+  return force;
 }
 
-// Energy that motors, pushes and losses have moved between two instants, J.
 double calcExchange(const Books& before, const Books& now) {
   return std::abs(now.motor_work - before.motor_work) + std::abs(now.push_work - before.push_work) +
          std::abs(now.contact_loss - before.contact_loss) + std::abs(now.stop_loss - before.stop_loss) +
          std::abs(now.other_loss - before.other_loss);
 }
-
-}  // namespace
 
 const char* getName(Outcome outcome) {
   switch (outcome) {
@@ -150,6 +69,8 @@ const char* getName(Outcome outcome) {
       return "running";
     case Outcome::Stood:
       return "stood";
+    case Outcome::Ended:
+      return "ended";
     case Outcome::Fell:
       return "fell";
     case Outcome::BrokeOff:
@@ -165,7 +86,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   const double duration = o.duration > 0 ? o.duration : plan.getDuration() + o.hold;
   const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
   const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
-  Recorder recorder(model, (ticks + ticks_per_row - 1) / ticks_per_row);
+  MotionRecorder recorder(model, (ticks + ticks_per_row - 1) / ticks_per_row);
 
   Execution out;
   Perception perception(plan.getModel(), o.perception);

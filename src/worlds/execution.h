@@ -38,7 +38,7 @@ struct ExecutionOptions {
   const std::atomic<bool>* interrupt = nullptr;
 };
 
-enum class Outcome { Running, Stood, Fell, BrokeOff, Stopped };
+enum class Outcome { Running, Stood, Ended, Fell, BrokeOff, Stopped };
 const char* getName(Outcome outcome);
 
 struct Execution {
@@ -71,6 +71,11 @@ struct Execution {
 using ExecutionSoFar = std::function<Execution(double since)>;
 /// Looks on: is called after every row of the record, at `time` of `duration`, s.
 using ExecutionObserver = std::function<void(double time, double duration, const ExecutionSoFar& so_far)>;
+
+/// The force of all pushes at an instant [s], N (world).
+Vector3d calcPush(const std::vector<Push>& pushes, double time);
+/// Energy that motors, pushes and losses have moved between two instants, J.
+double calcExchange(const Books& before, const Books& now);
 
 /// From the state in which the policy starts.
 /// \param model  of the world's robot; that of the policy may differ from it in its dimensions (robot_errors.h)

@@ -2,6 +2,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/worlds/bielle_world.h"
+#include "bielle/worlds/manifold_world.h"
 #ifdef BIELLE_WITH_MUJOCO
 #include "worlds/mujoco_world.h"
 #endif
@@ -18,6 +19,7 @@ struct Entry {
 const Entry kWorlds[] = {
     {"bielle",
      [](const Model& model, const WorldOptions& options) {
+       if (options.tolerance > 0) return makeManifoldWorld(model, {options, {}, options.tolerance});
        return makeBielleWorld(model, {options, {}});
      }},
 #ifdef BIELLE_WITH_MUJOCO
@@ -30,6 +32,7 @@ const Entry kWorlds[] = {
      [](const Model& model, const WorldOptions& options) {
        SimbodyWorldOptions simbody;
        simbody.world = options;
+       if (options.tolerance > 0) simbody.accuracy = options.tolerance;
        return makeSimbodyWorld(model, simbody);
      }},
 };

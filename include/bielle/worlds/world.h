@@ -20,6 +20,8 @@ struct WorldOptions {
   double time_step = 0;  ///< of worlds with fixed steps, s; 0: the world's own
   /// Polled after every step, so that a signal handler can set it: ends an advance(), however short the steps.
   const std::atomic<bool>* interrupt = nullptr;
+  /// Error allowed per step of worlds that control it (manifold_world.h); 0: the world's own.
+  double tolerance = 0;
 };
 
 /// Energies at present and work since reset(), J. With E = kinetic + potential + elastic,

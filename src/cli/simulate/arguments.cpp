@@ -1,5 +1,6 @@
 #include "cli/simulate/arguments.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -7,6 +8,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/worlds/terrain.h"
+#include "model/listing.h"
 #include "model/number_text.h"
 #include "results/number_option.h"
 #include "results/setting.h"
@@ -44,6 +46,20 @@ Push parsePush(const std::string& text, double shortest) {
   if (!(push.duration >= shortest && push.duration <= kLongest))
     refusePush(text, "its duration is not within a period of control, " + formatNumber(shortest) + " s, and 10000 s");
   return push;
+}
+
+// One world or, for free motions, several with commas.
+CLI::Validator isListOfWorlds() {
+  return CLI::Validator(
+      [](std::string& text) {
+        const std::vector<std::string> known = listWorlds();
+        std::istringstream parts(text);
+        for (std::string part; std::getline(parts, part, ',');)
+          if (std::find(known.begin(), known.end(), part) == known.end())
+            return "there is no world '" + part + "', only " + listItems(known);
+        return std::string();
+      },
+      "{" + listItems(listWorlds()) + "}");
 }
 
 }  // namespace
@@ -99,9 +115,10 @@ void parseOptions(SimulateArguments& arguments) {
 }
 
 void addOptions(CLI::App& app, SimulateArguments& a) {
-  app.add_option(
-         "DIR", a.directory,
-         "result of `bielle solve` for the closed robot; with --robot the name of a motion, which is solved first")
+  app.add_option("DIR", a.directory,
+                 "result of `bielle solve` for the closed robot; with --robot the name of a motion, which is solved "
+                 "first; or a "
+                 "robot or mechanism, which moves freely from a state, without a plan")
       ->required();
   app.add_option("--robot", a.robot, "name or directory of the robot for which the motion is solved");
   app.add_option("--speed", a.speed, "speed of the motion that is solved first [m/s]");
@@ -119,8 +136,27 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   app.add_option("--world", a.world,
                  "bielle: Bielle's dynamics and contact law, fixed steps; simbody: Simbody's dynamics, the same "
                  "contact law, error-controlled steps, 30 times slower; mujoco: MuJoCo, soft closures and contacts (if "
-                 "Bielle was built with it)")
-      ->check(CLI::IsMember(listWorlds()))
+                 "Bielle was built with it). Free motions take several, e.g. bielle,simbody, and compare them")
+      ->check(isListOfWorlds())
+      ->capture_default_str();
+  app.add_option("--posture", a.posture,
+                 "free motion: a reference posture of the robot, or neutral: the closed configuration next to zero "
+                 "(default: its first reference)");
+  app.add_option("--state", a.state,
+                 "free motion: JSON file with positions and velocities of joints and constant torques by name, as for "
+                 "`bielle eval`; joints that it does not give follow by the loops");
+  app.add_option("--torques", a.torques,
+                 "free motion: YAML file, torques: [{time: 0, MOTOR: 3}, {time: 0.5, MOTOR: 0}] [s, N m or N], each "
+                 "valid until the next");
+  app.add_option("--spring", a.springs,
+                 "free motion: a spring on a motor, e.g. stiffness=50,damping=1,motor=crank,angle=0.3 [N m/rad, N m "
+                 "s/rad, rad]; without motor: on each; without angle: where it starts; may be repeated")
+      ->allow_extra_args(false);
+  app.add_option(
+         "--accuracy", a.accuracy,
+         "error per step of worlds that control it, bielle and simbody [rad, m, relative in velocities]; 0: the "
+         "world's default; with a motion, bielle takes such steps only if it is given")
+      ->check(isWithin(0, 1))
       ->capture_default_str();
   app.add_option("--control", a.control,
                  "mpc: predictive control, which solves the next second again at every stage from the measured state; "

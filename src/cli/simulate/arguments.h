@@ -22,6 +22,11 @@ struct SimulateArguments {
   std::vector<std::string> settings;  // name=value
   std::vector<std::string> pushes;
   double friction = 0;  // 0: that of the plan
+  // Of a free motion.
+  std::string posture, state, torques;  // name of a reference; files
+  std::vector<std::string> springs;
+  double accuracy = 0;  // 0: that of the world
+  bool has_record_period = false;
   double time_step = 0;
   std::string sensors = "ideal";
   double noise = 1;

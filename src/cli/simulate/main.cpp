@@ -5,6 +5,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
+#include "cli/simulate/free.h"
 #include "cli/simulate/output.h"
 #include "cli/simulate/watch.h"
 #include "model/number_text.h"
@@ -32,6 +33,19 @@ void chooseControl(SimulateArguments& arguments) {
     return;
   arguments.control = "gains";
   arguments.reason = "mpc cannot carry out motions solved with --formulation full";
+}
+
+// Options of free motions alone.
+void requirePlan(const SimulateArguments& arguments) {
+  const std::pair<bool, const char*> options[] = {{!arguments.posture.empty(), "--posture"},
+                                                  {!arguments.state.empty(), "--state"},
+                                                  {!arguments.torques.empty(), "--torques"},
+                                                  {!arguments.springs.empty(), "--spring"}};
+  for (const auto& [is_given, name] : options)
+    if (is_given)
+      throw InputError("", name, "a motion has its own start and torques", "leave it out, or give a robot alone");
+  if (arguments.world.find(',') != std::string::npos)
+    throw InputError("", "--world", "a motion is carried out in one world at a time", "give one");
 }
 
 // The motion solved before or, where a robot is given, the motion of that name.
@@ -84,6 +98,8 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   if (arguments.dry_run) return kStood;
   if (arguments.robot.empty()) requireApart(arguments.output, {arguments.directory});
   watchInterrupts();
+  if (isFree(arguments)) return simulateFreely(arguments, command) ? kStood : kFell;
+  requirePlan(arguments);
   const double look_ahead = 1e-3 * arguments.look_ahead.value_or(arguments.sensors == "real" ? kRealLookAhead : 0);
   arguments.predictive.look_ahead = look_ahead;
   chooseControl(arguments);
@@ -102,7 +118,8 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   options.interrupt = &isInterrupted();
   const std::optional<Model> machine = makeOtherRobot(*plan, arguments);
   const Model& robot = machine ? *machine : model;
-  const auto world = makeWorld(arguments.world, robot, {ground, arguments.time_step, options.interrupt});
+  const auto world =
+      makeWorld(arguments.world, robot, {ground, arguments.time_step, options.interrupt, arguments.accuracy});
   makeOutputDirectory(arguments.output);
   const auto writeFiles = [&](const Execution& execution) {
     return write(arguments, *plan, ground, execution, command);
@@ -127,7 +144,8 @@ int main(int argc, char** argv) {
   ignoreClosedPipes();
   CLI::App app{
       "Executes a motion in a physics simulation with contact: a result of `bielle solve`, or a motion that is solved "
-      "first. A controller reads the robot's state and commands its motors; feet stand or slip as friction allows."};
+      "first. A controller reads the robot's state and commands its motors; feet stand or slip as friction allows. "
+      "Given a robot alone, lets it move freely, with or without feet, under torques, springs and pushes."};
   app.name("bielle simulate");
   SimulateArguments arguments;
   addOptions(app, arguments);
@@ -145,9 +163,11 @@ int main(int argc, char** argv) {
       "  bielle simulate walk -o fixed --control gains\n"
       "  bielle simulate walk -o pushed --push t=1.5,impulse=7,direction=90\n"
       "  bielle simulate walk --robot cleobot --speed 0.3 --duration 10 -o long\n"
-      "  bielle simulate walk --robot bipetto --command tour.yaml --duration 20 -o tour");
+      "  bielle simulate walk --robot bipetto --command tour.yaml --duration 20 -o tour\n"
+      "  bielle simulate fourbar --state swing.json --world bielle,simbody,mujoco -o swing");
   try {
     app.parse(argc, argv);
+    arguments.has_record_period = app.count("--record-period") > 0;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kStood : kBadInput;
   }

@@ -37,13 +37,6 @@ MotionResult makeResult(const SimulateArguments& arguments, const Plan& plan, co
   return result;
 }
 
-Json listBooks(const Execution& e) {
-  return {{"energy_start_J", e.start.getEnergy()}, {"energy_end_J", e.end.getEnergy()},
-          {"motor_work_J", e.end.motor_work},      {"push_work_J", e.end.push_work},
-          {"contact_loss_J", e.end.contact_loss},  {"stop_loss_J", e.end.stop_loss},
-          {"other_loss_J", e.end.other_loss},      {"imbalance_J", e.imbalance}};
-}
-
 // The drift of a robot that went nowhere is no share of its way.
 Json listEstimation(const EstimationErrors& e) {
   constexpr double kShortestWay = 0.1;  // m
@@ -131,16 +124,6 @@ Json listCommands(const std::vector<TimedCommand>& commands) {
   return list;
 }
 
-Json listPushes(const std::vector<Push>& pushes) {
-  auto list = Json::array();
-  for (const Push& push : pushes)
-    list.push_back({{"time_s", push.time},
-                    {"impulse_Ns", push.impulse},
-                    {"direction_deg", push.direction},
-                    {"duration_s", push.duration}});
-  return list;
-}
-
 // The mean speed in the steps in which the plan's own counts: without the time that the robot stands, starts and stops. Empty
 // where a plan has none, or the motion did not come that far.
 std::optional<double> calcSteadySpeed(const Plan& plan, const Execution& e) {
@@ -166,11 +149,7 @@ std::string describeSteadySpeed(const Plan& plan, const Execution& e) {
 
 // The summary of a result, with what happened in place of how it was solved.
 Json makeSummary(const MotionResult& result, const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
-  Json summary = bielle::makeSummary(result);
-  for (const char* of_solving :
-       {"formulation", "step", "goals", "converged", "interrupted", "termination", "message", "acceptable", "cost",
-        "iterations", "seconds", "solver_gap", "constraints", "free_timings", "log_columns", "log"})
-    summary.erase(of_solving);
+  Json summary = makeHappenedSummary(result);
   summary["world"] = arguments.world;
   summary["control"] = arguments.control;
   summary["believed_model"] = getName(plan.belief);
@@ -266,6 +245,32 @@ void printTimes(const PredictiveCounts& counts, const Execution& e) {
 }
 
 }  // namespace
+
+Json makeHappenedSummary(const MotionResult& result) {
+  Json summary = bielle::makeSummary(result);
+  for (const char* of_solving :
+       {"formulation", "step", "goals", "converged", "interrupted", "termination", "message", "acceptable", "cost",
+        "iterations", "seconds", "solver_gap", "constraints", "free_timings", "log_columns", "log"})
+    summary.erase(of_solving);
+  return summary;
+}
+
+Json listBooks(const Execution& e) {
+  return {{"energy_start_J", e.start.getEnergy()}, {"energy_end_J", e.end.getEnergy()},
+          {"motor_work_J", e.end.motor_work},      {"push_work_J", e.end.push_work},
+          {"contact_loss_J", e.end.contact_loss},  {"stop_loss_J", e.end.stop_loss},
+          {"other_loss_J", e.end.other_loss},      {"imbalance_J", e.imbalance}};
+}
+
+Json listPushes(const std::vector<Push>& pushes) {
+  auto list = Json::array();
+  for (const Push& push : pushes)
+    list.push_back({{"time_s", push.time},
+                    {"impulse_Ns", push.impulse},
+                    {"direction_deg", push.direction},
+                    {"duration_s", push.duration}});
+  return list;
+}
 
 void print(const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
   std::cout << plan.summary.motion << " of " << plan.summary.run.robot << " in world " << arguments.world

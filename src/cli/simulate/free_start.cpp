@@ -1,0 +1,96 @@
+#include <iostream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kept_motion.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/loop_conflict.h"
+#include "bielle/model/error.h"
+#include "bielle/model/names.h"
+#include "cli/eval_state.h"
+#include "cli/simulate/free.h"
+#include "model/listing.h"
+#include "model/number_text.h"
+
+namespace bielle::worlds {
+namespace {
+
+constexpr double kFollows = 1e-6;         // weight of joints that are not given, relative to those that are
+constexpr double kToldDifference = 1e-6;  // rad, m, rad/s or m/s: differences from what is given that are told
+
+VectorXd makePosture(const Model& model, const std::string& name) {
+  AssemblyResult result;
+  if (!name.empty() && name != "neutral") {
+    result = assembleReference(model, name);
+  } else {
+    if (name.empty() && !model.references().empty()) result = assembleReference(model, model.references().front().name);
+    if (result.status != AssemblyStatus::Closed) result = findClosedConfiguration(model);
+  }
+  if (result.status != AssemblyStatus::Closed) throw makeClosingError(model, model.name(), result);
+  return result.q;
+}
+
+void warn(const std::string& file, const Joint& joint, const std::string& what, double given, double taken) {
+  std::cerr << "bielle: warning: " << file << ": joint '" << joint.name << "': its " << what << " "
+            << formatNumber(given) << " does not fit to the loops; it starts with " << formatNumber(taken) << "\n";
+}
+
+// Closes the loops; joints that the file places stay where they are, if they can.
+void close(const Model& model, const std::string& file, cli::EvalState& state) {
+  if (model.closures().empty()) return;
+  AssemblyProblem problem;
+  problem.q_ref = state.q;
+  problem.weights = VectorXd::Constant(model.nv(), state.placed.empty() ? 1 : kFollows);
+  for (int j : state.placed) {
+    const Joint& joint = model.joints()[j];
+    problem.weights.segment(joint.idx_v, joint.nv).setOnes();
+  }
+  const AssemblyResult closed = assemble(model, problem);
+  if (closed.status != AssemblyStatus::Closed)
+    throw InputError(file, closed.worst, "its loop does not close near these positions: " + closed.message,
+                     "give other joints, or fewer: those that are not given follow");
+  const VectorXd moved = model.difference(state.q, closed.q);
+  for (int j : state.placed) {
+    const Joint& joint = model.joints()[j];
+    if (moved.segment(joint.idx_v, joint.nv).cwiseAbs().maxCoeff() > kToldDifference)
+      warn(file, joint, "position", state.q[joint.idx_q], closed.q[joint.idx_q]);
+  }
+  state.q = closed.q;
+}
+
+// The least velocity with that of the joints that the file moves; one that keeps the loops closed, if it does not.
+void move(const Model& model, const std::string& file, cli::EvalState& state) {
+  if (model.closures().empty() || state.moving.empty()) return;
+  Workspace ws(model);
+  const ConstraintSet loops = makeConstraintSet(model);
+  updatePositions(model, ws, state.q);
+  std::vector<int> held;
+  for (int j : state.moving)
+    for (int k = 0; k < model.joints()[j].nv; ++k) held.push_back(model.joints()[j].idx_v + k);
+  VectorXd values(held.size());
+  for (size_t k = 0; k < held.size(); ++k) values[k] = state.v[held[k]];
+  const VectorXd wanted = Closing(model, ws, loops, held).solve(VectorXd::Zero(loops.rows), values);
+  const VectorXd given = state.v;
+  state.v = projectVelocity(model, ws, loops, state.q, wanted);
+  for (int j : state.moving) {
+    const Joint& joint = model.joints()[j];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
+      if (std::abs(state.v[k] - given[k]) > kToldDifference * (1 + std::abs(given[k])))
+        warn(file, joint, "velocity", given[k], state.v[k]);
+  }
+}
+
+}  // namespace
+
+FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments) {
+  const VectorXd posture = makePosture(model, arguments.posture);
+  if (arguments.state.empty()) return {posture, VectorXd::Zero(model.nv()), VectorXd::Zero(model.nu())};
+  const std::string file = arguments.state == "-" ? "standard input" : arguments.state;
+  cli::EvalState state = cli::readState(model, arguments.state, posture);
+  if (!state.contacts.empty())
+    throw InputError(file, "key 'contacts'", "feet of a free motion stand where the ground holds them", "remove it");
+  close(model, file, state);
+  move(model, file, state);
+  return {state.q, state.v, state.u};
+}
+
+}  // namespace bielle::worlds

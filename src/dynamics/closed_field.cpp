@@ -1,0 +1,483 @@
+#include "dynamics/closed_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "model/joint.h"
+#include "model/number_text.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kClosed = 2e-16;    // m, rad: nothing can be gained below
+constexpr double kAccepted = 1e-11;  // where rounding keeps Newton's steps from gaining
+constexpr double kSlow = 0.05;       // gain of a step above which its matrix is renewed
+constexpr int kMostSteps = 20;
+constexpr double kMostRotation = 2;  // rad, of a joint whose tangent space is curved, in one chart
+constexpr double kRankTolerance = 1e-6;
+
+bool isFlat(const Joint& joint) { return joint.nv <= 1 || joint.kind == JointKind::Universal; }
+
+// Dofs of one tree over the world share a block.
+std::vector<std::pair<int, int>> makePlaces(const Model& model, std::vector<std::vector<int>>& dofs) {
+  std::vector<std::pair<int, int>> places(model.nv());
+  for (int k = 0; k < model.nv(); ++k) {
+    const int parent = model.dofs()[k].parent;
+    if (parent < 0) {
+      places[k] = {static_cast<int>(dofs.size()), 0};
+      dofs.push_back({k});
+    } else {
+      const int block = places[parent].first;
+      places[k] = {block, static_cast<int>(dofs[block].size())};
+      dofs[block].push_back(k);
+    }
+  }
+  return places;
+}
+
+}  // namespace
+
+ClosedField::ClosedField(const Model& model) : model_(model), set_(makeConstraintSet(model)), ws_(model) {
+  std::vector<std::vector<int>> dofs;
+  places_ = makePlaces(model, dofs);
+  blocks_.resize(dofs.size());
+  for (size_t b = 0; b < dofs.size(); ++b) {
+    const auto n = static_cast<Eigen::Index>(dofs[b].size());
+    blocks_[b].dofs = std::move(dofs[b]);
+    blocks_[b].M.setZero(n, n);
+    blocks_[b].factor = Eigen::LLT<MatrixXd>(n);
+    blocks_[b].x.setZero(n);
+  }
+  newtons_.resize(model.clusters().size());
+  for (size_t c = 0; c < newtons_.size(); ++c)
+    for (int closure : model.clusters()[c].closures) {
+      newtons_[c].loops.push_back(static_cast<int>(loops_.size()));
+      Loop loop;
+      loop.cluster = static_cast<int>(c);
+      loop.index = closure;
+      loop.dofs = model.closures()[closure].dofs;
+      loops_.push_back(std::move(loop));
+    }
+  for (size_t j = 1; j < model.joints().size(); ++j)
+    if (!isFlat(model.joints()[j])) grouped_.push_back(static_cast<int>(j));
+  scratch_.setZero(6, std::max(6, model.nv()));
+  q_start_ = q_ = model.makeNeutral();
+  for (VectorXd* x : {&delta_, &v_, &a_, &x_}) x->setZero(model.nv());
+}
+
+int ClosedField::select(ConstVectorRef q) {
+  updatePositions(model_, ws_, q);
+  for (const Newton& newton : newtons_) {
+    const LoopCluster& cluster = model_.clusters()[loops_[newton.loops.front()].cluster];
+    std::map<int, int> column;
+    for (size_t k = 0; k < cluster.dofs.size(); ++k) column[cluster.dofs[k]] = static_cast<int>(k);
+    std::vector<std::pair<int, int>> rows;  // loop and row of its closure
+    // Redundant rows of one closure would only burden what follows.
+    std::vector<VectorXd> values;
+    for (int l : newton.loops) {
+      Loop& loop = loops_[l];
+      loop.chosen.clear();
+      const Closure& closure = model_.closures()[loop.index];
+      const int count = getRows(closure.kind);
+      auto J = scratch_.topLeftCorner(count, model_.nv());
+      calcClosureJacobian<double>(ws_, closure, J);
+      MatrixXd own(loop.dofs.size(), count);
+      for (size_t k = 0; k < loop.dofs.size(); ++k) own.row(k) = J.col(loop.dofs[k]).transpose();
+      Eigen::ColPivHouseholderQR<MatrixXd> qr(own.rows(), own.cols());
+      qr.setThreshold(kRankTolerance);
+      qr.compute(own);
+      for (Eigen::Index i = 0; i < qr.rank(); ++i) {
+        rows.emplace_back(l, qr.colsPermutation().indices()[i]);
+        values.push_back(own.col(rows.back().second));
+      }
+    }
+    std::vector<Eigen::Index> chosen;
+    const auto count = static_cast<Eigen::Index>(rows.size()), n = static_cast<Eigen::Index>(cluster.dofs.size());
+    if (count <= kDenseRows) {
+      MatrixXd all = MatrixXd::Zero(n, count);
+      for (Eigen::Index r = 0; r < count; ++r) {
+        const Loop& loop = loops_[rows[r].first];
+        for (size_t k = 0; k < loop.dofs.size(); ++k) all(column[loop.dofs[k]], r) = values[r][static_cast<int>(k)];
+      }
+      Eigen::ColPivHouseholderQR<MatrixXd> qr(n, count);
+      qr.setThreshold(kRankTolerance);
+      qr.compute(all);
+      for (Eigen::Index i = 0; i < qr.rank(); ++i) chosen.push_back(qr.colsPermutation().indices()[i]);
+    } else {
+      for (Eigen::Index r = 0; r < count; ++r) chosen.push_back(r);
+    }
+    for (Eigen::Index r : chosen) loops_[rows[r].first].chosen.push_back(rows[r].second);
+  }
+  layOut();
+  return rows_;
+}
+
+// Sizes and places of everything that depends on the chosen rows.
+void ClosedField::layOut() {
+  rows_ = 0;
+  for (Block& block : blocks_) block.rows.clear();
+  for (Newton& newton : newtons_) {
+    newton.offset = rows_;
+    for (int l : newton.loops) {
+      Loop& loop = loops_[l];
+      std::sort(loop.chosen.begin(), loop.chosen.end());
+      loop.offset = rows_;
+      rows_ += static_cast<int>(loop.chosen.size());
+      loop.J.setZero(loop.chosen.size(), loop.dofs.size());
+      loop.J_start = loop.J;
+      loop.blocks.clear();
+      loop.places.clear();
+      for (int dof : loop.dofs) {
+        const auto [b, row] = places_[dof];
+        size_t i = 0;
+        while (i < loop.blocks.size() && loop.blocks[i].first != b) ++i;
+        if (i == loop.blocks.size()) {
+          loop.blocks.emplace_back(b, static_cast<int>(blocks_[b].rows.size()));
+          for (size_t r = 0; r < loop.chosen.size(); ++r) blocks_[b].rows.push_back(loop.offset + static_cast<int>(r));
+        }
+        loop.places.emplace_back(static_cast<int>(i), row);
+      }
+    }
+    newton.rows = rows_ - newton.offset;
+    newton.x.setZero(newton.rows);
+    newton.pairs.clear();
+    std::map<int, std::vector<std::pair<int, int>>> by_dof;  // loops and their columns
+    for (int l : newton.loops)
+      for (size_t k = 0; k < loops_[l].dofs.size(); ++k) by_dof[loops_[l].dofs[k]].emplace_back(l, static_cast<int>(k));
+    std::map<std::pair<int, int>, Pair> pairs;
+    for (const auto& [dof, users] : by_dof)
+      for (const auto& [a, k] : users)
+        for (const auto& [b, j] : users) {
+          Pair& pair = pairs[{a, b}];
+          pair.a = a, pair.b = b;
+          pair.columns.emplace_back(k, j);
+        }
+    for (auto& [key, pair] : pairs) newton.pairs.push_back(std::move(pair));
+    newton.sparse.reset();
+    newton.sparse_factor.reset();
+    if (newton.rows <= kDenseRows) {
+      newton.K.setZero(newton.rows, newton.rows);
+      newton.factor = Eigen::PartialPivLU<MatrixXd>(newton.rows);
+      continue;
+    }
+    std::vector<Eigen::Triplet<double>> entries;
+    for (const Pair& pair : newton.pairs)
+      for (size_t i = 0; i < loops_[pair.a].chosen.size(); ++i)
+        for (size_t j = 0; j < loops_[pair.b].chosen.size(); ++j)
+          entries.emplace_back(loops_[pair.a].offset - newton.offset + static_cast<int>(i),
+                               loops_[pair.b].offset - newton.offset + static_cast<int>(j), 1.0);
+    newton.sparse = std::make_unique<Eigen::SparseMatrix<double>>(newton.rows, newton.rows);
+    newton.sparse->setFromTriplets(entries.begin(), entries.end());
+    newton.sparse_factor = std::make_unique<Eigen::SparseLU<Eigen::SparseMatrix<double>>>();
+    newton.sparse_factor->analyzePattern(*newton.sparse);
+  }
+  for (Block& block : blocks_) {
+    const auto n = static_cast<Eigen::Index>(block.dofs.size()), r = static_cast<Eigen::Index>(block.rows.size());
+    for (MatrixXd* x : {&block.Jt, &block.W}) x->setZero(n, r);
+    block.gram.setZero(r, r);
+    block.y.setZero(r);
+  }
+  for (VectorXd* x : {&zeta_, &residual_, &gamma_, &lambda_, &r_, &diagonal_}) x->setZero(rows_);
+  S_sparse_.reset();
+  S_sparse_factor_.reset();
+  if (rows_ <= kDenseRows) {
+    S_.setZero(rows_, rows_);
+    S_factor_ = Eigen::LLT<MatrixXd>(rows_);
+    return;
+  }
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const Block& block : blocks_)
+    for (int i : block.rows)
+      for (int j : block.rows)
+        if (i >= j) entries.emplace_back(i, j, 1.0);
+  S_sparse_ = std::make_unique<Eigen::SparseMatrix<double>>(rows_, rows_);
+  S_sparse_->setFromTriplets(entries.begin(), entries.end());
+  S_sparse_factor_ = std::make_unique<Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>>();
+  S_sparse_factor_->analyzePattern(*S_sparse_);
+}
+
+bool ClosedField::begin(ConstVectorRef q) {
+  q_start_ = q;
+  updatePositions(model_, ws_, q_start_);
+  updateRows();
+  for (Loop& loop : loops_) loop.J_start = loop.J;
+  return true;
+}
+
+// delta and q of Eq. (1) for the present zeta.
+void ClosedField::displace(ConstVectorRef d) {
+  delta_ = d;
+  for (const Loop& loop : loops_)
+    for (size_t k = 0; k < loop.dofs.size(); ++k)
+      delta_[loop.dofs[k]] -= loop.J_start.col(k).dot(zeta_.segment(loop.offset, loop.J_start.rows()));
+  for (const Joint& joint : model_.joints())
+    if (joint.nv)
+      integrateJoint(joint, q_start_.segment(joint.idx_q, joint.nq), delta_.segment(joint.idx_v, joint.nv),
+                     q_.segment(joint.idx_q, joint.nq));
+}
+
+double ClosedField::updateResidual() {
+  double gap = 0;
+  for (const Loop& loop : loops_) {
+    const RowVectorUpTo6 all = calcClosureResidual<double>(ws_, model_.closures()[loop.index]);
+    for (size_t r = 0; r < loop.chosen.size(); ++r) {
+      const double value = all[loop.chosen[r]];
+      residual_[loop.offset + static_cast<int>(r)] = value;
+      if (!(std::abs(value) <= gap)) gap = std::abs(value);
+    }
+  }
+  return gap;
+}
+
+// J of all loops at the workspace's positions.
+void ClosedField::updateRows() {
+  for (Loop& loop : loops_) {
+    const Closure& closure = model_.closures()[loop.index];
+    auto J = scratch_.topLeftCorner(getRows(closure.kind), model_.nv());
+    calcClosureJacobian<double>(ws_, closure, J);
+    for (size_t k = 0; k < loop.dofs.size(); ++k)
+      for (size_t r = 0; r < loop.chosen.size(); ++r) loop.J(r, k) = J(loop.chosen[r], loop.dofs[k]);
+  }
+}
+
+bool ClosedField::updateNewton() {
+  for (Newton& newton : newtons_) {
+    if (newton.sparse)
+      std::fill(newton.sparse->valuePtr(), newton.sparse->valuePtr() + newton.sparse->nonZeros(), 0.0);
+    else
+      newton.K.setZero();
+    for (const Pair& pair : newton.pairs) {
+      const Loop &a = loops_[pair.a], &b = loops_[pair.b];
+      for (Eigen::Index i = 0; i < a.J.rows(); ++i)
+        for (Eigen::Index j = 0; j < b.J_start.rows(); ++j) {
+          double sum = 0;
+          for (const auto& [k, l] : pair.columns) sum += a.J(i, k) * b.J_start(j, l);
+          const Eigen::Index row = a.offset - newton.offset + i, col = b.offset - newton.offset + j;
+          if (newton.sparse)
+            newton.sparse->coeffRef(row, col) = sum;
+          else
+            newton.K(row, col) = sum;
+        }
+    }
+    if (newton.sparse) {
+      newton.sparse_factor->factorize(*newton.sparse);
+      if (newton.sparse_factor->info() != Eigen::Success) return false;
+    } else if (newton.rows > 0) {
+      newton.factor.compute(newton.K);
+    }
+  }
+  return true;
+}
+
+// zeta after a step of Newton's method: the residual falls by J dq (notation.h).
+void ClosedField::solveNewton() {
+  for (Newton& newton : newtons_) {
+    if (newton.rows == 0) continue;
+    newton.x = residual_.segment(newton.offset, newton.rows);
+    if (newton.sparse)
+      newton.x = newton.sparse_factor->solve(newton.x).eval();
+    else
+      newton.x = newton.factor.solve(newton.x);
+    zeta_.segment(newton.offset, newton.rows) -= newton.x;
+  }
+}
+
+bool ClosedField::close(ConstVectorRef d, ConstVectorRef u) {
+  zeta_.setZero();
+  double previous = std::numeric_limits<double>::infinity();
+  for (int i = 0;; ++i) {
+    displace(d);
+    updatePlacements<double>(model_, ws_, q_);
+    const double gap = updateResidual();
+    if (gap <= kClosed) break;
+    if (!(gap <= std::numeric_limits<double>::max()) || i == kMostSteps) return fail(describeWorst());
+    if (gap > 0.5 * previous) {
+      if (gap <= kAccepted) break;
+      if (i > 3) return fail(describeWorst());
+    }
+    if (gap > kSlow * previous || i == 0) {
+      updateColumns(model_, ws_);
+      updateRows();
+      if (!updateNewton()) return fail(describeWorst());
+    }
+    previous = gap;
+    solveNewton();
+  }
+  for (int j : grouped_) {
+    const Joint& joint = model_.joints()[j];
+    const int angles = joint.kind == JointKind::Planar ? 1 : 3;
+    if (delta_.segment(joint.idx_v + joint.nv - angles, angles).norm() > kMostRotation)
+      return fail("joint '" + joint.name + "' turns by more than " + formatNumber(kMostRotation) + " rad in a step");
+  }
+  updateColumns(model_, ws_);
+  updateRows();
+  updateCompositeInertias(model_, ws_);
+  if (!updateFactors()) return false;
+  v_ = u;
+  for (int refine = 0; refine < (rows_ > 0 ? 2 : 0); ++refine) {  // Eq. (2), and once more for the rounding of S
+    multiply(v_, r_);
+    r_ = -r_;
+    solveRows(r_);
+    addImpulse(r_, v_);
+  }
+  updateVelocities<double>(model_, ws_, v_);
+  updateBias(model_, ws_);
+  return true;
+}
+
+// M of every block, W = L^{-1} J^T, S and its factor.
+bool ClosedField::updateFactors() {
+  for (size_t b = 0; b < blocks_.size(); ++b) {
+    Block& block = blocks_[b];
+    for (size_t j = 0; j < block.dofs.size(); ++j) {
+      const int dof = block.dofs[j];
+      for (int k = dof; k >= 0; k = model_.dofs()[k].parent)
+        block.M(j, places_[k].second) = ws_.YJ.col(dof).dot(ws_.J.col(k));
+      block.M(j, j) += model_.armature()[dof];
+    }
+    block.factor.compute(block.M);
+    if (block.factor.info() != Eigen::Success) {
+      const Joint& joint = model_.joints()[model_.dofs()[block.dofs.front()].joint];
+      return fail("the mass matrix of the bodies behind joint '" + joint.name +
+                  "' is singular: one of them needs mass, inertia or the armature of a motor");
+    }
+  }
+  for (const Loop& loop : loops_)
+    for (size_t k = 0; k < loop.dofs.size(); ++k) {
+      const auto [i, row] = loop.places[k];
+      const auto [b, first] = loop.blocks[i];
+      blocks_[b].Jt.row(row).segment(first, loop.J.rows()) = loop.J.col(k).transpose();
+    }
+  if (rows_ == 0) return true;
+  if (S_sparse_)
+    std::fill(S_sparse_->valuePtr(), S_sparse_->valuePtr() + S_sparse_->nonZeros(), 0.0);
+  else
+    S_.setZero();
+  for (Block& block : blocks_) {
+    block.W = block.Jt;
+    block.factor.matrixL().solveInPlace(block.W);
+    block.gram.noalias() = block.W.transpose() * block.W;
+    for (size_t j = 0; j < block.rows.size(); ++j)
+      for (size_t i = 0; i < block.rows.size(); ++i)
+        if (block.rows[i] >= block.rows[j]) {
+          if (S_sparse_)
+            S_sparse_->coeffRef(block.rows[i], block.rows[j]) += block.gram(i, j);
+          else
+            S_(block.rows[i], block.rows[j]) += block.gram(i, j);
+        }
+  }
+  independence_ = 1;
+  if (S_sparse_) {
+    diagonal_ = S_sparse_->diagonal();
+    S_sparse_factor_->factorize(*S_sparse_);
+    if (S_sparse_factor_->info() != Eigen::Success) return fail("the rows of its loops are dependent");
+    const VectorXd L = S_sparse_factor_->matrixL().nestedExpression().diagonal();
+    for (int i = 0; i < rows_; ++i) {
+      const double pivot = L[S_sparse_factor_->permutationP().indices()[i]];
+      independence_ = std::min(independence_, pivot * pivot / diagonal_[i]);
+    }
+  } else {
+    diagonal_ = S_.diagonal();
+    S_factor_.compute(S_);
+    if (S_factor_.info() != Eigen::Success) independence_ = 0;
+    for (int i = 0; i < rows_; ++i) {
+      const double pivot = S_factor_.matrixLLT()(i, i);
+      independence_ = std::min(independence_, pivot * pivot / diagonal_[i]);
+    }
+  }
+  if (!(independence_ > kSingular)) return fail("the rows of its loops become dependent there: a singular posture");
+  return true;
+}
+
+void ClosedField::solveRows(VectorXd& x) {
+  if (S_sparse_)
+    x = S_sparse_factor_->solve(x).eval();
+  else
+    S_factor_.solveInPlace(x);
+}
+
+// rows = J x
+void ClosedField::multiply(const VectorXd& x, VectorXd& rows) const {
+  for (const Loop& loop : loops_) {
+    auto out = rows.segment(loop.offset, loop.J.rows());
+    out.setZero();
+    for (size_t k = 0; k < loop.dofs.size(); ++k) out += loop.J.col(k) * x[loop.dofs[k]];
+  }
+}
+
+// x += M^{-1} J^T rows
+void ClosedField::addImpulse(const VectorXd& rows, VectorXd& x) {
+  for (Block& block : blocks_) {
+    if (block.rows.empty()) continue;
+    for (size_t r = 0; r < block.rows.size(); ++r) block.y[r] = rows[block.rows[r]];
+    block.x.noalias() = block.W * block.y;
+    block.factor.matrixU().solveInPlace(block.x);
+    for (size_t k = 0; k < block.dofs.size(); ++k) x[block.dofs[k]] += block.x[k];
+  }
+}
+
+// x <- M^{-1} x
+void ClosedField::solveMass(VectorXd& x) {
+  for (Block& block : blocks_) {
+    for (size_t k = 0; k < block.dofs.size(); ++k) block.x[k] = x[block.dofs[k]];
+    block.factor.solveInPlace(block.x);
+    for (size_t k = 0; k < block.dofs.size(); ++k) x[block.dofs[k]] = block.x[k];
+  }
+}
+
+void ClosedField::accelerate(ConstVectorRef tau, VectorRef d_rate, VectorRef u_rate) {
+  a_ = tau - ws_.b;
+  solveMass(a_);
+  if (rows_ > 0) {
+    for (const Loop& loop : loops_) {
+      const RowVectorUpTo6 all = calcClosureAcceleration<double>(ws_, model_.closures()[loop.index]);
+      for (size_t r = 0; r < loop.chosen.size(); ++r) gamma_[loop.offset + static_cast<int>(r)] = all[loop.chosen[r]];
+    }
+    lambda_.setZero();
+    for (int refine = 0; refine < 2; ++refine) {  // Eq. (3), and once more for the rounding of S
+      multiply(a_, r_);
+      r_ = -r_ - gamma_;
+      solveRows(r_);
+      lambda_ += r_;
+      addImpulse(r_, a_);
+    }
+  }
+  u_rate = a_;
+  d_rate = v_;
+  for (int j : grouped_) {
+    const Joint& joint = model_.joints()[j];
+    auto D = scratch_.topLeftCorner(joint.nv, joint.nv);
+    calcJointDifferenceJacobian(joint, delta_.segment(joint.idx_v, joint.nv), D);
+    x_.head(joint.nv).noalias() = D * v_.segment(joint.idx_v, joint.nv);
+    d_rate.segment(joint.idx_v, joint.nv) = x_.head(joint.nv);
+  }
+}
+
+double ClosedField::calcGap() const {
+  double gap = 0;
+  for (const Loop& loop : loops_)
+    gap = std::max(gap, calcClosureResidual<double>(ws_, model_.closures()[loop.index]).cwiseAbs().maxCoeff());
+  return gap;
+}
+
+bool ClosedField::fail(const std::string& why) {
+  failure_ = why;
+  return false;
+}
+
+std::string ClosedField::describeWorst() const {
+  const Loop* worst = nullptr;
+  double largest = -1;
+  for (const Loop& loop : loops_)
+    for (size_t r = 0; r < loop.chosen.size(); ++r) {
+      const double gap = std::abs(residual_[loop.offset + static_cast<int>(r)]);
+      if (gap > largest) largest = gap, worst = &loop;
+    }
+  return "closure '" + (worst ? model_.closures()[worst->index].name : std::string()) + "' does not close";
+}
+
+}  // namespace bielle

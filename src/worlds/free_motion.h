@@ -1,0 +1,43 @@
+#pragma once
+/// \file A mechanism that moves by itself: from a state, under given torques, without a plan, a controller or feet.
+#include <atomic>
+#include <vector>
+
+#include "worlds/execution.h"
+
+namespace bielle::worlds {
+
+/// Torques from an instant on, until the next.
+struct TimedTorques {
+  double time = 0;  ///< s
+  VectorXd u;       ///< nu, N m or N
+};
+
+struct FreeMotionOptions {
+  double duration = 2;                ///< s
+  double record_period = 0.01;        ///< s
+  std::vector<TimedTorques> torques;  ///< in order of time; before the first, none
+  std::vector<Push> pushes;
+  const std::atomic<bool>* interrupt = nullptr;
+};
+
+struct FreeMotion {
+  Execution execution;       ///< outcome Ended, BrokeOff or Stopped; of the fields of a plan, none is set
+  std::vector<Books> books;  ///< one per node of the record
+};
+
+/// Moves a world from a closed state. Steps end where torques and pushes change.
+/// \param observer  is called after every row of the record
+FreeMotion moveFreely(const Model& model, World& world, ConstVectorRef q, ConstVectorRef v,
+                      const FreeMotionOptions& options, const ExecutionObserver& observer = {});
+
+/// A robot whose motors are held by springs and dampers where they are at q, each as a joint force of the model, so that it
+/// is the same in every world.
+struct MotorSpring {
+  int motor = 0;
+  double stiffness = 0, damping = 0;  ///< N m/rad and N m s/rad, or N/m and N s/m
+  double rest = 0;                    ///< coordinate of the motor's joint, rad or m
+};
+Model addMotorSprings(const Model& model, const std::vector<MotorSpring>& springs);
+
+}  // namespace bielle::worlds

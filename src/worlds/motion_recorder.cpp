@@ -1,0 +1,106 @@
+#include "worlds/motion_recorder.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "bielle/dynamics/closure.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/names.h"
+#include "motion/record_tables.h"
+
+namespace bielle::worlds {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+bool isWithinStops(const Model& model, const VectorXd& q) {
+  for (const Joint& joint : model.joints())
+    if (joint.nv == 1 &&
+        !(q[joint.idx_q] >= model.lowerLimits()[joint.idx_v] && q[joint.idx_q] <= model.upperLimits()[joint.idx_v]))
+      return false;
+  return true;
+}
+
+}  // namespace
+
+MotionRecorder::MotionRecorder(const Model& model, int stages)
+    : model_(model), loops_(makeConstraintSet(model)), ws_(model) {
+  record_.q_names = makePositionNames(model);
+  record_.v_names = makeVelocityNames(model);
+  record_.u_names = getNames(model.motors());
+  record_.closure_names = getNames(model.closures());
+  record_.contact_names = getNames(model.contacts());
+  resizeRecord(stages, record_);
+}
+
+void MotionRecorder::addNode(const World& world, const std::vector<PredictedFoothold>& footholds) {
+  const VectorXd &q = world.getConfiguration(), &v = world.getVelocity();
+  record_.time[node_] = world.getTime();
+  record_.q.row(node_) = q;
+  record_.v.row(node_) = v;
+  updatePositions(model_, ws_, q);
+  record_.com.row(node_) = calcCom(model_, ws_);
+  record_.gap.row(node_).setZero();
+  for (const Closure& closure : model_.closures()) {
+    const ClosureGap gap = calcClosureGap(ws_, closure);
+    record_.gap(node_, 0) = std::max(record_.gap(node_, 0), gap.position);
+    record_.gap(node_, 1) = std::max(record_.gap(node_, 1), gap.angle);
+  }
+  if (node_ > 0)
+    record_.a.row(node_ - 1) =
+        (record_.v.row(node_) - record_.v.row(node_ - 1)) / (record_.time[node_] - record_.time[node_ - 1]);
+  addFootholds(footholds);
+  ++node_;
+}
+
+void MotionRecorder::addStage(const World& world) {
+  const int stage = node_ - 1;
+  record_.u.row(stage) = world.getTorques();
+  record_.closure_wrenches.row(stage).setConstant(kUnknown);
+  for (size_t c = 0; c < world.getFeet().size(); ++c)
+    record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world.getFeet()[c].wrench;
+}
+
+void MotionRecorder::addClosureForces(const World& world) {
+  const int stage = node_ - 1;
+  if (loops_.rows == 0 || !record_.contact_wrenches.row(stage).isZero(0) ||
+      !isWithinStops(model_, world.getConfiguration()))
+    return;
+  if (updateConstrainedDynamics(model_, ws_, cws_, loops_, world.getConfiguration(), world.getVelocity(),
+                                calcMotorForces(model_, world.getTorques())) != DynamicsStatus::Ok)
+    return;
+  for (size_t c = 0; c < loops_.closures.size(); ++c) {
+    const Closure& closure = loops_.closures[c];
+    record_.closure_wrenches.block<1, 6>(stage, 6 * static_cast<Eigen::Index>(c)) =
+        expandRows(closure, cws_.lambda.segment(loops_.offsets[c], getRows(closure.kind))).transpose();
+  }
+}
+
+MotionRecord MotionRecorder::getRecord(double since) const {
+  int first = 0;
+  while (first + 2 < node_ && record_.time[first] < since) ++first;
+  MotionRecord record = record_;
+  if (record.footholds.rows() > 0) record.footholds = record_.footholds.middleRows(first, node_ - first);
+  record.time = record_.time.segment(first, node_ - first);
+  for (const RecordTable& table : listTables(record))
+    record.*table.data =
+        (record_.*table.data).middleRows(first, node_ - first - (table.per == RecordTable::Per::Node ? 0 : 1));
+  return record;
+}
+
+void MotionRecorder::addFootholds(const std::vector<PredictedFoothold>& footholds) {
+  constexpr int kEntries = MotionRecord::kFootholdEntries;
+  RowMatrixXd& table = record_.footholds;
+  if (table.rows() == 0 && !footholds.empty())
+    table.setConstant(record_.time.size(), kEntries * static_cast<int>(model_.contacts().size()), kUnknown);
+  for (const PredictedFoothold& foothold : footholds)
+    table.row(node_).segment<kEntries>(kEntries * foothold.contact) << foothold.time, foothold.X_WF.p.transpose(),
+        Eigen::Quaterniond(foothold.X_WF.R).coeffs().transpose();
+}
+
+double calcImbalance(const Books& start, const Books& end) {
+  return end.getEnergy() - start.getEnergy() - end.motor_work - end.push_work + end.contact_loss + end.stop_loss +
+         end.other_loss;
+}
+
+}  // namespace bielle::worlds
