@@ -6,8 +6,8 @@
     docs/results/execution.py --measure minutes real_time   these take hours and minutes
     docs/results/execution.py --record unknown=DIR          takes a table from a campaign: `bielle campaign SPEC -o DIR`
 
-The campaigns are worlds, pushes, pushes_predictive, pushes_felt and unknown, each from examples/campaign/NAME.yaml;
-they take hours. Every table keeps the commit, the date and the machine of its figures. `--quick` runs and records a
+The campaigns are worlds, pushes, pushes_predictive, pushes_felt, unknown, worlds_real_time and pushes_real_time, each
+from examples/campaign/NAME.yaml; they take hours, those in real time a quarter of one, on a quiet machine. Every table keeps the commit, the date and the machine of its figures. `--quick` runs and records a
 small campaign.
 """
 import contextlib
@@ -54,13 +54,13 @@ def read_runs(directory):
         return list(csv.DictReader(file))
 
 
-def count_by(column):
+def count_by(column, key=float):
     def reduce(directory):
         counts = {}
         for run in read_runs(directory):
             stood, runs = counts.get(run[column], (0, 0))
             counts[run[column]] = (stood + (run["outcome"] == STOOD), runs + 1)
-        return [column, "stood", "runs"], [[value, *counts[value]] for value in sorted(counts, key=float)]
+        return [column, "stood", "runs"], [[value, *counts[value]] for value in sorted(counts, key=key)]
     return reduce
 
 
@@ -85,7 +85,8 @@ def list_impulses(directory):
 
 
 CAMPAIGNS = {"worlds": list_falls, "pushes": list_impulses, "pushes_predictive": count_by("push time"),
-             "pushes_felt": count_by("push time"), "unknown": count_by("friction")}
+             "pushes_felt": count_by("push time"), "unknown": count_by("friction"),
+             "worlds_real_time": list_falls, "pushes_real_time": count_by("sensors", str)}
 
 
 # Measurements
@@ -272,6 +273,11 @@ that are 5 ± 1 ms late: {share("pushes_felt")}."""),
     ("Unknown ground", "unknown", lambda: f"""Bipetto walks for 20 s at 0.2 m/s on tiles of 25 cm, up to 2 cm above
 and below the planned ground, with masses off by up to 10 %, rods by up to 0.5 mm, and friction as in the table; its
 plan assumes 0.4. {share("unknown")}. A run takes 15 to 20 s of one core."""),
+    ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
+two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls."""),
+    ("Pushes in real time", "pushes_real_time", lambda: f"""Pushes of 10 N s from eight directions at ten instants of one
+step, with `--real-time`, by what the controller is told: the true state, or real sensors.
+{share("pushes_real_time")}."""),
     ("Minutes", "minutes", lambda: """`bielle simulate walk --duration 60 --control mpc`, true state, largest slip of
 a sole since its touchdown. Takes hours, most of them in Simbody's world."""),
     ("Real time", "real_time", lambda: """`bielle simulate walk --command FILE --duration 60 --control mpc

@@ -72,10 +72,9 @@ class HeldWorlds {
   py::object getBooks() {
     worlds::Books books;
     observeOnly([&](const World& world) { books = world.getBooks(); });
-    return makeNamed("Books",
-                     {py::float_(books.kinetic), py::float_(books.potential), py::float_(books.elastic),
-                      py::float_(books.motor_work), py::float_(books.push_work), py::float_(books.contact_loss),
-                      py::float_(books.stop_loss), py::float_(books.other_loss)});
+    return py::module_::import("bielle.named")
+        .attr("Books")(books.kinetic, books.potential, books.elastic, books.motor_work, books.push_work,
+                       books.contact_loss, books.stop_loss, books.other_loss);
   }
   std::string getMessage() {
     std::string message;

@@ -225,7 +225,6 @@ bool isFree(const SimulateArguments& arguments) {
 }
 
 bool simulateFreely(const SimulateArguments& given, const std::vector<std::string>& command) {
-  refuseOptionsOfPlans(given);
   SimulateArguments arguments = given;
   ExecutionOptions& execution = arguments.execution;
   if (execution.duration == 0) execution.duration = kDuration;
@@ -240,6 +239,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
                        "give one of them, or --robot with the name of a motion");
     }
   }();
+  refuseOptionsOfPlans(given);
   for (const std::string& warning : robot.warnings) std::cerr << "bielle: warning: " << warning << "\n";
   const FreeStart start = makeFreeStart(robot.model, arguments);
   std::vector<MotorSpring> springs;
