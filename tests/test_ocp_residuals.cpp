@@ -45,7 +45,7 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
   add("distance of capsules",
       makeShapeDistance(makeCapsule(a.body, random(), random(), 0.05), makeCapsule(b.body, random(), random(), 0.02)));
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
-    const int rows = getRows(set.closures[c].kind);
+    const int rows = countForces(set, c);
     add("contact force", makeContactForce(set, c, randomVector(rng, rows, 10)));
     add("contact force in the world", makeContactForce(set, c, randomVector(rng, rows, 10), ForceAxes::World));
     add("wrench cone", makeWrenchCone(set, c, 0.1, 0.04, 0.6));
@@ -92,6 +92,36 @@ TEST_CASE("every residual against differences, on mechanisms of every joint kind
       checkResidual(model, set, *entry.residual, q, v, lambda);
     }
   }
+}
+
+TEST_CASE("forces of edges against differences, and the cone of a sole that has shrunk to one") {
+  std::mt19937 rng(15);
+  const Mechanism mechanism =
+      makeRandomMechanism(rng, JointKind::Spherical, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
+  ModelParts parts = takeParts(mechanism.model);
+  for (ContactFrame& contact : parts.contacts)
+    contact = {contact.name, contact.body, contact.X_BF, ContactKind::Edge5D, 0.1, 0};
+  const Model model = ModelBuilder::restore(parts);
+  const ConstraintSet set =
+      makeConstraintSet(model, {{0, randomPlacement(rng), 0, 0}, {1, randomPlacement(rng), 0, 0}});
+  REQUIRE(getRows(set.closures.back().kind) == 5);
+  const VectorXd q = mechanism.q_closed, v = randomVector(rng, model.nv()), lambda = makeForces(rng, set);
+  const int c = set.num_loops;
+  for (ForceAxes axes : {ForceAxes::Contact, ForceAxes::World, ForceAxes::Ground}) {
+    checkResidual(model, set, *makeContactForce(set, c, randomVector(rng, 6, 10), axes), q, v, lambda);
+    checkResidual(model, set, *makeWrenchCone(set, c, 0.1, 0, 0.6, axes), q, v, lambda);
+  }
+  // The same wrench on a sole without width: each of its rows is one of the edge's.
+  parts.contacts[0].kind = ContactKind::Surface6D;
+  const Model sole = ModelBuilder::restore(parts);
+  const ConstraintSet of_sole = makeConstraintSet(sole, {{0, set.closures[c].X_B2, 0, 0}});
+  TestNode edge_node(model, set), sole_node(sole, of_sole);
+  VectorXd wrench = VectorXd::Zero(of_sole.rows);
+  wrench.tail<6>() = expandRows(set.closures[c], lambda.segment(set.offsets[c], 5));
+  const VectorXd edge = edge_node.calc(*makeWrenchCone(set, c, 0.1, 0, 0.6), q, v, lambda),
+                 all = sole_node.calc(*makeWrenchCone(of_sole, c, 0.1, 0, 0.6), q, v, wrench);
+  REQUIRE(edge.size() == 11);
+  CHECK(edge.minCoeff() == Approx(std::min(all.head<5>().minCoeff(), all.tail<10>().minCoeff())));
 }
 
 TEST_CASE("every residual against differences, on Bipetto in motion") {

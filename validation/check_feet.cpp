@@ -75,7 +75,7 @@ double calcGapAcrossEdges(const Corners& a, const Corners& b) {
   return widest;
 }
 
-bool hasSole(const ContactFrame& contact) { return contact.half_length > 0 && contact.half_width > 0; }
+bool hasSole(const ContactFrame& contact) { return contact.half_length > 0; }
 
 // Nodes [begin, end) during which a contact is in the air.
 struct Flight {
@@ -118,6 +118,8 @@ void addStanceRows(CheckContext& context) {
       const SE3 moved = touch_down->inverseTimes(node.feet[c]);
       slip.add(moved.p.norm(), k, contact.name);
       if (contact.kind == ContactKind::Surface6D) angle.add(log3(moved.R).norm(), k, contact.name);
+      if (contact.kind == ContactKind::Edge5D)  // its direction: it may roll
+        angle.add(moved.R.col(0).tail<2>().norm(), k, contact.name);
       height.add(calcGap(context.motion.summary.ground, calcCorners(contact, node.feet[c])), k, contact.name);
     }
   }

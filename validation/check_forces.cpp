@@ -18,16 +18,21 @@ struct ContactForces {
       cone{CheckRow::Kind::AtLeast}, point, in_air;
 };
 
-void addWrench(const ContactFrame& contact, const Vector6d& wrench, const CheckContext& context, double least_load,
-               int node, ContactForces& out) {
-  const Vector3d f = wrench.head<3>(), n = wrench.tail<3>();
+void addWrench(const ContactFrame& contact, Vector6d wrench, const CheckContext& context, double least_load, int node,
+               ContactForces& out) {
+  const Vector3d f = wrench.head<3>();
   const double load = getLarger(f.z(), least_load);
   out.normal.add(f.z(), node, contact.name);
   out.friction.add(f.head<2>().norm() / load, node, contact.name);
   if (contact.kind == ContactKind::Point3D) {
-    out.point.add(calcLargest(n), node, contact.name);
+    out.point.add(calcLargest(wrench.tail<3>()), node, contact.name);
     return;
   }
+  if (contact.kind == ContactKind::Edge5D) {
+    out.point.add(std::abs(wrench[3]), node, contact.name);
+    wrench[3] = 0;  // what remains is within the cone of a sole without width
+  }
+  const Vector3d n = wrench.tail<3>();
   const ConeMargin cone = calcConeMargin(wrench, contact.half_length, contact.half_width,
                                          context.motion.summary.ground.friction, least_load);
   out.cone.add(cone.value, node, contact.name + ", " + cone.limit);
@@ -36,6 +41,21 @@ void addWrench(const ContactFrame& contact, const Vector6d& wrench, const CheckC
   const double x = -n.y() / load, y = n.x() / load;
   out.torsion.add(std::abs(n.z() - (x * f.y() - y * f.x())) / load, node, contact.name);
   out.pressure.add(getLarger(std::abs(x) - contact.half_length, std::abs(y) - contact.half_width), node, contact.name);
+}
+
+// A wrench in the frame of a contact, in the axes of the ground under a point or an edge, which may tilt on it: those of the
+// world, or of the place where an edge stands.
+Vector6d turnToGround(const CheckContext& context, int c, int node, const Vector6d& wrench) {
+  const ContactFrame& contact = context.model().contacts()[c];
+  if (contact.kind == ContactKind::Surface6D) return wrench;
+  Matrix3d R = context.trace.nodes[node].feet[c].R;
+  if (contact.kind == ContactKind::Edge5D)
+    for (const ContactTarget& stance : context.motion.getContacts(context.motion.findPhase(node)))
+      if (stance.contact == c) R = stance.X_WT.R.transpose() * R;
+  Vector6d out;
+  out << R * wrench.head<3>(), R * wrench.tail<3>();
+  if (contact.kind == ContactKind::Edge5D) out[3] = wrench[3];  // about itself, wherever it slips to
+  return out;
 }
 
 // Largest |value| / limit of the motors that have a limit, with both in the note.
@@ -66,7 +86,8 @@ void addImpactRows(CheckContext& context) {
     for (int c = 0; c < static_cast<int>(model.contacts().size()); ++c)
       if (const Vector6d& impulse = context.trace.stages[k].impulses[c];
           context.motion.stands(c, k) && !(impulse.head<3>().norm() < kLeastChange * model.mass()))
-        addWrench(model.contacts()[c], impulse, context, kLeastChange * model.mass(), k, impulses);
+        addWrench(model.contacts()[c], turnToGround(context, c, k, impulse), context, kLeastChange * model.mass(), k,
+                  impulses);
   }
   if (!any) return;
   const std::string nothing = "no impulse changes the robot's speed by 1 mm/s";
@@ -133,7 +154,7 @@ void addForceRows(CheckContext& context) {
       const ContactFrame& contact = model.contacts()[c];
       const Vector6d wrench = context.motion.record.contact_wrenches.block<1, 6>(k, 6 * c).transpose();
       if (context.motion.stands(c, k))
-        addWrench(contact, wrench, context, least_load, k, forces);
+        addWrench(contact, turnToGround(context, c, k, wrench), context, least_load, k, forces);
       else
         forces.in_air.add(calcLargest(wrench), k, contact.name);
     }
@@ -144,7 +165,8 @@ void addForceRows(CheckContext& context) {
   context.add(forces.pressure, "contact: pressure beyond the sole", "m", context.bounds.pressure, "no sole stands");
   context.add(forces.cone, "contact: wrench cone of the sole", "m", context.bounds.wrench_cone, "no sole stands");
   context.add(forces.torsion, "contact: twisting over normal", "m", 0, "no sole stands");
-  context.add(forces.point, "contact: moment on a point", "N m", context.bounds.point_moment, "no point stands");
+  context.add(forces.point, "contact: moment on a point or about an edge", "N m", context.bounds.point_moment,
+              "no point or edge stands");
   context.add(forces.in_air, "contact: force in the air", "N, N m", context.bounds.force_in_air, "no foot swings");
   addImpactRows(context);
 }

@@ -23,6 +23,7 @@ void bindEnums(py::module_& module) {
       .value("COUPLER", ClosureKind::Coupler);
   py::enum_<ContactKind>(module, "ContactKind")
       .value("POINT_3D", ContactKind::Point3D)
+      .value("EDGE_5D", ContactKind::Edge5D)
       .value("SURFACE_6D", ContactKind::Surface6D);
   py::enum_<Visual::Shape>(module, "VisualShape")
       .value("BOX", Visual::Shape::Box)

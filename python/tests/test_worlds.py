@@ -199,3 +199,21 @@ def test_simulate(solution, robot, tmp_path):
     assert (tmp_path / "out" / "trajectory.npz").is_file() and kept["fell"] is False
     with pytest.raises(RuntimeError, match="nowhere"):
         bielle.simulate(result, world="nowhere")
+
+
+def test_mechanism_in_motion():
+    """A four-bar swings in steps of controlled error and keeps its energy; a coarser tolerance keeps it less well."""
+    model = bielle.load_robot("fourbar").model
+    drifts = []
+    for tolerance in (1e-4, 1e-10):
+        world = bielle.World(model, tolerance=tolerance)
+        world.reset(model.posture("crank_at_60_degrees"), np.zeros(model.nv))
+        start = world.books
+        state = world.step([0], 2.0)
+        assert state.ok and not world.message
+        end = world.books
+        assert end.kinetic > 0 and isinstance(end.kinetic, float)
+        drifts.append(abs(end.kinetic + end.potential - start.kinetic - start.potential))
+    assert drifts[1] < 1e-7 < drifts[0]
+    with pytest.raises(ValueError):
+        bielle.World(model, count=2, tolerance=1e-6).books

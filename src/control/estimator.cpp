@@ -14,7 +14,7 @@ namespace {
 
 std::vector<int> listSizes(const Model& model) {
   std::vector<int> sizes;
-  for (const ContactFrame& contact : model.contacts()) sizes.push_back(contact.kind == ContactKind::Point3D ? 3 : 6);
+  for (const ContactFrame& contact : model.contacts()) sizes.push_back(contact.kind == ContactKind::Surface6D ? 6 : 3);
   return sizes;
 }
 

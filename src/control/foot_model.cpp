@@ -11,7 +11,7 @@ constexpr double kTrunk = 0.1;            // w of Eq. (2), 1
 constexpr double kRest = 0.25;            // of Eq. (3): a faster foot is not at rest, m/s
 constexpr double kRegularization = 1e-4;  // e of Eq. (2), 1
 
-int countRows(ContactKind kind) { return kind == ContactKind::Surface6D ? 6 : 3; }
+int countRows(ContactKind kind) { return kind == ContactKind::Point3D ? 3 : 6; }
 
 }  // namespace
 
@@ -60,7 +60,7 @@ void FootModel::update(const PassiveJoints& joints, ConstVectorRef q, ConstVecto
     const ContactFrame& contact = model_.contacts()[c];
     const Matrix3d R = ws_.X_WB[contact.body].R * contact.X_BF.R;
     wrenches_[c].head<3>() = R.transpose() * f_.segment<3>(offsets_[c]);
-    if (contact.kind == ContactKind::Surface6D)
+    if (contact.kind != ContactKind::Point3D)
       wrenches_[c].tail<3>() = kLength * (R.transpose() * f_.segment<3>(offsets_[c] + 3));
   }
 }

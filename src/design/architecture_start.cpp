@@ -22,6 +22,7 @@ double calcPostureGap(const Model& start, const Model& model, const VectorXd& po
     const ContactFrame &from = start.contacts()[c], &foot = model.contacts()[c];
     FrameTarget target{foot.name, foot.body, foot.X_BF, getPlacement(ws, from.body, from.X_BF)};
     if (foot.kind == ContactKind::Point3D) target.mask.tail<3>().setConstant(false);
+    if (foot.kind == ContactKind::Edge5D) target.mask[3] = false;
     problem.frames.push_back(target);
   }
   AssemblyOptions options;

@@ -52,7 +52,10 @@ std::array<WorkspaceAxis, 6> fillAxes(const Model& model, const WorkspaceRegion&
   double total = 1;
   for (size_t i = 0; i < axes.size(); ++i) {
     WorkspaceAxis& axis = axes[i];
-    if (axis.kind == Kind::Default) axis.kind = i > 2 && foot.kind == ContactKind::Point3D ? Kind::Free : Kind::Range;
+    if (axis.kind == Kind::Default)
+      axis.kind = (i > 2 && foot.kind == ContactKind::Point3D) || (i == 3 && foot.kind == ContactKind::Edge5D)
+                      ? Kind::Free
+                      : Kind::Range;
     if (axis.kind == Kind::Free || axis.lower == axis.upper) axis.points = 1;
     if (!(axis.lower <= axis.upper && axis.points > 0))
       throw InputError(model.name(), std::string("workspace: ") + kAxes[i],

@@ -291,6 +291,7 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
     target.X_BF = contact.X_BF;
     target.X_WT.p = position;
     if (contact.kind == ContactKind::Point3D) target.mask.tail<3>().setConstant(false);
+    if (contact.kind == ContactKind::Edge5D) target.mask[3] = false;  // it may roll
     problem.frames.push_back(target);
   }
   if (!reference.height_frame.empty()) {

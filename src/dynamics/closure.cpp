@@ -93,7 +93,10 @@ ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTar
     const ContactFrame& frame = model.contacts()[target.contact];
     Closure closure;
     closure.name = frame.name;
-    closure.kind = frame.kind == ContactKind::Surface6D ? ClosureKind::Weld6D : ClosureKind::Ball3D;
+    closure.kind = frame.kind == ContactKind::Surface6D ? ClosureKind::Weld6D
+                   : frame.kind == ContactKind::Edge5D  ? ClosureKind::Hinge5D
+                                                        : ClosureKind::Ball3D;
+    closure.axis = Vector3d::UnitX();  // of an edge
     closure.body1 = frame.body;
     closure.X_B1 = frame.X_BF;
     closure.X_B2 = target.X_WT;

@@ -278,9 +278,9 @@ class MjcfWriter {
   }
 
   void writeSole(const ContactFrame& contact, XMLElement& e) {
-    const bool is_point = contact.kind == ContactKind::Point3D;
-    for (int corner = 0; corner < (is_point ? 1 : 4); ++corner) {
-      const Vector3d centre((corner < 2 ? 1 : -1) * contact.half_length,
+    const int corners = contact.kind == ContactKind::Point3D ? 1 : contact.kind == ContactKind::Edge5D ? 2 : 4;
+    for (int corner = 0; corner < corners; ++corner) {
+      const Vector3d centre((corner < corners / 2 || corners == 1 ? 1 : -1) * contact.half_length,
                             (corner % 2 == 0 ? 1 : -1) * contact.half_width, options_.sole_radius);
       addElement(e, "geom",
                  {{"class", "sole"},

@@ -200,17 +200,22 @@ void readPointSprings(const Entry& map, YamlFile& file) {
 
 void readContacts(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
-    const Fields fields = entry.getFields({"frame", "type", "sole"});
+    const Fields fields = entry.getFields({"frame", "type", "sole", "length"});
     ContactSpec contact;
     contact.name = name;
     contact.frame = require(fields, "frame", entry).getText();
     const Entry& type = require(fields, "type", entry);
     const std::string kind = lower(type.getText());
-    if (kind != "6d" && kind != "3d")
-      type.fail("contact type '" + kind + "' is unknown", "use 6d (sole) or 3d (point)");
-    contact.kind = kind == "6d" ? ContactKind::Surface6D : ContactKind::Point3D;
+    if (kind != "6d" && kind != "5d" && kind != "3d")
+      type.fail("contact type '" + kind + "' is unknown", "use 6d (sole), 5d (edge) or 3d (point)");
+    contact.kind = kind == "6d" ? ContactKind::Surface6D : kind == "5d" ? ContactKind::Edge5D : ContactKind::Point3D;
+    if (const Entry* length = find(fields, "length")) {
+      if (contact.kind != ContactKind::Edge5D) length->fail("only an edge has a length", "use type 5d, or `sole`");
+      contact.half_length = length->getNumber() / 2;
+    }
     if (const Entry* sole = find(fields, "sole")) {
       if (contact.kind == ContactKind::Point3D) sole->fail("a point has no sole", "use type 6d or remove it");
+      if (contact.kind == ContactKind::Edge5D) sole->fail("an edge has no sole", "give its `length`, in metres");
       const std::vector<double> size = sole->getNumbers(2);
       contact.half_length = size[0] / 2;
       contact.half_width = size[1] / 2;

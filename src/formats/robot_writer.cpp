@@ -171,8 +171,9 @@ class YamlWriter {
     writeMap("contacts", "", model_.contacts(), [this](const ContactFrame& c) {
       out_ << Key << c.name << Value << Flow << BeginMap;
       add("frame", findFrameName(model_, c.body, c.X_BF, c.name + "_sole"));
-      add("type", c.kind == ContactKind::Point3D ? "3d" : "6d");
-      if (c.kind != ContactKind::Point3D)
+      add("type", getName(c.kind));
+      if (c.kind == ContactKind::Edge5D) out_ << Key << "length" << Value << formatRounded(2 * c.half_length);
+      if (c.kind == ContactKind::Surface6D)
         out_ << Key << "sole" << Value << Flow << BeginSeq << formatRounded(2 * c.half_length)
              << formatRounded(2 * c.half_width) << EndSeq;
       out_ << EndMap;

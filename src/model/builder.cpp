@@ -215,6 +215,8 @@ void ModelBuilder::addContact(const std::string& name, const std::string& frame,
   const FramePlace place = getFrame(frame, element);
   if (!(half_length >= 0) || !(half_width >= 0) || !std::isfinite(half_length + half_width))
     fail(element, "its sole is not given by two sizes of 0 or more", "give length and width in metres");
+  if (kind == ContactKind::Edge5D && !(half_length > 0 && half_width == 0))
+    fail(element, "an edge needs a length, and has no width", "give its length in metres, along x of its frame");
   model_.data_->contacts.push_back({name, place.body, place.X_BF, kind, half_length, half_width});
 }
 

@@ -89,6 +89,18 @@ const char* getName(ClosureKind kind) {
   return "?";
 }
 
+const char* getName(ContactKind kind) {
+  switch (kind) {
+    case ContactKind::Point3D:
+      return "3d";
+    case ContactKind::Edge5D:
+      return "5d";
+    case ContactKind::Surface6D:
+      return "6d";
+  }
+  return "?";
+}
+
 int getRows(ClosureKind kind) {
   switch (kind) {
     case ClosureKind::Weld6D:

@@ -56,7 +56,7 @@ void addSwingVelocity(const Model& model, int contact, const Vector6d& V_F, cons
 void addLanding(const Model& model, int contact, const SE3& X_WF, double room, double speed, StageSpec& stage) {
   const ContactFrame& foot = model.contacts()[contact];
   const BodyFrame frame = getFrame(foot);
-  const bool point = foot.kind != ContactKind::Surface6D;
+  const bool point = foot.kind == ContactKind::Point3D, edge = foot.kind == ContactKind::Edge5D;
   const Vector3d position = Vector3d::Constant(kPosition), angle = Vector3d::Constant(kAngle);
   PathConstraint place = point
                              ? makeEquation("landing of " + foot.name, makeFrameTranslation(frame, X_WF.p), 3, position)
@@ -65,11 +65,16 @@ void addLanding(const Model& model, int contact, const SE3& X_WF, double room, d
   place.upper.head<2>().setConstant(room);
   const double reach = std::hypot(foot.half_length, foot.half_width);
   if (!point && reach > 0) place.upper[5] = room / reach;
+  if (edge) place.upper[3] = kFree;  // it rolls
   place.lower = -place.upper;
   PathConstraint velocity = makeEquation("landing velocity of " + foot.name, makeFrameVelocity(frame), point ? 3 : 6,
                                          Vector6d::Constant(kVelocity));
   velocity.lower.head<3>().setConstant(-speed);
   velocity.upper.head<3>() << speed, speed, -speed;
+  if (edge) {
+    velocity.upper[3] = kFree;
+    velocity.lower[3] = -kFree;
+  }
   stage.feet.push_back({contact, FootRole::Landing, room, place.residual, velocity.residual});
   stage.path_constraints.push_back(std::move(place));
   stage.path_constraints.push_back(std::move(velocity));
@@ -131,7 +136,7 @@ void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactF
                  double least, StageSpec& stage) {
   constexpr double kTracking = 0.01;  // m
   for (const ContactFrame* contact : {&swinging, &standing})
-    if (contact->half_length == 0 || contact->half_width == 0) return;
+    if (contact->half_length == 0) return;
   const Shape a = makeSoleCapsule(swinging), b = makeSoleCapsule(standing);
   const double of_path =
       calcDistance(a, X_path * swinging.X_BF.inverse(), b, X_standing * standing.X_BF.inverse()).distance;

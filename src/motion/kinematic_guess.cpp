@@ -123,7 +123,8 @@ class FeetPlacer {
     for (int i = 0; i < 2; ++i) {
       const ContactFrame& contact = model_.contacts()[stance_.contacts[i]];
       problem.frames.push_back({contact.name, contact.body, contact.X_BF, feet[i]});
-      if (!flat[i] || contact.kind != ContactKind::Surface6D) problem.frames.back().mask.tail<3>().setConstant(false);
+      if (!flat[i] || contact.kind == ContactKind::Point3D) problem.frames.back().mask.tail<3>().setConstant(false);
+      if (contact.kind == ContactKind::Edge5D) problem.frames.back().mask[3] = false;
     }
     AssemblyResult result = bielle::assemble(model_, problem, options_);
     if (result.status != AssemblyStatus::Closed || !keepsRanges(result.q)) return {};

@@ -272,11 +272,16 @@ void addCone(const Model& model, int c, double friction, double margin, double u
   const ConstraintSet& set = stage.constraints;
   const ContactFrame& contact = model.contacts()[set.getContact(c)];
   const double X = (1 - margin) * contact.half_length, Y = (1 - margin) * contact.half_width;
+  // Points and edges tilt on the ground; a point has no planned attitude.
+  if (contact.kind == ContactKind::Point3D) axes = ForceAxes::World;
+  if (contact.kind == ContactKind::Edge5D) axes = ForceAxes::Ground;
   std::unique_ptr<Residual> cone = makeWrenchCone(set, c, X, Y, (1 - margin) * friction / std::sqrt(2), axes);
   const int rows = cone->size();
+  const double least = 0.01;  // m, of soles without size
   VectorXd scale = VectorXd::Constant(rows, unit);
-  if (rows > 5) {
-    const double least = 0.01;  // m, of soles without size
+  if (contact.kind == ContactKind::Edge5D) {
+    scale.tail<6>() *= std::max(least, X);
+  } else if (contact.kind == ContactKind::Surface6D) {
     scale.segment<2>(5) *= std::max(least, Y);
     scale.segment<2>(7) *= std::max(least, X);
     scale.tail<8>() *= std::max(least, X + Y);
@@ -310,7 +315,7 @@ void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd
   const double weight = model.mass() * model.gravity().norm();
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const ContactFrame& contact = model.contacts()[set.getContact(c)];
-    const int rows = getRows(set.closures[c].kind);
+    const int rows = countForces(set, c);
     VectorXd reference = VectorXd::Zero(rows);
     reference[2] = loads[c - set.num_loops];
     if (costs.force_weight != 0)

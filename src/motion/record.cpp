@@ -165,6 +165,8 @@ Slip calcSlip(const Motion& motion, const MotionTrack& track) {
       const SE3 moved = start->inverseTimes(X_WF);
       slip.position = std::max(slip.position, moved.p.norm());
       if (contact.kind == ContactKind::Surface6D) slip.angle = std::max(slip.angle, log3(moved.R).norm());
+      if (contact.kind == ContactKind::Edge5D)  // its direction
+        slip.angle = std::max(slip.angle, moved.R.col(0).tail<2>().norm());
       stands[target.contact] = true;
     }
     for (size_t c = 0; c < stands.size(); ++c)

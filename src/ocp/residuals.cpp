@@ -39,17 +39,21 @@ class ComVelocity : public Residual {
   Vector3d reference_;
 };
 
-// Residuals linear or smooth in the force of one contact, F = blockdiag(R, R) lambda with R = 1 in the axes of the
-// contact, R = R_WF in those of the world and R = R_WT^T R_WF in those of the ground where the contact belongs.
+// Residuals linear or smooth in the force of one contact, F = blockdiag(R, R) E lambda with R = 1 in the axes of the
+// contact, R = R_WF in those of the world and R = R_WT^T R_WF in those of the ground where the contact belongs. E expands the
+// rows of an edge to a wrench, and is the identity otherwise.
 class ForceResidual : public Residual {
  public:
   ForceResidual(const ConstraintSet& set, int constraint, ForceAxes axes)
       : row_(set.offsets[constraint]),
         rows_(getRows(set.closures[constraint].kind)),
+        size_(countForces(set, constraint)),
         turns_(axes != ForceAxes::Contact),
         body_(set.closures[constraint].body1),
         R_BF_(set.closures[constraint].X_B1.R) {
     if (axes == ForceAxes::Ground) R_AW_ = set.closures[constraint].X_B2.R.transpose();
+    E_.setZero();
+    for (int k = 0; k < rows_; ++k) E_.col(k) = expandRows(set.closures[constraint], Force(Force::Unit(rows_, k)));
   }
   bool needsForces() const override { return true; }
   bool needsMotion() const override { return turns_; }
@@ -61,29 +65,40 @@ class ForceResidual : public Residual {
 
   Force getForce(const NodeView& node) const {
     Force f = node.lambda.segment(row_, rows_);
+    if (size_ != rows_) f = (E_.topLeftCorner(size_, rows_) * f).eval();
     if (!turns_) return f;
     const Matrix3d R = getAxes(node);
-    for (int i = 0; i < rows_; i += 3) f.segment<3>(i) = (R * f.segment<3>(i)).eval();
+    for (int i = 0; i < size_; i += 3) f.segment<3>(i) = (R * f.segment<3>(i)).eval();
     return f;
   }
 
-  // dF/dlambda = blockdiag(R, R), and the forces turn with the body: dF/dq_k = (R_AW J_k) x F, axis by axis.
+  // dF/dlambda = blockdiag(R, R) E, and the forces turn with the body: dF/dq_k = (R_AW J_k) x F, axis by axis.
   void addChain(const NodeView& node, const Force& f, const Gradient& gradient, ResidualRows rows) const {
+    const auto E = E_.topLeftCorner(size_, rows_);
     if (!turns_) {
-      rows.lambda.middleCols(row_, rows_) = gradient;
+      if (size_ == rows_)
+        rows.lambda.middleCols(row_, rows_) = gradient;
+      else
+        rows.lambda.middleCols(row_, rows_).noalias() = gradient * E;
       return;
     }
     const Matrix3d R = getAxes(node);
-    for (int i = 0; i < rows_; i += 3) rows.lambda.middleCols<3>(row_ + i).noalias() = gradient.middleCols<3>(i) * R;
+    if (size_ == rows_) {
+      for (int i = 0; i < size_; i += 3) rows.lambda.middleCols<3>(row_ + i).noalias() = gradient.middleCols<3>(i) * R;
+    } else {
+      Gradient turned(gradient.rows(), size_);
+      for (int i = 0; i < size_; i += 3) turned.middleCols<3>(i).noalias() = gradient.middleCols<3>(i) * R;
+      rows.lambda.middleCols(row_, rows_).noalias() = turned * E;
+    }
     for (int k : node.model.supportDofs(body_)) {
       const Vector3d w = R_AW_ * node.ws.J.col(k).tail<3>();
       rows.q.col(k).setZero();
-      for (int i = 0; i < rows_; i += 3)
+      for (int i = 0; i < size_; i += 3)
         rows.q.col(k) += gradient.middleCols<3>(i) * w.cross(Vector3d(f.segment<3>(i)));
     }
   }
 
-  int row_, rows_;
+  int row_, rows_, size_;  // first row, number of rows, entries of F
 
  private:
   Matrix3d getAxes(const NodeView& node) const { return R_AW_ * node.ws.X_WB[body_].R * R_BF_; }
@@ -91,6 +106,7 @@ class ForceResidual : public Residual {
   bool turns_;
   int body_;
   Matrix3d R_BF_;
+  Matrix6d E_;
   Matrix3d R_AW_ = Matrix3d::Identity();  // from the world to the axes of F
 };
 
@@ -98,10 +114,10 @@ class ContactForce : public ForceResidual {
  public:
   ContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference, ForceAxes axes)
       : ForceResidual(set, constraint, axes), reference_(reference) {}
-  int size() const override { return rows_; }
+  int size() const override { return size_; }
   void calc(const NodeView& node, VectorRef r) const override { r = getForce(node) - reference_; }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
-    addChain(node, getForce(node), Gradient::Identity(rows_, rows_), rows);
+    addChain(node, getForce(node), Gradient::Identity(size_, size_), rows);
   }
 
  private:
@@ -139,13 +155,23 @@ class CenterOfPressure : public ForceResidual {
 class WrenchCone : public ForceResidual {
  public:
   WrenchCone(const ConstraintSet& set, int constraint, double X, double Y, double mu, ForceAxes axes)
-      : ForceResidual(set, constraint, axes), A_(MatrixXd::Zero(rows_ == 6 ? 17 : 5, rows_)) {
+      : ForceResidual(set, constraint, axes),
+        A_(MatrixXd::Zero(rows_ == 6   ? 17
+                          : rows_ == 5 ? 11
+                                       : 5,
+                          size_)) {
     A_.col(2).setConstant(mu);
     A_(0, 2) = 1;
     for (int side = 0; side < 2; ++side) {
       const double s = side == 0 ? -1 : 1;
       A_(1 + side, 0) = A_(3 + side, 1) = s;
-      if (rows_ < 6) continue;
+      if (rows_ < 5) continue;
+      if (rows_ == 5) {  // that of a sole without width, whose moment about the edge is zero: each row once
+        A_.row(5 + side) << 0, 0, X, 0, s, 0;
+        A_.row(7 + side) << 0, s * X, mu * X, 0, -s * mu, 1;
+        A_.row(9 + side) << 0, s * X, mu * X, 0, s * mu, -1;
+        continue;
+      }
       A_.row(5 + side) << 0, 0, Y, s, 0, 0;
       A_.row(7 + side) << 0, 0, X, 0, s, 0;
       for (int other = 0; other < 2; ++other) {
@@ -300,6 +326,9 @@ std::unique_ptr<Residual> makeComPosition(const Vector3d& reference) {
 }
 std::unique_ptr<Residual> makeComVelocity(const Vector3d& reference) {
   return std::make_unique<ComVelocity>(reference);
+}
+int countForces(const ConstraintSet& set, int constraint) {
+  return set.closures[constraint].kind == ClosureKind::Ball3D ? 3 : 6;
 }
 std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
                                            ForceAxes axes) {

@@ -298,7 +298,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
     if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort)) json["drives"].push_back(describeDrive(motor));
   for (const ContactFrame& contact : model.contacts())
     json["contacts"].push_back({{"name", contact.name},
-                                {"kind", contact.kind == ContactKind::Surface6D ? "6d" : "3d"},
+                                {"kind", getName(contact.kind)},
                                 {"body", model.bodies()[contact.body].name},
                                 {"sole", {2 * contact.half_length, 2 * contact.half_width}}});
   for (size_t i = 1; i < postures.size(); ++i) {

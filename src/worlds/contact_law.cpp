@@ -33,14 +33,15 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
   std::vector<ContactPoint> points;
   for (size_t c = 0; c < model.contacts().size(); ++c) {
     const ContactFrame& contact = model.contacts()[c];
-    const bool is_surface = contact.kind == ContactKind::Surface6D;
-    const int count = is_surface ? grid * grid : 1;
+    const int along_x = contact.kind == ContactKind::Point3D ? 1 : grid,
+              along_y = contact.kind == ContactKind::Surface6D ? grid : 1, count = along_x * along_y;
     for (int i = 0; i < count; ++i) {
       ContactPoint point;
       point.contact = static_cast<int>(c);
       point.body = contact.body;
-      const auto place = [&](int along) { return is_surface ? 1 - 2.0 * along / (grid - 1) : 0; };  // from 1 to -1
-      const double x = place(i % grid) * contact.half_length, y = place(i / grid) * contact.half_width;
+      const auto place = [](int i, int points) { return points > 1 ? 1 - 2.0 * i / (points - 1) : 0; };  // from 1 to -1
+      const double x = place(i % along_x, along_x) * contact.half_length,
+                   y = place(i / along_x, along_y) * contact.half_width;
       point.p = contact.X_BF.act(Vector3d(x, y, 0));
       point.stiffness = sole / count;
       point.damping = options.damping;

@@ -168,7 +168,10 @@ struct Motor {
 inline constexpr double kDefaultTorqueLoss = 0.25;
 inline double Motor::getTorqueLoss() const { return torque_loss.value_or(kDefaultTorqueLoss); }
 
-enum class ContactKind { Point3D, Surface6D };
+/// A point; a blade, which stands on an edge along x and may roll about it; a rectangular sole.
+enum class ContactKind { Point3D, Edge5D, Surface6D };
+/// "3d", "5d", "6d", as in files.
+const char* getName(ContactKind kind);
 
 /// A frame of a body that may touch the ground; z is the outward normal of the ground when in contact.
 struct ContactFrame {
@@ -176,7 +179,7 @@ struct ContactFrame {
   int body = 0;
   SE3 X_BF;
   ContactKind kind = ContactKind::Surface6D;
-  double half_length = 0, half_width = 0;  ///< of the sole, along x and y, m
+  double half_length = 0, half_width = 0;  ///< of the sole, along x and y, m; an edge has no width, a point no size
 };
 
 /// One target of a reference configuration, by name, as read from a robot file.

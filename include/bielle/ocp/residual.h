@@ -94,6 +94,8 @@ std::unique_ptr<Residual> makeShapeDistance(const Shape& a, const Shape& b);
 /// on an edge is pushed along the normal of the ground, not along its own: with a friction of 0.3 its own cone holds no force that
 /// carries the robot once it leans by 0.3 rad.
 enum class ForceAxes { Contact, World, Ground };
+/// Entries of the force of a contact: 3 of a point, else those of a wrench.
+int countForces(const ConstraintSet& set, int constraint);
 /// Rows of the force of a contact minus a reference, N and N m (6 or 3). `constraint` is the index in the
 /// ConstraintSet.
 std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
@@ -108,7 +110,8 @@ std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int con
 ///     f_z,   mu f_z -+ f_x,   mu f_z -+ f_y,   Y f_z -+ n_x,   X f_z -+ n_y,                                        (1)
 ///     mu (X + Y) f_z + n_z + s (Y f_x - mu n_x) + t (X f_y - mu n_y)   and
 ///     mu (X + Y) f_z - n_z + s (Y f_x + mu n_x) + t (X f_y + mu n_y)   for s, t = -1, 1.                            (2)
-/// A 3D contact has the first five rows: it pushes, within the friction pyramid.
+/// A 3D contact has the first five rows: it pushes, within the friction pyramid. A 5D contact, an edge along x, bears no n_x and
+/// has no width: of (1) and (2) remain eleven rows. Both may tilt on the ground: take its axes, or those of the world.
 std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,
                                          double half_width, double mu, ForceAxes axes = ForceAxes::Contact);
 /// Coordinates of joints with one dof (all those with finite limits if `dofs` is empty) (n), rad or m.
