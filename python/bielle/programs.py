@@ -83,9 +83,10 @@ def make_arguments(options: Dict[str, Setting]) -> List[str]:
 def simulate(
     result: Union[Directory, Result], directory: Optional[Directory] = None, progress: bool = False, **options: Setting
 ) -> Dict[str, Any]:
-    """Executes a motion in a physics simulation with contact, as `bielle simulate` does. Returns its summary as a dictionary.
+    """Executes a motion in a physics simulation with contact, or lets a robot move freely, as `bielle simulate` does.
+    Returns its summary as a dictionary; of a free motion in several worlds, the summaries by world.
 
-    result: a Result, or the directory of one; for a commanded walk, the name of the motion
+    result: a Result, or the directory of one; for a commanded walk, the name of the motion; for a free motion, a robot
     directory: for the trajectory, the summary and the report; None: nothing is kept
     options: those of the command, e.g. world="mujoco", control="gains", push="t=1,impulse=5,direction=90,duration=0.1"
     """
@@ -98,6 +99,9 @@ def simulate(
             return simulate(result, output, progress, **options, summary_only=True)
     arguments = [str(result), "-o", str(directory), *make_arguments(options)]
     run_program("bielle-simulate", arguments, progress, statuses=(0, 1))  # 1: it fell
+    worlds = str(options.get("world", "")).split(",")
+    if len(worlds) > 1:
+        return {world: json.loads((Path(directory) / world / "summary.json").read_text()) for world in worlds}
     summary: Dict[str, Any] = json.loads((Path(directory) / "summary.json").read_text())
     return summary
 

@@ -217,3 +217,10 @@ def test_mechanism_in_motion():
     assert drifts[1] < 1e-7 < drifts[0]
     with pytest.raises(ValueError):
         bielle.World(model, count=2, tolerance=1e-6).books
+
+
+def test_free_motion_in_two_worlds(tmp_path):
+    pytest.importorskip("bielle._engines")
+    summaries = bielle.simulate("fourbar", tmp_path, world="bielle,simbody", duration=0.2, no_report=True)
+    assert [summary["outcome"] for summary in summaries.values()] == ["ended", "ended"]
+    assert summaries["bielle"]["largest_gap"] < 1e-12
