@@ -49,8 +49,8 @@ class ClosedField {
 
   /// Chooses independent rows at a closed configuration. \returns their number
   int select(ConstVectorRef q);
-  /// Begins a chart at a closed configuration, Eq. (1). \returns false as close() does
-  bool begin(ConstVectorRef q);
+  /// Begins a chart at a closed configuration, Eq. (1).
+  void begin(ConstVectorRef q);
   /// Eqs. (1) and (2): sets state and workspace (velocities, bias). \returns false where the loops do not close or the rows are
   /// dependent; getFailure() then tells why
   bool close(ConstVectorRef d, ConstVectorRef u);
@@ -102,7 +102,10 @@ class ClosedField {
     VectorXd x;
   };
 
-  void layOut();
+  void chooseRows(const Newton& newton);
+  void placeRows(Loop& loop);
+  void layOut(Newton& newton);
+  void layOutSystem();
   void displace(ConstVectorRef d);
   double updateResidual();
   void updateRows();

@@ -40,7 +40,7 @@ namespace bielle {
 
 struct PredictiveOptions {
   int nodes = 48;                ///< N, 10 to 1000
-  int fine_nodes = 20;           ///< at the beginning that are one stage long, at least 10; N or more: all are
+  int fine_nodes = 30;           ///< at the beginning that are one stage long, at least 10; N or more: all are
   int iterations = 1;            ///< of the solver, at every stage
   double regularization = 1e-5;  ///< of its sweeps
   double penalty = 1;            ///< of violated constraints (solve/fddp.h, Eq. 10)
