@@ -56,7 +56,7 @@ Problem makeFourbars(int count) {
   using namespace fourbars;
   Problem problem;
   problem.name = "fourbars_" + std::to_string(count);
-  problem.title = std::to_string(count) + " four-bars";
+  problem.title = std::to_string(count) + (count == 1 ? " four-bar" : " four-bars");
   problem.model = makeModel(count);
   problem.torques.resize(0);
   problem.duration = 10;
