@@ -84,6 +84,26 @@ TEST_CASE("Andrews' squeezer starts with the accelerations and forces that are p
   CHECK(found.lambda.tail<6>().norm() < 1e-10);
 }
 
+TEST_CASE("the accelerations printed for 0.03 s do not follow from the angles and velocities printed beside them") {
+  const Problem problem = makeSqueezer();
+  VectorXd q(7), v(7), printed(7), solved(7);  // beta, Theta, gamma, delta, Phi, epsilon, Omega
+  q << 15.81077119629904, -15.75637105984298, 0.04082224013073101, 0.5244099658805304, -0.5347301163226948,
+      1.048080741042263, 0.5347301163226948;
+  v << 1139.920302151208, -1424.379294994111, 11.03291221937134, 0.5735699284790808, 19.29337464421385,
+      0.3231791658026955, -19.29337464421385;
+  printed << -24631.76316946196, 51850.37701610329, 324102.5686413781, 16743.62929479361, 566749.3645176213,
+      9826.520791458422, -566749.3645176222;
+  // By a program of its own, from Newton's and Euler's equations of the seven bodies.
+  solved << -24631.76425, 51850.32138, 324102.6006, 16743.6354, 566749.4218, 9826.507826, -566749.4218;
+  const VectorXd a = calcAccelerations(problem.model, problem.torques, {q, v}).a;
+  CAPTURE((a - solved).transpose(), (a - printed).transpose());
+  CHECK((a - solved).cwiseAbs().maxCoeff() < 2e-4);
+  CHECK((a - printed).cwiseAbs().maxCoeff() > 0.05);
+  const Motion motion = problem.calcMotion(0.03);
+  CHECK((motion.v - v).cwiseAbs().maxCoeff() < 6e-7);
+  CHECK((calcAccelerations(problem.model, problem.torques, motion).a - printed).cwiseAbs().maxCoeff() < 0.06);
+}
+
 TEST_CASE("rank and mobility of the mechanisms") {
   const auto check = [](const Problem& problem, const VectorXd& q, int rows, int rank, int mobility) {
     CAPTURE(problem.name);
