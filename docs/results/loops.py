@@ -33,7 +33,8 @@ PROBLEMS = {
     "fourbars_2": """Two parallelograms side by side, three vertical and two horizontal thin rods of 1 kg and 1 m, thrown over
 from upright at 1 m/s (A02 of the IFToMM library, N = 2). Whenever the rods lie in a line, twice per turn, the mobility jumps
 from 1 to 3 and the rank of the closures falls from 4 to 2. Each closure is a ball, whose row out of the plane is redundant. A method that
-steps over the posture does not see it; one that lands on it has no unique acceleration. Gravity along -y.""",
+steps over the posture does not see it; one that lands on it has no unique acceleration. Simbody leaves
+the motion there, or breaks off; Bielle's leapfrog breaks off where a short step comes too close. Gravity along -y.""",
     "squeezer": """Andrews' squeezer, seven bodies and three loops in a plane, 0.05 s (A03). All three closures are balls at the
 point E; out of the plane their rows are redundant, 9 rows of rank 6. Steps are 200 times shorter than named for the
 other problems. No gravity.""",
@@ -45,7 +46,8 @@ slider, and its second in the rod. Gravity along -z.""",
 hinges about y and z at the slider; three independent rows. Gravity along -y.""",
     "governor": """The stiff flyball governor (A05): no loops, but springs of 8e5 N/m with dampers of 4e4 N s/m where couplers
 would be, with a time constant of 0.12 ms. The shaft is vertical, along y, and turns at 2 pi rad/s; the rods start 30 degrees below
-the horizontal and the slider at 0.5 m, so that the springs are at rest. What should stay is the momentum about the shaft.""",
+the horizontal and the slider at 0.5 m, so that the springs are at rest. Dampers between points
+are explicit in every engine: fixed steps of more than 0.1 to 0.2 ms diverge. What should stay is the momentum about the shaft.""",
 }
 
 
@@ -311,7 +313,7 @@ without contact, friction or control: what remains is how exactly an engine hold
 its energy gives the time as an integral over its coordinate, to 1e-12 and better. The governor has three freedoms by its symmetry; its
 true motion comes from their equations, extrapolated to the same accuracy. Neither uses Bielle's dynamics. Axes are as published, because gravity is part of a model.
 `bielle-loops robot PROBLEM` writes a mechanism as a robot for `bielle`.""")
-    page.add("""Simbody's accuracy is the relative error of a step, a tenth of which is the tolerance of its constraints in metres. MuJoCo's closures are
+    page.add("""Simbody is version 3.7, MuJoCo version 2.2.2. Simbody's accuracy is the relative error of a step, a tenth of which is the tolerance of its constraints in metres. MuJoCo's closures are
 soft; their time constant is twice the step, the least that it takes. *Opening*: the largest distance of points that a closure
 ties. *Drift*: the largest change of the energy, less the work of motors, over the largest kinetic energy.""")
     page.add("Every engine is stopped twenty times a motion and at the times compared, to be looked at.")
