@@ -30,6 +30,7 @@ void addGenerate(CLI::App& app, Action& action);
 void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);
 void addRatio(CLI::App& app, Action& action);
+void addModes(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
 void addCampaign(CLI::App& app, Action& action);
 

@@ -66,6 +66,7 @@ int run(int argc, char** argv) {
   addDesign(app, action);
   addCompare(app, action);
   addRatio(app, action);
+  addModes(app, action);
   addLift(app, action);
   addCampaign(app, action);
   addBench(app, action);

@@ -44,6 +44,7 @@ class MujocoWorld : public World {
         ws_(model),
         soles_(model) {
     const mjModel& mj = *mujoco_.get();
+    if (options.runge_kutta) mujoco_.get()->opt.integrator = mjINT_RK4;
     ground_.bind(mj);
     for (size_t c = 0; c < model.contacts().size(); ++c)
       for (int corner = 1; corner <= 4; ++corner) {

@@ -2,7 +2,7 @@
 /// \file The world of MuJoCo: all joints of the tree, with closures, contacts and stops as its soft constraints.
 ///
 /// MuJoCo (here 2.2.2) finds the acceleration by a convex problem over all constraints at once and takes semi-implicit
-/// Euler steps; friction cones are elliptic. Its constraints are springs and dampers of a time constant T. A closure
+/// Euler steps, or those of Runge and Kutta; friction cones are elliptic. Its constraints are springs and dampers of a time constant T. A closure
 /// opens by T^2 times the acceleration that its force does not cancel: dJ/dt v, which version 2.2.2 leaves out, and a
 /// share 1 - impedance of the rest. Soles creep by the same share.
 ///
@@ -17,6 +17,8 @@ namespace bielle::worlds {
 struct MujocoWorldOptions {
   WorldOptions world;  ///< time_step 0: that of MjcfOptions
   MjcfOptions robot;   ///< stiffnesses; friction and ground are those of `world`
+  /// Steps of fourth order, for smooth motions. Works are then those of the forces at the last of their stages.
+  bool runge_kutta = false;
 };
 
 /// Books: within a step MuJoCo's forces are constant and the velocity changes by M^-1 h f, so that a force f does the

@@ -150,6 +150,12 @@ class RotorCoupling : public SimTK::Constraint::Custom::Implementation {
   int next_ = 0;
 };
 
+std::unique_ptr<SimTK::Integrator> makeIntegrator(SimbodyIntegrator integrator, const SimTK::System& system) {
+  if (integrator == SimbodyIntegrator::RungeKuttaMerson)
+    return std::make_unique<SimTK::RungeKuttaMersonIntegrator>(system);
+  return std::make_unique<SimTK::RungeKutta3Integrator>(system);
+}
+
 class SimbodyWorld : public World {
  public:
   SimbodyWorld(const Model& model, const SimbodyWorldOptions& options);
@@ -177,7 +183,7 @@ class SimbodyWorld : public World {
   SimbodyTree tree_;
   WorldForces* forces_;                                // owned by the tree's system
   std::vector<std::pair<MobilizedBody, int>> rotors_;  // with the dof of their motor
-  SimTK::RungeKutta3Integrator integrator_;
+  std::unique_ptr<SimTK::Integrator> integrator_;
   SoleTrack soles_;
   VectorXd q_, v_;
   const std::atomic<bool>* const interrupt_;
@@ -192,16 +198,16 @@ SimbodyWorld::SimbodyWorld(const Model& model, const SimbodyWorldOptions& option
     : model_(model),
       tree_(model, model.closures(), options.as_modelled ? LoopCut::AsModelled : LoopCut::FewestRows),
       forces_(new WorldForces(tree_, options)),
-      integrator_(tree_.system),
+      integrator_(makeIntegrator(options.integrator, tree_.system)),
       soles_(model),
       interrupt_(options.world.interrupt) {
   SimTK::Force::Custom(tree_.forces, forces_);
   addRotors();
   tree_.finish();
-  integrator_.setAccuracy(options.accuracy);
-  integrator_.setConstraintTolerance(options.gap);
-  integrator_.setReturnEveryInternalStep(true);
-  integrator_.setAllowInterpolation(false);
+  integrator_->setAccuracy(options.accuracy);
+  integrator_->setConstraintTolerance(options.gap);
+  integrator_->setReturnEveryInternalStep(true);
+  integrator_->setAllowInterpolation(false);
 }
 
 void SimbodyWorld::addRotors() {
@@ -252,12 +258,12 @@ void SimbodyWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   elastic_start_ = forces_->calcElasticEnergy(state, stops_start_);
   try {
     tree_.system.project(state, 1e-9);
-    integrator_.initialize(state);
+    integrator_->initialize(state);
   } catch (const std::exception& error) {
     message_ = error.what();
   }
-  tree_.system.realize(integrator_.updAdvancedState(), Stage::Velocity);
-  last_ = forces_->calcPowers(integrator_.getAdvancedState());
+  tree_.system.realize(integrator_->updAdvancedState(), Stage::Velocity);
+  last_ = forces_->calcPowers(integrator_->getAdvancedState());
   readState();
 }
 
@@ -278,36 +284,37 @@ void SimbodyWorld::setPush(const Vector3d& force) {
 // Forces that do not depend on the state alone have changed: what was computed of them is stale.
 void SimbodyWorld::noteChange() {
   if (!changed_) return;
-  integrator_.updAdvancedState().invalidateAllCacheAtOrAbove(Stage::Dynamics);
-  integrator_.reinitialize(Stage::Dynamics, false);
-  tree_.system.realize(integrator_.updAdvancedState(), Stage::Velocity);
-  last_ = forces_->calcPowers(integrator_.getAdvancedState());
+  integrator_->updAdvancedState().invalidateAllCacheAtOrAbove(Stage::Dynamics);
+  integrator_->reinitialize(Stage::Dynamics, false);
+  tree_.system.realize(integrator_->updAdvancedState(), Stage::Velocity);
+  last_ = forces_->calcPowers(integrator_->getAdvancedState());
   changed_ = false;
 }
 
 bool SimbodyWorld::advance(double duration) {
   if (!message_.empty()) return false;
-  const double start = integrator_.getTime(), end = time_ + duration;
+  const double start = integrator_->getTime(), end = time_ + duration;
   try {
     noteChange();
-    for (double before = integrator_.getTime(); before < end - 1e-12; before = integrator_.getTime()) {
-      integrator_.stepTo(end, end);
-      finishStep(integrator_.getTime() - before);
-      if (integrator_.getTime() > start && interrupt_ && *interrupt_) break;  // the first return may be before any step
+    for (double before = integrator_->getTime(); before < end - 1e-12; before = integrator_->getTime()) {
+      integrator_->stepTo(end, end);
+      finishStep(integrator_->getTime() - before);
+      if (integrator_->getTime() > start && interrupt_ && *interrupt_)
+        break;  // the first return may be before any step
     }
   } catch (const std::exception& error) {
     message_ = error.what();
     std::replace(message_.begin(), message_.end(), '\n', ' ');
     return false;
   }
-  const bool is_done = integrator_.getTime() >= end - 1e-12;
-  time_ = is_done ? end : integrator_.getTime();
+  const bool is_done = integrator_->getTime() >= end - 1e-12;
+  time_ = is_done ? end : integrator_->getTime();
   readState();
   return is_done;
 }
 
 void SimbodyWorld::finishStep(double duration) {
-  const SimTK::State& state = integrator_.getState();
+  const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Velocity);
   const Powers now = forces_->calcPowers(state);
   work_.motor += 0.5 * duration * (last_.motor + now.motor);
@@ -326,7 +333,7 @@ void SimbodyWorld::finishStep(double duration) {
 }
 
 void SimbodyWorld::readState() {
-  const SimTK::State& state = integrator_.getState();
+  const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Velocity);
   tree_.readState(state, q_, v_);
   soles_.update([&](int body) {
@@ -336,7 +343,7 @@ void SimbodyWorld::readState() {
 }
 
 Books SimbodyWorld::getBooks() const {
-  const SimTK::State& state = integrator_.getState();
+  const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Dynamics);
   Books books;
   books.kinetic = tree_.system.calcKineticEnergy(state);
@@ -352,7 +359,7 @@ Books SimbodyWorld::getBooks() const {
 }
 
 double SimbodyWorld::getGap() const {
-  const SimTK::State& state = integrator_.getState();
+  const SimTK::State& state = integrator_->getState();
   double gap = 0;
   const auto locate = [&](int body, const Vector3d& point) {
     return tree_.bodies[body].findStationLocationInGround(state, toSimTK(point));

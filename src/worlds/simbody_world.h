@@ -14,11 +14,17 @@
 
 namespace bielle::worlds {
 
+enum class SimbodyIntegrator {
+  RungeKutta3,      ///< Simbody's choice where contacts limit the steps
+  RungeKuttaMerson  ///< of fourth order: fewer steps where the motion is smooth
+};
+
 struct SimbodyWorldOptions {
   WorldOptions world;      ///< time_step is not used
-  double accuracy = 1e-3;  ///< relative local error of the integrator, of third order
+  double accuracy = 1e-3;  ///< relative local error of the integrator
   double gap = 1e-7;       ///< tolerance of the constraints, m
   ContactOptions contact;
+  SimbodyIntegrator integrator = SimbodyIntegrator::RungeKutta3;
   bool as_modelled = false;  ///< loops cut where the model cuts them: the same motion, with more rows of constraints
 };
 
