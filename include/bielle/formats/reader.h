@@ -59,7 +59,8 @@
 ///   `bielle generate NAME` writes with these parameters, the others at their defaults. Further keys complete it likewise.
 ///
 /// ## MuJoCo files (MJCF, .xml), of version 2.2.2 and later
-/// The reader supports bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with
+/// The reader supports <include> (beside the main file, or beside the one that includes it); bodies and <frame>; inertias, or
+/// those of shapes and meshes (STL, OBJ) without <inertial>, and what <compiler> makes of them; joints of all kinds with
 /// range, ref, armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon
 /// (of fixed tendons) with polynomials of degree 1; springs and dampers of spatial tendons between two sites; motors
 /// with gear and limits (servos become motors); classes of defaults; gravity; keyframes as references; sites as frames;
@@ -67,12 +68,15 @@
 /// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
 ///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the
 ///   force of the joint. Without keyframes, the reference `qpos0` is the posture of the file, where MuJoCo closes loops.
+/// - A body on the world that moves by three slides across each other and a ball, or three hinges across each other, has a free joint
+///   `root_joint`, unless one of them has a spring, damping, friction or an armature of its own, or is named by an actuator, an
+///   equality or a tendon. Keyframes count as in the file.
 /// - What formats/mjcf.h writes is put together again: connects NAME.1 and NAME.2 to a hinge, the elements of a universal, planar
 ///   or free joint, the spheres of a sole at their site.
 /// - Elements that are left out are listed in `warnings` with their lines. Elements without which the mechanism
 ///   would be another one are errors:
-///   <include>, <attach>, <replicate> and <composite>, other equalities, polynomials of higher degree, masses of meshes.
-///   At most 16 MB and 3000 bodies and sites.
+///   <attach>, <replicate>, <composite> and <flexcomp>, other equalities, polynomials of higher degree, masses of convex hulls and
+///   of meshes that cannot be read. At most 16 MB and 3000 bodies and sites.
 #include <optional>
 #include <string>
 #include <vector>
