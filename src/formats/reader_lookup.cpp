@@ -44,6 +44,9 @@ std::string findInDirectory(const fs::path& directory) {
   if (found.size() == 1) return found.front();
   for (const char* extension : {".yaml", ".xml"})
     if (found.empty() && isFile(directory / (stem + extension))) return (directory / (stem + extension)).string();
+  if (found.empty())
+    for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
+      if (it->path().extension() == ".xacro") refuseXacro(it->path().string(), "file");
   std::sort(found.begin(), found.end());
   throw InputError(directory.string(), "directory",
                    found.empty() ? "it holds no .urdf file" : "it holds several .urdf files: " + listItems(found),

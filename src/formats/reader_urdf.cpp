@@ -318,11 +318,27 @@ std::string warnOfMeshes(const std::vector<std::string>& unread, const std::stri
          "<collision> with boxes, cylinders or spheres";
 }
 
+void checkForXacro(const XMLElement& element, const std::string& path) {
+  if (getTag(element).rfind("xacro:", 0) == 0) refuseXacro(path, describe(element));
+  for (const XMLElement* e : getChildren(element)) checkForXacro(*e, path);
+}
+
 }  // namespace
+
+void refuseXacro(const std::string& path, const std::string& element) {
+  std::filesystem::path urdf = std::filesystem::path(path).filename();
+  const bool is_urdf = urdf.extension() == ".urdf";  // and must not be replaced by what comes out
+  if (!is_urdf) urdf = urdf.stem();
+  if (urdf.extension() == ".urdf") urdf = urdf.stem();
+  urdf += is_urdf ? ".expanded.urdf" : ".urdf";
+  throw InputError(path, element, "it is written in xacro, which is not expanded here",
+                   "expand it and give the result: `xacro " + path + " > " + urdf.string() + "`");
+}
 
 UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& settings) {
   XMLDocument document(true, tinyxml2::COLLAPSE_WHITESPACE);
   const XMLElement& robot = parseXml(xml, path, "robot", document);
+  checkForXacro(robot, path);
   Tree tree = makeTree(robot, path);
   const bool for_drake = isForDrake(robot);
   XMLDocument

@@ -105,6 +105,9 @@ struct YamlFile {
 /// \throws InputError for anything but one tree of named links with finite numbers
 UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& settings);
 
+/// \throws InputError that says how to make a URDF of a file written in xacro
+[[noreturn]] void refuseXacro(const std::string& path, const std::string& element);
+
 /// \throws InputError for unknown keys, wrong types, lists that do not match
 YamlFile parseYaml(const std::string& text, const std::string& path);
 YamlFile readYaml(const std::string& path);
