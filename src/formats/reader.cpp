@@ -110,6 +110,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
 
 RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   if (path.extension() == ".xacro") refuseXacro(path.string(), "file");
+  if (path.extension() == ".sdf") return readSdf(path.string());
   if (path.extension() == ".xml") {
     MjcfFile file = readMjcf(path.string());
     return {std::move(file.tree), std::move(file.settings)};

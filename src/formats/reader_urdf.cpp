@@ -1,16 +1,15 @@
 // The only file that uses urdfdom. The document itself first provides what urdfdom discards or accepts:
 // the order of the joints, links with two parents, detached cycles, the place of a bad number.
-#include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>
 
 #include <cmath>
 #include <filesystem>
 #include <locale>
-#include <mutex>
 #include <set>
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "formats/log_capture.h"
 #include "formats/mesh.h"
 #include "formats/reader_drake.h"
 #include "formats/robot_files.h"
@@ -41,25 +40,6 @@ struct Tree {
   std::string robot, root;
   std::vector<std::pair<std::string, JointKind>> joints;  // depth first
   std::vector<std::string> warnings;
-};
-
-// Catches what urdfdom would print. console_bridge has one handler per process, hence the lock.
-class LogCapture : public console_bridge::OutputHandler {
- public:
-  LogCapture() : lock_(mutex()) { console_bridge::useOutputHandler(this); }
-  ~LogCapture() override { console_bridge::restorePreviousOutputHandler(); }
-  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_WARN) text_ += (text_.empty() ? "" : ", ") + text;
-  }
-  const std::string& text() const { return text_; }
-
- private:
-  static std::mutex& mutex() {
-    static std::mutex instance;
-    return instance;
-  }
-  std::lock_guard<std::mutex> lock_;
-  std::string text_;
 };
 
 bool areFiniteNumbers(const std::string& text, int count) {

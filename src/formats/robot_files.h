@@ -121,6 +121,11 @@ struct MjcfFile {
 /// \throws InputError for what is not MJCF, or cannot be read as a robot
 MjcfFile readMjcf(const std::string& path);
 
+struct RobotFiles;
+/// A file of Gazebo (SDF) as the contents of both files. \throws InputError for what libsdformat refuses, what cannot be read as a
+/// robot, and where libsdformat is not installed
+RobotFiles readSdf(const std::string& path);
+
 /// The whole content of a file. \throws InputError when it cannot be read, or is too large
 std::string readRobotText(const std::string& path);
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that URDF cannot
-/// express; or one MuJoCo file.
+/// express; or one MuJoCo or SDF file.
 ///
 /// ## The URDF
 /// Links and joints of one tree. Bodies are added depth first, the children of a link in the order of their joints in
@@ -77,6 +77,13 @@
 ///   would be another one are errors:
 ///   <attach>, <replicate>, <composite> and <flexcomp>, other equalities, polynomials of higher degree, masses of convex hulls and
 ///   of meshes that cannot be read. At most 16 MB and 3000 bodies and sites.
+///
+/// ## SDF files (.sdf), by libsdformat
+/// One model, whose bodies stand where all joints are at zero. Of several joints onto a link, the first carries it (one that cannot
+/// close a loop before any other); revolute, ball and fixed ones close loops at this posture, which is the reference `initial`.
+/// Links that nothing holds are free, those of a static model are not. The frame of a body keeps its directions and has its origin
+/// on its joint. Frames, ranges, springs, damping and friction of joints, visuals and collisions are read; motors come from a YAML
+/// file with `model`. <drake:linear_bushing_rpy> and <drake:ball_constraint> are loops.
 #include <optional>
 #include <string>
 #include <vector>
