@@ -6,6 +6,7 @@ get_property(reads_sdf GLOBAL PROPERTY BIELLE_READS_SDF)
 if(reads_sdf)
   bielle_test(sdf_reader SOURCES test_sdf_reader.cpp LIBS bielle_results)
 endif()
+bielle_test(loop_files SOURCES test_loop_files.cpp LIBS bielle_results)
 bielle_test(reader_errors SOURCES test_reader_errors.cpp LIBS bielle_model)
 bielle_test(robots SOURCES test_robots.cpp LIBS bielle_model)
 # Labelled `system`: tests/fuzz covers more under sanitizers.

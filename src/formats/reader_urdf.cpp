@@ -12,6 +12,7 @@
 #include "formats/log_capture.h"
 #include "formats/mesh.h"
 #include "formats/reader_drake.h"
+#include "formats/reader_loops.h"
 #include "formats/robot_files.h"
 #include "formats/xml_document.h"
 
@@ -346,6 +347,7 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
   if (!unread.empty()) file.warnings.push_back(warnOfMeshes(unread, path));
   for (const auto& [name, kind] : tree.joints) file.joints.push_back(makeJoint(*model->joints_.at(name), kind, path));
   if (for_drake) readDrakeElements(robot, file, settings);
+  readLoopJoints(robot, file, settings);
   return file;
 }
 
