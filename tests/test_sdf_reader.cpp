@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/sdf.h"
 #include "get_error.h"
@@ -113,6 +114,7 @@ TEST_CASE("robots come back from SDF with their bodies, loops, ranges and spring
     for (const Frame& frame : a.frames())
       if (frame.body > 0) CHECK(b.findFrame(frame.name) >= 0);
     CHECK(findClosedConfiguration(b).status == AssemblyStatus::Closed);
+    CHECK_NOTHROW(formatRobot(b));
   }
 }
 

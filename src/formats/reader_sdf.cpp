@@ -219,6 +219,8 @@ void SdfReader::readLink(const sdf::Link& link) {
   if (carrier != carriers_.end() && carrier->second->Type() != sdf::JointType::FIXED &&
       carrier->second->Type() != sdf::JointType::PRISMATIC)
     X_WL.p = getPlace(carrier->second->SemanticPose()).p;
+  if (carrier != carriers_.end() && carrier->second->Type() == sdf::JointType::UNIVERSAL)
+    if (const auto axes = findUniversalAxes(*carrier->second)) X_WL.R = X_WS.R * *axes;
   X_WL_[link.Name()] = X_WL;
   const SE3 X_LS = X_WL.inverse() * X_WS;
   UrdfLink& out = tree_.links[link.Name()];

@@ -3,7 +3,8 @@
 /// reader_no_sdf.cpp stands for it.
 ///
 /// The bodies of a robot stand in the file where all joints are at zero. A body may be the child of several joints: one carries
-/// it, the others close loops. The frame of a body keeps its directions, and has its origin on the joint that carries it.
+/// it, the others close loops. The frame of a body keeps its directions, unless it hangs on a universal joint, and has its origin on
+/// the joint that carries it.
 #include <sdf/sdf.hh>
 #include <set>
 
@@ -40,7 +41,9 @@ class SdfReader {
   std::string addFrame(const std::string& name, const std::string& link, const SE3& X_WF);
 
   // reader_sdf_joints.cpp
+  Vector3d resolveAxis(const sdf::Joint& joint, int k) const;
   Vector3d getAxis(const sdf::Joint& joint, int k) const;
+  std::optional<Matrix3d> findUniversalAxes(const sdf::Joint& joint) const;
   void readAxis(const sdf::Joint& joint, int k, UrdfJoint& out);
   void addClosure(const sdf::Joint& joint);
   void addClosure(const std::string& name, ClosureKind kind, const Vector3d& axis, const std::string& link1,

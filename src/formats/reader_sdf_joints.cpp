@@ -13,8 +13,8 @@ std::string describeSdf(const sdf::Joint& joint) { return "joint '" + joint.Name
 
 }  // namespace
 
-// In the directions of the child.
-Vector3d SdfReader::getAxis(const sdf::Joint& joint, int k) const {
+// In the directions of the child as the file gives it.
+Vector3d SdfReader::resolveAxis(const sdf::Joint& joint, int k) const {
   const sdf::JointAxis* axis = joint.Axis(k);
   ignition::math::Vector3d v;
   if (axis) check(axis->ResolveXyz(v, getChild(joint)));
@@ -23,6 +23,23 @@ Vector3d SdfReader::getAxis(const sdf::Joint& joint, int k) const {
   if (!axis || !(norm > 1e-12) || !std::isfinite(norm))
     fail(describeSdf(joint), "its axis is not a direction", "give a non-zero vector");
   return direction / norm;
+}
+
+// In our frame of the child.
+Vector3d SdfReader::getAxis(const sdf::Joint& joint, int k) const {
+  const std::string child = getChild(joint);
+  const Matrix3d R_WS = getPlace(model_->LinkByName(child)->SemanticPose()).R;
+  return getLinkPlace(child).R.transpose() * R_WS * resolveAxis(joint, k);
+}
+
+// Axes of a universal joint at right angles are x and y of its link, as our files and Drake's have it.
+std::optional<Matrix3d> SdfReader::findUniversalAxes(const sdf::Joint& joint) const {
+  constexpr double kRightAngle = 1e-9;
+  const Vector3d x = resolveAxis(joint, 0), y = resolveAxis(joint, 1);
+  if (std::abs(x.dot(y)) > kRightAngle) return {};
+  Matrix3d R;
+  R << x, y, x.cross(y);
+  return R;
 }
 
 // Limits, forces and speed of a coordinate.
@@ -80,8 +97,12 @@ void SdfReader::addCarried(const sdf::Joint& joint) {
       break;
     case sdf::JointType::UNIVERSAL:
       out.joint.kind = JointKind::Universal;
-      out.joint.axis = getAxis(joint, 0);
-      out.joint.axis2 = getAxis(joint, 1);
+      out.joint.axis = Vector3d::UnitX();
+      out.joint.axis2 = Vector3d::UnitY();
+      if (!findUniversalAxes(joint)) {
+        out.joint.axis = getAxis(joint, 0);
+        out.joint.axis2 = getAxis(joint, 1);
+      }
       for (int k : {0, 1}) readAxis(joint, k, out);
       break;
     default:

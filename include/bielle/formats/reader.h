@@ -81,9 +81,10 @@
 /// ## SDF files (.sdf), by libsdformat
 /// One model, whose bodies stand where all joints are at zero. Of several joints onto a link, the first carries it (one that cannot
 /// close a loop before any other); revolute, ball and fixed ones close loops at this posture, which is the reference `initial`.
-/// Links that nothing holds are free, those of a static model are not. The frame of a body keeps its directions and has its origin
-/// on its joint. Frames, ranges, springs, damping and friction of joints, visuals and collisions are read; motors come from a YAML
-/// file with `model`. <drake:linear_bushing_rpy> and <drake:ball_constraint> are loops.
+/// Links that nothing holds are free, those of a static model are not. The frame of a body keeps its directions (on a universal
+/// joint, x and y are its axes) and has its origin on its joint. Frames, ranges, springs, damping and friction of joints, visuals
+/// and collisions are read; motors come from a YAML file with `model`. <drake:linear_bushing_rpy> and <drake:ball_constraint> are
+/// loops.
 #include <optional>
 #include <string>
 #include <vector>
