@@ -6,6 +6,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/robots/robot_loader.h"
+#include "formats/mesh_inertia.h"
 #include "get_error.h"
 #include "robot_directory.h"
 
@@ -260,6 +261,13 @@ TEST_CASE("a mesh gives its body the mass that it encloses") {
   checkError("file=\"box.obj\"", ", but meshes/box.obj is missing, damaged, of another kind, or encloses nothing");
   directory.write("meshes/box.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
   checkError("file=\"box.obj\"", ", but meshes/box.obj is missing, damaged");
+  // Found by fuzzing: a huge triangle, whose volume is rounding.
+  Eigen::Matrix3Xd huge(3, 3);
+  huge << 1.3563156426940112e-19, 4.3368084314480763e-19, 1.3563178398925133e-19,  //
+      -2.1284328186216697e+38, 1.3563156426940112e-19, 1.3563156426940112e-19,     //
+      -2.1293607388610368e+38, 1.4918429822062306e-19, 1.3563156426940112e-19;
+  for (MeshSolid solid : {MeshSolid::Enclosed, MeshSolid::Overlapping, MeshSolid::Surface})
+    if (const std::optional<Inertia> inertia = calcMeshInertia(huge, solid)) CHECK(inertia->mass > 0);
 }
 
 TEST_CASE("what does not change the mechanism is left out by name and line, what bends is refused") {

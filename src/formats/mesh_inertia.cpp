@@ -47,11 +47,13 @@ std::optional<Inertia> calcMeshInertia(const Eigen::Matrix3Xd& corners, MeshSoli
   Moments sum = addUp(corners, middle, solid);
   if (sum.mass < 0) sum = {-sum.mass, -sum.first, -sum.second};  // faces that are all seen from inside
   const double scale = std::sqrt(surface.mass);
-  if (!(sum.mass > 1e-12 * (solid == MeshSolid::Surface ? scale * scale : scale * scale * scale))) return {};
+  const double least = 1e-12 * (solid == MeshSolid::Surface ? scale * scale : scale * scale * scale);
+  if (!(sum.mass > least)) return {};
   const Vector3d com = middle + sum.first / sum.mass;
   // Which tetrahedra overlap depends on the point that they share: MuJoCo takes the centre of mass for the moments.
   sum = addUp(corners, com, solid);
   if (sum.mass < 0) sum = {-sum.mass, -sum.first, -sum.second};
+  if (!(sum.mass > least)) return {};  // the first one was rounding
   Inertia inertia;
   inertia.mass = sum.mass;
   inertia.com = com;
