@@ -14,9 +14,11 @@ bielle_python_packages=(pybind11-dev python3-dev python3-numpy)
 bielle_worker_packages=(coop-computing-tools coop-computing-tools-dev)
 # pagmo, for fronts of several objectives (bielle design). Without it everything else is built.
 bielle_front_packages=(libpagmo-dev)
-# Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, what reads SDF,
-# what tests the Python package.
-bielle_test_packages=(catch2 python3 chromium pkg-config libsdformat-dev python3-pytest
+# libsdformat, which reads SDF files. Without it everything else is built.
+bielle_sdf_packages=(libsdformat-dev)
+# Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, what tests the Python
+# package.
+bielle_test_packages=(catch2 python3 chromium pkg-config python3-pytest
   python3-mypy python3-nbconvert python3-ipykernel python3-matplotlib)
 
 # install_missing PACKAGE...: installs the packages that dpkg does not list as installed.

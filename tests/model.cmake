@@ -1,6 +1,12 @@
 bielle_test(model SOURCES test_model.cpp LIBS bielle_model)
 bielle_test(options SOURCES test_options.cpp LIBS bielle_model)
 bielle_test(reader SOURCES test_reader.cpp test_reader_shapes.cpp LIBS bielle_dynamics)
+bielle_test(mjcf_reader SOURCES test_mjcf_reader.cpp LIBS bielle_results)
+get_property(reads_sdf GLOBAL PROPERTY BIELLE_READS_SDF)
+if(reads_sdf)
+  bielle_test(sdf_reader SOURCES test_sdf_reader.cpp LIBS bielle_results)
+endif()
+bielle_test(loop_files SOURCES test_loop_files.cpp LIBS bielle_results)
 bielle_test(reader_errors SOURCES test_reader_errors.cpp LIBS bielle_model)
 bielle_test(robots SOURCES test_robots.cpp LIBS bielle_model)
 # Labelled `system`: tests/fuzz covers more under sanitizers.

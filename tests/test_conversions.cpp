@@ -268,7 +268,7 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
   };
   checkError("<mujoco>", "line 1", "it is not well-formed XML");
   checkError("<robot/>", "document", "its outermost element is not <mujoco>");
-  checkError(makeSwing("", "<include file=\"a.xml\"/>"), "<include> (line 1)", "such elements are not supported");
+  checkError(makeSwing("", "<include file=\"a.xml\"/>"), "<include> (line 1)", "there is no file 'a.xml'");
   checkError(makeSwing("<replicate/>"), "<replicate> (line 1)", "such elements are not supported");
   checkError(makeSwing("\n<joint name=\"swing\"/>"), "joint 'swing' (line 2)", "two joints have this name");
   checkError(makeSwing("\n<joint name=\"x\" type=\"free\"/>"), "body 'tip' (line 1)", "it has a free joint");
@@ -282,7 +282,7 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
   checkError(makeSwing("\n<site name=\"a\" quat=\"1 0 0 0\" zaxis=\"0 0 1\"/>"), "site 'a' (line 2)", "it has several");
   checkError(makeSwing("\n<geom class=\"none\"/>"), "geom (line 2)", "there is no default class 'none'");
   checkError(makeSwing("\n<body><geom type=\"mesh\" mesh=\"a\"/></body>"), "geom (line 2)",
-             "the mass of the body comes");
+             "the mass of the body comes from the mesh 'a', which is not there");
   checkError(makeSwing("", "<equality>\n<flex/></equality>"), "flex (line 2)", "such equalities are not supported");
   checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\" joint2=\"turn\" polycoef=\"0 1 2 0 0\"/></equality>"),
              "joint (line 2)", "its polycoef is of degree 2 or more");

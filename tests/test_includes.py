@@ -32,7 +32,7 @@ OTHERS = {
     "yaml-cpp/": ["src/formats/yaml_entry.cpp", "src/formats/robot_writer.cpp", "src/formats/adopt.cpp", "src/formats/mjcf.cpp"],
     "urdf_": ["src/formats/reader_urdf.cpp"],
     "tinyxml": ["src/formats/xml_document.h"],
-    "sdf/": ["tests/test_sdf.cpp"],
+    "sdf/": ["src/formats/reader_sdf.h", "tests/test_sdf.cpp"],
     "zip.h": ["src/results/npz.cpp"],
     "nlopt": ["src/motion/slsqp.cpp", "src/design/nlopt_search.h"],
     "pagmo/": ["src/design/front_search.cpp"],

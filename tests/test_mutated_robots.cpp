@@ -10,6 +10,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/mjcf.h"
+#include "formats/sdf.h"
 #include "robot_directory.h"
 #include "robot_trial.h"
 
@@ -225,4 +226,27 @@ TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
   CHECK(count[Trial::Valid] > kTrials / 20);
   CHECK(count[Trial::Refused] > kTrials / 4);
   CHECK(said.size() > 20);
+}
+
+TEST_CASE("Mutated SDF files are models or clear errors") {
+  constexpr int kTrials = 600;  // libsdformat takes its time
+  std::vector<std::string> files;
+  for (const char* name : {"fourbar", "fivebar_leg", "belt_biped"}) {
+    const Model model = loadRobot(BIELLE_SOURCE_DIR "/robots/" + std::string(name)).model;
+    files.push_back(formatSdf(model, findClosedConfiguration(model).q).xml);
+  }
+  const RobotDirectory directory;
+  std::map<Trial, int> count;
+  for (int i = 0; i < kTrials; ++i) {
+    Random rng(i);
+    const std::string path =
+        directory.write("robot.sdf", mutate(files[choose(rng, static_cast<int>(files.size()))], rng));
+    const TrialResult result = tryRobot(path);
+    ++count[result.trial];
+    CAPTURE(i, result.message);
+    CHECK(result.trial != Trial::Wrong);
+  }
+  std::cout << kTrials << " mutated SDF files: " << count[Trial::Valid] << " models, " << count[Trial::Refused]
+            << " refused\n";
+  CHECK(count[Trial::Refused] > kTrials / 4);
 }

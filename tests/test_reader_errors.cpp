@@ -253,6 +253,23 @@ TEST_CASE("files that are no robot at all are errors") {
         std::string::npos);
 }
 
+TEST_CASE("files written in xacro are refused with the way to expand them") {
+  const RobotDirectory directory;
+  const std::string place = directory.path();
+  const std::string xacro =
+      "<robot name=\"a\" xmlns:xacro=\"http://ros.org/wiki/xacro\">\n<xacro:property name=\"l\"/></robot>";
+  const std::string remedy =
+      "it is written in xacro, which is not expanded here; expand it and give the result: `xacro ";
+  const std::string path = directory.write("leg.urdf.xacro", xacro);
+  for (const std::string& given : {path, place})
+    CHECK(getErrorOfLoading(given) == path + ": file: " + remedy + path + " > leg.urdf`");
+  const std::string urdf = directory.write("robot.urdf", xacro);
+  CHECK(getErrorOfLoading(urdf) == urdf + ": <xacro:property> (line 2): " + remedy + urdf + " > robot.expanded.urdf`");
+  const std::string toy = kToyUrdf;
+  CHECK(getErrorOfLoading(directory.write("robot.urdf", replaceOnce(toy, "<robot ", "<robot xmlns:xacro=\"x\" "))) ==
+        "");
+}
+
 TEST_CASE("names that are not in UTF-8 are refused where they are, in every format") {
   const RobotDirectory directory;
   const std::string urdf = kToyUrdf, yaml = kToyYaml;

@@ -41,7 +41,7 @@ void addAdopt(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("adopt", "Complete a published robot: feet, soles, posture, motors");
   const auto robot = std::make_shared<RobotArgument>();
   const auto directory = std::make_shared<std::string>();
-  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
+  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")->required();
   command.add_option("-o,--output", *directory, "directory of the new robot; its last part names the robot's file")
       ->required();
   command.footer(

@@ -63,7 +63,8 @@ int convert(const ConvertArguments& arguments) {
 void addConvert(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("convert", "Write a robot in another format");
   const auto arguments = std::make_shared<ConvertArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
+  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
+      ->required();
   command
       .add_option("--to", arguments->format,
                   "bielle: a directory with URDF and YAML, without losses; drake: a URDF with loops and motors for "

@@ -118,7 +118,8 @@ int evaluate(const EvalArguments& arguments) {
 void addEval(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("eval", "Compute accelerations, forces and derivatives at one state");
   const auto arguments = std::make_shared<EvalArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
+  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
+      ->required();
   command.add_option("--state", arguments->state, "JSON file with the state; - for the standard input")->required();
   command.add_flag("--derivatives", arguments->derivatives, "add the derivatives with respect to q, v and u");
   addFixedBase(command, arguments->robot);

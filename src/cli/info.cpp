@@ -59,7 +59,7 @@ void addInfo(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("info", "Describe a robot: joints, closures, motors, feet, mobility");
   const auto robot = std::make_shared<RobotArgument>();
   const auto as_json = std::make_shared<bool>(false);
-  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
+  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")->required();
   addFixedBase(command, *robot);
   command.add_flag("--json", *as_json, "print JSON");
   command.footer(

@@ -75,7 +75,8 @@ int run(const RatioArguments& arguments) {
 void addRatio(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("ratio", "Reduction ratio between motors and a joint along its range");
   const auto arguments = std::make_shared<RatioArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
+  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
+      ->required();
   command
       .add_option("--joint", arguments->joints,
                   "joint to sweep; then the other joints of its linkage, unless the robot's serial joints name them")
@@ -100,7 +101,8 @@ void addRatio(CLI::App& app, Action& action) {
       "from its start until a joint limit, a loss of rank, or a full turn, through its dead points:\n"
       "  output  the joint stands still while the motor turns: R is infinite, the angle reverses, another branch "
       "begins\n"
-      "  motors  the motor stands still while the joint turns: R is zero (singular), the motor does not hold the joint\n"
+      "  motors  the motor stands still while the joint turns: R is zero (singular), the motor does not hold the "
+      "joint\n"
       "The distance from the nearest of them is the largest way of a motor or joint to there [rad], up to 0.5.\n"
       "A linkage with two motors gets a 2 x 2 R, its condition number, and a map over both joints, up to the first "
       "dead\n"

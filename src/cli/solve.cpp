@@ -245,7 +245,8 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
 }
 
 void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
-  sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
+  sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
+      ->required();
   sub.add_option("-o,--output", arguments->directory,
                  "directory for trajectory.csv, trajectory.npz, summary.json and report.html; created if necessary")
       ->required();
@@ -270,7 +271,8 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
          [arguments](const std::string& name) {
            arguments->step = name == getName(StepRule::Euler) ? StepRule::Euler : StepRule::Midpoint;
          },
-         "midpoint: second-order steps; euler: first-order steps, as in the paper, which --model serial uses unless a rule "
+         "midpoint: second-order steps; euler: first-order steps, as in the paper, which --model serial uses unless a "
+         "rule "
          "is given")
       ->check(CLI::IsMember({getName(StepRule::Euler), getName(StepRule::Midpoint)}))
       ->default_str(getName(StepRule::Midpoint));

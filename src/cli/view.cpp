@@ -31,7 +31,8 @@ int view(const ViewArguments& arguments) {
 void addView(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("view", "Show a robot as a page, with a slider for each motor");
   const auto arguments = std::make_shared<ViewArguments>();
-  command.add_option("robot", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
+  command.add_option("robot", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
+      ->required();
   addFixedBase(command, arguments->robot);
   command.add_option("-o,--output", arguments->output, "the page; default: NAME.html here");
   command.footer(

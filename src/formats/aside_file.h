@@ -15,7 +15,7 @@ class AsideFile {
 
   /// The stream to write to.
   const std::string& aside() const { return aside_; }
-  /// \throws InputError when the text cannot be written
+  /// \throws InputError when the text cannot be written; not for a pipe whose reader has ended
   void write(const std::string& text);
   /// Renames the file to its final name, replacing any existing file. \throws InputError when it cannot
   void commit();

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <initializer_list>
 #include <iterator>
 #include <sstream>
 
@@ -67,17 +68,50 @@ std::string getExtension(const std::string& mesh) {
   return extension;
 }
 
-Points readMesh(const std::string& mesh, const std::string& directory) {
+// The whole file, if it is of one of these kinds and not too large.
+std::string readMeshFile(const std::string& mesh, const std::string& directory,
+                         std::initializer_list<const char*> kinds) {
   const std::string extension = getExtension(mesh);
   const fs::path place = findMesh(mesh, directory);
   std::error_code error;
-  if ((extension != ".stl" && extension != ".obj" && extension != ".dae") || place.empty() || fs::file_size(place, error) > kLargest || error)
-    return {};
+  if (std::find(kinds.begin(), kinds.end(), extension) == kinds.end() || place.empty() ||
+      fs::file_size(place, error) > kLargest || error)
+    return "";
   std::ifstream file(place, std::ios::binary);
-  const std::string content{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+Points readMesh(const std::string& mesh, const std::string& directory) {
+  const std::string extension = getExtension(mesh), content = readMeshFile(mesh, directory, {".stl", ".obj", ".dae"});
   if (extension == ".dae") return readCollada(content);
   if (extension == ".obj") return readVertices(content, "v");
   return isBinaryStl(content) ? readBinaryStl(content) : readVertices(content, "vertex");
+}
+
+// Corners of the faces of an OBJ file. They count vertices from 1, or backwards from the last one above by negative
+// numbers; what follows a slash are normals and textures.
+Points readObjFaces(const std::string& text) {
+  const Points vertices = readVertices(text, "v");
+  std::vector<double> corners;
+  Eigen::Index above = 0;
+  std::istringstream lines(text);
+  for (std::string line, word; std::getline(lines, line);) {
+    std::istringstream words(line);
+    if (!(words >> word)) continue;
+    above += word == "v";
+    if (word != "f") continue;
+    std::vector<Eigen::Index> face;
+    while (words >> word) {
+      const long number = std::strtol(word.c_str(), nullptr, 10);
+      const Eigen::Index index = number < 0 ? above + number : number - 1;
+      if (index < 0 || index >= vertices.cols()) return {};
+      face.push_back(index);
+    }
+    for (size_t i = 2; i < face.size(); ++i)
+      for (const Eigen::Index corner : {face[0], face[i - 1], face[i]})
+        corners.insert(corners.end(), vertices.col(corner).begin(), vertices.col(corner).end());
+  }
+  return Eigen::Map<const Points>(corners.data(), 3, static_cast<Eigen::Index>(corners.size() / 3));
 }
 
 // The box around points p along the columns of R.
@@ -116,7 +150,7 @@ double calcVolume(const Shape& shape) {
 }  // namespace
 
 fs::path findMesh(const std::string& mesh, const std::string& directory) {
-  const std::string package = "package://", file = "file://";
+  const std::string package = mesh.rfind("model://", 0) == 0 ? "model://" : "package://", file = "file://";
   std::vector<fs::path> places;
   if (mesh.rfind(file, 0) == 0) {
     places.emplace_back(mesh.substr(file.size()));
@@ -139,6 +173,17 @@ fs::path findMesh(const std::string& mesh, const std::string& directory) {
     if (fs::is_regular_file(place, error)) return place;
   }
   return {};
+}
+
+Eigen::Matrix3Xd readTriangles(const std::string& mesh, const std::string& directory) {
+  const std::string content = readMeshFile(mesh, directory, {".stl", ".obj"});
+  Points corners;
+  if (getExtension(mesh) == ".obj")
+    corners = readObjFaces(content);
+  else
+    corners = isBinaryStl(content) ? readBinaryStl(content) : readVertices(content, "vertex");
+  if (corners.cols() % 3 != 0 || !corners.allFinite()) return {};
+  return corners;
 }
 
 std::optional<Shape> fitMesh(const std::string& mesh, const std::string& directory, const Vector3d& scale) {

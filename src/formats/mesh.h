@@ -8,12 +8,16 @@
 
 namespace bielle {
 
-// The file of a mesh, empty if there is none. `package://name/rest` stands for name/rest in any directory above the robot's
-// or in $ROS_PACKAGE_PATH, or for rest beside the robot.
+// The file of a mesh, empty if there is none. `package://name/rest`, like `model://name/rest`, stands for name/rest in any
+// directory above the robot's or in $ROS_PACKAGE_PATH, or for rest beside the robot.
 std::filesystem::path findMesh(const std::string& mesh, const std::string& directory);
 
 // The box or capsule of least volume around the vertices of an STL, OBJ or COLLADA (.dae) file, along the axes of the file or the
 // principal ones of the vertices; none if the file is missing, of another kind, damaged, or larger than 100 MB.
 std::optional<Shape> fitMesh(const std::string& mesh, const std::string& directory, const Vector3d& scale);
+
+// Corners of the triangles of an STL or OBJ file, three columns each, polygons cut into fans; none if the file is missing, of
+// another kind, damaged, or larger than 100 MB.
+Eigen::Matrix3Xd readTriangles(const std::string& mesh, const std::string& directory);
 
 }  // namespace bielle

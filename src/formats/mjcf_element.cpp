@@ -22,7 +22,7 @@ std::string getDefaultTag(const std::string& tag) {
 
 void merge(const XMLElement& element, const std::string& path, MjcfAttributes& attributes) {
   for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next())
-    attributes[a->Name()] = {a->Value(), element.GetLineNum()};
+    attributes[a->Name()] = {a->Value(), path, element.GetLineNum()};
   if (attributes.size() > kMostAttributes)
     throw InputError(path, describe(element), "it has more than " + std::to_string(kMostAttributes) + " attributes",
                      "remove the unused ones");
@@ -43,43 +43,45 @@ std::string formatLines(const std::set<int>& lines) {
 
 }  // namespace
 
-void MjcfNotes::add(const std::string& element, int line, const std::string& problem) {
-  const std::pair key(element, problem);
-  if (!lines_.count(key)) order_.push_back(key);
-  lines_[key].insert(line);
+void MjcfNotes::add(const std::string& path, const std::string& element, int line, const std::string& problem) {
+  const Kind kind = {path, element, problem};
+  if (!lines_.count(kind)) order_.push_back(kind);
+  lines_[kind].insert(line);
 }
 
-void MjcfNotes::addAttribute(const std::string& element, int line, const std::string& attribute) {
-  attributes_[element].first.insert(attribute);
-  attributes_[element].second.insert(line);
+void MjcfNotes::addAttribute(const std::string& path, const std::string& element, int line,
+                             const std::string& attribute) {
+  auto& [names, lines] = attributes_[{path, element}];
+  names.insert(attribute);
+  lines.insert(line);
 }
 
-std::vector<std::string> MjcfNotes::format(const std::string& path) const {
+std::vector<std::string> MjcfNotes::format() const {
   std::vector<std::string> out;
-  for (const auto& key : order_)
-    out.push_back(path + ": " + key.first + formatLines(lines_.at(key)) + ": " + key.second);
-  for (const auto& [element, found] : attributes_) {
+  for (const Kind& kind : order_)
+    out.push_back(kind.path + ": " + kind.element + formatLines(lines_.at(kind)) + ": " + kind.problem);
+  for (const auto& [place, found] : attributes_) {
     std::string names;
     for (const std::string& name : found.first) names += (names.empty() ? "'" : ", '") + name + "'";
-    out.push_back(path + ": " + element + formatLines(found.second) + ": left out: " + names);
+    out.push_back(place.first + ": " + place.second + formatLines(found.second) + ": left out: " + names);
   }
   return out;
 }
 
 void readMjcfDefaults(const XMLElement& element, const std::string& parent, MjcfSettings& settings) {
+  const std::string& path = settings.files.getPath(element);
   const char* text = element.Attribute("class");
   const std::string name = text ? text : parent.empty() ? "main" : "";
-  if (name.empty()) throw InputError(settings.path, describe(element), "it has no class", "name it");
+  if (name.empty()) throw InputError(path, describe(element), "it has no class", "name it");
   if (!settings.defaults.count(name))
     settings.defaults[name] = parent.empty() ? std::map<std::string, MjcfAttributes>() : settings.defaults.at(parent);
   auto& defaults = settings.defaults[name];
   for (const auto& [tag, attributes] : defaults) settings.num_defaults += 1 + attributes.size();
   if (settings.num_defaults > kMostDefaults)
-    throw InputError(settings.path, describe(element), "there are more defaults than any robot needs",
-                     "remove classes");
-  for (const XMLElement* e : getChildren(element))
-    if (getTag(*e) != "default") merge(*e, settings.path, defaults[getDefaultTag(getTag(*e))]);
-  for (const XMLElement* e : getChildren(element, "default")) readMjcfDefaults(*e, name, settings);
+    throw InputError(path, describe(element), "there are more defaults than any robot needs", "remove classes");
+  for (const XMLElement* e : settings.files.getChildren(element))
+    if (getTag(*e) != "default") merge(*e, settings.files.getPath(*e), defaults[getDefaultTag(getTag(*e))]);
+  for (const XMLElement* e : settings.files.getChildren(element, "default")) readMjcfDefaults(*e, name, settings);
 }
 
 MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings)
@@ -87,7 +89,7 @@ MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclas
 
 MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings,
                          const std::string& kind)
-    : settings_(settings), tag_(getTag(element)), line_(element.GetLineNum()) {
+    : settings_(settings), path_(settings.files.getPath(element)), tag_(getTag(element)), line_(element.GetLineNum()) {
   if (const char* name = element.Attribute("name")) name_ = name;
   const char* text = element.Attribute("class");
   const std::string own = text ? text : childclass.empty() ? "main" : childclass;
@@ -97,13 +99,13 @@ MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclas
   } else if (const auto it = defaults->second.find(kind); it != defaults->second.end()) {
     attributes_ = it->second;
   }
-  merge(element, settings.path, attributes_);
+  merge(element, path_, attributes_);
   asked_ = {"name", "class", "user", "group"};  // they say nothing of the mechanism
 }
 
 MjcfElement::~MjcfElement() {
   for (const auto& [name, attribute] : attributes_)
-    if (!asked_.count(name)) settings_.notes.addAttribute("<" + tag_ + ">", attribute.line, name);
+    if (!asked_.count(name)) settings_.notes.addAttribute(attribute.path, "<" + tag_ + ">", attribute.line, name);
 }
 
 std::string MjcfElement::describe() const {
@@ -111,10 +113,12 @@ std::string MjcfElement::describe() const {
 }
 
 void MjcfElement::fail(const std::string& problem, const std::string& remedy) const {
-  throw InputError(settings_.path, describe(), problem, remedy);
+  throw InputError(path_, describe(), problem, remedy);
 }
 
-void MjcfElement::note(const std::string& problem) const { settings_.notes.add("<" + tag_ + ">", line_, problem); }
+void MjcfElement::note(const std::string& problem) const {
+  settings_.notes.add(path_, "<" + tag_ + ">", line_, problem);
+}
 
 void MjcfElement::leaveOut(const std::string& problem) {
   note(problem);

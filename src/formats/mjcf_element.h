@@ -5,15 +5,16 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "bielle/math/se3.h"
-#include "formats/xml_document.h"
+#include "formats/mjcf_files.h"
 
 namespace bielle {
 
 struct MjcfAttribute {
-  std::string value;
+  std::string value, path;  ///< and the file that says it
   int line = 0;
 };
 using MjcfAttributes = std::map<std::string, MjcfAttribute>;
@@ -21,20 +22,30 @@ using MjcfAttributes = std::map<std::string, MjcfAttribute>;
 /// What the reader leaves out, one warning per kind with all its lines.
 class MjcfNotes {
  public:
-  void add(const std::string& element, int line, const std::string& problem);
-  void addAttribute(const std::string& element, int line, const std::string& attribute);
+  void add(const std::string& path, const std::string& element, int line, const std::string& problem);
+  void addAttribute(const std::string& path, const std::string& element, int line, const std::string& attribute);
   /// "path: element (lines ...): problem", in the order in which they were first added.
-  std::vector<std::string> format(const std::string& path) const;
+  std::vector<std::string> format() const;
 
  private:
-  std::vector<std::pair<std::string, std::string>> order_;
-  std::map<std::pair<std::string, std::string>, std::set<int>> lines_;
-  std::map<std::string, std::pair<std::set<std::string>, std::set<int>>> attributes_;  // and their lines, by element
+  struct Kind {
+    std::string path, element, problem;
+    bool operator<(const Kind& other) const {
+      return std::tie(path, element, problem) < std::tie(other.path, other.element, other.problem);
+    }
+  };
+  std::vector<Kind> order_;
+  std::map<Kind, std::set<int>> lines_;
+  // Attributes and their lines, by path and element.
+  std::map<std::pair<std::string, std::string>, std::pair<std::set<std::string>, std::set<int>>> attributes_;
 };
 
-/// What holds for the whole file.
+/// What holds for the whole model.
 struct MjcfSettings {
-  std::string path;
+  explicit MjcfSettings(const std::string& main) : path(main), files(main) {}
+
+  std::string path;  ///< of the main file
+  MjcfFiles files;
   double angle = EIGEN_PI / 180;  ///< unit of angles, rad
   std::string euler = "xyz";
   bool auto_limits = true;                                                ///< as today
@@ -65,6 +76,7 @@ class MjcfElement {
   /// "joint 'knee' (line 3)"
   std::string describe() const;
   const std::string& tag() const { return tag_; }
+  const std::string& path() const { return path_; }
   int line() const { return line_; }
 
   /// Null without it.
@@ -86,7 +98,7 @@ class MjcfElement {
   double getAngle(double value) const { return value * settings_.angle; }
 
   MjcfSettings& settings_;
-  std::string tag_, name_;
+  std::string path_, tag_, name_;
   int line_;
   MjcfAttributes attributes_;
   std::set<std::string> asked_;

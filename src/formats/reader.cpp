@@ -7,6 +7,7 @@
 
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
+#include "formats/reader_loops.h"
 #include "formats/robot_files.h"
 
 namespace bielle {
@@ -109,6 +110,8 @@ void complete(const YamlFile& own, YamlFile& yaml) {
 }
 
 RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
+  if (path.extension() == ".xacro") refuseXacro(path.string(), "file");
+  if (path.extension() == ".sdf") return readSdf(path.string());
   if (path.extension() == ".xml") {
     MjcfFile file = readMjcf(path.string());
     return {std::move(file.tree), std::move(file.settings)};
@@ -117,8 +120,12 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   files.urdf = parseUrdf(readRobotText(path.string()), path.string(), files.yaml);
   std::filesystem::path settings = path;
   settings.replace_extension(".yaml");
-  if (!std::filesystem::exists(settings)) return files;
-  const YamlFile own = readYaml(settings.string());
+  const bool has_settings = std::filesystem::exists(settings);
+  const YamlFile own = has_settings ? readYaml(settings.string()) : YamlFile();
+  const std::filesystem::path loops = findLoopClosures(path);
+  if (own.closures.empty() && files.yaml.closures.empty() && !loops.empty())
+    readLoopClosures(loops.string(), files.urdf, files.yaml);
+  if (!has_settings) return files;
   if (!own.models.empty() || own.generator)
     throw InputError(own.path, own.generator ? "key 'generator'" : "key 'model'",
                      "there is a URDF beside this file, " + path.string(),

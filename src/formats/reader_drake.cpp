@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "formats/reader_loops.h"
 
 namespace bielle {
 namespace {
@@ -152,24 +153,6 @@ class DrakeReader {
     settings_.motors.push_back(motor);
   }
 
-  // A frame of the tree with this name, or with underscores behind it if that is taken.
-  std::string addFrame(std::string name, const std::string& link, const Vector3d& point) {
-    if (point.isZero(0)) return link;
-    while (file_.links.count(name) || findJoint(name)) name += "_";
-    UrdfJoint joint;
-    joint.parent = link;
-    joint.child = name;
-    joint.joint.name = name + "_frame";
-    joint.joint.kind = JointKind::Fixed;
-    joint.joint.X_PJ.p = point;
-    while (findJoint(joint.joint.name)) joint.joint.name += "_";
-    UrdfLink frame;
-    frame.name = name;
-    file_.links[name] = frame;
-    file_.joints.push_back(joint);
-    return name;
-  }
-
   // Drake gives them no names; ours are in an attribute that it does not look at.
   static std::string getName(const XMLElement& e, const std::string& prefix) {
     const std::string name = getAttribute(&e, "name");
@@ -183,8 +166,8 @@ class DrakeReader {
     closure.kind = ClosureKind::Ball3D;
     const std::string a = getLink(e, tag + "_body_A"), b = getLink(e, tag + "_body_B");
     const Vector3d p_AP = getChildVector(e, tag + "_p_AP"), p_BQ = getChildVector(e, tag + "_p_BQ");
-    closure.frame1 = addFrame(closure.name + "_frame1", a, p_AP);
-    closure.frame2 = addFrame(closure.name + "_frame2", b, p_BQ);
+    closure.frame1 = addUrdfFrame(file_, closure.name + "_frame1", a, {Matrix3d::Identity(), p_AP});
+    closure.frame2 = addUrdfFrame(file_, closure.name + "_frame2", b, {Matrix3d::Identity(), p_BQ});
     settings_.closures.push_back(closure);
   }
 

@@ -28,9 +28,11 @@ bool isDirectory(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-bool isTree(const fs::path& path) { return path.extension() == ".urdf" || path.extension() == ".xml"; }
+bool isTree(const fs::path& path) {
+  return path.extension() == ".urdf" || path.extension() == ".xml" || path.extension() == ".sdf";
+}
 
-// robot.urdf, else the one named as the directory, else the only one; without any, the YAML or MJCF named as the
+// robot.urdf, else the one named as the directory, else the only one; without any, the YAML, MJCF or SDF named as the
 // directory.
 std::string findInDirectory(const fs::path& directory) {
   const fs::path named = fs::absolute(directory).lexically_normal();
@@ -42,8 +44,11 @@ std::string findInDirectory(const fs::path& directory) {
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
     if (it->path().extension() == ".urdf" && isFile(it->path())) found.push_back(it->path().string());
   if (found.size() == 1) return found.front();
-  for (const char* extension : {".yaml", ".xml"})
+  for (const char* extension : {".yaml", ".xml", ".sdf"})
     if (found.empty() && isFile(directory / (stem + extension))) return (directory / (stem + extension)).string();
+  if (found.empty())
+    for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
+      if (it->path().extension() == ".xacro") refuseXacro(it->path().string(), "file");
   std::sort(found.begin(), found.end());
   throw InputError(directory.string(), "directory",
                    found.empty() ? "it holds no .urdf file" : "it holds several .urdf files: " + listItems(found),
@@ -53,7 +58,7 @@ std::string findInDirectory(const fs::path& directory) {
 // In the directories of robots; empty when there is none.
 std::string findByName(const std::string& name) {
   for (const std::string& directory : getRobotDirectories())
-    for (const std::string& file : {name + ".urdf", std::string("robot.urdf"), name + ".yaml", name + ".xml"})
+    for (const std::string& file : {name + ".urdf", std::string("robot.urdf"), name + ".yaml", name + ".xml", name + ".sdf"})
       if (const fs::path path = fs::path(directory) / name / file; isFile(path)) return path.string();
   return "";
 }
@@ -128,6 +133,7 @@ std::vector<std::string> listRobots() {
     for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
       const std::string name = it->path().filename().string();
       if (isFile(it->path() / (name + ".urdf")) || isFile(it->path() / (name + ".xml")) ||
+          isFile(it->path() / (name + ".sdf")) ||
           isRobotByItself(it->path() / (name + ".yaml")))
         names.insert(name);
     }

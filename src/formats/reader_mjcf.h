@@ -15,13 +15,17 @@ namespace bielle {
 /// Before the name of a motor: the name of a text of <custom> that says of it what our YAML file would.
 inline const std::string kMjcfMotorData = "bielle:motor:";
 
+/// Attributes of geoms that are read at several places.
+inline constexpr const char* kGeomAttributes[] = {"mass",        "density", "mesh",     "contype",
+                                                  "conaffinity", "rgba",    "material", "shellinertia"};
+
 constexpr double kSamePlace = 1e-9;  // of axes and places that the writer made equal
 
 inline SE3 translate(const Vector3d& p) { return {Matrix3d::Identity(), p}; }
 
 class MjcfReader {
  public:
-  MjcfReader(const std::string& path, const XMLElement& root);
+  explicit MjcfReader(const std::string& path);
   MjcfFile read();
 
  private:
@@ -29,6 +33,7 @@ class MjcfReader {
   struct BodyPlace {
     std::string link;
     SE3 X_LB, X_WB;
+    bool is_static = false;  // no joint carries it
   };
 
   // A joint of the file.
@@ -38,7 +43,7 @@ class MjcfReader {
     double ref = 0, armature = 0;
     VectorXd lower, upper;  // empty for none
     JointForce force;
-    bool has_force = false, is_driven = false;
+    bool has_force = false, is_named = false;  // by an actuator, an equality or a tendon
     int line = 0;
   };
 
@@ -48,12 +53,21 @@ class MjcfReader {
     JointKind kind = JointKind::Revolute;
     VectorXd q_ref;                         // its coordinates as the file stands
     Matrix3d R_ref = Matrix3d::Identity();  // that MuJoCo's quaternion is relative to
+    std::vector<Element> elements;          // of a free base that is made of them,
+    SE3 X_WB;                               // and its place with all of them at `ref`
   };
 
   struct FixedTendon {
     std::map<std::string, double> coefficients;
-    int line = 0;
+    const XMLElement* element = nullptr;
     bool is_used = false;
+  };
+
+  struct MeshAsset {
+    Visual visual;                          // file and scale
+    Vector3d p_ref = Vector3d::Zero();      // taken off its vertices, which
+    Matrix3d R_ref = Matrix3d::Identity();  // are then turned back by this and scaled
+    std::string inertia;                    // how it gives mass
   };
 
   // An element in a body, with the class whose defaults hold for it.
@@ -87,13 +101,17 @@ class MjcfReader {
 
   template <typename F>
   void forEachSection(const char* tag, const F& f) {
-    for (const XMLElement* e : getChildren(root_, tag)) f(*e);
+    for (const XMLElement* e : getChildren(settings_.files.root(), tag)) f(*e);
   }
   template <typename F>
   void forEach(const char* tag, const F& f) {
     forEachSection(tag, [&](const XMLElement& section) {
       for (const XMLElement* e : getChildren(section)) f(*e);
     });
+  }
+  // With those of included files.
+  std::vector<const XMLElement*> getChildren(const XMLElement& e, const char* tag = nullptr) {
+    return settings_.files.getChildren(e, tag);
   }
   void noteElement(const XMLElement& e, const std::string& problem = "left out");
   [[noreturn]] void refuse(const XMLElement& e, const std::string& problem, const std::string& remedy) const;
@@ -103,19 +121,20 @@ class MjcfReader {
   void readModel();
   void readSettings();
   void readCompiler(const XMLElement& e);
-  void readAsset(const XMLElement& e);
   void noteSection(const XMLElement& e);
 
-  // bodies and joints: reader_mjcf.cpp
+  // bodies: reader_mjcf.cpp
   void flatten(const XMLElement& body, const SE3& X_BF, const std::string& childclass, std::vector<Child>& out);
   void readContents(const XMLElement& e, const BodyPlace& place, const std::string& childclass);
   void readContents(const std::vector<Child>& children, const BodyPlace& place);
   void readBody(const Child& child, const BodyPlace& parent);
-  SE3 addJoints(const MjcfElement& body, const std::string& link, const std::vector<Child>& children,
-                const BodyPlace& parent, const SE3& X_PB);
   UrdfJoint& addLink(const std::string& link, const std::string& parent, JointKind kind, const std::string& name,
                      const SE3& X_PJ);
   std::string findFrame(const std::string& link, const SE3& X, bool is_ball, const std::string& made);
+
+  // joints: reader_mjcf_joints.cpp
+  SE3 addJoints(const MjcfElement& body, const std::string& link, const std::vector<Child>& children,
+                const BodyPlace& parent, const SE3& X_PB);
   void addSingle(const Element& element, const std::string& link, const std::string& parent, const SE3& X_PB);
   void addFree(const Element& element, const std::string& link, const SE3& X_WB);
   bool addCompound(const std::vector<Element>& elements, const std::string& link, const std::string& parent,
@@ -126,16 +145,35 @@ class MjcfReader {
   void readForce(MjcfElement& e, bool has_one, double unit, Element& out);
   void readJointClamp(MjcfElement& e, const Element& joint);
 
-  // inertia and shapes: reader_mjcf_shapes.cpp
+  // a free base of several elements, and postures: reader_mjcf_base.cpp
+  bool addBase(const MjcfElement& body, const std::vector<Element>& elements, const std::string& link,
+               const BodyPlace& parent, const SE3& X_WB);
+  static Eigen::Index getSize(const Slot& slot);
+  static std::vector<double> calcPosition(const Slot& slot, const MjcfElement& key, const double* qpos);
+  void readKey(const XMLElement& element);
+  void addStart();
+
+  // inertia: reader_mjcf_inertia.cpp
+  void readInertiaSettings(MjcfElement& compiler);
+  void readMesh(const XMLElement& e);
   Inertia readInertia(const std::vector<Child>& children);
-  Shape readShape(MjcfElement& e, const SE3& X_BF);
+  Inertia readGivenInertia(MjcfElement& e) const;
   Inertia readSolid(const Child& child);
+  static Inertia calcPrimitive(const MjcfElement& e, const Shape& shape);
+  Inertia readMeshSolid(MjcfElement& e, const std::string& mesh) const;
+  Inertia keepBounds(const Inertia& inertia) const;
+  void scaleMasses();
+
+  // shapes: reader_mjcf_shapes.cpp
+  static SE3 readPlace(MjcfElement& e, double* half_length);
+  static Shape readShape(MjcfElement& e, const SE3& X_BF);
   void readShapes(const std::vector<Child>& children, const BodyPlace& place);
   void readSite(const Child& child, const BodyPlace& place, const std::map<std::string, Sphere>& spheres,
                 std::set<std::string>& soles);
+  static bool placeMesh(const MeshAsset& mesh, Visual& visual);
   void readVisual(const Child& child, const BodyPlace& place);
 
-  // loops, couplers, springs, motors and postures: reader_mjcf_relations.cpp
+  // loops, couplers, springs and motors: reader_mjcf_relations.cpp
   const BodyPlace& findBody(MjcfElement& e, const char* attribute);
   const BodyPlace& findSite(MjcfElement& e, const char* attribute);
   void readEquality(const XMLElement& element);
@@ -149,20 +187,22 @@ class MjcfReader {
   void readTendon(const XMLElement& element);
   void readSpatialTendon(const XMLElement& element);
   void readTendonEquality(MjcfElement& e, const std::string& name);
-  void listDriven(const XMLElement& section);
+  void listNamed();
   void readActuator(const XMLElement& element);
   void readCustom(const XMLElement& element);
-  void readKey(const XMLElement& element);
-  void addStart();
 
-  const XMLElement& root_;
   MjcfSettings settings_;
   UrdfFile tree_;
   YamlFile yaml_;
+  // <compiler>: whether geoms give mass and those of which groups, least mass and moment of a body, mass of all
   std::string inertia_from_geom_ = "auto", mesh_directory_;
-  std::set<std::string> taken_, joint_names_, driven_;  // names of links; of joints; of joints with an actuator
-  std::map<std::string, BodyPlace> places_, sites_;     // by name in the file
-  std::map<std::string, Visual> meshes_;
+  double first_group_ = 0, last_group_ = 5, least_mass_ = 0, least_moment_ = 0, total_mass_ = 0;
+  bool has_gravity_ = true, has_equalities_ = true;  // flags of <option>
+  bool balances_inertia_ = false, strips_path_ = false, is_exact_ = false;
+  std::set<std::string> taken_, joint_names_,
+      named_;  // names of links; of joints; of joints named by an actuator and the like
+  std::map<std::string, BodyPlace> places_, sites_;  // by name in the file
+  std::map<std::string, MeshAsset> meshes_;
   std::vector<Slot> slots_;
   std::vector<Tie> ties_;
   std::map<std::string, ClosureSpec> couplers_;

@@ -1,4 +1,4 @@
-// What relates bodies beside their joints: loops, couplers, springs; motors; and postures.
+// What relates bodies beside their joints: loops, couplers, springs; and motors.
 #include <algorithm>
 #include <cmath>
 
@@ -25,6 +25,7 @@ const MjcfReader::BodyPlace& MjcfReader::findSite(MjcfElement& e, const char* at
 void MjcfReader::readEquality(const XMLElement& element) {
   MjcfElement e(element, "", settings_, "equality");
   if (!e.getFlag("active", true)) return e.leaveOut("it is not active, and left out");
+  if (!has_equalities_) return e.leaveOut("it is left out, because <flag> disables equalities");
   std::string name = getAttribute(&element, "name");
   if (name.empty()) name = e.tag() + "_" + std::to_string(e.line());
   if (e.tag() == "connect" || e.tag() == "weld") return readTie(e, name);
@@ -157,7 +158,7 @@ void MjcfReader::readTendon(const XMLElement& element) {
   if (getTag(element) != "fixed") return noteElement(element, "the tendon is left out");
   MjcfElement e(element, "", settings_, "tendon");
   FixedTendon tendon;
-  tendon.line = e.line();
+  tendon.element = &element;
   for (const XMLElement* j : getChildren(element, "joint")) {
     MjcfElement term(*j, "", settings_, "");
     const std::string joint = term.getText("joint");
@@ -227,10 +228,17 @@ void MjcfReader::readTendonEquality(MjcfElement& e, const std::string& name) {
   addCoupler(name, coupler, e);
 }
 
-void MjcfReader::listDriven(const XMLElement& section) {
-  for (const XMLElement* e : getChildren(section))
-    driven_.insert(getAttribute(e, "joint")), driven_.insert(getAttribute(e, "jointinparent"));
-  driven_.erase("");
+// Joints that other elements name stay what they are.
+void MjcfReader::listNamed() {
+  const auto add = [this](const XMLElement& e) {
+    for (const char* attribute : {"joint", "jointinparent", "joint1", "joint2"})
+      named_.insert(getAttribute(&e, attribute));
+  };
+  for (const char* section : {"actuator", "equality"}) forEach(section, add);
+  forEach("tendon", [&](const XMLElement& tendon) {
+    for (const XMLElement* e : getChildren(tendon)) add(*e);
+  });
+  named_.erase("");
 }
 
 void MjcfReader::readActuator(const XMLElement& element) {
@@ -283,61 +291,22 @@ void MjcfReader::readActuator(const XMLElement& element) {
 }
 
 void MjcfReader::readCustom(const XMLElement& element) {
+  const std::string& path = settings_.files.getPath(element);
   const std::string name = getAttribute(&element, "name"),
                     joint = name.substr(std::min(name.size(), kMjcfMotorData.size()));
   const auto motor =
       std::find_if(yaml_.motors.begin(), yaml_.motors.end(), [&joint](const MotorSpec& m) { return m.joint == joint; });
   if (getTag(element) != "text" || name != kMjcfMotorData + joint || motor == yaml_.motors.end())
-    return settings_.notes.add("<custom> <" + getTag(element) + ">", element.GetLineNum(), "left out");
+    return settings_.notes.add(path, "<custom> <" + getTag(element) + ">", element.GetLineNum(), "left out");
   const std::string lines_above(std::max(0, element.GetLineNum() - 1),
                                 '\n');  // so that errors name the line of the file
-  readYamlDocument(settings_.path, lines_above + "{'" + kMjcfMotorData + "': {" + getAttribute(&element, "data") + "}}",
+  readYamlDocument(path, lines_above + "{'" + kMjcfMotorData + "': {" + getAttribute(&element, "data") + "}}",
                    [&](const YamlEntry& root) {
                      const std::optional<double> effort = motor->effort;
-                     *motor = readMotorSpecs(root, settings_.path, nullptr).front();
+                     *motor = readMotorSpecs(root, path, nullptr).front();
                      motor->joint = joint;
                      motor->effort = effort;
                    });
-}
-
-void MjcfReader::readKey(const XMLElement& element) {
-  if (getTag(element) != "key") return noteElement(element);
-  MjcfElement e(element, "", settings_);
-  std::string name = getAttribute(&element, "name");
-  if (name.empty()) name = "key_" + std::to_string(yaml_.references.size() + 1);
-  Eigen::Index nq = 0;
-  for (const Slot& slot : slots_) nq += slot.q_ref.size();
-  if (!e.find("qpos")) return e.leaveOut("a key without qpos is left out");
-  const std::vector<double> qpos = e.getNumbers("qpos", nq, nq);
-  Reference reference;
-  reference.name = name;
-  const double* at = qpos.data();
-  for (const Slot& slot : slots_) {
-    std::vector<double> q(at, at + slot.q_ref.size());
-    at += slot.q_ref.size();
-    if (slot.kind == JointKind::Spherical || slot.kind == JointKind::FreeFlyer) {
-      const size_t k = q.size() - 4;
-      const Eigen::Vector4d xyzw(q[k + 1], q[k + 2], q[k + 3], q[k]);
-      const double norm = xyzw.stableNorm();
-      if (!(norm > 1e-12) || !std::isfinite(norm))
-        e.fail("the quaternion of joint '" + slot.joint + "' has zero length", "correct it");
-      const Eigen::Vector4d turned =
-          (Eigen::Quaterniond(slot.R_ref) * Eigen::Quaterniond(Eigen::Vector4d(xyzw / norm))).normalized().coeffs();
-      std::copy(turned.data(), turned.data() + 4, q.begin() + static_cast<std::ptrdiff_t>(k));
-    }
-    reference.joints[slot.joint] = q;
-  }
-  yaml_.references.push_back(reference);
-}
-
-// MuJoCo closes loops where the bodies stand in the file: without a keyframe, this is the posture to start from.
-void MjcfReader::addStart() {
-  if (!yaml_.references.empty() || yaml_.closures.empty()) return;
-  Reference reference;
-  reference.name = "qpos0";
-  for (const Slot& slot : slots_)
-    reference.joints[slot.joint] = std::vector<double>(slot.q_ref.data(), slot.q_ref.data() + slot.q_ref.size());
-  yaml_.references.push_back(reference);
 }
 
 }  // namespace bielle

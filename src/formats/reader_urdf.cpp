@@ -1,18 +1,18 @@
 // The only file that uses urdfdom. The document itself first provides what urdfdom discards or accepts:
 // the order of the joints, links with two parents, detached cycles, the place of a bad number.
-#include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>
 
 #include <cmath>
 #include <filesystem>
 #include <locale>
-#include <mutex>
 #include <set>
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "formats/log_capture.h"
 #include "formats/mesh.h"
 #include "formats/reader_drake.h"
+#include "formats/reader_loops.h"
 #include "formats/robot_files.h"
 #include "formats/xml_document.h"
 
@@ -41,25 +41,6 @@ struct Tree {
   std::string robot, root;
   std::vector<std::pair<std::string, JointKind>> joints;  // depth first
   std::vector<std::string> warnings;
-};
-
-// Catches what urdfdom would print. console_bridge has one handler per process, hence the lock.
-class LogCapture : public console_bridge::OutputHandler {
- public:
-  LogCapture() : lock_(mutex()) { console_bridge::useOutputHandler(this); }
-  ~LogCapture() override { console_bridge::restorePreviousOutputHandler(); }
-  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_WARN) text_ += (text_.empty() ? "" : ", ") + text;
-  }
-  const std::string& text() const { return text_; }
-
- private:
-  static std::mutex& mutex() {
-    static std::mutex instance;
-    return instance;
-  }
-  std::lock_guard<std::mutex> lock_;
-  std::string text_;
 };
 
 bool areFiniteNumbers(const std::string& text, int count) {
@@ -318,11 +299,27 @@ std::string warnOfMeshes(const std::vector<std::string>& unread, const std::stri
          "<collision> with boxes, cylinders or spheres";
 }
 
+void checkForXacro(const XMLElement& element, const std::string& path) {
+  if (getTag(element).rfind("xacro:", 0) == 0) refuseXacro(path, describe(element));
+  for (const XMLElement* e : getChildren(element)) checkForXacro(*e, path);
+}
+
 }  // namespace
+
+void refuseXacro(const std::string& path, const std::string& element) {
+  std::filesystem::path urdf = std::filesystem::path(path).filename();
+  const bool is_urdf = urdf.extension() == ".urdf";  // and must not be replaced by what comes out
+  if (!is_urdf) urdf = urdf.stem();
+  if (urdf.extension() == ".urdf") urdf = urdf.stem();
+  urdf += is_urdf ? ".expanded.urdf" : ".urdf";
+  throw InputError(path, element, "it is written in xacro, which is not expanded here",
+                   "expand it and give the result: `xacro " + path + " > " + urdf.string() + "`");
+}
 
 UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& settings) {
   XMLDocument document(true, tinyxml2::COLLAPSE_WHITESPACE);
   const XMLElement& robot = parseXml(xml, path, "robot", document);
+  checkForXacro(robot, path);
   Tree tree = makeTree(robot, path);
   const bool for_drake = isForDrake(robot);
   XMLDocument
@@ -350,6 +347,7 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
   if (!unread.empty()) file.warnings.push_back(warnOfMeshes(unread, path));
   for (const auto& [name, kind] : tree.joints) file.joints.push_back(makeJoint(*model->joints_.at(name), kind, path));
   if (for_drake) readDrakeElements(robot, file, settings);
+  readLoopJoints(robot, file, settings);
   return file;
 }
 

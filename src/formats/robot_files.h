@@ -105,6 +105,9 @@ struct YamlFile {
 /// \throws InputError for anything but one tree of named links with finite numbers
 UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& settings);
 
+/// \throws InputError that says how to make a URDF of a file written in xacro
+[[noreturn]] void refuseXacro(const std::string& path, const std::string& element);
+
 /// \throws InputError for unknown keys, wrong types, lists that do not match
 YamlFile parseYaml(const std::string& text, const std::string& path);
 YamlFile readYaml(const std::string& path);
@@ -117,6 +120,11 @@ struct MjcfFile {
 
 /// \throws InputError for what is not MJCF, or cannot be read as a robot
 MjcfFile readMjcf(const std::string& path);
+
+struct RobotFiles;
+/// A file of Gazebo (SDF) as the contents of both files. \throws InputError for what libsdformat refuses, what cannot be read as a
+/// robot, and where libsdformat is not installed
+RobotFiles readSdf(const std::string& path);
 
 /// The whole content of a file. \throws InputError when it cannot be read, or is too large
 std::string readRobotText(const std::string& path);

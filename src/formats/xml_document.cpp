@@ -52,9 +52,10 @@ const XMLElement& parseXml(const std::string& xml, const std::string& path, cons
   if (document.Error())
     throw InputError(path, line > 0 ? "line " + std::to_string(line) : "document",
                      std::string("it is not well-formed XML (") + document.ErrorName() + ")", "correct the syntax");
-  if (!document.RootElement() || getTag(*document.RootElement()) != root)
+  if (!document.RootElement()) throw InputError(path, "document", "it has no elements", "give a file with a robot");
+  if (!root.empty() && getTag(*document.RootElement()) != root)
     throw InputError(path, "document", "its outermost element is not <" + root + ">",
-                     root == "robot" ? "give a URDF file" : "give a MuJoCo file (MJCF)");
+                     root == "robot" ? "give a URDF file" : root == "sdf" ? "give an SDF file" : "give a MuJoCo file (MJCF)");
   checkAttributes(*document.RootElement(), path);
   return *document.RootElement();
 }

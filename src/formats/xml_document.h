@@ -12,7 +12,7 @@ namespace bielle {
 using tinyxml2::XMLDocument;
 using tinyxml2::XMLElement;
 
-/// \returns the outermost element, whose tag is `root`
+/// \returns the outermost element, whose tag is `root` (any if that is empty)
 /// \throws InputError naming `path` for text that is not UTF-8 or not well-formed XML, that declares entities, that gives an
 ///   attribute twice, that nests deeper than tinyxml2 allows (100), or that has another root
 const XMLElement& parseXml(const std::string& xml, const std::string& path, const std::string& root,

@@ -5,7 +5,8 @@ namespace bielle {
 /// Prevents a reader that ends early (`| head`) from terminating the program, which may still have results to write.
 void ignoreClosedPipes();
 
-/// Call this at the end. \throws InputError when the standard output could not be written completely
+/// Call this at the end. A reader that has seen enough is no failure.
+/// \throws InputError when the standard output could not be written completely, as on a full disk
 void finishStandardOutput();
 
 }  // namespace bielle

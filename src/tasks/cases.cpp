@@ -223,7 +223,8 @@ std::string describeLog(const std::string& log) {
 std::vector<fs::path> listRobotFiles(const fs::path& directory) {
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(directory))
-    if (const fs::path type = entry.path().extension(); type == ".urdf" || type == ".yaml" || type == ".xml")
+    if (const fs::path type = entry.path().extension();
+        type == ".urdf" || type == ".yaml" || type == ".xml" || type == ".sdf")
       files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   return files;

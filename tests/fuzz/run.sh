@@ -7,14 +7,14 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf mesh json npz)
+[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf sdf loops mesh json npz)
 build=$root/build-fuzz
 bielle=${BIELLE:-$root/build/bin/bielle}
 mkdir -p "$build/findings" "$build/seeds"
 
 # Seeds: the robots of the source tree, a small robot's YAML with every key, and a result that the command makes.
 if [ ! -e "$build/seeds/done" ]; then
-  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,mesh,json,npz}
+  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,sdf,loops,mesh,json,npz}
   cp "$root"/robots/*/*.urdf "$build/seeds/urdf"
   cp "$root"/robots/*/*.yaml "$root"/tests/fuzz/toy.yaml "$build/seeds/yaml"
   sed 's/^  ak80-9:/  m:/' "$root/robots/motors.yaml" >"$build/seeds/motors/all.yaml"
@@ -25,8 +25,11 @@ if [ ! -e "$build/seeds/done" ]; then
   printf 'v 0 0 0\nv 1 0 0\nv 0 1 0.5\nf 1 2 3\n' >"$build/seeds/mesh/t.obj"
   for robot in fourbar fivebar_leg spring_leg belt_biped; do
     "$bielle" convert "$root/robots/$robot" --to mjcf -o "$build/seeds/mjcf/$robot.xml" >/dev/null 2>&1
+    "$bielle" convert "$root/robots/$robot" --to sdf -o "$build/seeds/sdf/$robot.sdf" >/dev/null 2>&1
     "$bielle" convert "$root/robots/$robot" --to drake -o "$build/seeds/drake/$robot.urdf" >/dev/null 2>&1
   done
+  echo 'closures: [{link_a: hand, link_b: rod, point: [0, 0, 1], axis: [0, 1, 0]}]' >"$build/seeds/loops/hinge.yaml"
+  printf 'pin_loops: [{name: p, parent: hand, child: rod, parent_xyz: [0, 0, 1], child_xyz: [0, 0, 0], axis: [0, 1, 0]}]\nindependent: [shoulder]\nball_upgrades: [rod_joint]\n' >"$build/seeds/loops/pin.yaml"
   "$bielle" convert "$root/validation/elements/point_spring.yaml" --to mjcf -o "$build/seeds/mjcf/springs.xml" >/dev/null 2>&1
   "$bielle" convert "$root/validation/elements/point_spring.yaml" --to drake -o "$build/seeds/drake/springs.urdf" >/dev/null 2>&1
   "$bielle" solve squat --robot bipetto --depth 0.95 --set duration=0.4 --set settle=0 \
@@ -44,7 +47,7 @@ for target in "${targets[@]}"; do
   dictionary=()
   case $target in
     urdf | drake | yaml | motors) dictionary=("-dict=$root/tests/fuzz/robot.dict") ;;
-    mjcf) dictionary=("-dict=$root/tests/fuzz/mjcf.dict") ;;
+    mjcf | sdf) dictionary=("-dict=$root/tests/fuzz/$target.dict") ;;
   esac
   if nice "$build/tests/fuzz/fuzz_$target" "$build/corpus/$target" "$build/seeds/$target" -max_total_time="$seconds" \
     -timeout=10 -rss_limit_mb=2048 -malloc_limit_mb=1024 -max_len=65536 -print_final_stats=1 \

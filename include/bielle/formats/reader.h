@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that URDF cannot
-/// express; or one MuJoCo file.
+/// express; or one MuJoCo or SDF file.
 ///
 /// ## The URDF
 /// Links and joints of one tree. Bodies are added depth first, the children of a link in the order of their joints in
@@ -12,7 +12,7 @@
 ///   whose number of coordinates is changed by the YAML have no limits.
 /// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> its damping and friction, unless
 ///   `joint_forces` names it; meshes need not exist. Files for Drake (formats/drake.h) can also define loops,
-///   springs, motors and other joints.
+///   springs, motors and other joints; <loop_joint> and a file loop_closures.yaml beside it loops (formats/reader_loops.h).
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
 ///   of rounding.
 ///
@@ -59,7 +59,8 @@
 ///   `bielle generate NAME` writes with these parameters, the others at their defaults. Further keys complete it likewise.
 ///
 /// ## MuJoCo files (MJCF, .xml), of version 2.2.2 and later
-/// The reader supports bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with
+/// The reader supports <include> (beside the main file, or beside the one that includes it); bodies and <frame>; inertias, or
+/// those of shapes and meshes (STL, OBJ) without <inertial>, and what <compiler> makes of them; joints of all kinds with
 /// range, ref, armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon
 /// (of fixed tendons) with polynomials of degree 1; springs and dampers of spatial tendons between two sites; motors
 /// with gear and limits (servos become motors); classes of defaults; gravity; keyframes as references; sites as frames;
@@ -67,12 +68,23 @@
 /// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
 ///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the
 ///   force of the joint. Without keyframes, the reference `qpos0` is the posture of the file, where MuJoCo closes loops.
+/// - A body on the world that moves by three slides across each other and a ball, or three hinges across each other, has a free joint
+///   `root_joint`, unless one of them has a spring, damping, friction or an armature of its own, or is named by an actuator, an
+///   equality or a tendon. Keyframes count as in the file.
 /// - What formats/mjcf.h writes is put together again: connects NAME.1 and NAME.2 to a hinge, the elements of a universal, planar
 ///   or free joint, the spheres of a sole at their site.
 /// - Elements that are left out are listed in `warnings` with their lines. Elements without which the mechanism
 ///   would be another one are errors:
-///   <include>, <attach>, <replicate> and <composite>, other equalities, polynomials of higher degree, masses of meshes.
-///   At most 16 MB and 3000 bodies and sites.
+///   <attach>, <replicate>, <composite> and <flexcomp>, other equalities, polynomials of higher degree, masses of convex hulls and
+///   of meshes that cannot be read. At most 16 MB and 3000 bodies and sites.
+///
+/// ## SDF files (.sdf), by libsdformat
+/// One model, whose bodies stand where all joints are at zero. Of several joints onto a link, the first carries it (one that cannot
+/// close a loop before any other); revolute, ball and fixed ones close loops at this posture, which is the reference `initial`.
+/// Links that nothing holds are free, those of a static model are not. The frame of a body keeps its directions (on a universal
+/// joint, x and y are its axes) and has its origin on its joint. Frames, ranges, springs, damping and friction of joints, visuals
+/// and collisions are read; motors come from a YAML file with `model`. <drake:linear_bushing_rpy> and <drake:ball_constraint> are
+/// loops.
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,0 +1,65 @@
+#include "formats/mesh_inertia.h"
+
+#include <cmath>
+
+namespace bielle {
+namespace {
+
+using MeshTriangle = Eigen::Matrix3d;  // its corners
+
+struct Moments {
+  double mass = 0;
+  Vector3d first = Vector3d::Zero();
+  Matrix3d second = Matrix3d::Zero();  // integral of x x^T
+};
+
+Vector3d calcArea(const MeshTriangle& t) { return (t.col(1) - t.col(0)).cross(t.col(2) - t.col(0)) / 2; }
+
+// Adds a triangle (k = 3), or the tetrahedron between it and the origin (k = 4), of mass m: with the sum s of the corners, it has
+// the first moment m s / k and the second m (s s^T + sum of x x^T) / (k (k + 1)).
+void addSimplex(const MeshTriangle& t, double mass, int k, Moments& sum) {
+  const Vector3d s = t.rowwise().sum();
+  sum.mass += mass;
+  sum.first += mass / k * s;
+  sum.second += mass / (k * (k + 1)) * (s * s.transpose() + t * t.transpose());
+}
+
+// About `origin`. Volumes of tetrahedra have no sign if they may overlap.
+Moments addUp(const Eigen::Matrix3Xd& corners, const Vector3d& origin, MeshSolid solid) {
+  Moments sum;
+  for (Eigen::Index i = 0; i + 2 < corners.cols(); i += 3) {
+    const MeshTriangle t = corners.middleCols<3>(i).colwise() - origin;
+    const double volume = t.determinant() / 6;
+    if (solid == MeshSolid::Surface)
+      addSimplex(t, calcArea(t).norm(), 3, sum);
+    else
+      addSimplex(t, solid == MeshSolid::Overlapping ? std::abs(volume) : volume, 4, sum);
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::optional<Inertia> calcMeshInertia(const Eigen::Matrix3Xd& corners, MeshSolid solid) {
+  const Moments surface = addUp(corners, Vector3d::Zero(), MeshSolid::Surface);
+  if (!(surface.mass > 0)) return {};
+  const Vector3d middle = surface.first / surface.mass;  // of the faces
+  Moments sum = addUp(corners, middle, solid);
+  if (sum.mass < 0) sum = {-sum.mass, -sum.first, -sum.second};  // faces that are all seen from inside
+  const double scale = std::sqrt(surface.mass);
+  const double least = 1e-12 * (solid == MeshSolid::Surface ? scale * scale : scale * scale * scale);
+  if (!(sum.mass > least)) return {};
+  const Vector3d com = middle + sum.first / sum.mass;
+  // Which tetrahedra overlap depends on the point that they share: MuJoCo takes the centre of mass for the moments.
+  sum = addUp(corners, com, solid);
+  if (sum.mass < 0) sum = {-sum.mass, -sum.first, -sum.second};
+  if (!(sum.mass > least)) return {};  // the first one was rounding
+  Inertia inertia;
+  inertia.mass = sum.mass;
+  inertia.com = com;
+  inertia.I_com = sum.second.trace() * Matrix3d::Identity() - sum.second;
+  if (!std::isfinite(inertia.mass) || !inertia.com.allFinite() || !inertia.I_com.allFinite()) return {};
+  return inertia;
+}
+
+}  // namespace bielle

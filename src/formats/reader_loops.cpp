@@ -1,0 +1,246 @@
+#include "formats/reader_loops.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "bielle/model/error.h"
+#include "model/number_text.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+UrdfJoint* findTreeJoint(UrdfFile& tree, const std::string& name) {
+  const auto it = std::find_if(tree.joints.begin(), tree.joints.end(),
+                               [&name](const UrdfJoint& joint) { return joint.joint.name == name; });
+  return it == tree.joints.end() ? nullptr : &*it;
+}
+
+Vector3d readTriple(const XMLElement& e, const char* attribute, const Vector3d& otherwise, const std::string& path) {
+  const char* text = e.Attribute(attribute);
+  if (!text) return otherwise;
+  std::vector<double> v;
+  if (!parseNumbers(text, v) || v.size() != 3)
+    throw InputError(path, describe(e),
+                     std::string("its attribute '") + attribute + "' is not made of 3 finite numbers", "correct it");
+  return {v[0], v[1], v[2]};
+}
+
+SE3 readEnd(const XMLElement& e, const std::string& path) {
+  const Vector3d rpy = readTriple(e, "rpy", Vector3d::Zero(), path);
+  const Matrix3d R = (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
+                      Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
+                         .toRotationMatrix();
+  return {R, readTriple(e, "xyz", Vector3d::Zero(), path)};
+}
+
+class LoopClosuresReader {
+ public:
+  LoopClosuresReader(const std::string& path, UrdfFile& tree, YamlFile& settings)
+      : path_(path), tree_(tree), settings_(settings) {
+    X_WL_[tree.root] = {};
+    for (const UrdfJoint& joint : tree.joints) X_WL_[joint.child] = X_WL_[joint.parent] * joint.joint.X_PJ;
+  }
+
+  void read(const YamlEntry& root) {
+    if (!isOfThisRobot(root)) {
+      tree_.warnings.push_back(path_ + ": it is left out: it names no link of " + tree_.path);
+      return;
+    }
+    tree_.warnings.push_back(tree_.path + ": its loops are those of " + path_);
+    settings_.path = path_;
+    for (const auto& [key, entry] : root.getMap()) {
+      if (key == "closures")
+        forEach(entry, [this](const YamlEntry& e) { readHinge(e); });
+      else if (key == "ball_loops" || key == "pin_loops")
+        forEach(entry, [this, pin = key == "pin_loops"](const YamlEntry& e) { readTied(e, pin); });
+      else if (key == "dependent")
+        forEach(entry, [this](const YamlEntry& e) { removeMimic(e); });
+      else if (key == "independent" || key == "actuated_joints")
+        forEach(entry, [this](const YamlEntry& e) { addMotor(e); });
+      else if (key == "ball_upgrades")
+        forEach(entry, [this](const YamlEntry& e) {
+          settings_.joint_types.emplace_back(findJoint(e).joint.name,
+                                             JointRetyping{JointKind::Spherical, Vector3d::UnitZ(), Vector3d::UnitY()});
+        });
+      else
+        tree_.warnings.push_back(path_ + ": " + entry.element() + ": it is left out");
+    }
+  }
+
+ private:
+  template <typename Read>
+  static void forEach(const YamlEntry& list, const Read& read) {
+    for (const YamlEntry& entry : list.getList()) read(entry);
+  }
+
+  bool isOfThisRobot(const YamlEntry& root) const {
+    for (const auto& [key, entry] : root.getMap()) {
+      if (!entry.isList()) continue;
+      for (const YamlEntry& loop : entry.getList()) {
+        if (!loop.isMap()) continue;
+        for (const auto& [name, value] : loop.getMap())
+          if ((name == "link_a" || name == "link_b" || name == "parent" || name == "child") &&
+              X_WL_.count(value.getText()))
+            return true;
+      }
+    }
+    return false;
+  }
+
+  UrdfJoint& findJoint(const YamlEntry& entry) {
+    UrdfJoint* joint = findTreeJoint(tree_, entry.getText());
+    if (!joint) entry.fail("there is no joint '" + entry.getText() + "'", "correct the name");
+    return *joint;
+  }
+
+  std::string findLink(const YamlEntry& entry) const {
+    const std::string name = entry.getText();
+    if (!X_WL_.count(name)) entry.fail("there is no link '" + name + "'", "correct the name");
+    return name;
+  }
+
+  static Vector3d getDirection(const YamlEntry& entry) {
+    const Vector3d axis = entry.getVector3();
+    const double norm = axis.stableNorm();
+    if (!(norm > 1e-12) || !std::isfinite(norm)) entry.fail("it is not a direction", "give a non-zero vector");
+    return axis / norm;
+  }
+
+  // What is known of an entry; the rest is told.
+  YamlFields getKnown(const YamlEntry& entry, const std::set<std::string>& known) {
+    YamlFields fields;
+    for (const auto& [key, value] : entry.getMap())
+      if (known.count(key))
+        fields.emplace(key, value);
+      else
+        tree_.warnings.push_back(path_ + ": " + value.element() + ": it is left out");
+    return fields;
+  }
+
+  void add(const std::string& name, ClosureKind kind, const Vector3d& axis, const std::string& link1, const SE3& X_L1,
+           const std::string& link2, const SE3& X_L2) {
+    ClosureSpec closure;
+    closure.name = name;
+    closure.kind = kind;
+    closure.axis = axis;
+    closure.frame1 = addUrdfFrame(tree_, name + "_frame1", link1, X_L1);
+    closure.frame2 = addUrdfFrame(tree_, name + "_frame2", link2, X_L2);
+    settings_.closures.push_back(closure);
+  }
+
+  void readHinge(const YamlEntry& entry) {
+    const YamlFields fields = getKnown(entry, {"link_a", "link_b", "point", "axis"});
+    const std::string a = findLink(require(fields, "link_a", entry)), b = findLink(require(fields, "link_b", entry));
+    const SE3 X_WP(Matrix3d::Identity(), require(fields, "point", entry).getVector3());
+    add(a + "--" + b, ClosureKind::Hinge5D, getDirection(require(fields, "axis", entry)), a,
+        X_WL_.at(a).inverse() * X_WP, b, X_WL_.at(b).inverse() * X_WP);
+  }
+
+  // Frames that are parallel with all joints at zero.
+  void readTied(const YamlEntry& entry, bool is_pin) {
+    const YamlFields fields = getKnown(entry, {"name", "parent", "child", "parent_xyz", "child_xyz", "axis"});
+    const std::string a = findLink(require(fields, "parent", entry)), b = findLink(require(fields, "child", entry));
+    const YamlEntry* name = find(fields, "name");
+    const Matrix3d R_ba = X_WL_.at(b).R.transpose() * X_WL_.at(a).R;
+    add(name ? name->getText() : a + "--" + b, is_pin ? ClosureKind::Hinge5D : ClosureKind::Ball3D,
+        is_pin ? getDirection(require(fields, "axis", entry)) : Vector3d::UnitZ(), a,
+        {Matrix3d::Identity(), require(fields, "parent_xyz", entry).getVector3()}, b,
+        {is_pin ? R_ba : Matrix3d::Identity(), require(fields, "child_xyz", entry).getVector3()});
+  }
+
+  // It follows others by its loop; the line of <mimic> is only near to that.
+  void removeMimic(const YamlEntry& entry) {
+    UrdfJoint& joint = findJoint(entry);
+    if (joint.mimicked.empty()) return;
+    joint.mimicked.clear();
+    tree_.warnings.push_back(tree_.path + ": joint '" + joint.joint.name +
+                             "': its <mimic> is left out, because its loop is in " + path_);
+  }
+
+  void addMotor(const YamlEntry& entry) {
+    const UrdfJoint& joint = findJoint(entry);
+    if (getNv(joint.joint.kind) != 1)
+      entry.fail("joint '" + joint.joint.name + "' does not have exactly one coordinate",
+                 "name a revolute or prismatic joint");
+    for (const MotorSpec& other : settings_.motors)
+      if (other.joint == joint.joint.name) return;
+    MotorSpec motor;
+    motor.joint = joint.joint.name;
+    settings_.motors.push_back(motor);
+  }
+
+  const std::string path_;
+  UrdfFile& tree_;
+  YamlFile& settings_;
+  std::map<std::string, SE3> X_WL_;  // of the links in the root, with all joints at zero
+};
+
+}  // namespace
+
+std::string addUrdfFrame(UrdfFile& tree, std::string name, const std::string& link, const SE3& X_LF) {
+  if (X_LF.p.isZero(0) && X_LF.R.isIdentity(0)) return link;
+  while (tree.links.count(name) || findTreeJoint(tree, name)) name += "_";
+  UrdfJoint joint;
+  joint.parent = link;
+  joint.child = name;
+  joint.joint.name = name + "_frame";
+  joint.joint.kind = JointKind::Fixed;
+  joint.joint.X_PJ = X_LF;
+  while (findTreeJoint(tree, joint.joint.name)) joint.joint.name += "_";
+  tree.links[name].name = name;
+  tree.joints.push_back(joint);
+  return name;
+}
+
+void readLoopJoints(const XMLElement& robot, UrdfFile& tree, YamlFile& settings) {
+  const std::string& path = tree.path;
+  for (const XMLElement* e : getChildren(robot, "loop_joint")) {
+    ClosureSpec closure;
+    closure.name = getAttribute(e, "name");
+    if (closure.name.empty()) closure.name = "loop_" + std::to_string(e->GetLineNum());
+    const std::string type = getAttribute(e, "type");
+    if (type == "continuous" || type == "revolute") {
+      closure.kind = ClosureKind::Hinge5D;
+      const XMLElement* axis = e->FirstChildElement("axis");
+      closure.axis = axis ? readTriple(*axis, "xyz", Vector3d::UnitX(), path) : Vector3d::UnitX();
+    } else if (type == "spherical" || type == "fixed") {
+      closure.kind = type == "fixed" ? ClosureKind::Weld6D : ClosureKind::Ball3D;
+    } else {
+      throw InputError(path, describe(*e), "its type '" + type + "' cannot close a loop",
+                       "use spherical, continuous, revolute or fixed");
+    }
+    const auto addEnd = [&](const char* tag) {
+      const XMLElement* end = e->FirstChildElement(tag);
+      if (!end) throw InputError(path, describe(*e), std::string("it has no <") + tag + ">", "name the link");
+      const std::string link = getAttribute(end, "link");
+      if (!tree.links.count(link))
+        throw InputError(path, describe(*end), "there is no link '" + link + "'",
+                         "declare the link or correct the name");
+      return addUrdfFrame(tree, closure.name + "_" + tag, link, readEnd(*end, path));
+    };
+    closure.frame1 = addEnd("link1");
+    closure.frame2 = addEnd("link2");
+    settings.path = path;
+    settings.closures.push_back(closure);
+  }
+}
+
+fs::path findLoopClosures(const fs::path& urdf) {
+  const fs::path directory = urdf.has_parent_path() ? urdf.parent_path() : ".";
+  for (const fs::path& place : {directory, directory / "..", directory / "../config"}) {
+    std::error_code error;
+    const fs::path file = (place / "loop_closures.yaml").lexically_normal();
+    if (fs::is_regular_file(file, error)) return file;
+  }
+  return {};
+}
+
+void readLoopClosures(const std::string& path, UrdfFile& tree, YamlFile& settings) {
+  readYamlDocument(path, readRobotText(path),
+                   [&](const YamlEntry& root) { LoopClosuresReader(path, tree, settings).read(root); });
+}
+
+}  // namespace bielle

@@ -1,0 +1,200 @@
+// Inertias as given, or from geoms and the files of their meshes; and what <compiler> makes of them.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "bielle/model/error.h"
+#include "formats/mesh.h"
+#include "formats/mesh_inertia.h"
+#include "formats/reader_mjcf.h"
+#include "math/decompositions.h"
+
+namespace bielle {
+
+void MjcfReader::readInertiaSettings(MjcfElement& compiler) {
+  inertia_from_geom_ = compiler.getText("inertiafromgeom", inertia_from_geom_);
+  if (inertia_from_geom_ != "true" && inertia_from_geom_ != "false" && inertia_from_geom_ != "auto")
+    compiler.fail("its inertiafromgeom is '" + inertia_from_geom_ + "'", "use true, false or auto");
+  if (const std::vector<double> groups = compiler.getNumbers("inertiagrouprange", 2, 2); !groups.empty())
+    first_group_ = groups[0], last_group_ = groups[1];
+  least_mass_ = compiler.getNumber("boundmass", least_mass_);
+  least_moment_ = compiler.getNumber("boundinertia", least_moment_);
+  total_mass_ = compiler.getNumber("settotalmass", total_mass_);
+  balances_inertia_ = compiler.getFlag("balanceinertia", balances_inertia_);
+  is_exact_ = compiler.getFlag("exactmeshinertia", is_exact_);
+  for (const char* without_effect : {"discardvisual", "fusestatic", "convexhull", "usethread", "texturedir"})
+    compiler.find(without_effect);
+}
+
+void MjcfReader::readMesh(const XMLElement& e) {
+  MjcfElement mesh(e, "", settings_);
+  const std::string file = mesh.getText("file");
+  const std::filesystem::path name_of_file = std::filesystem::path(file).filename();
+  std::string name = getAttribute(&e, "name");
+  if (name.empty()) name = name_of_file.stem().string();
+  MeshAsset asset;
+  asset.visual.shape = Visual::Shape::Mesh;
+  asset.visual.size = mesh.getVector("scale", Vector3d::Ones());
+  asset.visual.mesh =
+      (std::filesystem::path(mesh_directory_) / (strips_path_ ? name_of_file : std::filesystem::path(file))).string();
+  asset.p_ref = mesh.getVector("refpos", Vector3d::Zero());
+  if (const std::vector<double> q = mesh.getNumbers("refquat", 4, 4); !q.empty()) {
+    const Eigen::Vector4d xyzw(q[1], q[2], q[3], q[0]);
+    const double norm = xyzw.stableNorm();
+    if (!(norm > 1e-12) || !std::isfinite(norm))
+      mesh.fail("its refquat has zero length", "give a unit quaternion w x y z");
+    asset.R_ref = Eigen::Quaterniond(Eigen::Vector4d(xyzw / norm)).toRotationMatrix();
+  }
+  asset.inertia = mesh.getText("inertia");
+  for (const char* drawn : {"smoothnormal", "maxhullvert", "content_type"}) mesh.find(drawn);
+  if (file.empty()) return mesh.leaveOut("a mesh without a file is left out");
+  meshes_[name] = asset;
+}
+
+Inertia MjcfReader::readInertia(const std::vector<Child>& children) {
+  const XMLElement* given = nullptr;
+  SE3 X;
+  for (const Child& child : children) {
+    if (getTag(*child.element) != "inertial") continue;
+    if (given) refuse(*child.element, "the body has two inertias", "keep one");
+    given = child.element;
+    X = child.X_BF;
+  }
+  if (given && inertia_from_geom_ != "true") {
+    MjcfElement e(*given, "", settings_);
+    return readGivenInertia(e).transformed(X);
+  }
+  if (given) noteElement(*given, "left out, because inertiafromgeom is true");
+  if (inertia_from_geom_ == "false") return {};
+  Inertia sum;
+  for (const Child& child : children)
+    if (getTag(*child.element) == "geom") sum = sum + readSolid(child);
+  return sum;
+}
+
+Inertia MjcfReader::readGivenInertia(MjcfElement& e) const {
+  if (!e.find("mass")) e.fail("it has no mass", "give one");
+  const double mass = e.getNumber("mass", 0);
+  if (!(mass >= 0)) e.fail("its mass is negative", "give 0 or more");
+  if (!e.find("pos")) e.fail("it has no pos", "give the centre of mass");
+  Matrix3d I = Matrix3d::Zero();
+  const std::vector<double> diagonal = e.getNumbers("diaginertia", 3, 3), full = e.getNumbers("fullinertia", 6, 6);
+  const SE3 X_BI = e.getPose();
+  if (diagonal.empty() == full.empty())
+    e.fail(full.empty() ? "it has no diaginertia or fullinertia" : "it has both diaginertia and fullinertia",
+           "give one of them");
+  if (!diagonal.empty()) I.diagonal() << diagonal[0], diagonal[1], diagonal[2];
+  if (!full.empty()) {
+    if (e.find("quat") || e.find("euler") || e.find("axisangle") || e.find("xyaxes") || e.find("zaxis"))
+      e.fail("it has a fullinertia and an orientation", "keep one: fullinertia is in the axes of the body");
+    I << full[0], full[3], full[4], full[3], full[1], full[5], full[4], full[5], full[2];
+  }
+  return Inertia{mass, Vector3d::Zero(), I}.transformed(X_BI);
+}
+
+// What <compiler> asks for: a mean moment where no body can have those given, and least values.
+Inertia MjcfReader::keepBounds(const Inertia& inertia) const {
+  if (!balances_inertia_ && least_mass_ <= 0 && least_moment_ <= 0) return inertia;
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(inertia.I_com);
+  Vector3d moments = principal.eigenvalues();  // in increasing order
+  if (balances_inertia_ && moments[0] + moments[1] < moments[2]) moments.setConstant(moments.mean());
+  moments = moments.cwiseMax(least_moment_);
+  return {std::max(inertia.mass, least_mass_), inertia.com,
+          principal.eigenvectors() * moments.asDiagonal() * principal.eigenvectors().transpose()};
+}
+
+void MjcfReader::scaleMasses() {
+  if (!(total_mass_ > 0)) return;
+  double mass = 0;
+  for (const auto& [name, link] : tree_.links) mass += link.inertia.mass;
+  if (!(mass > 0)) return;
+  for (auto& [name, link] : tree_.links) {
+    link.inertia.mass *= total_mass_ / mass;
+    link.inertia.I_com *= total_mass_ / mass;
+  }
+}
+
+// Volume, centre and moments per mass in the frame of its file.
+Inertia MjcfReader::readMeshSolid(MjcfElement& e, const std::string& mesh) const {
+  const std::string remedy =
+      "give the body an <inertial>, as MuJoCo does when it saves the model, or the mesh as an STL or OBJ file";
+  const auto asset = meshes_.find(mesh);
+  if (asset == meshes_.end())
+    e.fail("the mass of the body comes from the mesh '" + mesh + "', which is not there", remedy);
+  std::string kind = asset->second.inertia;
+  if (kind.empty()) kind = is_exact_ ? "exact" : "legacy";
+  if (e.getFlag("shellinertia", false)) kind = "shell";
+  if (kind != "exact" && kind != "legacy" && kind != "shell")
+    e.fail("the mass of the body comes from the mesh '" + mesh + "' by its convex hull, which is not supported",
+           "give the body an <inertial>, as MuJoCo does when it saves the model");
+  const Visual& visual = asset->second.visual;
+  const Eigen::Matrix3Xd corners =
+      visual.size.asDiagonal() * asset->second.R_ref.transpose() *
+      (readTriangles(visual.mesh, std::filesystem::path(settings_.path).parent_path().string()).colwise() -
+       asset->second.p_ref);
+  const std::optional<Inertia> solid = calcMeshInertia(corners, kind == "shell"   ? MeshSolid::Surface
+                                                                : kind == "exact" ? MeshSolid::Enclosed
+                                                                                  : MeshSolid::Overlapping);
+  if (!solid)
+    e.fail("the mass of the body comes from the mesh '" + mesh + "', but " + visual.mesh +
+               " is missing, damaged, of another kind, or encloses nothing",
+           remedy);
+  return {solid->mass, solid->com, solid->I_com / solid->mass};
+}
+
+Inertia MjcfReader::readSolid(const Child& child) {
+  MjcfElement e(*child.element, child.childclass, settings_);
+  const Shape shape = readShape(e, child.X_BF);
+  for (const char* read : kGeomAttributes) e.find(read);
+  const double density = e.getNumber("density", 1000), group = e.getNumber("group", 0), *given = nullptr;
+  const double mass_given = e.getNumber("mass", -1);
+  if (e.find("mass")) given = &mass_given;
+  if ((given && !(*given >= 0)) || !(density >= 0)) e.fail("its mass or density is negative", "give 0 or more");
+  if ((given ? *given : density) == 0 || shape.type == "plane" || shape.type == "hfield" || group < first_group_ ||
+      group > last_group_)
+    return {};
+  const bool is_mesh = shape.type == "mesh";
+  if (shape.type == "sdf" || (!is_mesh && (e.find("mesh") || e.getFlag("shellinertia", false))))
+    e.fail("the mass of the body comes from this geom, whose " +
+               std::string(shape.type == "sdf" ? "distance field"
+                           : e.find("mesh")    ? "fit to a mesh"
+                                               : "shell") +
+               " is not supported",
+           "give the body an <inertial>, as MuJoCo does when it saves the model");
+  Inertia solid = is_mesh ? readMeshSolid(e, e.getText("mesh")) : calcPrimitive(e, shape);
+  solid.mass = given ? *given : density * solid.mass;
+  solid.I_com *= solid.mass;
+  return solid.transformed(shape.X_BG);
+}
+
+// Volume, and moments per mass about its own frame.
+Inertia MjcfReader::calcPrimitive(const MjcfElement& e, const Shape& shape) {
+  const double a = shape.size[0], b = shape.size[1], c = shape.size[2];
+  double volume = 0;
+  Vector3d moments = Vector3d::Zero();  // per mass
+  const auto fromSquares = [](double xx, double yy, double zz) { return Vector3d(yy + zz, xx + zz, xx + yy); };
+  if (shape.type == "sphere" || shape.type == "ellipsoid") {
+    const double y = shape.type == "sphere" ? a : b, z = shape.type == "sphere" ? a : c;
+    volume = 4 * EIGEN_PI / 3 * a * y * z;
+    moments = fromSquares(a * a / 5, y * y / 5, z * z / 5);
+  } else if (shape.type == "box") {
+    volume = 8 * a * b * c;
+    moments = fromSquares(a * a / 3, b * b / 3, c * c / 3);
+  } else if (shape.type == "cylinder") {
+    volume = 2 * EIGEN_PI * a * a * b;
+    moments = fromSquares(a * a / 4, a * a / 4, b * b / 3);
+  } else if (shape.type == "capsule") {
+    // A cylinder and two half balls, whose centres of mass are 3/8 of the radius beyond its ends.
+    const double tube = 2 * EIGEN_PI * a * a * b, ball = 4 * EIGEN_PI / 3 * a * a * a, far = b + 3 * a / 8;
+    volume = tube + ball;
+    if (!(volume > 0)) return {};
+    const double xx = (tube * a * a / 4 + ball * a * a / 5) / volume,
+                 zz = (tube * b * b / 3 + ball * (a * a / 5 - 9 * a * a / 64 + far * far)) / volume;
+    moments = fromSquares(xx, xx, zz);
+  } else {
+    e.fail("its type '" + shape.type + "' is unknown", "use sphere, capsule, ellipsoid, cylinder, box, mesh or plane");
+  }
+  return {volume, Vector3d::Zero(), moments.asDiagonal()};
+}
+
+}  // namespace bielle

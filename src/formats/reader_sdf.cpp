@@ -1,0 +1,296 @@
+#include "formats/reader_sdf.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "bielle/model/error.h"
+#include "formats/log_capture.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+constexpr size_t kMostSdfJoints = 3000, kMostSdfBytes = 16'000'000;
+
+bool canClose(sdf::JointType type) {
+  return type == sdf::JointType::REVOLUTE || type == sdf::JointType::CONTINUOUS || type == sdf::JointType::BALL ||
+         type == sdf::JointType::FIXED;
+}
+
+// Files that it includes: beside the file, or below a directory of that name.
+std::string findIncluded(const fs::path& directory, const std::string& uri) {
+  const size_t scheme = uri.find("://");
+  const fs::path name = scheme == std::string::npos ? uri : uri.substr(scheme + 3);
+  std::error_code error;
+  for (const fs::path& base : {directory, directory.parent_path()})
+    if (fs::exists(base / name, error)) return (base / name).string();
+  return "";
+}
+
+}  // namespace
+
+SdfReader::SdfReader(const std::string& path) : path_(path) {
+  tree_.path = yaml_.path = path;
+  tree_.root = "world";
+  tree_.links["world"].name = "world";
+  tree_.has_own_base = true;
+  X_WL_["world"] = {};
+  names_ = {"world"};
+}
+
+RobotFiles SdfReader::read() {
+  const std::string xml = readRobotText(path_);
+  if (xml.size() > kMostSdfBytes)
+    fail("file", "it exceeds the largest size of an SDF file (16 MB)", "give one without embedded data");
+  parseXml(xml, path_, "sdf", document_);
+  load(xml);
+  model_ = &findModel();
+  tree_.name = model_->Name();
+  if (model_->ModelCount() > 0 || model_->InterfaceModelCount() > 0)
+    fail("model '" + model_->Name() + "'", "it contains other models",
+         "put their links and joints into the model itself, as <include merge=\"true\"> does");
+  if (model_->LinkCount() + model_->JointCount() + model_->FrameCount() > kMostSdfJoints)
+    fail("model '" + model_->Name() + "'", "it has more than " + std::to_string(kMostSdfJoints) + " elements",
+         "no robot needs so many");
+  for (uint64_t i = 0; i < model_->LinkCount(); ++i) names_.insert(model_->LinkByIndex(i)->Name());
+  for (uint64_t i = 0; i < model_->JointCount(); ++i) names_.insert(model_->JointByIndex(i)->Name());
+  for (uint64_t i = 0; i < model_->FrameCount(); ++i) names_.insert(model_->FrameByIndex(i)->Name());
+  chooseCarriers();
+  for (uint64_t i = 0; i < model_->LinkCount(); ++i) readLink(*model_->LinkByIndex(i));
+  addBelow("world");
+  for (uint64_t i = 0; i < model_->LinkCount(); ++i)
+    if (const std::string& link = model_->LinkByIndex(i)->Name(); !carriers_.count(link)) addRoot(link);
+  for (uint64_t i = 0; i < model_->FrameCount(); ++i) readFrame(*model_->FrameByIndex(i));
+  for (const sdf::Joint* joint : closing_) addClosure(*joint);
+  if (element_) readDrake(*element_), noteElements(*element_);
+  addStart();
+  const std::vector<std::string> notes = notes_.format();
+  tree_.warnings.insert(tree_.warnings.end(), notes.begin(), notes.end());
+  return {std::move(tree_), std::move(yaml_)};
+}
+
+void SdfReader::fail(const std::string& element, const std::string& problem, const std::string& remedy) const {
+  throw InputError(path_, element, problem, remedy);
+}
+
+void SdfReader::check(const sdf::Errors& errors) const {
+  for (const sdf::Error& error : errors) {
+    // Frames may be links without mass.
+    if (error.Code() == sdf::ErrorCode::LINK_INERTIA_INVALID) continue;
+    const std::string line = error.LineNumber() ? "line " + std::to_string(*error.LineNumber()) : "document";
+    fail(line, "libsdformat says: " + error.Message(), "correct the element");
+  }
+}
+
+void SdfReader::load(const std::string& xml) {
+  sdf::Console::Instance()->SetQuiet(true);
+  sdf::ParserConfig config;
+  config.SetWarningsPolicy(sdf::EnforcementPolicy::LOG);
+  config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::LOG);
+  const fs::path directory = fs::absolute(path_).parent_path();
+  config.SetFindCallback([directory](const std::string& uri) { return findIncluded(directory, uri); });
+  sdf::Errors errors;
+  bool is_read = true;
+  const LogCapture capture;  // libsdformat tries whether what is no SDF is a URDF
+  try {
+    errors = root_.LoadSdfString(xml, config);
+  } catch (const sdf::Exception&) {
+    is_read = false;
+  } catch (const std::exception&) {
+    is_read = false;
+  }
+  if (!is_read) fail("document", "libsdformat cannot read it", "correct it; `ign sdf --check` may say where");
+  check(errors);
+}
+
+// The only one of the file.
+const sdf::Model& SdfReader::findModel() {
+  const XMLElement& root = *document_.RootElement();
+  element_ = root.FirstChildElement("model");
+  if (root_.Model()) {
+    X_WM_ = toSE3(root_.Model()->RawPose());
+    return *root_.Model();
+  }
+  std::vector<const sdf::Model*> moving;
+  std::string names;
+  for (uint64_t w = 0; w < root_.WorldCount(); ++w)
+    for (uint64_t i = 0; i < root_.WorldByIndex(w)->ModelCount(); ++i) {
+      const sdf::Model& model = *root_.WorldByIndex(w)->ModelByIndex(i);
+      if (model.JointCount() == 0) continue;
+      moving.push_back(&model);
+      names += (names.empty() ? "'" : ", '") + model.Name() + "'";
+    }
+  if (moving.size() != 1)
+    fail("document", moving.empty() ? "it has no model with joints" : "it has several models with joints: " + names,
+         "give a file with one model");
+  const sdf::World& world = *root_.WorldByIndex(0);
+  const auto& g = world.Gravity();
+  yaml_.gravity = Vector3d(g.X(), g.Y(), g.Z());
+  ignition::math::Pose3d pose;
+  check(moving[0]->SemanticPose().Resolve(pose));
+  X_WM_ = toSE3(pose);
+  const XMLElement* place = root.FirstChildElement("world");
+  for (element_ = place ? place->FirstChildElement("model") : nullptr;
+       element_ && getAttribute(element_, "name") != moving[0]->Name();)
+    element_ = element_->NextSiblingElement("model");
+  return *moving[0];
+}
+
+SE3 SdfReader::toSE3(const ignition::math::Pose3d& pose) {
+  const auto& q = pose.Rot();
+  return {Eigen::Quaterniond(q.W(), q.X(), q.Y(), q.Z()).normalized().toRotationMatrix(),
+          {pose.Pos().X(), pose.Pos().Y(), pose.Pos().Z()}};
+}
+
+SE3 SdfReader::getPlace(const sdf::SemanticPose& semantic) const {
+  ignition::math::Pose3d pose;
+  check(semantic.Resolve(pose, "__model__"));
+  return X_WM_ * toSE3(pose);
+}
+
+std::string SdfReader::getParent(const sdf::Joint& joint) const {
+  std::string link;
+  check(joint.ResolveParentLink(link));
+  return link;
+}
+
+std::string SdfReader::getChild(const sdf::Joint& joint) const {
+  std::string link;
+  check(joint.ResolveChildLink(link));
+  return link;
+}
+
+// Which joint carries a link: the first that leads to it, but one that cannot close a loop before any other.
+void SdfReader::chooseCarriers() {
+  for (const bool closes : {false, true})
+    for (uint64_t i = 0; i < model_->JointCount(); ++i) {
+      const sdf::Joint& joint = *model_->JointByIndex(i);
+      if (canClose(joint.Type()) != closes) continue;
+      const std::string parent = getParent(joint), child = getChild(joint);
+      bool is_free = !carriers_.count(child);
+      for (std::string above = parent; is_free && parents_.count(above); above = parents_[above])
+        is_free = parents_[above] != child;
+      if (is_free && parent != child) {
+        carriers_[child] = &joint;
+        parents_[child] = parent;
+      } else if (closes) {
+        closing_.push_back(&joint);
+      } else {
+        fail("joint '" + joint.Name() + "'",
+             "its child '" + child + "' hangs on another joint too, and it cannot close a loop",
+             "cut the loop at a revolute, ball or fixed joint");
+      }
+    }
+  for (uint64_t i = 0; i < model_->JointCount(); ++i) {
+    const sdf::Joint& joint = *model_->JointByIndex(i);
+    const auto carrier = carriers_.find(getChild(joint));
+    if (carrier != carriers_.end() && carrier->second == &joint)
+      carried_[parents_.at(carrier->first)].push_back(&joint);
+  }
+}
+
+// The links on `link`, depth first in the order of the file.
+void SdfReader::addBelow(const std::string& link) {
+  for (const sdf::Joint* joint : carried_[link]) {
+    addCarried(*joint);
+    addBelow(getChild(*joint));
+  }
+}
+
+void SdfReader::addRoot(const std::string& link) {
+  UrdfJoint root;
+  root.parent = "world";
+  root.child = link;
+  root.joint.kind = model_->Static() ? JointKind::Fixed : JointKind::FreeFlyer;
+  root.joint.name = "root_joint";
+  while (!names_.insert(root.joint.name).second) root.joint.name = link + "_" + root.joint.name;
+  if (model_->Static()) root.joint.X_PJ = X_WL_.at(link);
+  tree_.joints.push_back(root);
+  addBelow(link);
+}
+
+SE3 SdfReader::getLinkPlace(const std::string& link) const { return X_WL_.at(link); }
+
+void SdfReader::readLink(const sdf::Link& link) {
+  const SE3 X_WS = getPlace(link.SemanticPose());
+  SE3 X_WL = X_WS;
+  const auto carrier = carriers_.find(link.Name());
+  if (carrier != carriers_.end() && carrier->second->Type() != sdf::JointType::FIXED &&
+      carrier->second->Type() != sdf::JointType::PRISMATIC)
+    X_WL.p = getPlace(carrier->second->SemanticPose()).p;
+  if (carrier != carriers_.end() && carrier->second->Type() == sdf::JointType::UNIVERSAL)
+    if (const auto axes = findUniversalAxes(*carrier->second)) X_WL.R = X_WS.R * *axes;
+  X_WL_[link.Name()] = X_WL;
+  const SE3 X_LS = X_WL.inverse() * X_WS;
+  UrdfLink& out = tree_.links[link.Name()];
+  out.name = link.Name();
+  const auto& moments = link.Inertial().MassMatrix();
+  Matrix3d I;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) I(i, j) = moments.Moi()(i, j);
+  out.inertia = Inertia{moments.Mass(), Vector3d::Zero(), I}.transformed(X_LS * toSE3(link.Inertial().Pose()));
+  readShapes(link, X_LS);
+}
+
+// A frame of the tree.
+std::string SdfReader::addFrame(const std::string& name, const std::string& link, const SE3& X_WF) {
+  const SE3 X_LF = getLinkPlace(link).inverse() * X_WF;
+  UrdfJoint joint;
+  joint.parent = link;
+  joint.child = joint.joint.name = name;
+  joint.joint.name += "_frame";
+  while (!names_.insert(joint.joint.name).second) joint.joint.name += "_";
+  joint.joint.kind = JointKind::Fixed;
+  joint.joint.X_PJ = X_LF;
+  tree_.links[name].name = name;
+  tree_.joints.push_back(joint);
+  return name;
+}
+
+void SdfReader::readFrame(const sdf::Frame& frame) {
+  std::string link;
+  check(frame.ResolveAttachedToBody(link));
+  if (!X_WL_.count(link)) fail("frame '" + frame.Name() + "'", "it is not attached to a link", "attach it to one");
+  addFrame(frame.Name(), link, getPlace(frame.SemanticPose()));
+}
+
+// The bodies of the file stand where its loops are closed.
+void SdfReader::addStart() {
+  if (yaml_.closures.empty()) return;
+  Reference reference;
+  reference.name = "initial";
+  for (const UrdfJoint& joint : tree_.joints) {
+    std::vector<double>& q = reference.joints[joint.joint.name];
+    q.assign(getNq(joint.joint.kind), 0);
+    if (joint.joint.kind == JointKind::Spherical) q.back() = 1;
+    if (joint.joint.kind == JointKind::FreeFlyer) {
+      const SE3 X = getLinkPlace(joint.child);
+      Eigen::Map<Vector3d>(q.data()) = X.p;
+      Eigen::Map<Eigen::Vector4d>(q.data() + 3) = Eigen::Quaterniond(X.R).coeffs();
+    }
+    if (q.empty()) reference.joints.erase(joint.joint.name);
+  }
+  yaml_.references.push_back(reference);
+}
+
+// What is not read, by its line.
+void SdfReader::noteElements(const XMLElement& element) {
+  static const std::map<std::string, std::set<std::string>> read = {
+      {"model", {"link", "joint", "frame", "pose", "static", "include"}},
+      {"link", {"pose", "inertial", "visual", "collision"}},
+      {"joint", {"parent", "child", "pose", "axis", "axis2"}}};
+  const std::string& tag = getTag(element);
+  for (const XMLElement* e : getChildren(element)) {
+    const std::string& own = getTag(*e);
+    if (own.rfind("drake:", 0) == 0 && tag == "model") continue;  // reader_sdf_drake.cpp
+    if (!read.at(tag).count(own))
+      notes_.add(path_, "<" + tag + "> <" + own + ">", e->GetLineNum(), "left out");
+    else if (read.count(own))
+      noteElements(*e);
+  }
+}
+
+RobotFiles readSdf(const std::string& path) { return SdfReader(path).read(); }
+
+}  // namespace bielle

@@ -1,0 +1,146 @@
+// Loops that others add to a URDF, inside it and in a file beside it.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/robots/robot_loader.h"
+#include "get_error.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// A square of four bars in the plane of x and z, cut in its upper right corner; a joint of it turns the other way round.
+std::string makeSquare(const std::string& in_robot = "") {
+  const auto link = [](const std::string& name) {
+    return "<link name=\"" + name +
+           "\"><inertial><origin xyz=\"0 0 0.5\"/><mass value=\"1\"/><inertia ixx=\"0.1\" iyy=\"0.1\" "
+           "izz=\"0.1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>\n";
+  };
+  const auto joint = [](const std::string& name, const std::string& parent, const std::string& child,
+                        const std::string& origin, const std::string& more = "") {
+    return "<joint name=\"" + name + "\" type=\"continuous\"><parent link=\"" + parent + "\"/><child link=\"" + child +
+           "\"/><origin " + origin + "/><axis xyz=\"0 1 0\"/>" + more + "</joint>\n";
+  };
+  return "<robot name=\"square\">\n" + link("ground") + link("left") + link("top") + link("right") +
+         joint("turn", "ground", "left", "xyz=\"0 0 0\"") +
+         joint("bend", "left", "top", "xyz=\"0 0 1\" rpy=\"0 1.5707963267948966 0\"",
+               "<mimic joint=\"turn\" multiplier=\"-1\"/>") +
+         joint("swing", "ground", "right", "xyz=\"1 0 0\"") + in_robot + "</robot>\n";
+}
+
+LoadedRobot loadIn(const RobotDirectory& directory, const std::string& urdf) {
+  LoadOptions options;
+  options.base = BaseKind::Fixed;
+  return loadRobot(directory.write("urdf/robot.urdf", urdf), options);
+}
+
+void checkLoop(const LoadedRobot& robot, ClosureKind kind, int mobility) {
+  const Model& model = robot.model;
+  int loops = 0;
+  for (const Closure& closure : model.closures()) {
+    if (closure.kind == ClosureKind::Coupler) continue;
+    ++loops;
+    CHECK(closure.kind == kind);
+  }
+  CHECK(loops == 1);
+  CHECK(findClosedConfiguration(model).status == AssemblyStatus::Closed);
+  // Elsewhere the loop closes too, so that its frames are where the axes are.
+  const VectorXd apart = model.integrate(model.makeNeutral(), VectorXd::Constant(model.nv(), 0.1));
+  const AssemblyResult closed = closeConfiguration(model, apart);
+  CHECK((closed.status == AssemblyStatus::Closed) == (mobility > 0));
+}
+
+bool tells(const LoadedRobot& robot, const std::string& text) {
+  for (const std::string& warning : robot.warnings)
+    if (warning.find(text) != std::string::npos) return true;
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("a <loop_joint> of a URDF closes a loop") {
+  const RobotDirectory directory;
+  const auto makeLoop = [](const std::string& type, const std::string& more = "") {
+    return "<loop_joint name=\"corner\" type=\"" + type +
+           "\">\n<link1 link=\"top\" xyz=\"0 0 1\"/><link2 link=\"right\" xyz=\"0 0 1\" rpy=\"0 0.5 0\"/>" + more +
+           "</loop_joint>";
+  };
+  checkLoop(loadIn(directory, makeSquare(makeLoop("spherical"))), ClosureKind::Ball3D, 1);
+  checkLoop(loadIn(directory, makeSquare(makeLoop("continuous", "<axis xyz=\"0 1 0\"/>"))), ClosureKind::Hinge5D, 1);
+  const auto getLoopError = [&](const std::string& loop) {
+    return getError([&] { loadIn(directory, makeSquare(loop)); });
+  };
+  CHECK_THAT(
+      getLoopError(makeLoop("prismatic")),
+      Catch::Contains("robot.urdf: <loop_joint> (line 9): its type 'prismatic' cannot close a loop; use spherical"));
+  CHECK_THAT(getLoopError(replaceOnce(makeLoop("fixed"), "\"right\"", "\"none\"")),
+             Catch::Contains("<link2> (line 10): there is no link 'none'; declare"));
+  CHECK_THAT(getLoopError(replaceOnce(makeLoop("fixed"), "0 0.5 0", "0 nan 0")),
+             Catch::Contains("<link2> (line 10): its attribute 'rpy' is not made of 3 finite numbers; correct it"));
+  CHECK_THAT(getLoopError("<loop_joint type=\"fixed\"/>"),
+             Catch::Contains("<loop_joint> (line 9): it has no <link1>; name"));
+}
+
+TEST_CASE("a file loop_closures.yaml beside a URDF closes loops, by hinges in the root link") {
+  const RobotDirectory directory;
+  const std::string loops = R"(closures:
+- {link_a: top, link_b: right, point: [1, 0, 1], axis: [0, -2, 0]}
+dependent: [bend, swing]
+independent: [turn]
+)";
+  const std::string path = directory.write("loop_closures.yaml", loops);
+  const LoadedRobot robot = loadIn(directory, makeSquare());
+  checkLoop(robot, ClosureKind::Hinge5D, 1);
+  CHECK(robot.model.closures().size() == 1);  // not the <mimic>
+  REQUIRE(robot.model.nu() == 1);
+  CHECK(robot.model.motors()[0].name == "turn");
+  CHECK(tells(robot, "urdf/robot.urdf: its loops are those of " + path));
+  CHECK(tells(robot, "joint 'bend': its <mimic> is left out"));
+
+  const auto getLoopError = [&](const std::string& from, const std::string& to) {
+    directory.write("loop_closures.yaml", replaceOnce(loops, from, to));
+    return getError([&] { loadIn(directory, makeSquare()); });
+  };
+  CHECK_THAT(getLoopError("link_b: right", "link_b: none"), Catch::Contains("loop_closures.yaml: ") &&
+                                                                Catch::Contains("(line 2)") &&
+                                                                Catch::Contains("there is no link 'none'; correct"));
+  CHECK_THAT(getLoopError("[1, 0, 1]", "[1, .nan, 1]"), Catch::Contains("(line 2)") && Catch::Contains("not finite"));
+  CHECK_THAT(getLoopError("[0, -2, 0]", "[0, 0, 0]"), Catch::Contains("it is not a direction; give a non-zero vector"));
+  CHECK_THAT(getLoopError("bend, swing", "bend, none"),
+             Catch::Contains("(line 3)") && Catch::Contains("there is no joint 'none'"));
+  CHECK_THAT(getLoopError(", axis: [0, -2, 0]}", "}"), Catch::Contains("axis"));
+  CHECK_THAT(getLoopError("independent: [turn]", "independent: [turn"), Catch::Contains("loop_closures.yaml: line "));
+  CHECK(getLoopError("independent: [turn]", "version: 3") == "");
+  directory.write("loop_closures.yaml", "closures: [{link_a: x, link_b: y, point: [1, 0, 1], axis: [0, 1, 0]}]");
+  const LoadedRobot other = loadIn(directory, makeSquare());
+  CHECK(tells(other, "loop_closures.yaml: it is left out: it names no link of "));
+  // The YAML file of the robot takes precedence.
+  directory.write("loop_closures.yaml", loops);
+  directory.write("urdf/robot.yaml", "closures: [{name: own, frames: [top, right], type: 3d}]");
+  CHECK(loadIn(directory, makeSquare()).model.findClosure("own") >= 0);
+  CHECK(loadIn(directory, makeSquare()).model.nu() == 0);
+}
+
+TEST_CASE("a file loop_closures.yaml beside a URDF closes loops, by balls and pins in their links") {
+  const RobotDirectory directory;
+  directory.write("config/loop_closures.yaml", R"(
+pin_loops:
+  - name: corner
+    parent: top
+    child: right
+    parent_xyz: [0, 0, 1]
+    child_xyz: [0, 0, 1]
+    axis: [0, 1, 0]
+ball_upgrades: [bend]
+ball_limit_deg: 15
+actuated_joints: [turn]
+)");
+  const LoadedRobot robot =
+      loadIn(directory, replaceOnce(makeSquare(), "<mimic joint=\"turn\" multiplier=\"-1\"/>", ""));
+  checkLoop(robot, ClosureKind::Hinge5D, 1);
+  CHECK(robot.model.joints()[robot.model.findJoint("bend")].kind == JointKind::Spherical);
+  CHECK(robot.model.nu() == 1);
+  CHECK(tells(robot, "key 'ball_limit_deg'"));
+}

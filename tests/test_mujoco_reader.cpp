@@ -1,0 +1,124 @@
+// MuJoCo and the reader of its files agree: masses of meshes, and where free bases made of several joints stand.
+#include <catch2/catch.hpp>
+#include <memory>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/robots/robot_loader.h"
+#include "robot_directory.h"
+#include "worlds/mujoco_model.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+using MjModel = std::unique_ptr<mjModel, void (*)(mjModel*)>;
+
+MjModel loadMujoco(const std::string& path) {
+  char error[500] = "";
+  MjModel model(mj_loadXML(path.c_str(), nullptr, error, sizeof error), mj_deleteModel);
+  CAPTURE(std::string(error));
+  REQUIRE(model);
+  return model;
+}
+
+// A plate of the shape of an L, not convex, and thick; seen from outside.
+const char* const kAngle = R"(v 0 0 0
+v 3 0 0
+v 3 1 0
+v 1 1 0
+v 1 4 0
+v 0 4 0
+v 0 0 0.5
+v 3 0 0.5
+v 3 1 0.5
+v 1 1 0.5
+v 1 4 0.5
+v 0 4 0.5
+f 4 3 2
+f 4 2 1
+f 4 1 6
+f 4 6 5
+f 10 8 9
+f 10 7 8
+f 10 12 7
+f 10 11 12
+f 1 2 8
+f 1 8 7
+f 2 3 9
+f 2 9 8
+f 3 4 10
+f 3 10 9
+f 4 5 11
+f 4 11 10
+f 5 6 12
+f 5 12 11
+f 6 1 7
+f 6 7 12
+)";
+
+}  // namespace
+
+TEST_CASE("MuJoCo has the masses of meshes that the reader has, by both of its ways") {
+  const RobotDirectory directory;
+  directory.write("angle.obj", kAngle);
+  // By its older way, MuJoCo 2.2.2 takes another volume for the mass than its successors.
+  for (const auto& [exact, mass] : {std::pair("false", "mass=\"3\""), std::pair("true", "density=\"700\"")}) {
+    CAPTURE(exact);
+    const std::string path = directory.write(
+        "robot.xml",
+        std::string("<mujoco><compiler exactmeshinertia=\"") + exact +
+            R"("/><asset><mesh file="angle.obj" scale="0.1 0.2 -0.3" refpos="0.3 0.2 0.1" refquat="0.8 0.1 0.2 0.3"/></asset>
+      <worldbody><body name="a" pos="0 0 1"><joint/><geom type="mesh" mesh="angle" )" +
+            mass + R"( pos="0.1 0.2 0.3"
+        euler="10 20 30"/></body></worldbody></mujoco>)");
+    const Inertia ours = loadRobot(path).model.bodies()[1].inertia;
+    const MjModel mj = loadMujoco(path);
+    CHECK(ours.mass == Approx(mj->body_mass[1]).epsilon(1e-5));  // its vertices are of single precision
+    CHECK((ours.com - Eigen::Map<Vector3d>(mj->body_ipos + 3)).norm() < 1e-5);
+    const double* wxyz = mj->body_iquat + 4;
+    const Matrix3d R = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).toRotationMatrix();
+    const Matrix3d I = R * Eigen::Map<Vector3d>(mj->body_inertia + 3).asDiagonal() * R.transpose();
+    CHECK((ours.I_com - I).norm() < 1e-5 * I.norm());
+  }
+}
+
+TEST_CASE("a free base of several joints stands where MuJoCo puts it") {
+  const RobotDirectory directory;
+  const std::string slides =
+      "<joint type=\"slide\" axis=\"0 0 1\" ref=\"0.4\"/><joint type=\"slide\" axis=\"1 1 0\"/>"
+      "<joint type=\"slide\" axis=\"1 -1 0\" ref=\"-1\"/>";
+  const std::string hinges =
+      "<joint axis=\"0 1 0\" pos=\"0.1 0.2 0.3\"/><joint axis=\"1 0 0\" ref=\"20\" pos=\"0.1 0 0.3\"/><joint axis=\"0 "
+      "0 1\"/>";
+  const std::string ball = "<joint type=\"ball\" pos=\"0.3 0.1 0\"/>";
+  for (const auto& [joints, qpos] : {std::pair(slides + ball, "0.3 0.5 -0.7 0.8 0.2 -0.3 0.4 0.6"),
+                                     std::pair(slides + hinges, "0.3 0.5 -0.7 0.2 0.6 -1.3 0.6")}) {
+    CAPTURE(qpos);
+    const std::string path = directory.write(
+        "robot.xml",
+        "<mujoco><worldbody><body pos=\"0 0.5 0\" euler=\"0 30 0\"><geom size=\"0.1\"/><body name=\"trunk\" "
+        "pos=\"0.1 0.2 1\" euler=\"20 0 10\">" +
+            joints +
+            "<geom size=\"0.2\"/><body name=\"leg\" pos=\"0 0 -0.2\"><joint name=\"hip\"/><geom size=\"0.1\" pos=\"0 0 "
+            "-1\"/>"
+            "</body></body></body></worldbody><keyframe><key name=\"k\" qpos=\"" +
+            qpos + "\"/></keyframe></mujoco>");
+    const Model model = loadRobot(path).model;
+    REQUIRE(model.hasFreeFlyer());
+    Workspace ws(model);
+    updatePositions(model, ws, assembleReference(model, "k").q);
+    const MjModel mj = loadMujoco(path);
+    const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(mj.get()), mj_deleteData);
+    mj_resetDataKeyframe(mj.get(), data.get(), 0);
+    mj_kinematics(mj.get(), data.get());
+    for (const char* name : {"trunk", "leg"}) {
+      const int body = mj_name2id(mj.get(), mjOBJ_BODY, name);
+      const Frame& frame = model.frames()[model.findFrame(name)];
+      const SE3 X = getPlacement(ws, frame.body, frame.X_BF);
+      CHECK((X.p - Eigen::Map<Vector3d>(data->xpos + 3 * body)).norm() < 1e-12);
+      CHECK((X.R - Eigen::Map<RowMatrixXd>(data->xmat + 9 * body, 3, 3)).norm() < 1e-12);
+    }
+  }
+}

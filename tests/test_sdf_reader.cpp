@@ -1,0 +1,234 @@
+// Robots from SDF files: what is written comes back, and what others write is read or refused with a remedy.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/formats/robot_writer.h"
+#include "bielle/robots/robot_loader.h"
+#include "formats/sdf.h"
+#include "get_error.h"
+#include "robot_difference.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+LoadedRobot loadSdf(const std::string& text) {
+  const RobotDirectory directory;
+  return loadRobot(directory.write("robot.sdf", text));
+}
+
+bool warnsOf(const LoadedRobot& robot, const std::string& text) {
+  for (const std::string& warning : robot.warnings)
+    if (warning.find(text) != std::string::npos) return true;
+  return false;
+}
+
+const Joint& getSdfJoint(const Model& model, const std::string& name) {
+  const int i = model.findJoint(name);
+  return model.joints()[i >= 0 ? i : model.findJoint(name + "_joint")];
+}
+
+// In an SDF file all coordinates are zero at q_ref, but for those of free bases.
+VectorXd mapToSdf(const Model& a, const Model& b, ConstVectorRef q_ref, ConstVectorRef q) {
+  VectorXd out = b.makeNeutral();
+  for (const Joint& joint : a.joints()) {
+    if (joint.nq == 0) continue;
+    const auto own = q.segment(joint.idx_q, joint.nq), ref = q_ref.segment(joint.idx_q, joint.nq);
+    auto mapped = out.segment(getSdfJoint(b, joint.name).idx_q, joint.nq);
+    if (joint.kind == JointKind::FreeFlyer)
+      mapped = own;
+    else if (joint.kind == JointKind::Spherical)
+      mapped =
+          (Eigen::Quaterniond(Eigen::Vector4d(ref)).conjugate() * Eigen::Quaterniond(Eigen::Vector4d(own))).coeffs();
+    else
+      mapped = own - ref;
+  }
+  return out;
+}
+
+// Four bars in a plane, of which two close the loop; the last one hangs on both.
+std::string makeFourBar(const std::string& in_model, const std::string& closing = R"(
+<joint name="close" type="revolute"><parent>b</parent><child>c</child><pose relative_to="c">0 0 1 0 0 0</pose>
+<axis><xyz>0 1 0</xyz></axis></joint>)") {
+  const auto link = [](const std::string& name, const std::string& pose) {
+    return "<link name=\"" + name + "\"><pose>" + pose +
+           "</pose><inertial><pose>0 0 0.5 0 0 0</pose><mass>2</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>0.5</izz>"
+           "</inertia></inertial></link>\n";
+  };
+  const auto joint = [](const std::string& name, const std::string& parent, const std::string& child) {
+    return "<joint name=\"" + name + "\" type=\"revolute\"><parent>" + parent + "</parent><child>" + child +
+           "</child><axis><xyz>0 1 0</xyz></axis></joint>\n";
+  };
+  return "<?xml version=\"1.0\"?>\n<sdf version=\"1.9\"><model name=\"bars\">\n" + link("a", "0 0 0 0 0 0") +
+         link("b", "0 0 1 0 1.5707963267948966 0") + link("c", "1 0 0 0 0 0") + joint("ja", "world", "a") +
+         joint("jb", "a", "b") + joint("jc", "world", "c") + closing + in_model + "</model></sdf>\n";
+}
+
+}  // namespace
+
+TEST_CASE("robots come back from SDF with their bodies, loops, ranges and springs") {
+  for (const char* name : {"bipetto", "cleobot", "delta", "fivebar", "fourbar", "rsu_biped", "spring_leg"}) {
+    CAPTURE(name);
+    const Model a = loadRobot(name).model;
+    const VectorXd q_ref = findClosedConfiguration(a).q;
+    const Model b = loadSdf(formatSdf(a, q_ref).xml).model;
+    REQUIRE(a.nq() == b.nq());
+    REQUIRE(a.numBodies() == b.numBodies());
+    REQUIRE(a.closures().size() == b.closures().size());
+    std::mt19937 rng(4);
+    Workspace wa(a), wb(b);
+    double mass = 0, bias = 0, closures = 0;
+    for (int i = 0; i < 3; ++i) {
+      const VectorXd q = a.integrate(q_ref, randomVector(rng, a.nv(), 0.5)), v = randomVector(rng, a.nv());
+      const VectorXd qb = mapToSdf(a, b, q_ref, q);
+      MatrixXd order = MatrixXd::Zero(b.nv(), a.nv());
+      for (const Joint& joint : a.joints())
+        if (joint.nv) order.block(getSdfJoint(b, joint.name).idx_v, joint.idx_v, joint.nv, joint.nv).setIdentity();
+      updatePositions(a, wa, q), updatePositions(b, wb, qb);
+      updateVelocities(a, wa, v), updateVelocities(b, wb, order * v);
+      updateMassMatrix(a, wa), updateMassMatrix(b, wb);
+      updateBias(a, wa), updateBias(b, wb);
+      const MatrixXd armature = a.armature().asDiagonal();  // SDF has none
+      mass = std::max(mass, calcRelativeError(order.transpose() * wb.M * order + armature, wa.M));
+      bias = std::max(bias, calcRelativeError(order.transpose() * wb.b, wa.b));
+      for (const Closure& closure : a.closures()) {
+        const int k = b.findClosure(closure.name);
+        closures = std::max(closures,
+                            compareClosure(wa, closure, wb,
+                                           b.closures()[k >= 0 ? k : b.findClosure(closure.name + "_closure")], q, qb));
+      }
+    }
+    CHECK(mass < kTolerance);
+    if (a.pointSprings().empty()) CHECK(bias < kTolerance);
+    CHECK(closures < 1e-9);  // the loops are closed to about this
+    for (const Joint& joint : a.joints()) {
+      if (joint.nv != 1) continue;
+      const int k = joint.idx_v, kb = getSdfJoint(b, joint.name).idx_v;
+      if (std::isfinite(a.lowerLimits()[k]))
+        CHECK(b.lowerLimits()[kb] == Approx(a.lowerLimits()[k] - q_ref[joint.idx_q]).margin(1e-14));
+      else
+        CHECK_FALSE(std::isfinite(b.lowerLimits()[kb]));
+    }
+    for (const Frame& frame : a.frames())
+      if (frame.body > 0) CHECK(b.findFrame(frame.name) >= 0);
+    CHECK(findClosedConfiguration(b).status == AssemblyStatus::Closed);
+    CHECK_NOTHROW(formatRobot(b));
+  }
+}
+
+TEST_CASE("joints of SDF: frames that poses are relative to, ranges, springs, and a second joint that closes a loop") {
+  const LoadedRobot robot = loadSdf(makeFourBar(R"(
+<frame name="knee" attached_to="a"><pose>0 0 1 0 0 0</pose></frame>
+<link name="slider"><pose relative_to="knee">0 0.2 0 0 0 0</pose></link>
+<joint name="slide" type="prismatic"><pose>0.5 0 0 0 0 1.5707963267948966</pose><parent>a</parent><child>slider</child><axis>
+<xyz>2 0 0</xyz><limit><lower>-1</lower><upper>2</upper><effort>30</effort><velocity>4</velocity></limit>
+<dynamics><damping>0.1</damping><friction>0.2</friction><spring_reference>0.3</spring_reference>
+<spring_stiffness>5</spring_stiffness></dynamics></axis></joint>
+<link name="plate"><pose>0 0 3 0 0 0</pose></link>
+<joint name="cross" type="universal"><pose>0 0 -1 0 0 0</pose><parent>slider</parent><child>plate</child><axis><xyz>1 0 0</xyz>
+<limit><lower>-0.5</lower><upper>0.5</upper></limit></axis><axis2><xyz>0 1 0</xyz></axis2></joint>
+<link name="ball"/><joint name="socket" type="ball"><parent>plate</parent><child>ball</child></joint>
+<plugin name="p" filename="f"/>)"));
+  const Model& model = robot.model;
+  CHECK_FALSE(model.hasFreeFlyer());
+  REQUIRE(model.closures().size() == 1);
+  CHECK(model.closures()[0].name == "close");
+  CHECK(model.closures()[0].kind == ClosureKind::Hinge5D);
+  CHECK(findClosedConfiguration(model).status == AssemblyStatus::Closed);
+  CHECK(model.references()[0].name == "initial");
+  const Joint &slide = getSdfJoint(model, "slide"), &cross = getSdfJoint(model, "cross");
+  CHECK(slide.kind == JointKind::Prismatic);
+  CHECK((slide.axis - Vector3d::UnitY()).norm() < 1e-12);
+  CHECK((slide.X_PJ.p - Vector3d(0, 0.2, 1)).norm() < 1e-12);
+  CHECK(model.lowerLimits()[slide.idx_v] == -1);
+  CHECK(model.velocityLimits()[slide.idx_v] == 4);
+  REQUIRE(model.jointForces().size() == 1);
+  CHECK(model.jointForces()[0].stiffness == 5);
+  CHECK(model.jointForces()[0].rest == 0.3);
+  CHECK(model.jointForces()[0].friction == 0.2);
+  CHECK(cross.kind == JointKind::Universal);
+  CHECK((cross.X_PJ.p - Vector3d(0, -0.2, 1)).norm() < 1e-12);
+  CHECK(cross.axis == Vector3d::UnitX());
+  CHECK(model.upperLimits()[cross.idx_v] == 0.5);
+  CHECK(getSdfJoint(model, "socket").kind == JointKind::Spherical);
+  CHECK(getSdfJoint(model, "ja").kind == JointKind::Continuous);
+  CHECK(warnsOf(robot, "<model> <plugin> (line "));
+}
+
+TEST_CASE("a model of SDF that nothing holds has a free base, one that is static has none") {
+  const std::string body =
+      "<sdf version=\"1.7\"><world name=\"w\"><gravity>0 0 -2</gravity><model name=\"ground\"><static>1</static><link "
+      "name=\"l\"/>"
+      "</model><model name=\"m\">STATIC<pose>1 2 3 0 0 0</pose><link name=\"trunk\"><pose>0 0 1 0 0 "
+      "0</pose></link><link "
+      "name=\"leg\"/><joint name=\"hip\" type=\"revolute\"><parent>trunk</parent><child>leg</child><axis><xyz>1 0 "
+      "0</xyz></axis>"
+      "</joint></model></world></sdf>";
+  const Model free = loadSdf(replaceOnce(body, "STATIC", "")).model;
+  CHECK(free.hasFreeFlyer());
+  CHECK(free.name() == "m");
+  CHECK(free.gravity().z() == -2);
+  CHECK(free.mass() == 2);  // of links that do not tell theirs
+  const Model held = loadSdf(replaceOnce(body, "STATIC", "<static>true</static>")).model;
+  CHECK(held.nv() == 1);
+  CHECK((held.joints()[1].X_PJ.p - Vector3d(1, 2, 3)).norm() < 1e-12);
+}
+
+TEST_CASE("Drake's bushings in SDF are the joints that they stand for") {
+  const auto bushing = [](const std::string& torque, const std::string& force = "30000 30000 30000") {
+    return "<frame name=\"fb\" attached_to=\"b\"><pose>0 0 1 1.5707963267948966 0 0</pose></frame><frame name=\"fc\" "
+           "attached_to=\"c\"><pose>0 0 1 1.5707963267948966 0 0</pose></frame>\n<drake:linear_bushing_rpy>"
+           "<drake:bushing_frameA>fb</drake:bushing_frameA><drake:bushing_frameC>fc</drake:bushing_frameC>"
+           "<drake:bushing_torque_stiffness>" +
+           torque +
+           "</drake:bushing_torque_stiffness><drake:bushing_torque_damping>1 1 0</drake:bushing_torque_damping>"
+           "<drake:bushing_force_stiffness>" +
+           force + "</drake:bushing_force_stiffness></drake:linear_bushing_rpy>";
+  };
+  const LoadedRobot hinge = loadSdf(makeFourBar(bushing("3000 3000 0"), ""));
+  REQUIRE(hinge.model.closures().size() == 1);
+  CHECK(hinge.model.closures()[0].kind == ClosureKind::Hinge5D);
+  CHECK(findClosedConfiguration(hinge.model).status == AssemblyStatus::Closed);
+  CHECK(warnsOf(hinge, "<drake:linear_bushing_rpy> (line 10): its springs become a hinge that does not give"));
+  CHECK(loadSdf(makeFourBar(bushing("0 0 0"), "")).model.closures()[0].kind == ClosureKind::Ball3D);
+  const auto getSdfError = [&](const std::string& in_model) {
+    return getError([&] { loadSdf(makeFourBar(in_model, "")); });
+  };
+  CHECK_THAT(getSdfError(bushing("3000 0 0")),
+             Catch::Contains("it is not as stiff as a ball, a hinge or a weld; make"));
+  CHECK_THAT(getSdfError(bushing("1 1 x")), Catch::Contains("it is not made of 3 finite numbers; correct it"));
+  CHECK_THAT(getSdfError(bushing("1 1 nan")), Catch::Contains("<drake:bushing_torque_stiffness> (line 10)"));
+  std::string elsewhere = bushing("1 1 0");
+  CHECK_THAT(getSdfError(replaceOnce(elsewhere, "frameA>fb<", "frameA>none<")),
+             Catch::Contains("<drake:bushing_frameA> (line 10): there is no link or frame 'none'; correct the name"));
+}
+
+TEST_CASE("SDF files that are no robot are errors with a remedy") {
+  const auto getSdfError = [](const std::string& text) { return getError([&] { loadSdf(text); }); };
+  const std::string whole = makeFourBar("");
+  CHECK_THAT(getSdfError("<robot/>"), Catch::Contains("its outermost element is not <sdf>; give an SDF file"));
+  for (size_t length = 1; length + 20 < whole.size(); length += 53) {
+    const std::string error = getSdfError(whole.substr(0, length));
+    CAPTURE(error);
+    CHECK(error.find("robot.sdf: line ") != std::string::npos);
+  }
+  CHECK_THAT(
+      getSdfError(replaceOnce(whole, "<parent>b</parent>", "<parent>none</parent>")),
+      Catch::Contains("libsdformat says: ") && Catch::Contains("none") && Catch::Contains("; correct the element"));
+  CHECK_FALSE(getSdfError(replaceOnce(whole, "<pose>1 0 0 0 0 0</pose>", "<pose>nan 0 0 0 0 0</pose>")).empty());
+  CHECK_FALSE(getSdfError(replaceOnce(whole, "<pose>1 0 0 0 0 0</pose>", "<pose>inf 0 0 0 0 0</pose>")).empty());
+  CHECK_THAT(getSdfError(makeFourBar(
+                 "<joint name=\"x\" type=\"gearbox\"><gearbox_ratio>2</gearbox_ratio><gearbox_reference_body>a"
+                 "</gearbox_reference_body><parent>b</parent><child>d</child><axis><xyz>1 0 0</xyz></axis><axis2>"
+                 "<xyz>1 0 0</xyz></axis2></joint><link name=\"d\"/>")),
+             Catch::Contains("joint 'x': joints of type gearbox, revolute2 and screw are not supported; replace it"));
+  const std::string rail =
+      "<joint name=\"r1\" type=\"prismatic\"><parent>a</parent><child>d</child><axis><xyz>1 0 0</xyz></axis></joint>";
+  CHECK_THAT(getSdfError(makeFourBar("<link name=\"d\"/>" + rail + replaceOnce(rail, "r1", "r2"))),
+             Catch::Contains(
+                 "joint 'r2': its child 'd' hangs on another joint too, and it cannot close a loop; cut the loop"));
+  CHECK_THAT(getSdfError(makeFourBar("<model name=\"n\"><link name=\"l\"/></model>")),
+             Catch::Contains("it contains other models; put"));
+}
