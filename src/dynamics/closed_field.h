@@ -20,7 +20,7 @@
 /// **Redundant rows.** Rows are chosen once by pivoting; any independent ones give the same a.
 /// **Singular postures.** Where rows become dependent at an instant, as those of a parallelogram that folds, the branches of the
 /// motion cross. (1) moves along the rows of q_0 alone, across the branch that the motion is on, so that it cannot slip to
-/// the other; the error of (3) grows like rounding over the sine between rows. Nearer than kSingular the field says that it
+/// the other; the error of (3) grows like rounding over the square of the sine between rows. Nearer than kSingular the field says that it
 /// is not defined: the step is to be taken with another length, and passes over.
 ///
 /// The trees that hang on the world are factorized apart, and S is sparse where it is large: the cost of N four-bars side by
@@ -39,7 +39,7 @@ namespace bielle {
 /// No function but select() allocates after the constructor, unless more than kDenseRows rows are chosen.
 class ClosedField {
  public:
-  /// Square of the sine between a row and those before it, in the metric of M^{-1}, below which rows count as dependent.
+  /// Of getIndependence(): below it rows count as dependent.
   static constexpr double kSingular = 1e-12;
   static constexpr int kDenseRows = 96;
 
@@ -63,7 +63,8 @@ class ClosedField {
   const Workspace& getWorkspace() const { return ws_; }
   const std::string& getFailure() const { return failure_; }
   int getRank() const { return rows_; }
-  /// The least square of a sine between rows at the present state (kSingular); 1 without loops.
+  /// The least part of a row that is independent of those before it, in the metric of M^{-1}, as a square over the largest square of
+  /// any row so far; 1 without loops. It falls where rows turn into others, or vanish.
   double getIndependence() const { return independence_; }
   /// Largest residual of all rows, the dependent ones included, at the present state, m or rad.
   double calcGap() const;
@@ -132,9 +133,8 @@ class ClosedField {
   Eigen::LLT<MatrixXd> S_factor_;
   std::unique_ptr<Eigen::SparseMatrix<double>> S_sparse_;
   std::unique_ptr<Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>> S_sparse_factor_;
-  VectorXd diagonal_;  // of S
   VectorXd q_start_, q_, delta_, zeta_, residual_, gamma_, lambda_, r_, v_, a_, x_;
-  double independence_ = 1;
+  double independence_ = 1, largest_ = 0;  // largest: of the diagonals of all S so far
   std::string failure_;
 };
 

@@ -182,7 +182,7 @@ void ClosedField::layOutSystem() {
     block.gram.setZero(r, r);
     block.y.setZero(r);
   }
-  for (VectorXd* x : {&zeta_, &residual_, &gamma_, &lambda_, &r_, &diagonal_}) x->setZero(rows_);
+  for (VectorXd* x : {&zeta_, &residual_, &gamma_, &lambda_, &r_}) x->setZero(rows_);
   S_sparse_.reset();
   S_sparse_factor_.reset();
   if (rows_ <= kDenseRows) {

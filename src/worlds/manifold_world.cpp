@@ -21,8 +21,9 @@ constexpr double kFirstStep = 1e-4;        // s, before anything is known of the
 constexpr double kShortestStep = 1e-11;    // s
 constexpr double kLeastTolerance = 1e-12;  // what rounding permits
 constexpr double kShorter = 0.61;   // of a step that met a singular posture: no simple fraction, to pass beside it
-constexpr double kFutile = 1e-3;    // share of a step below which it is not shortened further beside a singular posture
+constexpr double kFutile = 0.02;    // share of a step below which it is not shortened further beside a singular posture
 constexpr double kNear = 1e-3;      // square of a sine between rows: beside a singular posture
+constexpr double kNearest = 1e-9;   // below which rows are not chosen anew: some would be missing
 constexpr double kMostLoose = 1e4;  // error of a step that is taken there, over the tolerance
 constexpr double kOpen = 1e-8;      // of dependent rows, m or rad: the rank has changed
 constexpr double kLessIndependent = 1e-2;  // than when they were chosen: rows are chosen anew
@@ -73,7 +74,7 @@ class ManifoldWorld : public World {
   Vector3d push_ = Vector3d::Zero();
   VectorXd tau_motors_, tau_, x_, rate_, scale_;
   std::array<double, kWorks> work_{};  // on the robot since reset(), J
-  double time_ = 0, next_step_ = 0, gap_ = 0, chosen_independence_ = 1, least_independence_ = 1;
+  double time_ = 0, next_step_ = 0, usual_step_ = 0, gap_ = 0, best_independence_ = 1, least_independence_ = 1;
   double elastic_start_ = 0, stops_start_ = 0;
   std::string message_;
   mutable Workspace ws_;
@@ -104,7 +105,7 @@ void ManifoldWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   message_.clear();
   time_ = 0;
   work_.fill(0);
-  next_step_ = kFirstStep;
+  next_step_ = usual_step_ = kFirstStep;
   u_.setZero();
   tau_motors_.setZero();
   push_.setZero();
@@ -117,7 +118,7 @@ void ManifoldWorld::reset(ConstVectorRef q, ConstVectorRef v) {
     if (!message_.empty()) return;
   }
   if (!settle(VectorXd::Zero(model_.nv()), v_)) fail(field_.getFailure());
-  chosen_independence_ = field_.getIndependence();
+  best_independence_ = field_.getIndependence();
   for (ContactPoint& point : points_) {
     point.touches = false;
     updateAnchor(terrain_, field_.getWorkspace().X_WB[point.body].act(point.p), ContactForce(), point);
@@ -188,16 +189,13 @@ bool ManifoldWorld::step(double& h) {
   x_.setZero();
   x_.segment(nv, nv) = v_;
   if (!evaluate(x_, rate_)) return fail(field_.getFailure());
-  if (field_.getIndependence() < kLessIndependent * chosen_independence_) {
-    const int rank = field_.getRank();
-    if (field_.select(q_) < rank) {
-      return fail("the loops are singular: rank " + std::to_string(field_.getRank()) + " instead of " +
-                  std::to_string(rank));
-    }
+  const double independence = field_.getIndependence();
+  if (independence < kLessIndependent * best_independence_ && independence > kNearest * best_independence_) {
+    field_.select(q_);
     field_.begin(q_);
     if (!evaluate(x_, rate_)) return fail(field_.getFailure());
-    chosen_independence_ = field_.getIndependence();
   }
+  best_independence_ = std::max(best_independence_, field_.getIndependence());
   scale_.head(nv).setConstant(tolerance_);
   scale_.tail(nv) = tolerance_ * (1 + v_.array().abs());
   const double wanted = h;
@@ -217,6 +215,10 @@ bool ManifoldWorld::step(double& h) {
         for (int w = 0; w < kWorks; ++w) work_[w] += end[2 * nv + w];
         // A step that had to be short says nothing about the next one.
         next_step_ = std::max(h < next_step_ && h == wanted ? next_step_ : 0.0, h * factor);
+        if (least_independence_ >= kNear * best_independence_)
+          usual_step_ = h == wanted ? std::max(usual_step_, h) : h;
+        else
+          next_step_ = std::max(next_step_, 10 * kFutile * usual_step_);
         break;
       }
       h *= kShorter;
@@ -226,7 +228,8 @@ bool ManifoldWorld::step(double& h) {
       h *= std::isfinite(error) ? std::min(factor, 0.9) : kShorter;
     }
     // Beside a singular posture rounding grows like the inverse square of the sine between rows: shorter steps gain nothing.
-    if (h < kFutile * wanted && least_independence_ < kNear && best < kMostLoose && !takes_best) {
+    if (h < kFutile * usual_step_ && least_independence_ < kNear * best_independence_ && best < kMostLoose &&
+        !takes_best) {
       h = best_h;
       takes_best = true;
     }
