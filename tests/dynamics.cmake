@@ -1,4 +1,5 @@
 bielle_test(dynamics SOURCES test_dynamics.cpp LIBS bielle_dynamics)
+bielle_test(closed_field SOURCES test_closed_field.cpp LIBS bielle_dynamics)
 bielle_test(couplers SOURCES test_couplers.cpp LIBS bielle_dynamics)
 bielle_test(joint_forces SOURCES test_joint_forces.cpp LIBS bielle_dynamics)
 bielle_test(assembly SOURCES test_assembly.cpp test_loop_conflicts.cpp LIBS bielle_dynamics)

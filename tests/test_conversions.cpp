@@ -531,6 +531,52 @@ TEST_CASE("an adopted robot has the feet, the serial joints and a posture of the
              Catch::Contains("it has a fixed base; only robots that stand"));
 }
 
+TEST_CASE("an adopted foot is a sole, a blade or a point by its shape") {
+  struct Case {
+    Vector3d half;  // in the axes of the foot, m
+    double radius;
+    ContactKind kind;
+    double length;
+  };
+  for (const Case& c :
+       {Case{{0.1, 0.04, 0.01}, 0, ContactKind::Surface6D, 0.2}, Case{{0.1, 0.01, 0.01}, 0, ContactKind::Edge5D, 0.2},
+        Case{{0.08, 0, 0}, 0.02, ContactKind::Edge5D, 0.16}, Case{{0, 0, 0}, 0.03, ContactKind::Point3D, 0}}) {
+    CAPTURE(getName(c.kind), c.radius);
+    const Model original = loadRobot("rsu_biped").model;
+    ModelParts parts = takeParts(original);
+    for (const ContactFrame& contact : parts.contacts) {
+      parts.shapes.erase(std::remove_if(parts.shapes.begin(), parts.shapes.end(),
+                                        [&](const Shape& shape) { return shape.body == contact.body; }),
+                         parts.shapes.end());
+      parts.visuals.erase(std::remove_if(parts.visuals.begin(), parts.visuals.end(),
+                                         [&](const Visual& visual) { return visual.body == contact.body; }),
+                          parts.visuals.end());
+      Shape shape;
+      shape.body = contact.body;
+      shape.X_BS = contact.X_BF;
+      shape.half = c.half;
+      shape.radius = c.radius;
+      if (c.radius > 0 && c.half.x() > 0) {  // a capsule lies along z of its own frame
+        shape.X_BS.R = contact.X_BF.R * Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitY()).toRotationMatrix();
+        shape.half = {0, 0, c.half.x()};
+      }
+      parts.shapes.push_back(shape);
+    }
+    parts.contacts.clear();
+    parts.references.clear();
+    const RobotText bare = formatRobot(ModelBuilder::restore(parts));
+    const RobotDirectory directory;
+    const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(bare.urdf, bare.yaml)), "../robot.urdf");
+    CAPTURE(adoption.yaml);
+    const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+    REQUIRE(model.contacts().size() == 2);
+    for (const ContactFrame& contact : model.contacts()) {
+      CHECK(contact.kind == c.kind);
+      CHECK(2 * contact.half_length == Approx(c.length).margin(1e-3));
+    }
+  }
+}
+
 TEST_CASE("an adopted robot bends its knees the way that their ranges allow") {
   for (const auto& [lower, upper] : {std::pair{0.02, 2.0}, {-2.0, -0.02}}) {
     CAPTURE(lower);

@@ -1,13 +1,11 @@
-// The world that moves mechanisms in steps of controlled error: closed forms of the field's benchmarks, the full system as an
-// oracle on random mechanisms of every kind, and the trials of all worlds.
+// The world that moves mechanisms in steps of controlled error: closed forms of the field's benchmarks, random mechanisms of
+// every kind, and the trials of all worlds.
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/worlds/manifold_world.h"
-#include "dynamics/closed_field.h"
 #include "mechanisms.h"
 #include "own_robots.h"
 #include "world_trials.h"
@@ -161,34 +159,6 @@ TEST_CASE("manifold world: a start where the loops are singular is refused with 
   CHECK_FALSE(world->advance(0.1));
   CAPTURE(world->getMessage());
   CHECK(world->getMessage().find("singular at the start: they have rank 2") != std::string::npos);
-}
-
-TEST_CASE("closed field: accelerations and forces of the full system, for every joint and closure") {
-  std::mt19937 rng(7);
-  for (JointKind joint : kJointKinds)
-    for (ClosureKind closure : kClosureKinds)
-      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
-        CAPTURE(getName(joint), getName(closure));
-        const Mechanism mechanism = makeSprungMechanism(rng, joint, closure, base);
-        const Model& model = mechanism.model;
-        ClosedField field(model);
-        field.select(mechanism.q_closed);
-        field.begin(mechanism.q_closed);
-        const VectorXd u = randomVector(rng, model.nv()), tau = randomVector(rng, model.nv(), 5);
-        REQUIRE(field.close(VectorXd::Zero(model.nv()), u));
-        VectorXd d_rate(model.nv()), a(model.nv());
-        field.accelerate(tau, d_rate, a);
-        Workspace ws(model);
-        ConstrainedWorkspace cws;
-        REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), field.getConfiguration(),
-                                          field.getVelocity(), tau) == DynamicsStatus::Ok);
-        CHECK(calcRelativeError(a, cws.a) < 1e-9);
-        CHECK((d_rate - field.getVelocity()).norm() < 1e-12);
-        VectorXd poisoned = tau;
-        poisoned[model.nv() - 1] += 1e-3 * (1 + std::abs(poisoned[model.nv() - 1]));
-        field.accelerate(poisoned, d_rate, a);
-        CHECK(calcRelativeError(a, cws.a) > 1e-9);
-      }
 }
 
 TEST_CASE("manifold world: mechanisms of every joint and closure keep their energy, and converge") {

@@ -193,7 +193,7 @@ const std::vector<Mistake> kYamlMistakes = {
     {kMotors, "importance: {shoulder: [1, -1]}", "key 'importance': key 'shoulder'", "negative", "0 or more"},
     {kMotors, "importance: {shoulder: 1}", "key 'importance': key 'shoulder'", "not a list", "[a, b"},
     {kMotors, "contacts: {toe: {frame: foot, type: 6d}}", "contact 'toe'", "no link or joint 'foot'", "name"},
-    {kMotors, "contacts: {toe: {frame: hand, type: 5d}}", "key 'contacts': key 'toe': key 'type'", "unknown", "3d"},
+    {kMotors, "contacts: {toe: {frame: hand, type: 4d}}", "key 'contacts': key 'toe': key 'type'", "unknown", "3d"},
     {kMotors, "contacts: {toe: {frame: hand, type: 3d, sole: [1, 1]}}", "key 'contacts': key 'toe': key 'sole'",
      "no sole", "6d"},
     {kMotors, "contacts: {toe: {frame: hand, type: 6d, sole: [-1, 1]}}", "contact 'toe'", "sole", "length and width"},

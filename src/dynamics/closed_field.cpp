@@ -96,11 +96,11 @@ bool ClosedField::updateNewton() {
 void ClosedField::solveNewton() {
   for (Newton& newton : newtons_) {
     if (newton.rows == 0) continue;
-    newton.x = residual_.segment(newton.offset, newton.rows);
+    const auto residual = residual_.segment(newton.offset, newton.rows);
     if (newton.sparse)
-      newton.x = newton.sparse_factor->solve(newton.x).eval();
+      newton.x = newton.sparse_factor->solve(residual);
     else
-      newton.x = newton.factor.solve(newton.x);
+      newton.x.noalias() = newton.factor.solve(residual);
     zeta_.segment(newton.offset, newton.rows) -= newton.x;
   }
 }

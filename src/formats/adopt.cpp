@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -22,6 +24,8 @@ constexpr double kHighest = 0.94, kLowest = 0.5, kStep = 0.04;  // shares of the
 constexpr double kOver = 0.005;                                 // from the centre of mass to the middle of the feet, m
 constexpr int kShifts = 20;
 constexpr double kRotor = 1e-3, kLever = 0.02, kSole = 0.1;
+constexpr double kRound = 1.05;  // extent of a round shape across, over its radius
+constexpr double kBlade = 0.03;  // m, the width of a foot that stands on an edge is less
 
 struct Foot {
   int frame = 0;
@@ -144,10 +148,12 @@ class Adopter {
     out_ << EndMap;
   }
 
-  // Length and width of the shapes of a foot along x and y of its frame; empty without shapes.
-  std::vector<double> measureSole(const Foot& foot) const {
+  // What a foot stands on, from the extent of its shapes along x and y of its frame; empty without shapes. A capsule along x, and
+  // a box that is hardly wider than a rod, are blades; a ball is a point.
+  std::optional<ContactFrame> measureFoot(const Foot& foot) const {
     const Frame& frame = model_.frames()[foot.frame];
     Eigen::Vector2d half = Eigen::Vector2d::Zero();
+    double radius = std::numeric_limits<double>::infinity();
     for (const Shape& shape : model_.shapes()) {
       if (shape.body != frame.body) continue;
       const SE3 X = frame.X_BF.inverse() * shape.X_BS;
@@ -156,23 +162,35 @@ class Adopter {
         const Vector3d place = X.act(sign.cwiseProduct(shape.half)).cwiseAbs();
         half = half.cwiseMax(place.head<2>() + Eigen::Vector2d::Constant(shape.radius));
       }
+      radius = std::min(radius, shape.radius);
     }
     if (half.isZero()) return {};
-    return {2 * half.x(), 2 * half.y()};
+    ContactFrame contact{"", frame.body, frame.X_BF, ContactKind::Surface6D, half.x(), half.y()};
+    const bool is_round = radius > 0 && half.y() <= kRound * radius;
+    if (is_round && half.x() <= kRound * radius) {
+      contact.kind = ContactKind::Point3D;
+      contact.half_length = contact.half_width = 0;
+    } else if (is_round || 2 * half.y() < kBlade) {
+      contact.kind = ContactKind::Edge5D;
+      contact.half_length -= is_round ? radius : 0;
+      contact.half_width = 0;
+    }
+    return contact;
   }
 
   void writeContacts() {
-    bool is_measured = true;
+    bool is_measured = true, is_flat = true;
     ModelParts parts = takeParts(model_);
     parts.contacts.clear();
     parts.references.clear();
     for (size_t i = 0; i < feet_.size(); ++i) {
       const Frame& frame = model_.frames()[feet_[i].frame];
-      std::vector<double> sole = measureSole(feet_[i]);
-      is_measured &= !sole.empty();
-      if (sole.empty()) sole = {kSole, kSole};
-      parts.contacts.push_back(
-          {getContactName(i), frame.body, frame.X_BF, ContactKind::Surface6D, sole[0] / 2, sole[1] / 2});
+      std::optional<ContactFrame> contact = measureFoot(feet_[i]);
+      is_measured &= contact.has_value();
+      if (!contact) contact = ContactFrame{"", frame.body, frame.X_BF, ContactKind::Surface6D, kSole / 2, kSole / 2};
+      contact->name = getContactName(i);
+      is_flat &= contact->kind == ContactKind::Surface6D;
+      parts.contacts.push_back(*contact);
     }
     guess("Feet: the lowest frames with z up" +
           std::string(feet_[0].is_named ? " that are named like feet" : ", although not named like feet") +
@@ -180,14 +198,19 @@ class Adopter {
                              : ": only one, without a mirror image."));
     guesses_.push_back(is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
                                    : "Soles: 0.1 m square, because the feet have no readable shapes.");
+    if (!is_flat) guesses_.back() += " Narrow or round ones are edges (5d) or points (3d), which roll.";
     with_feet_ = ModelBuilder::restore(std::move(parts));
     out_ << YAML::Newline << YAML::Comment(guesses_.back()) << Key << "contacts" << Value << BeginMap;
     for (size_t i = 0; i < feet_.size(); ++i) {
       const ContactFrame& contact = with_feet_->contacts()[i];
       out_ << Key << contact.name << Value << Flow << BeginMap;
-      out_ << Key << "frame" << Value << model_.frames()[feet_[i].frame].name << Key << "type" << Value << "6d";
-      out_ << Key << "sole" << Value << BeginSeq << format(2 * contact.half_length) << format(2 * contact.half_width)
-           << EndSeq << EndMap;
+      out_ << Key << "frame" << Value << model_.frames()[feet_[i].frame].name;
+      out_ << Key << "type" << Value << getName(contact.kind);
+      if (contact.kind == ContactKind::Edge5D) out_ << Key << "length" << Value << format(2 * contact.half_length);
+      if (contact.kind == ContactKind::Surface6D)
+        out_ << Key << "sole" << Value << BeginSeq << format(2 * contact.half_length) << format(2 * contact.half_width)
+             << EndSeq;
+      out_ << EndMap;
     }
     out_ << EndMap;
   }
