@@ -577,6 +577,34 @@ TEST_CASE("an adopted foot is a sole, a blade or a point by its shape") {
   }
 }
 
+TEST_CASE("an adopted robot starts from the posture of its file, if it has one") {
+  const Model original = loadRobot("rsu_biped").model;
+  const VectorXd q = assembleReference(original, "half_sitting").q;
+  ModelParts parts = takeParts(original);
+  parts.contacts.clear();
+  parts.references.clear();
+  Reference home;
+  home.name = "home";
+  for (const Joint& joint : original.joints())
+    if (joint.nq > 0)
+      home.joints[joint.name] = std::vector<double>(q.data() + joint.idx_q, q.data() + joint.idx_q + joint.nq);
+  parts.references.push_back(home);
+  const RobotText bare = formatRobot(ModelBuilder::restore(parts));
+  const RobotDirectory directory;
+  const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(bare.urdf, bare.yaml)), "../robot.urdf");
+  CAPTURE(adoption.yaml);
+  CHECK(adoption.yaml.find("the posture 'home' of the robot") != std::string::npos);
+  const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+  const AssemblyResult posture = assembleReference(model, "half_sitting");
+  REQUIRE(posture.status == AssemblyStatus::Closed);
+  // Knees bent as there, and a little more: the base is lower.
+  for (const char* knee : {"knee_left", "knee_right"}) {
+    const int i = original.joints()[original.findJoint(knee)].idx_q;
+    CHECK(std::abs(posture.q[i] - q[i]) < 0.5);
+    CHECK(posture.q[i] * q[i] > 0);
+  }
+}
+
 TEST_CASE("an adopted robot bends its knees the way that their ranges allow") {
   for (const auto& [lower, upper] : {std::pair{0.02, 2.0}, {-2.0, -0.02}}) {
     CAPTURE(lower);

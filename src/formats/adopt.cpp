@@ -215,17 +215,22 @@ class Adopter {
     out_ << EndMap;
   }
 
-  // The posture at this share of the height of the base over the feet.
-  Reference makePosture(double share) const {
-    const SE3& base = ws_.X_WB[1];
+  // The posture of a workspace at this share of the height of the base over the feet.
+  Reference makePosture(const Workspace& ws, double share) const {
+    const SE3& base = ws.X_WB[1];
+    std::vector<Vector3d> places;
     Vector3d middle = Vector3d::Zero();
-    for (const Foot& foot : feet_) middle += foot.X_WF.p / static_cast<double>(feet_.size());
+    for (const Foot& foot : feet_) {
+      const Frame& frame = model_.frames()[foot.frame];
+      places.push_back(getPlacement(ws, frame.body, frame.X_BF).p);
+      middle += places.back() / static_cast<double>(feet_.size());
+    }
     Reference reference;
     reference.name = "half_sitting";
     reference.height_frame = model_.bodies()[1].name;
     double apart = 0;  // from the middle
     for (size_t i = 0; i < feet_.size() && feet_.size() == 2; ++i)
-      apart = std::max({apart, std::abs(feet_[i].X_WF.p.y() - middle.y()), 2 * with_feet_->contacts()[i].half_width});
+      apart = std::max({apart, std::abs(places[i].y() - middle.y()), 2 * with_feet_->contacts()[i].half_width});
     reference.height = round(share * (base.p.z() - middle.z()));
     for (size_t i = 0; i < feet_.size(); ++i)
       reference.feet[getContactName(i)] = {0, (i == 0 ? 1 : -1) * round(apart), 0};
@@ -272,19 +277,36 @@ class Adopter {
   }
 
   void writePosture() {
+    if (!model_.references().empty() && writeGivenPosture(model_.references().front())) return;
     for (bool within_ranges : {false, true})
       for (double share = kHighest; share > kLowest; share -= kStep) {
-        Reference r = makePosture(share);
+        Reference r = makePosture(ws_, share);
         if (within_ranges) preferRanges(r);
-        if (stand(r)) return writePosture(r, share);
+        if (stand(r)) return writePosture(r, share, "the neutral configuration");
       }
     guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
   }
 
-  void writePosture(const Reference& r, double share) {
-    guess(
-        "Posture: feet flat below the centre of mass, as far apart as in the neutral configuration but at least two "
-        "soles;");
+  // From a posture of the robot's file, lowered a little, so that springs bear the weight, and as far as puts the feet flat on the
+  // ground.
+  bool writeGivenPosture(const Reference& given) {
+    const AssemblyResult posture = assembleReference(model_, given.name);
+    if (posture.status != AssemblyStatus::Closed) return false;
+    Workspace ws(model_);
+    updatePositions(model_, ws, posture.q);
+    for (double share = 1 - kStep; share > kLowest; share -= kStep) {
+      Reference r = makePosture(ws, share);
+      for (const Joint& joint : model_.joints())
+        if (joint.nv == 1) r.joints[joint.name] = {posture.q[joint.idx_q]};
+      if (!stand(r)) continue;
+      writePosture(r, share, "the posture '" + given.name + "' of the robot");
+      return true;
+    }
+    return false;
+  }
+
+  void writePosture(const Reference& r, double share, const std::string& source) {
+    guess("Posture: feet flat below the centre of mass, as far apart as in " + source + " but at least two soles;");
     const std::string more =
         "the base at " + format(100 * share) +
         " % of its height there. Its loops close; angles under `joints` determine how the legs bend.";

@@ -21,12 +21,12 @@ constexpr double kFirstStep = 1e-4;        // s, before anything is known of the
 constexpr double kShortestStep = 1e-11;    // s
 constexpr double kLeastTolerance = 1e-12;  // what rounding permits
 constexpr double kShorter = 0.61;   // of a step that met a singular posture: no simple fraction, to pass beside it
-constexpr double kFutile = 0.02;    // share of a step below which it is not shortened further beside a singular posture
-constexpr double kNear = 1e-3;      // square of a sine between rows: beside a singular posture
-constexpr double kNearest = 1e-9;   // below which rows are not chosen anew: some would be missing
+constexpr double kFutile = 0.02;    // share of the usual step: shorter ones gain nothing beside a singular posture
+constexpr double kNear = 1e-3;      // share of the best independence of rows: beside a singular posture
+constexpr double kNearest = 1e-9;   // share of it below which rows are not chosen anew: some would be missing
 constexpr double kMostLoose = 1e4;  // error of a step that is taken there, over the tolerance
 constexpr double kOpen = 1e-8;      // of dependent rows, m or rad: the rank has changed
-constexpr double kLessIndependent = 1e-2;  // than when they were chosen: rows are chosen anew
+constexpr double kLessIndependent = 1e-2;  // share of it below which rows are chosen anew
 constexpr double kBeside = 1e-3;  // rad or m, of the displacement that tells a singular posture from its neighbours
 
 enum Work { kMotors, kPush, kContacts, kStops, kJoints, kWorks };
