@@ -174,8 +174,10 @@ TEST_CASE("predictive control: a foot that finds no ground is lowered until it d
   for (int i = 0; i < 3; ++i) walk.update({1, 1});
   const double height = walk.getHeight(foot), lag = walk.getLag();
   CHECK(height < -5e-3);
-  for (int i = 0; i < 3; ++i) walk.update({1, 1});
-  CHECK(walk.getHeight(foot) == Approx(height).margin(2e-3));  // it stands there
+  // It stands there, in the middle of each stage: nothing here takes the speed at which it touched, which steps from middle to
+  // middle turn round at every node.
+  for (int i = 0; i < 4; ++i) walk.update({1, 1});
+  CHECK(walk.getHeight(foot) == Approx(height).margin(1e-4));
   CHECK(walk.getLag() == Approx(lag));
   CHECK(walk.controller->getCounts().late == 1);
   CHECK(walk.controller->getCounts().failed == 0);

@@ -50,6 +50,8 @@ Push parsePush(const std::string& text, double shortest) {
 
 // One world or, for free motions, several with commas.
 CLI::Validator isListOfWorlds() {
+  std::string choices;
+  for (const std::string& world : listWorlds()) choices += (choices.empty() ? "" : ",") + world;
   return CLI::Validator(
       [](std::string& text) {
         const std::vector<std::string> known = listWorlds();
@@ -59,7 +61,7 @@ CLI::Validator isListOfWorlds() {
             return "there is no world '" + part + "', only " + listItems(known);
         return std::string();
       },
-      "{" + listItems(listWorlds()) + "}");
+      "{" + choices + "}");
 }
 
 }  // namespace
