@@ -49,7 +49,7 @@ ClosedField::ClosedField(const Model& model) : model_(model), set_(makeConstrain
     const auto n = static_cast<Eigen::Index>(dofs[b].size());
     blocks_[b].dofs = std::move(dofs[b]);
     blocks_[b].M.setZero(n, n);
-    blocks_[b].factor = Eigen::LLT<MatrixXd>(n);
+    blocks_[b].factor.compute(MatrixXd::Identity(n, n));  // sizes it
     blocks_[b].x.setZero(n);
   }
   newtons_.resize(model.clusters().size());
@@ -159,7 +159,7 @@ void ClosedField::layOut(Newton& newton) {
   newton.sparse_factor.reset();
   if (newton.rows <= kDenseRows) {
     newton.K.setZero(newton.rows, newton.rows);
-    newton.factor = Eigen::PartialPivLU<MatrixXd>(newton.rows);
+    if (newton.rows > 0) newton.factor.compute(MatrixXd::Identity(newton.rows, newton.rows));
     return;
   }
   std::vector<Eigen::Triplet<double>> entries;
@@ -187,7 +187,7 @@ void ClosedField::layOutSystem() {
   S_sparse_factor_.reset();
   if (rows_ <= kDenseRows) {
     S_.setZero(rows_, rows_);
-    S_factor_ = Eigen::LLT<MatrixXd>(rows_);
+    if (rows_ > 0) S_factor_.compute(MatrixXd::Identity(rows_, rows_));
     return;
   }
   std::vector<Eigen::Triplet<double>> entries;

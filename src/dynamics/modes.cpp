@@ -81,6 +81,7 @@ MatrixXd makeBasis(const MatrixXd& J, const MatrixXd& M, double tolerance) {
     const Eigen::Index rank = (sizes.array() > tolerance * (sizes.size() > 0 ? sizes[0] : 0)).count();
     basis = svd.matrixV().rightCols(n - rank).eval();
   }
+  if (basis.cols() == 0) return basis;  // nothing can move
   return factors.matrixU().solve(basis);
 }
 
