@@ -9,7 +9,7 @@ namespace bielle::python {
 
 /// As worlds::makeWorld.
 using MakeWorld = std::unique_ptr<worlds::World> (*)(const std::string& name, const Model& model,
-                                                         const worlds::WorldOptions& options);
+                                                     const worlds::WorldOptions& options);
 
 /// The name of the capsule, which changes when its type does.
 inline constexpr char kEnginesCapsule[] = "bielle.make_world.2";

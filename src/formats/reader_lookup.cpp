@@ -58,7 +58,8 @@ std::string findInDirectory(const fs::path& directory) {
 // In the directories of robots; empty when there is none.
 std::string findByName(const std::string& name) {
   for (const std::string& directory : getRobotDirectories())
-    for (const std::string& file : {name + ".urdf", std::string("robot.urdf"), name + ".yaml", name + ".xml", name + ".sdf"})
+    for (const std::string& file :
+         {name + ".urdf", std::string("robot.urdf"), name + ".yaml", name + ".xml", name + ".sdf"})
       if (const fs::path path = fs::path(directory) / name / file; isFile(path)) return path.string();
   return "";
 }
@@ -133,8 +134,7 @@ std::vector<std::string> listRobots() {
     for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
       const std::string name = it->path().filename().string();
       if (isFile(it->path() / (name + ".urdf")) || isFile(it->path() / (name + ".xml")) ||
-          isFile(it->path() / (name + ".sdf")) ||
-          isRobotByItself(it->path() / (name + ".yaml")))
+          isFile(it->path() / (name + ".sdf")) || isRobotByItself(it->path() / (name + ".yaml")))
         names.insert(name);
     }
   }

@@ -44,8 +44,7 @@ const XMLElement& parseXml(const std::string& xml, const std::string& path, cons
                            XMLDocument& document) {
   requireUtf8(xml, path);
   if (document.Parse(xml.c_str()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED)
-    throw InputError(path, "document",
-                     "elements are nested deeper than " + std::to_string(TINYXML2_MAX_ELEMENT_DEPTH),
+    throw InputError(path, "document", "elements are nested deeper than " + std::to_string(TINYXML2_MAX_ELEMENT_DEPTH),
                      "close them; a robot needs few levels");
   refuseEntities(document, path);
   const int line = document.ErrorLineNum();  // 0 of an empty text
@@ -55,7 +54,9 @@ const XMLElement& parseXml(const std::string& xml, const std::string& path, cons
   if (!document.RootElement()) throw InputError(path, "document", "it has no elements", "give a file with a robot");
   if (!root.empty() && getTag(*document.RootElement()) != root)
     throw InputError(path, "document", "its outermost element is not <" + root + ">",
-                     root == "robot" ? "give a URDF file" : root == "sdf" ? "give an SDF file" : "give a MuJoCo file (MJCF)");
+                     root == "robot" ? "give a URDF file"
+                     : root == "sdf" ? "give an SDF file"
+                                     : "give a MuJoCo file (MJCF)");
   checkAttributes(*document.RootElement(), path);
   return *document.RootElement();
 }

@@ -31,13 +31,13 @@ struct FreeMotion {
 FreeMotion moveFreely(const Model& model, World& world, ConstVectorRef q, ConstVectorRef v,
                       const FreeMotionOptions& options, const ExecutionObserver& observer = {});
 
-/// A robot whose motors are held by springs and dampers where they are at q, each as a joint force of the model, so that it
-/// is the same in every world.
+/// A spring and damper that hold a motor at a coordinate.
 struct MotorSpring {
   int motor = 0;
   double stiffness = 0, damping = 0;  ///< N m/rad and N m s/rad, or N/m and N s/m
   double rest = 0;                    ///< coordinate of the motor's joint, rad or m
 };
+/// The robot with these springs as joint forces of its model, so that they are the same in every world.
 Model addMotorSprings(const Model& model, const std::vector<MotorSpring>& springs);
 
 }  // namespace bielle::worlds

@@ -14,10 +14,10 @@
 namespace bielle::worlds {
 
 struct ManifoldWorldOptions {
-  WorldOptions world;  ///< time_step: of the longest step; 0: no limit
+  WorldOptions world;  ///< time_step: the longest step; 0: no limit
   ContactOptions contact;
-  /// Error allowed per step: of coordinates, m or rad, and of velocities relative to 1 (m/s, rad/s) or their size; 1e-12 at least.
-  /// Over a motion of many steps the error is some ten to hundred times as large.
+  /// Error allowed per step, 1e-12 at least: of coordinates, in m or rad; of velocities, relative to 1 (m/s, rad/s) or to their
+  /// size. Over a motion of many steps the errors add up to ten or a hundred times as much.
   double tolerance = 1e-9;
 };
 
