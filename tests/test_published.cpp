@@ -18,7 +18,7 @@
 #include "solve_in_place.h"
 
 using namespace bielle;
-using bielle::testing::RobotDirectory;
+using namespace bielle::testing;
 namespace fs = std::filesystem;
 
 namespace {
