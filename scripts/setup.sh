@@ -4,7 +4,7 @@ bielle_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 # Build dependencies on a bare Debian 12; gnuplot draws the figures.
 bielle_packages=(g++ cmake ninja-build libeigen3-dev liburdfdom-dev liburdfdom-headers-dev libconsole-bridge-dev
-  libtinyxml2-dev libyaml-cpp-dev nlohmann-json3-dev libcli11-dev libzip-dev libnlopt-dev
+  libtinyxml2-dev libyaml-cpp-dev libmuparser-dev nlohmann-json3-dev libcli11-dev libzip-dev libnlopt-dev
   libnlopt-cxx-dev gnuplot-nox libjs-three libjs-dygraphs)
 # Simbody and MuJoCo, against which motions and dynamics are checked.
 bielle_check_packages=(libsimbody-dev libmujoco-dev)

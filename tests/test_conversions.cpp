@@ -75,7 +75,7 @@ TEST_CASE("every robot comes back from MJCF with its mass matrix, closures, moto
 }
 
 TEST_CASE("generated robots come back from MJCF") {
-  for (const Generator& generator : getGenerators()) {
+  for (const Generator& generator : listGenerators()) {
     CAPTURE(generator.name);
     const Model model = generator.make(generator.parameters);
     checkMjcfRoundTrip(model, findClosedConfiguration(model).q);

@@ -197,7 +197,7 @@ TEST_CASE("every robot comes back from Drake's URDF as the same mechanism, with 
 }
 
 TEST_CASE("generated robots come back from Drake's URDF") {
-  for (const Generator& generator : getGenerators()) {
+  for (const Generator& generator : listGenerators()) {
     CAPTURE(generator.name);
     const Model model = generator.make(generator.parameters);
     checkDrakeRoundTrip(model, findClosedConfiguration(model).q);

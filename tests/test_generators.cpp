@@ -17,9 +17,7 @@
 #include "robot_directory.h"
 #include "robots/cleobot.h"
 #include "robots/delta.h"
-#include "robots/humanoid.h"
 #include "robots/kangaroo.h"
-#include "robots/leg_biped.h"
 #include "robots/solid.h"
 #include "robots/spring_biped.h"
 #include "robots/spring_leg.h"
@@ -30,6 +28,13 @@ using namespace bielle::testing;
 namespace {
 
 const std::string kRobots = std::string(BIELLE_SOURCE_DIR) + "/robots/";
+
+Model makeLegBiped(const OptionValues& values) {
+  const Generator generator = findGenerator("leg_biped", values);
+  OptionSet parameters = generator.parameters;
+  for (const auto& [name, value] : values) parameters.set(name, value);
+  return generator.make(parameters);
+}
 
 // Same bodies, joints, closures, motors and feet; placements and inertias to the rounding of the files.
 void checkSame(const Model& a, const Model& b) {
@@ -179,7 +184,7 @@ TEST_CASE("solids: inertias by their own integrals") {
 }
 
 TEST_CASE("generators: every body is possible, the loops close, mobility is what Gruebler counts") {
-  for (const Generator& generator : getGenerators()) {
+  for (const Generator& generator : listGenerators()) {
     CAPTURE(generator.name);
     const Model model = generator.make(generator.parameters);
     double mass = 0;
@@ -209,7 +214,7 @@ TEST_CASE("generators: every body is possible, the loops close, mobility is what
 }
 
 TEST_CASE("generators: references are assembled with the angles that they give, and those of robots that come along") {
-  for (const Generator& generator : getGenerators()) {
+  for (const Generator& generator : listGenerators()) {
     CAPTURE(generator.name);
     CHECK(checkReferences({generator.make(generator.parameters), {}, "", ""}).empty());
   }
@@ -221,7 +226,7 @@ TEST_CASE("generators: references are assembled with the angles that they give, 
 }
 
 TEST_CASE("generators: robots that come along name theirs, and are the same from the files that it writes") {
-  for (const Generator& generator : getGenerators()) {
+  for (const Generator& generator : listGenerators()) {
     CAPTURE(generator.name);
     const std::string place = kRobots + generator.name + "/";
     CHECK(std::filesystem::exists(place + "README.md"));
@@ -254,12 +259,9 @@ TEST_CASE("generators: robots that come along name theirs, and are the same from
 TEST_CASE("files that name a generator: parameters by number and choice, a fixed base, keys that complete them") {
   const RobotDirectory files;
   files.write("mine/mine.yaml", "generator: leg_biped\nset:\n  knee: belt\n  thigh_length: 0.25\n");
-  LegBipedParameters p;
-  p.knee = KneePart::Belt;
-  p.thigh_length = 0.25;
   const LoadedRobot mine = loadRobot(files.path() + "/mine");
   CHECK(mine.warnings.empty());
-  checkSame(makeLegBiped(p), mine.model);
+  checkSame(makeLegBiped({{"knee", "belt"}, {"thigh_length", 0.25}}), mine.model);
   CHECK(mine.model.hasFreeFlyer());
   LoadOptions fixed;
   fixed.base = BaseKind::Fixed;
@@ -341,7 +343,7 @@ TEST_CASE("writer: names are escaped, what the files cannot say is refused") {
 }
 
 TEST_CASE("generators: names stay when lengths change, bounds and names are checked") {
-  for (const Generator& generator : getGenerators()) {
+  for (const Generator& generator : listGenerators()) {
     CAPTURE(generator.name);
     const Model model = generator.make(generator.parameters);
     generator.parameters.check();
@@ -374,7 +376,7 @@ TEST_CASE("generators: names stay when lengths change, bounds and names are chec
 }
 
 TEST_CASE("humanoid: fingers mimic the one that has the motor, tips stay parallel") {
-  const Model model = makeHumanoid();
+  const Model model = loadRobot("humanoid").model;
   const auto index = [&](const char* joint) { return model.joints()[model.findJoint(joint)].idx_q; };
   VectorXd q = assembleReference(model, "half_sitting").q;
   q[index("finger1_joint_left")] = 0.3;
@@ -399,20 +401,14 @@ TEST_CASE("leg biped: eighteen combinations stand, move in 18 ways, and weigh wh
   const double chain = 0.5 * 0.05 + 0.03 + 0.02, of_knee[] = {0, 0.1, chain + 0.5 * (0.22 + 0.05)};
   const double of_ankle[] = {0, 0.2, 2 * (chain + 0.5 * 0.17)};
   const int rows_of_knee[] = {0, 1, 3}, rows_of_ankle[] = {0, 2, 6};
-  const double bare = makeLegBiped([] {
-                        LegBipedParameters p;
-                        p.knee = KneePart::Serial, p.ankle = AnklePart::Serial;
-                        return p;
-                      }())
-                          .mass();
+  const char *const knees[] = {"serial", "belt", "four_bar"}, *const ankles[] = {"serial", "differential", "rsu"},
+                   *const hips[] = {"serial", "three_rrs"};
+  const double bare = makeLegBiped({{"knee", "serial"}, {"ankle", "serial"}}).mass();
   for (int knee = 0; knee < 3; ++knee)
     for (int ankle = 0; ankle < 3; ++ankle)
       for (int hip = 0; hip < 2; ++hip) {
         CAPTURE(knee, ankle, hip);
-        LegBipedParameters p;
-        p.knee = static_cast<KneePart>(knee), p.ankle = static_cast<AnklePart>(ankle),
-        p.hip = static_cast<HipPart>(hip);
-        const Model model = makeLegBiped(p);
+        const Model model = makeLegBiped({{"knee", knees[knee]}, {"ankle", ankles[ankle]}, {"hip", hips[hip]}});
         CHECK(model.mass() - bare == Approx(2 * (of_knee[knee] + of_ankle[ankle])).margin(1e-12));
         CHECK(model.nu() == 12);
         const AssemblyResult standing = assembleReference(model, "half_sitting");
@@ -425,9 +421,7 @@ TEST_CASE("leg biped: eighteen combinations stand, move in 18 ways, and weigh wh
       }
   // The four-bar as it is meant: square at the middle angle, where it gears by arm over crank; a parallelogram turns with the knee.
   const auto close = [](double crank, double angle) {  // to knee, motor
-    LegBipedParameters p;
-    p.knee_crank = crank;
-    const Model model = makeLegBiped(p);
+    const Model model = makeLegBiped({{"knee_crank", crank}});
     const int knee = model.joints()[model.findJoint("knee_left")].idx_q;
     const int motor = model.joints()[model.findJoint("motor_knee_left")].idx_q;
     VectorXd q = model.makeNeutral();
@@ -446,15 +440,14 @@ TEST_CASE("leg biped: eighteen combinations stand, move in 18 ways, and weigh wh
 
   OptionSet parameters = findGenerator("leg_biped").parameters;
   parameters.set("ankle", "rsu");
-  CHECK(readOptions<LegBipedParameters>(parameters).ankle == AnklePart::Rsu);
-  CHECK_THROWS_WITH(parameters.set("ankle", "belt"), Catch::Contains("serial, differential, rsu"));
+  CHECK(parameters.get<std::string>("ankle") == "rsu");
+  CHECK_THROWS_WITH(parameters.set("ankle", "belt"), Catch::Contains("rsu, serial, spu"));
   CHECK_THROWS_WITH(parameters.set("knee", 1), Catch::Contains("parameter 'knee'") && Catch::Contains("four_bar"));
 }
 
 TEST_CASE("leg biped: motors of a 3-RRS hip by spherical trigonometry, one to one in its middle posture") {
-  LegBipedParameters p;
-  p.hip = HipPart::ThreeRrs, p.knee = KneePart::Serial, p.ankle = AnklePart::Serial;
-  const Model model = makeLegBiped(p);
+  const Model model = makeLegBiped({{"hip", "three_rrs"}, {"knee", "serial"}, {"ankle", "serial"}});
+  const double middle = -0.6;  // hip_middle
   const auto getIndex = [&](const std::string& joint) { return model.joints()[model.findJoint(joint)].idx_q; };
   const char* const hinges[] = {"hipz", "hipx", "hipy"};
   // Near yaw, roll and pitch, along the way from straight legs.
@@ -471,7 +464,7 @@ TEST_CASE("leg biped: motors of a 3-RRS hip by spherical trigonometry, one to on
   for (const double s : {1.0, -1.0}) {
     const std::string side = s > 0 ? "_left" : "_right";
     const Vector3d u[] = {{-1, 0, 0}, {0, -s, 0}, {0, 0, 1}}, w[] = {{0, 0, 1}, {1, 0, 0}, {0, -s, 0}};
-    const Vector3d v[] = {{0, s, 0}, {0, 0, -1}, {std::cos(p.hip_middle), 0, std::sin(p.hip_middle)}};
+    const Vector3d v[] = {{0, s, 0}, {0, 0, -1}, {std::cos(middle), 0, std::sin(middle)}};
     // The axis of the hinge, turned about that of the motor, stays square to the ball: (w cos a + u x w sin a) . R v = 0.
     const auto calcMotor = [&](int i, const Vector3d& hip) {
       const Matrix3d R = (Eigen::AngleAxisd(hip[0], Vector3d::UnitZ()) * Eigen::AngleAxisd(hip[1], Vector3d::UnitX()) *
@@ -500,7 +493,7 @@ TEST_CASE("leg biped: motors of a 3-RRS hip by spherical trigonometry, one to on
         }
       return ratios;
     };
-    CHECK((calcRatios(p.hip_middle).cwiseAbs() - Matrix3d::Identity()).norm() < 1e-8);
-    CHECK(calcRatios(p.hip_middle + 1.5).cwiseAbs().maxCoeff() > 10);
+    CHECK((calcRatios(middle).cwiseAbs() - Matrix3d::Identity()).norm() < 1e-8);
+    CHECK(calcRatios(middle + 1.5).cwiseAbs().maxCoeff() > 10);
   }
 }

@@ -25,7 +25,7 @@ Robot load(const std::string& name, const std::optional<std::string>& base) {
 
 Robot generate(const std::string& name, const std::string& directory,
                const std::map<std::string, OptionValue>& parameters) {
-  const Generator& generator = findGenerator(name);
+  const Generator generator = findGenerator(name, {parameters.begin(), parameters.end()});
   OptionSet options = generator.parameters;
   for (const auto& [parameter, value] : parameters) options.set(parameter, value);
   auto model = std::make_shared<Model>(generator.make(options));
@@ -36,7 +36,7 @@ Robot generate(const std::string& name, const std::string& directory,
 
 py::dict describeGenerators() {
   py::dict out;
-  for (const Generator& generator : getGenerators()) {
+  for (const Generator& generator : listGenerators()) {
     py::dict parameters;
     for (const Option& p : generator.parameters) parameters[py::str(p.name)] = describeOption(p);
     out[py::str(generator.name)] = parameters;

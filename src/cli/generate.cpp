@@ -14,6 +14,7 @@ namespace bielle::cli {
 namespace {
 
 struct GenerateArguments {
+  std::string robot;
   std::vector<std::string> settings;  // name=value
   std::string directory;
 };
@@ -28,49 +29,68 @@ std::string formatParameters(const Generator& generator) {
   return text.str();
 }
 
-int generate(const Generator& generator, const GenerateArguments& arguments) {
-  OptionSet parameters = generator.parameters;
+int generate(const GenerateArguments& arguments) {
+  OptionValues values;
   std::string changes;
   for (const std::string& setting : arguments.settings) {
-    const auto [name, value] = splitSetting("--set", setting, generator.parameters.begin()->name + "=0.1");
-    parameters.set(name, parseOption(value));
+    const auto [name, value] = splitSetting("--set", setting, "thigh_length=0.25");
+    values.emplace_back(name, parseOption(value));
     changes += (changes.empty() ? " with " : ", ") + setting;
   }
+  const Generator generator = findGenerator(arguments.robot, values);
+  OptionSet parameters = generator.parameters;
+  for (const auto& [name, value] : values) parameters.set(name, value);
   const Model model = generator.make(parameters);
-  writeRobot(model, arguments.directory, "Written by `bielle generate " + generator.name + "`" + changes + ".");
+  writeRobot(model, arguments.directory, "Written by `bielle generate " + arguments.robot + "`" + changes + ".");
   std::cout << model.name() << ": " << formatNumber(model.mass()) << " kg, nv " << model.nv() << ", " << model.nu()
             << " motors, " << model.closures().size() << " closures\n  " << arguments.directory << "\n";
   return kOk;
+}
+
+std::string formatRobots() {
+  std::vector<Row> rows;
+  for (const Generator& generator : listGenerators()) rows.push_back({generator.name, generator.help});
+  std::ostringstream text;
+  printTable(text, rows);
+  return text.str();
+}
+
+std::string formatHelp(const GenerateArguments& arguments) {
+  if (!arguments.robot.empty()) {
+    try {
+      return "Parameters of --set, with default, unit and bounds:\n" + formatParameters(findGenerator(arguments.robot));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  }
+  return "Robots:\n" + formatRobots() +
+         "Examples:\n"
+         "  bielle generate cleobot --set upper_length=0.25 -o longer\n"
+         "  bielle generate leg_biped --set knee=belt --set knee_ratio=3 -o belted\n"
+         "  bielle info longer\n"
+         "`bielle generate ROBOT --help` lists the parameters of a robot. The URDF and YAML files written are for "
+         "editing,\n"
+         "and for other programs. A short file longer/longer.yaml is the same robot for Bielle:\n"
+         "  generator: cleobot\n"
+         "  set: {upper_length: 0.25}\n"
+         "Robots of your own, composed of parts of your own: docs/parts.md";
 }
 
 }  // namespace
 
 void addGenerate(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("generate", "Generate a robot from named lengths, angles and masses");
-  command.callback([&action] {
-    if (!action) throw CLI::RequiredError("A robot");
-  });
-  for (const Generator& generator : getGenerators()) {
-    CLI::App& sub = *command.add_subcommand(generator.name, generator.help);
-    const auto arguments = std::make_shared<GenerateArguments>();
-    sub.add_option("--set", arguments->settings, "NAME=VALUE, may be repeated")->type_name("NAME=VALUE");
-    sub.add_option("-o,--output", arguments->directory,
-                   "directory of the robot; its last part names the files, and every command accepts it as a robot")
-        ->required();
-    sub.footer("Parameters of --set, with default, unit and bounds:\n" + formatParameters(generator) +
-               "Example:\n  bielle generate " + generator.name + " -o my_" + generator.name);
-    sub.callback([&action, &generator, arguments] {
-      action = [&generator, arguments] { return generate(generator, *arguments); };
-    });
-  }
-  command.footer(
-      "Examples:\n"
-      "  bielle generate cleobot --set upper_length=0.25 -o longer\n"
-      "  bielle info longer\n"
-      "`bielle generate ROBOT --help` lists the parameters. The URDF and YAML files written are for editing, and for\n"
-      "other programs. A short file longer/longer.yaml is the same robot for Bielle:\n"
-      "  generator: cleobot\n"
-      "  set: {upper_length: 0.25}");
+  const auto arguments = std::make_shared<GenerateArguments>();
+  command.add_option("ROBOT", arguments->robot, "one of those below, or a file that composes a robot of parts")
+      ->required();
+  command.add_option("--set", arguments->settings, "NAME=VALUE, may be repeated; the value of a part may be its file")
+      ->type_name("NAME=VALUE");
+  command
+      .add_option("-o,--output", arguments->directory,
+                  "directory of the robot; its last part names the files, and every command accepts it as a robot")
+      ->required();
+  command.footer([arguments] { return formatHelp(*arguments); });
+  command.callback([&action, arguments] { action = [arguments] { return generate(*arguments); }; });
 }
 
 }  // namespace bielle::cli

@@ -112,7 +112,7 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
 Parametrization::Parametrization(const std::string& generator, OptionValues settings,
                                  std::vector<DesignVariable> variables, std::string source)
     : source_(std::move(source)),
-      generator_(generator),
+      generator_(findGenerator(generator, settings)),
       settings_(std::move(settings)),
       variables_(std::move(variables)) {
   const OptionSet parameters = getParameters();
@@ -152,7 +152,7 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
 
 // Of the robot before the variables change them.
 OptionSet Parametrization::getParameters() const {
-  OptionSet parameters = findGenerator(generator_).parameters;
+  OptionSet parameters = generator_->parameters;
   for (const auto& [name, value] : settings_) parameters.set(name, value);
   return parameters;
 }
@@ -170,7 +170,7 @@ Model Parametrization::generate(const VectorXd& x) const {
     else
       parameters.set(variable.parameter, value);
   }
-  return findGenerator(generator_).make(parameters);
+  return generator_->make(parameters);
 }
 
 // Types come before ratios, whatever the order of the variables.
@@ -207,7 +207,7 @@ void Parametrization::refuseSharedTargets(const Model& robot) const {
 
 // Of variables of motors: what is given, or that of the first of them. A type brings its ratio.
 void Parametrization::readStart() {
-  const Model robot = generator_.empty() ? model_ : generate(start_);
+  const Model robot = !generator_ ? model_ : generate(start_);
   refuseSharedTargets(robot);
   std::vector<Motor> motors = robot.motors();
   for (const bool choices : {true, false})
@@ -260,7 +260,7 @@ void Parametrization::finish() {
                        variable.motors.empty() ? "widen the bounds" : "widen the bounds, or give `start`");
     }
   }
-  if (generator_.empty()) {
+  if (!generator_) {
     changePlaces(start_);  // \throws what cannot be changed
     model_ = changeMotors(std::move(model_), start_);
     return;
@@ -298,7 +298,7 @@ std::vector<VectorXd> Parametrization::listCombinations() const {
 Model Parametrization::make(const VectorXd& x) const {
   if (x.size() != start_.size() || !x.allFinite())
     throw InputError(source_, "design", "it does not have one finite number for each variable");
-  return changeMotors(generator_.empty() ? changePlaces(x) : generate(x), x);
+  return changeMotors(!generator_ ? changePlaces(x) : generate(x), x);
 }
 
 Model Parametrization::changePlaces(const VectorXd& x) const {

@@ -81,7 +81,7 @@ void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& s
   if (spec.robot.generator.empty())
     choices.fail("a given robot has no parts to choose, and its links include the masses of its motors",
                  "give the `ratio` of its motors, or a generator");
-  const OptionSet& parameters = findGenerator(spec.robot.generator).parameters;
+  const OptionSet parameters = findGenerator(spec.robot.generator, spec.robot.settings).parameters;
   const auto getParameter = [&](const Entry& entry) -> const Option& {
     if (const Option* parameter = parameters.find(entry.getText())) return *parameter;
     entry.fail("the generator has no parameter '" + entry.getText() + "'",
@@ -154,7 +154,7 @@ DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const En
 void readArchitecture(const Entry& entry, DesignSpec& spec) {
   if (spec.robot.generator.empty())
     entry.fail("a given robot has one architecture", "give a generator of parts, e.g. leg_biped");
-  const OptionSet& parameters = findGenerator(spec.robot.generator).parameters;
+  const OptionSet parameters = findGenerator(spec.robot.generator, spec.robot.settings).parameters;
   std::map<std::string, DesignVariable> parts;
   std::map<std::string, int> count;  // of parameters with such a choice
   std::string known;

@@ -76,7 +76,7 @@ std::string findRobotDirectory(const RobotSpec& spec, const std::string& file) {
 
 Model makeRobot(const RobotSpec& spec, const std::string& file) {
   if (spec.generator.empty()) return loadRobot(locateRobot(spec, file)).model;
-  const Generator& generator = findGenerator(spec.generator);
+  const Generator generator = findGenerator(spec.generator, spec.settings);
   OptionSet parameters = generator.parameters;
   for (const auto& [name, value] : spec.settings) parameters.set(name, value);
   return generator.make(parameters);

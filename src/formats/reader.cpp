@@ -126,8 +126,11 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   if (own.closures.empty() && files.yaml.closures.empty() && !loops.empty())
     readLoopClosures(loops.string(), files.urdf, files.yaml);
   if (!has_settings) return files;
-  if (!own.models.empty() || own.generator)
-    throw InputError(own.path, own.generator ? "key 'generator'" : "key 'model'",
+  if (!own.models.empty() || own.generator || own.composed)
+    throw InputError(own.path,
+                     own.composed    ? "key 'tree'"
+                     : own.generator ? "key 'generator'"
+                                     : "key 'model'",
                      "there is a URDF beside this file, " + path.string(),
                      "remove the key, or move the file to another directory");
   complete(own, files.yaml);
@@ -154,6 +157,7 @@ RobotFiles readCompleted(const YamlFile& own, const Generate& generate) {
 RobotFiles readRobotFiles(const std::filesystem::path& path, const Generate& generate) {
   if (path.extension() != ".yaml") return readUrdfAndYaml(path);
   const YamlFile own = readYaml(path.string());
+  if (own.composed) return generate(own);
   RobotFiles files = own.generator ? generate(own) : readCompleted(own, generate);
   complete(own, files.yaml);
   return files;
@@ -290,14 +294,13 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
 
 }  // namespace
 
-LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options, const Generate& generate) {
-  const std::filesystem::path path = findRobotFile(name_or_path);
-  auto [urdf, yaml] = readRobotFiles(path, generate);
+Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::vector<std::string>* warnings) {
+  auto& [urdf, yaml] = files;
   retypeJoints(yaml, urdf);
   if (yaml.cross_inertia) splitUniversalJoints(*yaml.cross_inertia, urdf);
   setImportance(yaml, urdf);
 
-  const BaseKind base = options.base.value_or(yaml.base.value_or(BaseKind::Free));
+  const BaseKind base = overriding.value_or(yaml.base.value_or(BaseKind::Free));
   if (urdf.has_own_base && base == BaseKind::Fixed) fixBase(urdf, yaml);
   ModelBuilder builder(urdf.name, urdf.path);
   addRoot(urdf, base, builder);
@@ -307,11 +310,16 @@ LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& option
   addNamed(urdf, yaml, builder);
   builder.setSource(urdf.path);
   addMimics(urdf, builder);
+  if (warnings)
+    for (const std::vector<std::string>* own : {&urdf.warnings, &yaml.warnings})
+      warnings->insert(warnings->end(), own->begin(), own->end());
+  return builder.build(warnings);
+}
 
+LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options, const Generate& generate) {
+  const std::filesystem::path path = findRobotFile(name_or_path);
   LoadedRobot robot;
-  robot.warnings = urdf.warnings;
-  robot.warnings.insert(robot.warnings.end(), yaml.warnings.begin(), yaml.warnings.end());
-  robot.model = builder.build(&robot.warnings);
+  robot.model = combineFiles(readRobotFiles(path, generate), options.base, &robot.warnings);
   robot.file = std::filesystem::absolute(path).lexically_normal().string();
   robot.directory = path.has_parent_path() ? path.parent_path().string() : ".";
   return robot;

@@ -65,7 +65,9 @@ std::string findByName(const std::string& name) {
 }
 
 bool hasGenerator(const fs::path& path) {
-  return path.extension() == ".yaml" && isFile(path) && readYaml(path.string()).generator;
+  if (path.extension() != ".yaml" || !isFile(path)) return false;
+  const YamlFile yaml = readYaml(path.string());
+  return yaml.generator || yaml.composed;
 }
 
 // Whether this is a file that names a generator, or completes a robot that is there.

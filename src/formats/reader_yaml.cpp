@@ -268,14 +268,36 @@ void readGenerator(const Fields& fields, YamlFile& file) {
 }
 
 void readRoot(const Entry& root, YamlFile& file) {
-  const Fields fields = root.getFields(
-      {"closed_loop", "type",         "closure_name",  "closures",   "name_mot",   "motors",        "motor_catalogue",
-       "armature",    "joint_forces", "point_springs", "joint_name", "joint_type", "cross_inertia", "base",
-       "contacts",    "references",   "serial_joints", "importance", "gravity",    "model",         "generator",
-       "set"});
+  if (root.isMap())
+    for (const auto& [key, entry] : root.getMap())
+      if (key == "tree") {  // its numbers are expressions
+        file.composed = root;
+        return;
+      }
+  std::vector<std::string> known = {"closed_loop", "type", "closure_name", "name_mot"};
+  known.insert(known.end(), listSharedKeys().begin(), listSharedKeys().end());
+  for (const char* key : {"joint_name", "joint_type", "cross_inertia", "model", "generator", "set"})
+    known.push_back(key);
+  const Fields fields = root.getFields(known);
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
   if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
+  readSharedKeys(fields, file);
+  if (const Entry* entry = find(fields, "model"))
+    file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};
+  readGenerator(fields, file);
+}
+
+}  // namespace
+
+const std::vector<std::string>& listSharedKeys() {
+  static const std::vector<std::string> keys = {"motors",        "motor_catalogue", "armature",      "closures",
+                                                "joint_forces",  "contacts",        "point_springs", "references",
+                                                "serial_joints", "gravity",         "importance",    "base"};
+  return keys;
+}
+
+void readSharedKeys(const YamlFields& fields, YamlFile& file) {
   readMotors(fields, file);
   if (const Entry* entry = find(fields, "closures")) readClosures(*entry, file);
   if (const Entry* entry = find(fields, "joint_forces")) readJointForces(*entry, file);
@@ -286,12 +308,7 @@ void readRoot(const Entry& root, YamlFile& file) {
   if (const Entry* entry = find(fields, "importance")) readImportance(*entry, file);
   if (const Entry* entry = find(fields, "gravity")) file.gravity = entry->getVector3();
   if (const Entry* entry = find(fields, "base")) file.base = readBase(*entry);
-  if (const Entry* entry = find(fields, "model"))
-    file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};
-  readGenerator(fields, file);
 }
-
-}  // namespace
 
 YamlFile parseYaml(const std::string& text, const std::string& path) {
   YamlFile file;

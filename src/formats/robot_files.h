@@ -83,6 +83,7 @@ struct YamlFile {
   std::vector<std::string> models;  ///< of the robot that this file completes, in the order in which they are tried
   std::optional<YamlEntry> generator,
       settings;  ///< of the robot that this file is, or completes; names and values as given
+  std::optional<YamlEntry> composed;  ///< the whole document of a robot composed of parts; then all else is empty
   std::optional<BaseKind> base;
   std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file
   std::optional<double> cross_inertia;                             ///< of universal joints, kg m^2
@@ -111,6 +112,10 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
 /// \throws InputError for unknown keys, wrong types, lists that do not match
 YamlFile parseYaml(const std::string& text, const std::string& path);
 YamlFile readYaml(const std::string& path);
+/// The keys that a robot's YAML file has in common with a part: closures, motors, joint_forces, point_springs, contacts, references,
+/// serial_joints, importance, gravity and base.
+const std::vector<std::string>& listSharedKeys();
+void readSharedKeys(const YamlFields& fields, YamlFile& file);
 
 /// A file of MuJoCo as the contents of both files.
 struct MjcfFile {
@@ -139,8 +144,12 @@ struct RobotFiles {
   YamlFile yaml;
 };
 
+/// The model of both files.
+/// \param base  overrides the file's key   \param warnings  receives what is valid but suspicious; null for none
+Model combineFiles(RobotFiles files, std::optional<BaseKind> base, std::vector<std::string>* warnings);
+
 /// A robot as loadRobot (robots/robot_loader.h) describes.
-/// \param generate  the files of the robot that a YAML file with the key `generator` describes
+/// \param generate  the files of the robot that a YAML file with the key `generator`, or one composed of parts, describes
 LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options,
                       const std::function<RobotFiles(const YamlFile&)>& generate);
 

@@ -14,6 +14,18 @@ namespace bielle {
 YamlEntry::YamlEntry(std::string path, std::string element, const YAML::Node& node)
     : path_(std::move(path)), element_(std::move(element)), node_(std::make_shared<const YAML::Node>(node)) {}
 
+YamlEntry YamlEntry::withSymbols(std::shared_ptr<const Symbols> symbols) const {
+  YamlEntry entry = *this;
+  entry.symbols_ = std::move(symbols);
+  return entry;
+}
+
+YamlEntry YamlEntry::makeChild(const std::string& element, const YAML::Node& node) const {
+  YamlEntry child(path_, element, node);
+  child.symbols_ = symbols_;
+  return child;
+}
+
 void YamlEntry::fail(const std::string& problem, const std::string& remedy) const {
   const int line = node_->IsDefined() ? node_->Mark().line : -1;
   throw InputError(
@@ -26,6 +38,11 @@ bool YamlEntry::isList() const { return node_->IsSequence(); }
 
 bool YamlEntry::isWord(const std::string& word) const { return node_->IsScalar() && node_->Scalar() == word; }
 
+bool YamlEntry::isText() const {
+  double value;
+  return node_->IsScalar() && !node_->Scalar().empty() && !YAML::convert<double>::decode(*node_, value);
+}
+
 std::string YamlEntry::getText() const {
   if (!node_->IsScalar() || node_->Scalar().empty()) fail("it is not a name", "give one word");
   return node_->Scalar();
@@ -33,8 +50,15 @@ std::string YamlEntry::getText() const {
 
 double YamlEntry::getNumber(bool may_be_infinite) const {
   double value = 0;
-  if (!node_->IsScalar() || !YAML::convert<double>::decode(*node_, value))
-    fail("it is not a number", "give one number");
+  if (!node_->IsScalar()) fail("it is not a number", "give one number");
+  if (!YAML::convert<double>::decode(*node_, value)) {
+    if (!symbols_) fail("it is not a number", "give one number");
+    try {
+      value = symbols_->calcNumber(node_->Scalar());
+    } catch (const ExpressionError& error) {
+      fail(error.problem, error.remedy);
+    }
+  }
   if (std::isnan(value) || (std::isinf(value) && !may_be_infinite)) fail("it is not finite", "give a finite number");
   return value;
 }
@@ -45,7 +69,7 @@ std::vector<YamlEntry> YamlEntry::getList(int count) const {
     fail("it has " + std::to_string(node_->size()) + " element(s)", "give " + std::to_string(count));
   std::vector<YamlEntry> entries;
   for (const YAML::Node& item : *node_)
-    entries.emplace_back(path_, element_ + "[" + std::to_string(entries.size()) + "]", item);
+    entries.push_back(makeChild(element_ + "[" + std::to_string(entries.size()) + "]", item));
   return entries;
 }
 
@@ -61,7 +85,14 @@ std::vector<double> YamlEntry::getNumbers(int count) const {
   return out;
 }
 
-Vector3d YamlEntry::getVector3() const { return Eigen::Map<const Vector3d>(getNumbers(3).data()); }
+Vector3d YamlEntry::getVector3() const {
+  if (!symbols_ || !node_->IsScalar()) return Eigen::Map<const Vector3d>(getNumbers(3).data());
+  try {
+    return symbols_->calcPoint(node_->Scalar());
+  } catch (const ExpressionError& error) {
+    fail(error.problem, error.remedy);
+  }
+}
 
 std::vector<std::pair<std::string, YamlEntry>> YamlEntry::getMap() const {
   std::vector<std::pair<std::string, YamlEntry>> pairs;
@@ -73,7 +104,7 @@ std::vector<std::pair<std::string, YamlEntry>> YamlEntry::getMap() const {
     const std::string key = pair.first.Scalar();
     if (!seen.insert(key).second) fail("key '" + key + "' is given twice", "keep one");
     pairs.emplace_back(
-        key, YamlEntry(path_, element_.empty() ? "key '" + key + "'" : element_ + ": key '" + key + "'", pair.second));
+        key, makeChild(element_.empty() ? "key '" + key + "'" : element_ + ": key '" + key + "'", pair.second));
   }
   return pairs;
 }

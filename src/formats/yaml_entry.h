@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bielle/math/types.h"
+#include "formats/expressions.h"
 
 namespace YAML {
 class Node;
@@ -20,12 +21,16 @@ class YamlEntry {
  public:
   YamlEntry(std::string path, std::string element, const YAML::Node& node);
 
+  /// The same entry, and all below it, whose numbers and points may be expressions of these symbols.
+  YamlEntry withSymbols(std::shared_ptr<const Symbols> symbols) const;
+
   /// \throws InputError, naming file, element and line
   [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const;
   const std::string& element() const { return element_; }
   bool isMap() const;
   bool isList() const;
   bool isWord(const std::string& word) const;
+  bool isText() const;  ///< a scalar that is no number
 
   // Return the requested type, or call fail().
   std::string getText() const;
@@ -34,15 +39,20 @@ class YamlEntry {
   std::vector<YamlEntry> getList(int count = -1) const;
   std::vector<std::string> getTexts(int count = -1) const;
   std::vector<double> getNumbers(int count = -1) const;
+  /// A list of three numbers or, with symbols, an expression of points.
   Vector3d getVector3() const;
+  const std::string& path() const { return path_; }
   /// Pairs of a map in the order of the file; a missing value counts as an empty map.
   std::vector<std::pair<std::string, YamlEntry>> getMap() const;
   /// The map by key, all keys among the known ones.
   std::map<std::string, YamlEntry> getFields(const std::vector<std::string>& known) const;
 
  private:
+  YamlEntry makeChild(const std::string& element, const YAML::Node& node) const;
+
   std::string path_, element_;
   std::shared_ptr<const YAML::Node> node_;
+  std::shared_ptr<const Symbols> symbols_;
 };
 
 using YamlFields = std::map<std::string, YamlEntry>;

@@ -3,19 +3,7 @@
 #include <cmath>
 
 namespace bielle {
-namespace {
-
-// Hips are weighted in the state regularization as in the paper's walk.
-Joint makeHip(const std::string& name, const Vector3d& place, const Vector3d& axis, double position, double velocity) {
-  Joint joint = makeRevolute(name, place, axis);
-  joint.position_importance = position;
-  joint.velocity_importance = velocity;
-  return joint;
-}
-
-}  // namespace
-
-void describeSerial(OptionFields& f, SerialBipedParameters& p, const std::string& motor_mass) {
+void describeSerial(OptionFields& f, SerialBipedParameters& p) {
   f.number("hip_offset", p.hip_offset, "m", {0.05, 0.4}, "distance of a hip from the middle plane");
   f.number("trunk_height", p.trunk_height, "m", {0, 0.5}, "height of the trunk's frame above the hips");
   f.number("thigh_length", p.thigh_length, "m", {0.05, 1}, "distance from hip to knee");
@@ -27,7 +15,7 @@ void describeSerial(OptionFields& f, SerialBipedParameters& p, const std::string
   f.number("sole_offset", p.sole_offset, "m", {-0.2, 0.2}, "distance of the middle of the sole in front of the ankle");
   f.number("sole_width", p.sole_width, "m", {0.02, 0.3}, "width of the sole, along y");
   f.number("trunk_mass", p.trunk_mass, "kg", {0.1, 100}, "mass of the trunk without motors");
-  f.number("motor_mass", p.motor_mass, "kg", {0.01, 10}, motor_mass);
+  f.number("motor_mass", p.motor_mass, "kg", {0.01, 10}, "mass of each motor");
   f.number("hip_link_mass", p.hip_link_mass, "kg", {0.01, 10},
            "mass of each of the two links of a hip, without motors");
   f.number("link_density", p.link_density, "kg/m", {0.01, 50}, "mass per length of thigh and shank, without motors");
@@ -37,44 +25,6 @@ void describeSerial(OptionFields& f, SerialBipedParameters& p, const std::string
 
 Vector3d getHip(const BipedSide& side, const SerialBipedParameters& p) {
   return side.mirror(0, p.hip_offset, -p.trunk_height);
-}
-
-namespace {
-
-// Height of the plate over the hips, in the trunk.
-double getPlate(const SerialBipedParameters& p) { return 0.055 - p.trunk_height; }
-
-}  // namespace
-
-std::vector<Solid> makeSerialTrunk(const SerialBipedParameters& p) {
-  const double plate = getPlate(p);
-  return {makeBox({-0.01, 0, 0.10}, {0.13, 0.22, 0.20}, 0.72 * p.trunk_mass, colors::kShell),
-          makeBox({0, 0, plate + 0.03}, {0.10, 0.34, 0.02}, 0.2 * p.trunk_mass, colors::kSteel),
-          makeCylinder({0, 0, plate / 2}, kZ, 0.03, std::abs(plate) + 0.02, 0.03 * p.trunk_mass, colors::kSteel),
-          makeSphere({-0.01, 0, 0.26}, 0.055, 0.05 * p.trunk_mass, colors::kShell)};
-}
-
-std::vector<Solid> makeHipYawMotors(const SerialBipedParameters& p) {
-  std::vector<Solid> motors;
-  for (double s : {1.0, -1.0}) motors.push_back(makeMotor({0, s * p.hip_offset, getPlate(p) + 0.06}, kZ, p.motor_mass));
-  return motors;
-}
-
-void addHipLinks(const BipedSide& side, const SerialBipedParameters& p, const std::vector<Solid>& yaw,
-                 const std::vector<Solid>& roll, ModelBuilder& builder) {
-  addSolidLink("hip_yaw" + side.name, "trunk", makeHip("hipz" + side.name, getHip(side, p), kZ, 10, 5), yaw, builder);
-  addSolidLink("hip_roll" + side.name, "hip_yaw" + side.name, makeHip("hipx" + side.name, kOrigin, kX, 3, 3), roll,
-               builder);
-}
-
-void addHip(const BipedSide& side, const SerialBipedParameters& p, ModelBuilder& builder) {
-  const Vector3d behind(-0.07, 0, 0), beside(0, 0.055 * side.s, 0);
-  addHipLinks(side, p,
-              {makeBox(behind / 2 + 0.045 * kZ, {0.09, 0.03, 0.02}, p.hip_link_mass, colors::kFrame),
-               makeMotor(behind, kX, p.motor_mass)},
-              {makeBox(behind / 4 + beside / 2, {0.04, 0.06, 0.03}, p.hip_link_mass, colors::kFrame),
-               makeMotor(beside, kY, p.motor_mass)},
-              builder);
 }
 
 std::vector<Solid> makeFoot(const SerialBipedParameters& p) {

@@ -27,9 +27,7 @@ struct SerialBipedParameters {
   double foot_mass = 0.5;      // kg
   double armature = 1e-3;      // of every motor, kg m^2
 };
-// \param motor_mass  its help
-void describeSerial(OptionFields& fields, SerialBipedParameters& parameters,
-                    const std::string& motor_mass = "mass of each motor");
+void describeSerial(OptionFields& fields, SerialBipedParameters& parameters);
 
 // A leg's side. Frames are parallel to the trunk's in the neutral configuration.
 struct BipedSide {
@@ -60,15 +58,6 @@ void addSole(const BipedSide& side, const Vector3d& middle, double length, doubl
 
 // Centre of a hip, in the trunk.
 Vector3d getHip(const BipedSide& side, const SerialBipedParameters& p);
-// Trunk without the motors of the hips.
-std::vector<Solid> makeSerialTrunk(const SerialBipedParameters& p);
-// Motors of hipz, in the plate of the trunk.
-std::vector<Solid> makeHipYawMotors(const SerialBipedParameters& p);
-// Joints hipz and hipx, without motors, and their links "hip_yaw_left", "hip_roll_left" out of these solids.
-void addHipLinks(const BipedSide& side, const SerialBipedParameters& p, const std::vector<Solid>& yaw,
-                 const std::vector<Solid>& roll, ModelBuilder& builder);
-// The same with the motors of hipx and hipy in the links.
-void addHip(const BipedSide& side, const SerialBipedParameters& p, ModelBuilder& builder);
 // Sole and post of a foot, 0.7 of its mass.
 std::vector<Solid> makeFoot(const SerialBipedParameters& p);
 // Hips over the ankles, by the law of cosines. \throws InputError if the legs do not reach

@@ -1,20 +1,35 @@
 #include "robots/generator_entry.h"
 
+#include <filesystem>
+
 #include "bielle/model/error.h"
+
+namespace fs = std::filesystem;
 
 namespace bielle {
 
 GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settings) {
   YamlEntry entry = name;  // the one that an error is about
   try {
-    const Generator& generator = findGenerator(name.getText());
-    OptionSet parameters = generator.parameters;
+    const fs::path directory = fs::path(name.path()).parent_path();
+    const auto locate = [&directory](const std::string& text) {
+      const fs::path file = directory / text;
+      return file.extension() == ".yaml" && fs::exists(file) ? file.lexically_normal().string() : text;
+    };
+    std::vector<std::pair<YamlEntry, std::pair<std::string, OptionValue>>> given;
+    OptionValues values;
     if (settings)
       for (const auto& [key, value] : settings->getMap()) {
-        entry = value;
-        parameters.set(key, parseOption(value.getText()));
+        values.emplace_back(key, parseOption(locate(value.getText())));
+        given.emplace_back(value, values.back());
       }
-    return {&generator, std::move(parameters)};
+    Generator generator = findGenerator(locate(name.getText()), values);
+    OptionSet parameters = generator.parameters;
+    for (const auto& [value, setting] : given) {
+      entry = value;
+      parameters.set(setting.first, setting.second);
+    }
+    return {std::move(generator), std::move(parameters)};
   } catch (const InputError& error) {
     if (!error.source().empty() && error.source() != name.getText()) throw;  // it names file and line
     entry.fail(error.problem(), error.remedy());

@@ -1,15 +1,21 @@
 #include "bielle/robots/generators.h"
 
+#include <filesystem>
+#include <memory>
+
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"
+#include "formats/robot_files.h"
+#include "model/listing.h"
 #include "robots/cleobot.h"
+#include "robots/composed_robot.h"
 #include "robots/delta.h"
 #include "robots/fivebar_leg.h"
-#include "robots/humanoid.h"
 #include "robots/kangaroo.h"
-#include "robots/leg_biped.h"
 #include "robots/spring_biped.h"
 #include "robots/spring_leg.h"
+
+namespace fs = std::filesystem;
 
 namespace bielle {
 namespace {
@@ -46,26 +52,10 @@ Model makeChain(const FourBarChainParameters& p) {
   return makeFourBarChain(p.options).model;
 }
 
-}  // namespace
-
-const std::vector<Generator>& getGenerators() {
+const std::vector<Generator>& getCompiledGenerators() {
   static const std::vector<Generator> generators = {
       makeGenerator("cleobot", "biped with parallel legs: 3-RRS lower legs, hips turned by three crank-and-rod chains",
                     makeCleobot),
-      makeGenerator("leg_biped",
-                    "biped composed of parts: hips driven by motors or 3-RRS limbs, knees by motors, belts or "
-                    "four-bars, ankles by "
-                    "motors, differentials or rods",
-                    makeLegBiped),
-      makeGenerator("rsu_biped",
-                    "biped with serial hips and knees, ankles driven by two rods with spherical ends (RSU)",
-                    makeRsuBiped),
-      makeGenerator("humanoid", "rsu_biped with two arms and grippers whose fingers mimic each other", makeHumanoid),
-      makeGenerator("belt_biped", "biped with serial hips, knees driven by belts, ankles by differentials",
-                    makeBeltBiped),
-      makeGenerator("belt_knee", "biped with knees driven by belts, otherwise serial", makeBeltKnee),
-      makeGenerator("differential_ankle", "biped with ankles driven by differentials, otherwise serial",
-                    makeDifferentialAnkle),
       makeGenerator("kangaroo",
                     "biped driven only by ball screws: hip differentials, parallelograms; 96 redundant rows",
                     makeKangaroo),
@@ -81,13 +71,61 @@ const std::vector<Generator>& getGenerators() {
   return generators;
 }
 
-const Generator& findGenerator(const std::string& name) {
-  std::string known;
-  for (const Generator& generator : getGenerators()) {
-    if (generator.name == name) return generator;
-    known += (known.empty() ? "" : ", ") + generator.name;
+// The file of a robot composed of parts in a directory of robots, or empty.
+std::string findComposition(const fs::path& directory, const std::string& name) {
+  const fs::path path = directory / name / (name + ".yaml");
+  std::error_code error;
+  return fs::is_regular_file(path, error) && readYaml(path.string()).composed ? path.string() : "";
+}
+
+Generator makeComposedGenerator(const std::string& path, const OptionValues& settings) {
+  std::map<std::string, std::string> parts;
+  for (const auto& [name, value] : settings)
+    if (const std::string* text = std::get_if<std::string>(&value))
+      if (fs::path(*text).extension() == ".yaml") parts[name] = *text;
+  const auto robot = std::make_shared<const ComposedRobot>(path, parts);
+  return {fs::path(path).stem().string(), robot->help(), robot->parameters(),
+          [robot](const OptionSet& parameters) { return combineFiles(robot->make(parameters), {}, nullptr); }};
+}
+
+// Names of all in the directories of robots.
+std::map<std::string, std::string> listCompositions() {
+  std::map<std::string, std::string> files;
+  for (const std::string& directory : getRobotDirectories()) {
+    std::error_code error;
+    for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
+      const std::string name = it->path().filename().string();
+      if (files.count(name)) continue;
+      if (const std::string file = findComposition(directory, name); !file.empty()) files[name] = file;
+    }
   }
-  throw InputError("", "robot '" + name + "'", "there is no such generator", "choose one of: " + known);
+  return files;
+}
+
+}  // namespace
+
+std::vector<Generator> listGenerators() {
+  std::vector<Generator> out = getCompiledGenerators();
+  for (const auto& [name, file] : listCompositions()) out.push_back(makeComposedGenerator(file, {}));
+  return out;
+}
+
+Generator findGenerator(const std::string& name, const OptionValues& settings) {
+  for (const Generator& generator : getCompiledGenerators())
+    if (generator.name == name) return generator;
+  if (fs::path(name).extension() == ".yaml" && fs::exists(name)) {
+    if (!readYaml(name).composed) throw InputError(name, "file", "it composes no robot", "give a file with a `tree`");
+    return makeComposedGenerator(name, settings);
+  }
+  if (name.find('/') == std::string::npos)
+    for (const std::string& directory : getRobotDirectories())
+      if (const std::string file = findComposition(directory, name); !file.empty())
+        return makeComposedGenerator(file, settings);
+  std::vector<std::string> known;
+  for (const Generator& generator : getCompiledGenerators()) known.push_back(generator.name);
+  for (const auto& [other, file] : listCompositions()) known.push_back(other);
+  throw InputError("", "robot '" + name + "'", "there is no such generator",
+                   "choose one of: " + listItems(known) + ", or give a file that composes a robot");
 }
 
 }  // namespace bielle

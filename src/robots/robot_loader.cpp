@@ -4,21 +4,29 @@
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "formats/robot_files.h"
+#include "robots/composed_robot.h"
 #include "robots/generator_entry.h"
 
 namespace bielle {
 namespace {
 
-// As if they had been written and read again: a generated robot is the same by its generator and from its files, and
-// whatever completes a robot, or fixes its base, has the same meaning for it.
-RobotFiles generate(const YamlFile& yaml) {
+Model makeModel(const YamlFile& yaml) {
+  if (yaml.composed) {
+    const ComposedRobot robot(yaml.path);
+    return combineFiles(robot.make(robot.parameters()), {}, nullptr);
+  }
   const GeneratorEntry entry = readGeneratorEntry(*yaml.generator, yaml.settings ? &*yaml.settings : nullptr);
-  RobotText text;
   try {
-    text = formatRobot(entry.generator->make(entry.parameters));
+    return entry.generator.make(entry.parameters);
   } catch (const InputError& error) {  // parameters that are possible one by one, but not together
     yaml.generator->fail(error.element() + ": " + error.problem(), error.remedy());
   }
+}
+
+// As if they had been written and read again: a generated robot is the same by its generator and from its files, and
+// whatever completes a robot, or fixes its base, has the same meaning for it.
+RobotFiles generate(const YamlFile& yaml) {
+  const RobotText text = formatRobot(makeModel(yaml));
   RobotFiles files;
   files.urdf = parseUrdf(text.urdf, yaml.path, files.yaml);
   files.yaml = parseYaml(text.yaml, yaml.path);

@@ -7,6 +7,7 @@
 
 #include "bielle/dynamics/variation.h"
 #include "bielle/model/options.h"
+#include "bielle/robots/generators.h"
 
 namespace bielle {
 
@@ -86,7 +87,8 @@ class Parametrization {
   Model changeMotors(Model model, const VectorXd& x) const;
   void finish();
 
-  std::string source_, generator_;
+  std::string source_;
+  std::optional<Generator> generator_;
   OptionValues settings_;
   std::vector<DesignVariable> variables_;
   Model model_;

@@ -16,9 +16,12 @@ struct Generator {
   std::function<Model(const OptionSet& parameters)> make;
 };
 
-const std::vector<Generator>& getGenerators();
+/// Those that are compiled, and files of robots that are composed of parts (docs/parts.md) in the directories of robots.
+std::vector<Generator> listGenerators();
 
+/// \param name      of one of them, or the path of a file that composes a robot of parts
+/// \param settings  those whose value is the path of a .yaml file add it to the parts among which that parameter chooses
 /// \throws InputError listing the generators
-const Generator& findGenerator(const std::string& name);
+Generator findGenerator(const std::string& name, const OptionValues& settings = {});
 
 }  // namespace bielle

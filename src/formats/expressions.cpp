@@ -1,0 +1,135 @@
+#include "formats/expressions.h"
+
+#include <muParser.h>
+
+#include <cmath>
+#include <map>
+
+#include "model/listing.h"
+
+namespace bielle {
+namespace {
+
+const char kNameCharacters[] = "0123456789_.abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
+
+double calcHypot(double a, double b) { return std::hypot(a, b); }
+
+bool isIdentifier(const std::string& name) {
+  return !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) &&
+         name.find_first_not_of("0123456789_abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ") == std::string::npos;
+}
+
+}  // namespace
+
+struct Symbols::Data {
+  mu::Parser parser;
+  std::map<std::string, double> numbers;  // nodes of a map stay where they are: the parser points to them
+  std::map<std::string, Vector3d> points;
+  std::map<std::string, double> components;  // of the points, of which one component at a time is evaluated
+
+  void parse(const std::string& expression) {
+    parser.SetExpr(expression);
+    for (const auto& [name, address] : parser.GetUsedVar())
+      if (!address) fail(name);
+  }
+
+  double evaluate(const std::string& expression) {
+    const double value = parser.Eval();
+    if (!std::isfinite(value))
+      throw ExpressionError{"'" + expression + "' is not finite", "look for a root, an arc or a quotient out of range"};
+    return value;
+  }
+
+  [[noreturn]] void fail(const std::string& name) const {
+    std::vector<std::string> known;
+    for (const auto& [number, value] : numbers)
+      if (number.find('.') == std::string::npos) known.push_back(number);
+    for (const auto& [point, value] : points) known.push_back(point);
+    throw ExpressionError{"'" + name + "' is unknown", "known are " + listItems(known)};
+  }
+};
+
+namespace {
+
+// Messages of muParser name token and position.
+template <typename Evaluate>
+auto translate(const std::string& expression, const Evaluate& evaluate) {
+  try {
+    return evaluate();
+  } catch (const mu::Parser::exception_type& error) {
+    throw ExpressionError{"'" + expression + "' is not an expression: " + error.GetMsg(), "correct it"};
+  }
+}
+
+}  // namespace
+
+Symbols::Symbols() : data_(std::make_unique<Data>()) {
+  mu::Parser& parser = data_->parser;
+  parser.EnableOptimizer(false);  // the same roundings whatever the numbers
+  parser.DefineNameChars(kNameCharacters);
+  parser.ClearConst();
+  parser.DefineFun("hypot", calcHypot);
+  define("pi", M_PI);
+  define("origin", Vector3d::Zero());
+  define("x", Vector3d::UnitX());
+  define("y", Vector3d::UnitY());
+  define("z", Vector3d::UnitZ());
+}
+
+Symbols::~Symbols() = default;
+
+bool Symbols::has(const std::string& name) const { return data_->numbers.count(name) || data_->points.count(name); }
+
+void Symbols::define(const std::string& name, double value) {
+  if (!isIdentifier(name))
+    throw ExpressionError{"'" + name + "' cannot be used in expressions", "use letters, digits and _"};
+  if (has(name) || data_->parser.GetFunDef().count(name))
+    throw ExpressionError{"the name '" + name + "' is taken", "choose another one"};
+  const auto it = data_->numbers.emplace(name, value).first;
+  data_->parser.DefineVar(name, &it->second);
+}
+
+void Symbols::define(const std::string& name, const Vector3d& value) {
+  define(name, 0.0);
+  data_->numbers.erase(name);
+  data_->parser.RemoveVar(name);
+  data_->points[name] = value;
+  data_->parser.DefineVar(name, &(data_->components[name] = value.x()));
+  for (int i = 0; i < 3; ++i) {
+    const std::string component = name + "." + "xyz"[i];
+    data_->parser.DefineVar(component, &(data_->numbers[component] = value[i]));
+  }
+}
+
+bool Symbols::usesPoints(const std::string& expression) const {
+  return translate(expression, [&] {
+    data_->parse(expression);
+    for (const auto& [name, address] : data_->parser.GetUsedVar())
+      if (data_->points.count(name)) return true;
+    return false;
+  });
+}
+
+double Symbols::calcNumber(const std::string& expression) const {
+  return translate(expression, [&] {
+    data_->parse(expression);
+    for (const auto& [name, address] : data_->parser.GetUsedVar())
+      if (data_->points.count(name))
+        throw ExpressionError{"'" + name + "' is a point, not a number", "name a component, such as " + name + ".x"};
+    return data_->evaluate(expression);
+  });
+}
+
+Vector3d Symbols::calcPoint(const std::string& expression) const {
+  return translate(expression, [&] {
+    data_->parse(expression);
+    Vector3d point;
+    for (int i = 0; i < 3; ++i) {
+      for (const auto& [name, value] : data_->points) data_->components[name] = value[i];
+      point[i] = data_->evaluate(expression);
+    }
+    return point;
+  });
+}
+
+}  // namespace bielle

@@ -1,0 +1,50 @@
+#pragma once
+/// \file Files of parts and of robots composed of them, before they are evaluated. docs/parts.md describes the format.
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bielle/model/options.h"
+#include "formats/yaml_entry.h"
+
+namespace bielle {
+
+struct PartParameter {
+  Option option;
+  bool required = false;  ///< it has no value of its own: whoever mounts the part gives it
+  std::string file;       ///< that declares it
+};
+
+enum class MountKind { Link, Joint };
+
+/// A file with the key `tree`: a robot, or a part of one.
+struct PartFile {
+  std::string path, help;
+  YamlFields fields;
+  std::vector<PartParameter> parameters;                  ///< its own
+  std::vector<std::string> points;                        ///< that whoever mounts it sets
+  std::vector<std::pair<std::string, MountKind>> mounts;  ///< what it wants to be mounted on
+  std::vector<std::pair<std::string, YamlEntry>> tree;    ///< links, and parts mounted at their place among them
+
+  const PartParameter* findParameter(const std::string& name) const;
+  bool defines(const std::string& name) const;  ///< a parameter, or a value of `let`
+};
+
+/// A name with {placeholders} replaced. \throws InputError of `entry` for one that is unknown
+std::string fillIn(const std::string& text, const std::map<std::string, std::string>& values, const YamlEntry& entry);
+
+/// Reads each file once.
+class PartLibrary {
+ public:
+  /// \param document  of the file, if it has been read
+  const PartFile& read(const std::string& path);
+  /// A part by its name: a file beside that of `entry`, in `parts` of the directories of robots, or the file of a robot.
+  const PartFile& find(const std::string& name, const YamlEntry& entry);
+
+ private:
+  std::map<std::string, std::unique_ptr<PartFile>> files_;
+};
+
+}  // namespace bielle
