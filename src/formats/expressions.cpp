@@ -25,22 +25,39 @@ struct Symbols::Data {
   mu::Parser parser;
   std::map<std::string, double> numbers;  // nodes of a map stay where they are: the parser points to them
   std::map<std::string, Vector3d> points;
-  std::map<std::string, double> components;  // of the points, of which one component at a time is evaluated
+  std::map<std::string, double>
+      components;  // of the points: one at a time, or none, so that numbers made of them are none
 
-  void parse(const std::string& expression) {
+  void setComponents(int i) {
+    for (auto& [name, value] : components) value = i < 0 ? std::nan("") : points.at(name)[i];
+  }
+
+  // Names that occur in it; addresses are null if they are unknown.
+  const mu::varmap_type& listUsed(const std::string& expression) {
     parser.SetExpr(expression);
-    for (const auto& [name, address] : parser.GetUsedVar())
-      if (!address) fail(name);
+    return parser.GetUsedVar();
   }
 
   double evaluate(const std::string& expression) {
-    const double value = parser.Eval();
-    if (!std::isfinite(value))
-      throw ExpressionError{"'" + expression + "' is not finite", "look for a root, an arc or a quotient out of range"};
-    return value;
+    parser.SetExpr(expression);
+    return parser.Eval();
   }
 
-  [[noreturn]] void fail(const std::string& name) const {
+  // Why an expression has no finite value.
+  [[noreturn]] void explain(const std::string& expression, bool may_have_points) {
+    try {
+      for (const auto& [name, address] : listUsed(expression)) {
+        if (!address) failUnknown(name);
+        if (points.count(name) && !may_have_points)
+          throw ExpressionError{"'" + name + "' is a point, not a number", "name a component, such as " + name + ".x"};
+      }
+    } catch (const mu::Parser::exception_type& error) {
+      throw ExpressionError{"'" + expression + "' is not an expression: " + error.GetMsg(), "correct it"};
+    }
+    throw ExpressionError{"'" + expression + "' is not finite", "look for a root, an arc or a quotient out of range"};
+  }
+
+  [[noreturn]] void failUnknown(const std::string& name) const {
     std::vector<std::string> known;
     for (const auto& [number, value] : numbers)
       if (number.find('.') == std::string::npos) known.push_back(number);
@@ -48,20 +65,6 @@ struct Symbols::Data {
     throw ExpressionError{"'" + name + "' is unknown", "known are " + listItems(known)};
   }
 };
-
-namespace {
-
-// Messages of muParser name token and position.
-template <typename Evaluate>
-auto translate(const std::string& expression, const Evaluate& evaluate) {
-  try {
-    return evaluate();
-  } catch (const mu::Parser::exception_type& error) {
-    throw ExpressionError{"'" + expression + "' is not an expression: " + error.GetMsg(), "correct it"};
-  }
-}
-
-}  // namespace
 
 Symbols::Symbols() : data_(std::make_unique<Data>()) {
   mu::Parser& parser = data_->parser;
@@ -94,7 +97,7 @@ void Symbols::define(const std::string& name, const Vector3d& value) {
   data_->numbers.erase(name);
   data_->parser.RemoveVar(name);
   data_->points[name] = value;
-  data_->parser.DefineVar(name, &(data_->components[name] = value.x()));
+  data_->parser.DefineVar(name, &(data_->components[name] = std::nan("")));
   for (int i = 0; i < 3; ++i) {
     const std::string component = name + "." + "xyz"[i];
     data_->parser.DefineVar(component, &(data_->numbers[component] = value[i]));
@@ -102,34 +105,38 @@ void Symbols::define(const std::string& name, const Vector3d& value) {
 }
 
 bool Symbols::usesPoints(const std::string& expression) const {
-  return translate(expression, [&] {
-    data_->parse(expression);
-    for (const auto& [name, address] : data_->parser.GetUsedVar())
+  try {
+    for (const auto& [name, address] : data_->listUsed(expression))
       if (data_->points.count(name)) return true;
     return false;
-  });
+  } catch (const mu::Parser::exception_type&) {
+    data_->explain(expression, true);
+  }
 }
 
 double Symbols::calcNumber(const std::string& expression) const {
-  return translate(expression, [&] {
-    data_->parse(expression);
-    for (const auto& [name, address] : data_->parser.GetUsedVar())
-      if (data_->points.count(name))
-        throw ExpressionError{"'" + name + "' is a point, not a number", "name a component, such as " + name + ".x"};
-    return data_->evaluate(expression);
-  });
+  try {
+    const double value = data_->evaluate(expression);
+    if (std::isfinite(value)) return value;
+  } catch (const mu::Parser::exception_type&) {
+  }
+  data_->explain(expression, false);
 }
 
 Vector3d Symbols::calcPoint(const std::string& expression) const {
-  return translate(expression, [&] {
-    data_->parse(expression);
-    Vector3d point;
+  Vector3d point;
+  try {
+    data_->parser.SetExpr(expression);
     for (int i = 0; i < 3; ++i) {
-      for (const auto& [name, value] : data_->points) data_->components[name] = value[i];
-      point[i] = data_->evaluate(expression);
+      data_->setComponents(i);
+      point[i] = data_->parser.Eval();
     }
-    return point;
-  });
+  } catch (const mu::Parser::exception_type&) {
+    point[0] = std::nan("");
+  }
+  data_->setComponents(-1);
+  if (!point.allFinite()) data_->explain(expression, true);
+  return point;
 }
 
 }  // namespace bielle

@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <set>
 
@@ -51,7 +52,8 @@ std::string YamlEntry::getText() const {
 double YamlEntry::getNumber(bool may_be_infinite) const {
   double value = 0;
   if (!node_->IsScalar()) fail("it is not a number", "give one number");
-  if (!YAML::convert<double>::decode(*node_, value)) {
+  const bool begins_a_name = std::isalpha(static_cast<unsigned char>(node_->Scalar().c_str()[0])) != 0;
+  if ((symbols_ && begins_a_name) || !YAML::convert<double>::decode(*node_, value)) {
     if (!symbols_) fail("it is not a number", "give one number");
     try {
       value = symbols_->calcNumber(node_->Scalar());

@@ -423,7 +423,7 @@ ComposedRobot::ComposedRobot(const std::string& path, const std::map<std::string
     : file_(&library_.read(path)), parameters_("parameter", std::filesystem::path(path).stem().string()) {
   if (!file_->mounts.empty())
     throw InputError(path, "key 'mounts'", "it is a part of a robot", "give a robot whose `tree` mounts it");
-  for (PartParameter& p : listParameters(library_, *file_, {})) {
+  for (PartParameter p : listParameters(library_, *file_, {})) {
     const std::string element = "parameter '" + p.option.name + "' of " + p.file;
     if (p.required)
       throw InputError(path, element, "nothing gives it a value", "declare one of this name, or `set` it");

@@ -35,13 +35,18 @@ struct PartFile {
 /// A name with {placeholders} replaced. \throws InputError of `entry` for one that is unknown
 std::string fillIn(const std::string& text, const std::map<std::string, std::string>& values, const YamlEntry& entry);
 
+/// What choosing parameters choose.
+using PartChoices = std::map<std::string, std::string>;
+
 /// Reads each file once.
 class PartLibrary {
  public:
-  /// \param document  of the file, if it has been read
   const PartFile& read(const std::string& path);
   /// A part by its name: a file beside that of `entry`, in `parts` of the directories of robots, or the file of a robot.
   const PartFile& find(const std::string& name, const YamlEntry& entry);
+
+  /// Of listParameters (part_parameters.h), by file and choices.
+  std::map<std::pair<const PartFile*, PartChoices>, std::vector<PartParameter>> parameters;
 
  private:
   std::map<std::string, std::unique_ptr<PartFile>> files_;

@@ -7,6 +7,8 @@
 namespace bielle {
 namespace {
 
+constexpr int kDeepest = 20;  // parts in parts
+
 bool areSame(const Option& a, const Option& b) {
   return a.value == b.value && a.unit == b.unit && a.bounds.lower == b.bounds.lower &&
          a.bounds.upper == b.bounds.upper && a.choices == b.choices;
@@ -87,7 +89,13 @@ PartChoices listBoundChoices(const PartFile& owner, const PartMounting& mounting
   return bound;
 }
 
-std::vector<PartParameter> listParameters(PartLibrary& library, const PartFile& file, const PartChoices& chosen) {
+const std::vector<PartParameter>& listParameters(PartLibrary& library, const PartFile& file, const PartChoices& chosen,
+                                                 int depth) {
+  if (depth > kDeepest)
+    throw InputError(file.path, "key 'tree'", "its parts mount each other without end",
+                     "remove the part that is its own");
+  const std::pair<const PartFile*, PartChoices> key = {&file, chosen};
+  if (const auto known = library.parameters.find(key); known != library.parameters.end()) return known->second;
   std::vector<PartParameter> out;
   for (const PartParameter& p : file.parameters)
     if (p.option.choices.empty() || !chosen.count(p.option.name)) out.push_back(p);
@@ -96,13 +104,13 @@ std::vector<PartParameter> listParameters(PartLibrary& library, const PartFile& 
     const PartMounting mounting(entry);
     const PartChoices bound = listBoundChoices(file, mounting, chosen);
     for (const PartFile* part : listAlternatives(library, file, mounting, chosen))
-      for (PartParameter p : listParameters(library, *part, bound)) {
+      for (PartParameter p : listParameters(library, *part, bound, depth + 1)) {
         if (mounting.findSet(p.option.name) || file.defines(p.option.name)) continue;
         p.option.name = mounting.prefix + p.option.name;
         addParameter(std::move(p), entry, out);
       }
   }
-  return out;
+  return library.parameters.emplace(key, std::move(out)).first->second;
 }
 
 }  // namespace bielle

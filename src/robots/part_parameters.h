@@ -4,8 +4,6 @@
 
 namespace bielle {
 
-using PartChoices = std::map<std::string, std::string>;  // parameter that chooses -> what is chosen
-
 /// The entry of a tree that mounts a part.
 struct PartMounting {
   const YamlEntry& entry;
@@ -27,8 +25,10 @@ std::vector<const PartFile*> listAlternatives(PartLibrary& library, const PartFi
 /// Choices of a mounted part that its mounting binds to a name.
 PartChoices listBoundChoices(const PartFile& owner, const PartMounting& mounting, const PartChoices& chosen);
 
-/// All parameters of a file that `chosen` leaves open, with those of parts in it.
-/// \throws InputError for parameters of one name that differ
-std::vector<PartParameter> listParameters(PartLibrary& library, const PartFile& file, const PartChoices& chosen);
+/// All parameters of a file that `chosen` leaves open, with those of parts in it; kept by the library.
+/// \param depth  of the file in others
+/// \throws InputError for parameters of one name that differ, and for parts that mount each other without end
+const std::vector<PartParameter>& listParameters(PartLibrary& library, const PartFile& file, const PartChoices& chosen,
+                                                 int depth = 0);
 
 }  // namespace bielle
