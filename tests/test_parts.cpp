@@ -113,6 +113,15 @@ tree:
   lower: {part: rod, prefix: lower_, sides: [_left, _right], mounts: {base: "rod_upper{side}"}, set: {at: -span*z, length: span/2}}
 )";
 
+VectorXd closeAngle(const Model& slider, double angle) {
+  VectorXd q = slider.makeNeutral();
+  for (int step = 1; step <= 20; ++step) {
+    getCoordinate(slider, q, "motor") = angle * step / 20;
+    q = closeConfiguration(slider, q).q;
+  }
+  return q;
+}
+
 const double kThigh = 0.22, kShank = 0.24, kMiddle = 1.2;
 const std::vector<double> kKnees = {0.5, 0.9, 1.2, 1.6};
 
@@ -168,9 +177,10 @@ TEST_CASE("parts: six-bars by circles that meet") {
 
     // Stephenson: with the crank's angle as it came out, the coupler's pivots are where circles meet, and the rod has its length.
     q = closeAt(stephenson, {{"knee_left", angle}, {"knee_right", angle}});
-    const Eigen::Vector2d b = turn(getCoordinate(stephenson, q, "motor_knee_left"), {-0.05, 0}), d(0, -0.08);
-    const Eigen::Vector2d b0(-0.05, 0), c0(-0.045, -0.08), e0(-0.055, -0.13);
-    const Eigen::Vector2d c = intersect(d, 0.045, b, (c0 - b0).norm(), 1);
+    const Eigen::Vector2d b = turn(getCoordinate(stephenson, q, "motor_knee_left"), {-0.05, 0}), d(0.013, -0.089);
+    const Eigen::Vector2d b0(-0.05, 0), c0 = d - 0.053 * Eigen::Vector2d(std::cos(0.03), std::sin(0.03)),
+                                        e0 = c0 - Eigen::Vector2d(0.006, 0.041);
+    const Eigen::Vector2d c = intersect(d, 0.053, b, (c0 - b0).norm(), 1);
     const double tilt = std::atan2((c - b).y(), (c - b).x()) - std::atan2((c0 - b0).y(), (c0 - b0).x());
     const Eigen::Vector2d e = b + turn(-tilt, e0 - b0);
     const Eigen::Vector2d f = knee + turn(getCoordinate(stephenson, q, "knee_left") - kMiddle, {-0.05, 0});
@@ -247,7 +257,7 @@ TEST_CASE("parts: accelerations by their parameters, against robots made anew") 
         if (!is_own && p.name != "thigh_length" && p.name != "rod_density") continue;
         DesignVariable variable;
         variable.name = variable.parameter = p.name;
-        const double width = 0.1 * std::max(1e-6, std::abs(*value));
+        const double width = std::max(p.unit == "m" || p.unit == "rad" ? 5e-3 : 0.0, 0.1 * std::abs(*value));
         variable.lower = std::max(p.bounds.lower, *value - width);
         variable.upper = std::min(p.bounds.upper, *value + width);
         variables.push_back(variable);
@@ -257,7 +267,7 @@ TEST_CASE("parts: accelerations by their parameters, against robots made anew") 
       std::mt19937 random(7);
       std::uniform_real_distribution<double> uniform(-1, 1);
       const VectorXd q = assembleReference(model, "half_sitting").q;
-      const VectorXd v = VectorXd::NullaryExpr(model.nv(), [&] { return uniform(random); });
+      VectorXd v = VectorXd::NullaryExpr(model.nv(), [&] { return uniform(random); });
       const VectorXd u = VectorXd::NullaryExpr(model.nv(), [&] { return 10 * uniform(random); });
       const auto calcAcceleration = [&](const Model& of) {
         Workspace ws(of);
@@ -270,11 +280,13 @@ TEST_CASE("parts: accelerations by their parameters, against robots made anew") 
       const ConstraintSet constraints = makeConstraintSet(model);
       ConstrainedWorkspace cws;
       updateConstrainedDynamics(model, ws, cws, constraints, q, v, u);
+      v -= MatrixXd(cws.J).completeOrthogonalDecomposition().solve(cws.J * v);  // loops stay closed
+      updateConstrainedDynamics(model, ws, cws, constraints, q, v, u);
       const MatrixXd analytic =
           calcConstrainedVariation(model, ws, cws, constraints, calcDesignVariations(robot, robot.start())).a;
       MatrixXd numeric(model.nv(), static_cast<Eigen::Index>(variables.size()));
       for (Eigen::Index i = 0; i < numeric.cols(); ++i) {
-        const double h = 1e-4 * (robot.upper()[i] - robot.lower()[i]);
+        const double h = 6e-4 * (robot.upper()[i] - robot.lower()[i]);
         const VectorXd step = h * VectorXd::Unit(numeric.cols(), i);
         numeric.col(i) =
             (calcAcceleration(robot.make(robot.start() + step)) - calcAcceleration(robot.make(robot.start() - step))) /
@@ -289,16 +301,14 @@ TEST_CASE("parts: bars that are drawn with a slide, against the closed form of c
   const std::string file = files.write("slider/slider.yaml", kSlider);
   const Model model = loadRobot(file).model;
   CHECK(model.name() == "slider");
-  CHECK(model.nv() == 3);
+  CHECK(model.nv() == 4);
   REQUIRE(model.nu() == 1);
   CHECK(model.motors()[0].name == "motor");
-  CHECK(calcMobility(model, model.makeNeutral()).mobility == 1);
+  const Mobility mobility = calcMobility(model, closeAngle(model, 0.3));
+  CHECK(mobility.mobility == 1);
+  CHECK(mobility.rank == mobility.rows);
   for (const double angle : {0.3, 1.0, 2.0}) {
-    VectorXd q = model.makeNeutral();
-    for (int step = 1; step <= 20; ++step) {
-      getCoordinate(model, q, "motor") = angle * step / 20;
-      q = closeConfiguration(model, q).q;
-    }
+    VectorXd q = closeAngle(model, angle);
     const double at = getCoordinate(model, q, "motor"), c = 0.1 * std::cos(at), s = 0.1 * std::sin(at);
     CHECK(at == Approx(angle).margin(0.1));
     CHECK(getCoordinate(model, q, "slide") == Approx(c + std::sqrt(0.09 - s * s) - 0.4).margin(1e-9));

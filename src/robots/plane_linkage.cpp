@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -178,6 +179,7 @@ class PlaneLinkage {
         const auto named = hinges_.find(point);
         const bool is_named = named != hinges_.end() && !hung_.count(point);
         joint.joint.name = is_named ? place_.make_name(named->second.getText(), named->second) : bar.name + "_hinge";
+        if (is_named) named_.push_back(joint.joint.name);
         addJointTo(place_.files.urdf, joint, bar.entry);
         bar.X = SE3{X->R, points_.at(point)};
         addSolidsTo(place_.files.urdf.links.at(bar.name), makeBar(bar));
@@ -206,6 +208,31 @@ class PlaneLinkage {
     }
   }
 
+  // A universal joint in place of the hinge of a bar that carries no other: then no row of the closure is redundant.
+  void freeOne(const std::string& point, const Body& a, const Body& b) {
+    std::vector<UrdfJoint>& joints = place_.files.urdf.joints;
+    const bool is_first_simpler = a.points.size() < b.points.size();  // a rod rather than what turns several
+    for (const Body* bar : {is_first_simpler ? &a : &b, is_first_simpler ? &b : &a}) {
+      const bool carries =
+          std::any_of(joints.begin(), joints.end(), [bar](const UrdfJoint& j) { return j.parent == bar->name; });
+      const auto it =
+          std::find_if(joints.begin(), joints.end(), [bar](const UrdfJoint& j) { return j.child == bar->name; });
+      if (!bar->is_bar || carries || it->joint.kind != JointKind::Revolute || contains(named_, it->joint.name))
+        continue;
+      // Across the bar as far as axes of coordinates go.
+      const Vector3d along = getPlaceIn(*bar, point);
+      Vector3d across;
+      double least = std::numeric_limits<double>::infinity();
+      for (int i = 0; i < 3; ++i) {
+        const double share = normal_[i] != 0 ? least : std::abs(along[i]);
+        if (share < least) least = share, across = Vector3d::Unit(i);
+      }
+      it->joint.kind = JointKind::Universal;
+      it->joint.axis2 = across;
+      return;
+    }
+  }
+
   void closeAt(const std::string& point, const Body& a, const Body& b, size_t number) {
     const std::string stem =
         place_.make_name(point + "_{part}" + (number > 1 ? "_" + std::to_string(number) : ""), entry_);
@@ -215,6 +242,7 @@ class PlaneLinkage {
     closure.frame1 = stem + "_1";
     closure.frame2 = stem + "_2";
     place_.files.yaml.closures.push_back(closure);
+    freeOne(point, a, b);
     const auto self = *this;
     place_.later.push_back([self, a, b, closure, point = point] {
       UrdfFile& urdf = self.place_.files.urdf;
@@ -233,6 +261,7 @@ class PlaneLinkage {
   std::map<std::string, Vector3d> points_;  // in the base
   std::vector<Body> bodies_;
   std::map<std::string, YamlEntry> hinges_;
+  std::vector<std::string> named_;                        // joints of hinges_, which keep their coordinate
   std::map<std::string, std::vector<const Body*>> hung_;  // bars that hang on a point
 };
 

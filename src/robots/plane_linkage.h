@@ -3,8 +3,9 @@
 ///
 /// Points are places of a plane through a link, at one posture. Bodies that have a point in common are hinged there, about the normal
 /// of the plane: bars to each other, and to links of the robot. A tree of hinges, breadth first from those links, carries the bars;
-/// every other coincidence is a closure of three rows, one of which repeats that the linkage is plane. In that posture the
-/// coordinates of all hinges are zero, and the links that the drawing shows at an angle are at that angle of their joint.
+/// every other coincidence is a closure of three rows, for which a bar that carries no other gets a universal joint, so that no row
+/// is redundant. In that posture the coordinates of all hinges are zero, and the links that the drawing shows at an angle are at that
+/// angle of their joint.
 #include <functional>
 #include <string>
 #include <vector>

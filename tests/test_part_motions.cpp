@@ -1,0 +1,34 @@
+// Every part of leg_biped in one of five robots: dynamics against Simbody, a squat and a walk that pass the check.
+#include <catch2/catch.hpp>
+
+#include "robot_directory.h"
+#include "run_command.h"
+
+using namespace bielle::testing;
+using Catch::Contains;
+
+TEST_CASE("parts: bipeds of all of them squat and walk, and have Simbody's dynamics") {
+  const RobotDirectory files;
+  const char* const robots[] = {
+      "hip: serial, knee: watt, ankle: biarticular", "hip: serial, knee: stephenson, ankle: spu",
+      "hip: three_rrs, knee: parallel_spring, ankle: digit", "hip: serial, knee: pantograph, ankle: thigh_rods",
+      "hip: serial, knee: ball_screw, ankle: stacked_rods"};
+  int count = 0;
+  for (const char* parts : robots) {
+    CAPTURE(parts);
+    const std::string name = "biped" + std::to_string(++count);
+    const std::string robot =
+        files.write(name + "/" + name + ".yaml", "generator: leg_biped\nset: {" + std::string(parts) + "}\n");
+    const CommandResult validated =
+        runCommand({BIELLE_COMMAND, "validate", "--samples", "2", "--motion", "0.02", "--motion-step", "1e-4", robot});
+    INFO(validated.out << validated.err);
+    CHECK(validated.status == 0);
+    for (const char* motion : {"squat", "walk"}) {
+      const CommandResult solved = runCommand(
+          {BIELLE_COMMAND, "solve", motion, "--robot", robot, "--no-report", "-o", files.path() + "/" + name + motion});
+      INFO(solved.out << solved.err);
+      CHECK(solved.status == 0);
+      CHECK_THAT(solved.out, Contains(": passed"));
+    }
+  }
+}
