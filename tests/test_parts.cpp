@@ -351,6 +351,22 @@ TEST_CASE("parts: one of one's own beside the robot that chooses it, with what t
   CHECK(found);
 }
 
+TEST_CASE("parts: motors of a catalogue by their role") {
+  const RobotDirectory files;
+  const std::string text = "tree: {biped: {part: leg_biped}}\nroles: {knee: {type: ak80-9, ratio: 18}}\n";
+  const Model model = loadRobot(files.write("typed/typed.yaml", text)).model;
+  int count = 0;
+  for (const Motor& motor : model.motors()) {
+    const bool is_knee = motor.name.rfind("motor_knee", 0) == 0;
+    CHECK((motor.drive.type == "ak80-9") == is_knee);
+    CHECK((motor.armature == 1e-3) != is_knee);
+    count += is_knee;
+  }
+  CHECK(count == 2);
+  CHECK_THROWS_WITH(loadRobot(files.write("typed/typed.yaml", replaceOnce(text, "knee:", "elbow:"))),
+                    Contains("no motor has the role 'elbow'; known are hip, knee, ankle"));
+}
+
 TEST_CASE("parts: errors give the file, the line, the name and what to do") {
   const RobotDirectory files;
   const auto refuse = [&](const std::string& text, const std::string& from, const std::string& to,

@@ -59,6 +59,7 @@ struct MotorSpec {
   std::string joint;
   std::optional<double> armature, effort, velocity, torque_loss, continuous_effort;
   MotorDrive drive;
+  std::string role = {};  ///< in a robot composed of parts
 };
 
 struct JointForceSpec {

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "bielle/model/error.h"
+#include "formats/motor_catalogue.h"
 #include "model/listing.h"
 #include "robots/part_parameters.h"
 #include "robots/part_solids.h"
@@ -20,6 +21,7 @@ using Values = std::map<std::string, OptionValue>;
 struct MountedPart {
   std::string name;                           // of its place in the tree of the mounting file
   std::string suffix;                         // of all its names
+  std::string role;                           // of its motors
   double side = 1;                            // -1: the mirror image
   std::map<std::string, std::string> mounts;  // what it calls what
   PartChoices chosen;
@@ -81,6 +83,7 @@ class PartComposer {
     addSolidsOfMounts();
     addFrames();
     addShared();
+    applyRoles();
   }
 
  private:
@@ -247,7 +250,7 @@ class PartComposer {
       c.coefficients = std::move(coefficients);
     }
     append(own.closures, yaml.closures);
-    for (MotorSpec& motor : own.motors) use(motor.joint);
+    for (MotorSpec& motor : own.motors) use(motor.joint), motor.role = part_.role;
     append(own.motors, yaml.motors);
     for (const auto& [joint, value] : own.armature) yaml.armature[resolve(joint, any)] = value;
     for (JointForceSpec& force : own.joint_forces) use(force.joint);
@@ -267,6 +270,27 @@ class PartComposer {
     if (own.gravity) yaml.gravity = own.gravity;
     if (own.base) yaml.base = own.base;
     append(own.warnings, yaml.warnings);
+  }
+
+  // Motors by their role, those of the parts in this one: what the file says takes the place of what the parts said.
+  void applyRoles() {
+    const YamlEntry* roles = findScoped("roles");
+    if (!roles) return;
+    const YamlEntry* catalogue = findScoped("motor_catalogue");
+    std::vector<MotorSpec>& motors = out_.files.yaml.motors;
+    for (const MotorSpec& spec : readMotorSpecs(*roles, file_.path, catalogue)) {
+      std::vector<std::string> known;
+      bool is_found = false;
+      for (MotorSpec& motor : motors) {
+        if (!motor.role.empty() && !contains(known, motor.role)) known.push_back(motor.role);
+        if (motor.role != spec.joint) continue;
+        const std::string joint = motor.joint;
+        is_found = true;
+        motor = spec;
+        motor.joint = joint, motor.role = spec.joint;
+      }
+      if (!is_found) roles->fail("no motor has the role '" + spec.joint + "'", "known are " + listItems(known));
+    }
   }
 
   // References of one name are one.
@@ -299,6 +323,8 @@ class PartComposer {
     part.name = fillIn(key, placeholders_, entry);
     part.suffix = part_.suffix;
     part.side = part_.side;
+    const YamlEntry* role = find(mounting.fields, "role");
+    part.role = role ? fillIn(role->getText(), placeholders_, *role) : part_.role;
     part.chosen = listBoundChoices(file_, mounting, chosen);
     part.values = bindValues(file, mounting, part.chosen);
     part.points = bindPoints(file, mounting);

@@ -71,8 +71,8 @@ MountKind readMountKind(const YamlEntry& entry) {
 }
 
 std::vector<std::string> listPartKeys() {
-  std::vector<std::string> keys = {"help",     "parameters", "points", "mounts", "let",
-                                   "requires", "tree",       "solids", "frames", "linkage"};
+  std::vector<std::string> keys = {"help", "parameters", "points", "mounts",  "let",  "requires",
+                                   "tree", "solids",     "frames", "linkage", "roles"};
   keys.insert(keys.end(), listSharedKeys().begin(), listSharedKeys().end());
   return keys;
 }

@@ -32,7 +32,7 @@ void addParameter(PartParameter parameter, const YamlEntry& entry, std::vector<P
 }  // namespace
 
 PartMounting::PartMounting(const YamlEntry& mounted)
-    : entry(mounted), fields(mounted.getFields({"part", "prefix", "set", "mounts", "sides", "when"})) {
+    : entry(mounted), fields(mounted.getFields({"part", "prefix", "set", "mounts", "role", "sides", "when"})) {
   if (const YamlEntry* given = find(fields, "prefix")) prefix = given->getText();
   if (const YamlEntry* given = find(fields, "set")) set = given->getMap();
 }
