@@ -346,7 +346,47 @@ class ReportPage(unittest.TestCase):
             self.assertGreater(differ(before, self.browser.evaluate(PICTURE)), 100, index)
         self.assertGreater(closed, 48)
         self.assertGreater(refused, 0)  # the knee's linkage has a dead point
-        self.browser.evaluate("document.querySelector('#sliders > button').click()")
+        self.browser.evaluate("document.querySelector('#sliders > div:last-child > button').click()")
+        self.assertLess(differ(start, self.browser.evaluate(PICTURE)), 200)
+
+    def test_parameters_have_sliders_whose_robots_close(self):
+        page = self.root / "parameters.html"
+        run("view", "leg_biped", "--parameter", "knee_crank", "--parameter", "thigh_length=0.1:0.3", "-o", page)
+        self.browser.open(page)
+        start = self.browser.evaluate(PICTURE)
+        move = """((index, place) => {
+          const slider = document.querySelectorAll('.parameters input')[index];
+          slider.value = place;
+          slider.dispatchEvent(new Event('input'));
+          return [slider.parentElement.querySelector('output').textContent, report.viewer.getLargestGap(),
+                  report.scene.robots.filter(robot => robot.root.visible).length,
+                  report.viewer.run.robot.closures[0].pose[2]];
+        })"""
+        names = self.browser.evaluate("[...document.querySelectorAll('.parameters .name')].map(e => e.textContent)")
+        self.assertEqual(names, ["knee_crank", "thigh_length"])
+        self.assertGreater(self.browser.evaluate("document.querySelector('.parameters').clientHeight"), 20)
+        motor = self.browser.evaluate("""(() => {
+          const slider = document.querySelectorAll('.motors input')[0];
+          slider.value = Number(slider.value) + 0.3;
+          slider.dispatchEvent(new Event('input'));
+          return Number(slider.value);
+        })()""")
+        for index, place, shown in ((0, 6, "0.065 m"), (1, 6, "0.3 m"), (0, 0, "0.035 m")):
+            before = self.browser.evaluate(PICTURE)
+            value, gap, visible, _ = self.browser.evaluate(f"{move}({index}, {place})")
+            self.assertEqual(value, shown)
+            self.assertLess(gap, 2e-3)
+            self.assertEqual(visible, 1)
+            self.assertGreater(differ(before, self.browser.evaluate(PICTURE)), 100)
+            kept = self.browser.evaluate("Number(document.querySelectorAll('.motors input')[0].value)")
+            self.assertAlmostEqual(kept, motor, 6)
+        self.browser.evaluate(f"{move}(1, 0)")  # a thigh of 0.1 m does not reach the ground
+        self.assertIn("no such robot", self.browser.evaluate("document.querySelector('.parameters .status').textContent"))
+        self.browser.evaluate(f"{move}(0, 0)")
+        # One parameter at a time; in its middle it is the robot again.
+        self.assertEqual(self.browser.evaluate("document.querySelectorAll('.parameters output')[1].textContent"), "0.22 m")
+        self.browser.evaluate(f"{move}(0, 3)")
+        self.browser.evaluate("document.querySelector('#sliders > div:last-child > button').click()")
         self.assertLess(differ(start, self.browser.evaluate(PICTURE)), 200)
 
     def test_springs_between_points_follow_the_bodies(self):

@@ -9,13 +9,13 @@ class Report {
     this.options = readFragment();
     document.title = makeTitle(this.runs) + ' – Bielle';
     document.getElementById('title').textContent = makeTitle(this.runs);
-    if (!json.view) fillBadges(document.getElementById('badges'), this.runs);
+    if (!json.views) fillBadges(document.getElementById('badges'), this.runs);
     this.openScene();
     if (this.scene && this.options.film.length) {
       new Film(this.scene, this.camera, this.runs, this.options).show();
       return;
     }
-    if (json.view) {
+    if (json.views) {
       this.showRobot(json);
       return;
     }
@@ -60,6 +60,7 @@ class Report {
     document.title = this.runs[0].robot.name + ' – Bielle';
     if (!this.scene) return;
     for (const [layer] of LAYERS) this.scene.setLayer(layer, layer === 'locks');
+    this.scene.setSideBySide(false);  // one of them is shown
     this.addViewerControls(['locks']);
     const caption = document.getElementById('caption');
     const update = () => {
@@ -68,9 +69,22 @@ class Report {
           'largest gap of a loop ' + formatNumber(this.viewer.getLargestGap(), 2) + ' m' :
           '';
     };
-    this.viewer = new RobotViewer(this.scene, this.runs[0], json.view, update);
-    this.viewer.addControls(document.getElementById('sliders'));
-    this.viewer.place();
+    const viewers = json.views.map((view, i) => new RobotViewer(this.scene, this.runs[i], view, update));
+    const parameters = addElement(document.getElementById('sliders'), 'div');
+    const motors = addElement(document.getElementById('sliders'), 'div');
+    this.showVariant = index => {
+      const values = this.viewer ? this.viewer.listValues() : {};
+      this.viewer = viewers[index];
+      this.scene.robots.forEach((robot, i) => {
+        robot.root.visible = i === index;
+      });
+      this.viewer.takeValues(values);
+      motors.textContent = '';
+      this.viewer.addControls(motors);
+      this.viewer.place();
+    };
+    this.parameters = new RobotParameters(parameters, json.parameters, this.showVariant);
+    this.showVariant(0);
     const tick = () => {
       if (this.isStale) this.draw();
       requestAnimationFrame(tick);
@@ -116,7 +130,7 @@ class Report {
     toggle('follow', true, on => {
       this.camera.following = on;
     });
-    if (this.runs.length > 1)
+    if (this.runs.length > 1 && !page.views)
       toggle('side by side', this.options.apart, on => {
         this.scene.setSideBySide(on);
         this.camera.setView('oblique');

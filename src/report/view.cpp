@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/loop_conflict.h"
+#include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "formats/text_file.h"
 #include "report/pack.h"
@@ -169,9 +170,12 @@ ReportRun makeStill(const LoadedRobot& robot, const VectorXd& q) {
   return run;
 }
 
-}  // namespace
+// A robot as a run of the page, and its grids.
+struct StillView {
+  Json run, view;
+};
 
-std::string makeView(const LoadedRobot& robot) {
+StillView makeStillView(const LoadedRobot& robot, const std::string& label) {
   const Model& model = robot.model;
   const VectorXd start = makeStart(robot);
   const ReportRun still = makeStill(robot, start);
@@ -179,16 +183,46 @@ std::string makeView(const LoadedRobot& robot) {
   Json grids = Json::array(), parents = Json::array();
   for (const Group& group : groups) grids.push_back(GroupGrid(model, group, start).describe());
   for (const Joint& joint : model.joints()) parents.push_back(joint.parent);
-  return makePage({{"bielle", getBuildInfo().bielle},
-                   {"runs",
-                    {{{"label", model.name()},
-                      {"summary", still.summary},
-                      {"check", Json()},
-                      {"robot", describeRobot(robot)},
-                      {"motion", describeMotion(still)}}}},
-                   {"view", {{"parents", parents}, {"groups", grids}}}});
+  return {{{"label", label},
+           {"summary", still.summary},
+           {"check", Json()},
+           {"robot", describeRobot(robot)},
+           {"motion", describeMotion(still)}},
+          {{"parents", parents}, {"groups", grids}}};
 }
 
-void writeView(const std::string& path, const LoadedRobot& robot) { writeTextFile(path, makeView(robot)); }
+std::optional<StillView> findStillView(const LoadedRobot& robot, const std::string& label) {
+  try {
+    return makeStillView(robot, label);
+  } catch (const InputError&) {  // its loops do not close
+    return {};
+  }
+}
+
+}  // namespace
+
+std::string makeView(const LoadedRobot& robot, const std::vector<ViewParameter>& parameters) {
+  const StillView base = makeStillView(robot, robot.model.name());
+  Json runs = {base.run}, views = {base.view}, sliders = Json::array();
+  for (const ViewParameter& parameter : parameters) {
+    Json indices = Json::array();  // of runs, null where the robot does not close
+    for (size_t i = 0; i < parameter.values.size(); ++i) {
+      std::optional<StillView> other;
+      if (i != parameter.start && parameter.robots[i]) other = findStillView(*parameter.robots[i], parameter.name);
+      indices.push_back(i == parameter.start ? Json(0) : other ? Json(runs.size()) : Json());
+      if (other) runs.push_back(other->run), views.push_back(other->view);
+    }
+    sliders.push_back({{"name", parameter.name},
+                       {"unit", parameter.unit},
+                       {"values", parameter.values},
+                       {"start", parameter.start},
+                       {"runs", indices}});
+  }
+  return makePage({{"bielle", getBuildInfo().bielle}, {"runs", runs}, {"views", views}, {"parameters", sliders}});
+}
+
+void writeView(const std::string& path, const LoadedRobot& robot, const std::vector<ViewParameter>& parameters) {
+  writeTextFile(path, makeView(robot, parameters));
+}
 
 }  // namespace bielle

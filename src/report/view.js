@@ -108,6 +108,27 @@ class RobotViewer {
     return this.run.robot.closures.reduce((gap, closure, c) => Math.max(gap, this.run.gaps.get(0, 2 * c)), 0);
   }
 
+  // Values of motors by name, where they are on their grids.
+  listValues() {
+    const values = {};
+    for (const grid of this.grids)
+      grid.motors.forEach((entry, i) => {
+        values[this.run.robot.motors[entry.motor].name] = grid.values[i];
+      });
+    return values;
+  }
+
+  // The motors as those of another robot, as far as the grids go and the loops close.
+  takeValues(values) {
+    this.grids.forEach((grid, g) => {
+      const wished = grid.motors.map((entry, i) => {
+        const value = values[this.run.robot.motors[entry.motor].name];
+        return Math.min(entry.high, Math.max(entry.low, value === undefined ? grid.values[i] : value));
+      });
+      this.setValues(g, wished);
+    });
+  }
+
   addControls(parent) {
     const robot = this.run.robot;
     this.sliders = [];
@@ -143,7 +164,14 @@ class RobotViewer {
     const row = addElement(card, 'label', 'motor');
     addElement(row, 'span', 'name', name);
     const slider = addElement(row, 'input');
-    Object.assign(slider, {type: 'range', min: entry.low, max: entry.high, step: 'any', value: entry.start});
+    const grid = this.grids.find(grid => grid.motors.includes(entry));
+    Object.assign(slider, {
+      type: 'range',
+      min: entry.low,
+      max: entry.high,
+      step: 'any',
+      value: grid.values[grid.motors.indexOf(entry)]
+    });
     const value = addElement(row, 'output');
     slider.show = () => {
       value.textContent = Number(slider.value).toFixed(3);
@@ -151,5 +179,40 @@ class RobotViewer {
     slider.addEventListener('input', slider.show);
     slider.show();
     return slider;
+  }
+}
+
+// A slider for each parameter; one at a time differs from the robot itself. Each value is a robot of its own.
+class RobotParameters {
+  // \param show  called with the index of a robot
+  constructor(parent, parameters, show) {
+    this.sliders = [];
+    if (!parameters.length) return;
+    const card = addElement(parent, 'div', 'card parameters');
+    const status = addElement(card, 'p', 'status', '');
+    for (const parameter of parameters) {
+      const row = addElement(card, 'label', 'motor');
+      addElement(row, 'span', 'name', parameter.name);
+      const slider = addElement(row, 'input');
+      Object.assign(slider, {type: 'range', min: 0, max: parameter.values.length - 1, step: 1, value: parameter.start});
+      const value = addElement(row, 'output');
+      slider.show = () => {
+        value.textContent = formatNumber(parameter.values[Number(slider.value)], 4) +
+            (parameter.unit && parameter.unit !== '1' ? ' ' + parameter.unit : '');
+      };
+      slider.show();
+      slider.addEventListener('input', () => {
+        this.sliders.forEach((other, i) => {
+          if (other !== slider) other.value = parameters[i].start;
+          other.show();
+        });
+        const index = parameter.runs[Number(slider.value)];
+        status.textContent = index === null ? 'there is no such robot, or its loops do not close; the last one is shown' : '';
+        status.className = index === null ? 'status fail' : 'status';
+        if (index !== null) show(index);
+      });
+      this.sliders.push(slider);
+    }
+    if (parameters.length > 1) addElement(card, 'p', 'status', 'One parameter at a time differs from the robot.');
   }
 }

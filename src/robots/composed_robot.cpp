@@ -449,12 +449,11 @@ ComposedRobot::ComposedRobot(const std::string& path, const std::map<std::string
     : file_(&library_.read(path)), parameters_("parameter", std::filesystem::path(path).stem().string()) {
   if (!file_->mounts.empty())
     throw InputError(path, "key 'mounts'", "it is a part of a robot", "give a robot whose `tree` mounts it");
-  for (PartParameter p : listParameters(library_, *file_, {})) {
+  library_.own_parts = parts;
+  for (const PartParameter& p : listParameters(library_, *file_, {})) {
     const std::string element = "parameter '" + p.option.name + "' of " + p.file;
     if (p.required)
       throw InputError(path, element, "nothing gives it a value", "declare one of this name, or `set` it");
-    const auto own = parts.find(p.option.name);
-    if (own != parts.end() && !contains(p.option.choices, own->second)) p.option.choices.push_back(own->second);
     parameters_.add(p.option);
   }
 }

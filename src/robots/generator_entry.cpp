@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "bielle/model/error.h"
+#include "formats/robot_files.h"
 
 namespace fs = std::filesystem;
 
@@ -34,6 +35,16 @@ GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settin
     if (!error.source().empty() && error.source() != name.getText()) throw;  // it names file and line
     entry.fail(error.problem(), error.remedy());
   }
+}
+
+std::optional<GeneratorEntry> readGeneratorOf(const std::string& file) {
+  if (fs::path(file).extension() != ".yaml") return {};
+  const YamlFile yaml = readYaml(file);
+  if (yaml.generator) return readGeneratorEntry(*yaml.generator, yaml.settings ? &*yaml.settings : nullptr);
+  if (!yaml.composed) return {};
+  Generator generator = findGenerator(file);
+  OptionSet parameters = generator.parameters;
+  return GeneratorEntry{std::move(generator), std::move(parameters)};
 }
 
 }  // namespace bielle

@@ -1,5 +1,8 @@
 #pragma once
 /// \file The generated robot that a YAML file names, with the parameters that it sets.
+#include <optional>
+#include <string>
+
 #include "bielle/robots/generators.h"
 #include "formats/yaml_entry.h"
 
@@ -14,5 +17,8 @@ struct GeneratorEntry {
 /// \param settings  a map from parameters to numbers, or to names of choices, of which files (.yaml) are relative to that of the entry; null for none
 /// \throws InputError naming file, line, parameter and remedy
 GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settings);
+
+/// That of a robot's file: one that names a generator, or composes a robot of parts; none for any other.
+std::optional<GeneratorEntry> readGeneratorOf(const std::string& file);
 
 }  // namespace bielle

@@ -143,9 +143,11 @@ const PartFile& PartLibrary::find(const std::string& name, const YamlEntry& entr
   std::vector<std::string> searched;
   for (const fs::path& directory : listPartDirectories(entry.path()))
     for (const fs::path& candidate : {directory / file, directory.parent_path() / name / (stem + ".yaml")}) {
+      if (has_extension && candidate != directory / file) continue;
       if (fs::is_regular_file(candidate, error)) return read(candidate.lexically_normal().string());
       searched.push_back(candidate.lexically_normal().string());
     }
+  if (has_extension && fs::is_regular_file(name, error)) return read(name);  // chosen by its path
   entry.fail("there is no part '" + name + "'", "searched were " + listItems(searched));
 }
 

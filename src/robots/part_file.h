@@ -45,6 +45,7 @@ class PartLibrary {
   /// A part by its name: a file beside that of `entry`, in `parts` of the directories of robots, or the file of a robot.
   const PartFile& find(const std::string& name, const YamlEntry& entry);
 
+  PartChoices own_parts;  ///< files that are choices of parameters of these names, besides those that files list
   /// Of listParameters (part_parameters.h), by file and choices.
   std::map<std::pair<const PartFile*, PartChoices>, std::vector<PartParameter>> parameters;
 

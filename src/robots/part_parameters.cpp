@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "bielle/model/error.h"
+#include "model/listing.h"
 
 namespace bielle {
 namespace {
@@ -12,6 +13,14 @@ constexpr int kDeepest = 20;  // parts in parts
 bool areSame(const Option& a, const Option& b) {
   return a.value == b.value && a.unit == b.unit && a.bounds.lower == b.bounds.lower &&
          a.bounds.upper == b.bounds.upper && a.choices == b.choices;
+}
+
+std::vector<std::string> listChoices(const PartLibrary& library, const PartParameter& parameter) {
+  std::vector<std::string> choices = parameter.option.choices;
+  const auto own = library.own_parts.find(parameter.option.name);
+  if (!choices.empty() && own != library.own_parts.end() && !contains(choices, own->second))
+    choices.push_back(own->second);
+  return choices;
 }
 
 void addParameter(PartParameter parameter, const YamlEntry& entry, std::vector<PartParameter>& out) {
@@ -63,7 +72,7 @@ std::vector<const PartFile*> listAlternatives(PartLibrary& library, const PartFi
       }
       const auto one = chosen.find(p.option.name);
       const std::vector<std::string> choices =
-          one == chosen.end() ? p.option.choices : std::vector<std::string>{one->second};
+          one == chosen.end() ? listChoices(library, p) : std::vector<std::string>{one->second};
       for (const std::string& choice : choices)
         filled.push_back(choice.size() > 5 && choice.substr(choice.size() - 5) == ".yaml"
                              ? choice
@@ -98,7 +107,10 @@ const std::vector<PartParameter>& listParameters(PartLibrary& library, const Par
   if (const auto known = library.parameters.find(key); known != library.parameters.end()) return known->second;
   std::vector<PartParameter> out;
   for (const PartParameter& p : file.parameters)
-    if (p.option.choices.empty() || !chosen.count(p.option.name)) out.push_back(p);
+    if (p.option.choices.empty() || !chosen.count(p.option.name)) {
+      out.push_back(p);
+      out.back().option.choices = listChoices(library, p);
+    }
   for (const auto& [name, entry] : file.tree) {
     if (!mountsPart(entry)) continue;
     const PartMounting mounting(entry);
