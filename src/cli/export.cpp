@@ -6,6 +6,8 @@
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "formats/text_file.h"
+#include "report/run.h"
+#include "results/motion_mcap.h"
 #include "results/opensim.h"
 #include "results/output_place.h"
 #include "results/result_files.h"
@@ -19,13 +21,19 @@ struct ExportArguments {
   std::string directory, format = "sto", output;
 };
 
+std::string formatTrajectory(const ExportArguments& arguments) {
+  if (arguments.format == "mot") return formatMot(readResultRecord(arguments.directory));
+  if (arguments.format == "sto") return formatSto(readResultRecord(arguments.directory));
+  const ReportRun run = readRun(arguments.directory);
+  return formatMotionMcap(run.robot, run.record, run.plan, run.summary);
+}
+
 int exportTrajectory(const ExportArguments& arguments) {
   const fs::path place = arguments.directory;
-  const MotionRecord record = readResultRecord(place.string());
   const fs::path path =
       arguments.output.empty() ? place / ("trajectory." + arguments.format) : fs::path(arguments.output);
   requireApart(path.string(), listResultFiles(place.string()));
-  writeTextFile(path.string(), arguments.format == "mot" ? formatMot(record) : formatSto(record));
+  writeTextFile(path.string(), formatTrajectory(arguments));
   std::cout << path.string() << "\n";
   return kOk;
 }
@@ -38,8 +46,9 @@ void addExport(CLI::App& app, Action& action) {
   command.add_option("DIR", arguments->directory, "result of `bielle solve` or `bielle simulate`")->required();
   command
       .add_option("--format", arguments->format,
+                  "mcap: frames, shapes, joints, forces and events (Foxglove, Lichtblick, PlotJuggler, Rerun); "
                   "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim)")
-      ->check(CLI::IsMember({"mot", "sto"}))
+      ->check(CLI::IsMember({"mcap", "mot", "sto"}))
       ->capture_default_str();
   command.add_option("-o,--output", arguments->output, "the file; default: trajectory.FORMAT in the directory");
   command.footer(
@@ -49,6 +58,7 @@ void addExport(CLI::App& app, Action& action) {
       "a joint, and q_names and v_names to sort the joints by.\n"
       "Examples:\n"
       "  bielle export squat --format mot\n"
+      "  bielle export squat --format mcap\n"
       "  bielle export squat --format sto -o squat.sto");
   command.callback([&action, arguments] { action = [=] { return exportTrajectory(*arguments); }; });
 }
