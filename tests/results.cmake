@@ -4,4 +4,5 @@ set_tests_properties(warm_start PROPERTIES LABELS unit)  # whole motions: minute
 bielle_test(hostile_files SOURCES test_hostile_files.cpp LIBS bielle_results)
 if(TARGET bielle_mujoco)
   bielle_test(mujoco SOURCES test_mujoco.cpp test_mujoco_hinges.cpp test_mujoco_reader.cpp LIBS bielle_mujoco)
+  bielle_test(reference_motion SOURCES test_reference_motion.cpp LIBS bielle_mujoco)
 endif()

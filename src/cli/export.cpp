@@ -3,13 +3,17 @@
 #include <iostream>
 #include <memory>
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
+#include "formats/mjcf.h"
 #include "formats/text_file.h"
 #include "report/run.h"
 #include "results/motion_mcap.h"
+#include "results/number_option.h"
 #include "results/opensim.h"
 #include "results/output_place.h"
+#include "results/reference_motion.h"
 #include "results/result_files.h"
 
 namespace fs = std::filesystem;
@@ -19,7 +23,33 @@ namespace {
 
 struct ExportArguments {
   std::string directory, format = "sto", output;
+  double rate = 50;
 };
+
+bool isReference(const std::string& format) { return format == "amp" || format == "mjlab"; }
+
+fs::path makePath(const ExportArguments& arguments) {
+  if (!arguments.output.empty()) return arguments.output;
+  return fs::path(arguments.directory) /
+         (isReference(arguments.format) ? arguments.format + ".npz" : "trajectory." + arguments.format);
+}
+
+// The robot is written beside it, as MuJoCo has it in the frames.
+void exportReference(const ExportArguments& arguments, const fs::path& path) {
+  const ReportRun run = readRun(arguments.directory);
+  const fs::path robot = fs::path(path).replace_extension(".xml");
+  requireApart(robot.string(), {path.string(), run.robot.file});
+  const VectorXd q_ref = findClosedConfiguration(run.robot.model).q;
+  MjcfOptions options;
+  options.rotations = MjcfRotations::Hinges;
+  const MjcfText text = formatMjcf(run.robot.model, q_ref, options);
+  const ReferenceMotion motion = makeReferenceMotion(run.robot.model, q_ref, run.record, arguments.rate);
+  for (const std::string& warning : motion.warnings) std::cerr << "bielle: warning: " << warning << "\n";
+  writeTextFile(path.string(), formatReferenceMotion(
+                                   motion, arguments.format == "amp" ? ReferenceFormat::Amp : ReferenceFormat::Mjlab));
+  writeTextFile(robot.string(), text.xml);
+  std::cout << path.string() << "\n" << robot.string() << "\n";
+}
 
 std::string formatTrajectory(const ExportArguments& arguments) {
   if (arguments.format == "mot") return formatMot(readResultRecord(arguments.directory));
@@ -29,10 +59,12 @@ std::string formatTrajectory(const ExportArguments& arguments) {
 }
 
 int exportTrajectory(const ExportArguments& arguments) {
-  const fs::path place = arguments.directory;
-  const fs::path path =
-      arguments.output.empty() ? place / ("trajectory." + arguments.format) : fs::path(arguments.output);
-  requireApart(path.string(), listResultFiles(place.string()));
+  const fs::path path = makePath(arguments);
+  requireApart(path.string(), listResultFiles(arguments.directory));
+  if (isReference(arguments.format)) {
+    exportReference(arguments, path);
+    return kOk;
+  }
   writeTextFile(path.string(), formatTrajectory(arguments));
   std::cout << path.string() << "\n";
   return kOk;
@@ -46,11 +78,17 @@ void addExport(CLI::App& app, Action& action) {
   command.add_option("DIR", arguments->directory, "result of `bielle solve` or `bielle simulate`")->required();
   command
       .add_option("--format", arguments->format,
+                  "amp, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; mjlab, BeyondMimic); "
                   "mcap: frames, shapes, joints, forces and events (Foxglove, Lichtblick, PlotJuggler, Rerun); "
                   "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim)")
-      ->check(CLI::IsMember({"mcap", "mot", "sto"}))
+      ->check(CLI::IsMember({"amp", "mcap", "mjlab", "mot", "sto"}))
       ->capture_default_str();
-  command.add_option("-o,--output", arguments->output, "the file; default: trajectory.FORMAT in the directory");
+  command.add_option("--fps", arguments->rate, "frames per second of a reference for learning")
+      ->check(isWithin(1e-3, 1e4))
+      ->capture_default_str();
+  command.add_option(
+      "-o,--output", arguments->output,
+      "the file; default: trajectory.FORMAT in the directory, amp.npz or mjlab.npz with the robot as .xml");
   command.footer(
       "SI units, radians. Without export: trajectory.csv has one named column per quantity and a column 'time', as\n"
       "PlotJuggler and spreadsheets read it; trajectory.npz holds arrays q and v with Pinocchio's frames and orders "
@@ -59,6 +97,7 @@ void addExport(CLI::App& app, Action& action) {
       "Examples:\n"
       "  bielle export squat --format mot\n"
       "  bielle export squat --format mcap\n"
+      "  bielle export squat --format mjlab --fps 50\n"
       "  bielle export squat --format sto -o squat.sto");
   command.callback([&action, arguments] { action = [=] { return exportTrajectory(*arguments); }; });
 }
