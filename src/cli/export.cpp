@@ -1,4 +1,6 @@
 // bielle export: a trajectory in the format of another program.
+#include "cli/export.h"
+
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -26,51 +28,51 @@ struct ExportArguments {
   double rate = 50;
 };
 
-bool isReference(const std::string& format) { return format == "amp" || format == "mjlab"; }
-
 fs::path makePath(const ExportArguments& arguments) {
   if (!arguments.output.empty()) return arguments.output;
   return fs::path(arguments.directory) /
          (isReference(arguments.format) ? arguments.format + ".npz" : "trajectory." + arguments.format);
 }
 
-// The robot is written beside it, as MuJoCo has it in the frames.
-void exportReference(const ExportArguments& arguments, const fs::path& path) {
-  const ReportRun run = readRun(arguments.directory);
-  const fs::path robot = fs::path(path).replace_extension(".xml");
-  requireApart(robot.string(), {path.string(), run.robot.file});
-  const VectorXd q_ref = findClosedConfiguration(run.robot.model).q;
-  MjcfOptions options;
-  options.rotations = MjcfRotations::Hinges;
-  const MjcfText text = formatMjcf(run.robot.model, q_ref, options);
-  const ReferenceMotion motion = makeReferenceMotion(run.robot.model, q_ref, run.record, arguments.rate);
-  for (const std::string& warning : motion.warnings) std::cerr << "bielle: warning: " << warning << "\n";
-  writeTextFile(path.string(), formatReferenceMotion(
-                                   motion, arguments.format == "amp" ? ReferenceFormat::Amp : ReferenceFormat::Mjlab));
-  writeTextFile(robot.string(), text.xml);
-  std::cout << path.string() << "\n" << robot.string() << "\n";
-}
-
-std::string formatTrajectory(const ExportArguments& arguments) {
-  if (arguments.format == "mot") return formatMot(readResultRecord(arguments.directory));
-  if (arguments.format == "sto") return formatSto(readResultRecord(arguments.directory));
-  const ReportRun run = readRun(arguments.directory);
-  return formatMotionMcap(run.robot, run.record, run.plan, run.summary);
-}
-
 int exportTrajectory(const ExportArguments& arguments) {
   const fs::path path = makePath(arguments);
   requireApart(path.string(), listResultFiles(arguments.directory));
+  ExportRequest request{arguments.directory, arguments.format, path.string(), "", arguments.rate};
   if (isReference(arguments.format)) {
-    exportReference(arguments, path);
-    return kOk;
+    request.robot = fs::path(path).replace_extension(".xml").string();
+    requireApart(request.robot, {path.string()});
   }
-  writeTextFile(path.string(), formatTrajectory(arguments));
+  for (const std::string& warning : writeExport(request)) std::cerr << "bielle: warning: " << warning << "\n";
   std::cout << path.string() << "\n";
+  if (!request.robot.empty()) std::cout << request.robot << "\n";
   return kOk;
 }
 
 }  // namespace
+
+bool isReference(const std::string& format) { return format == "amp" || format == "mjlab"; }
+
+std::vector<std::string> writeExport(const ExportRequest& request) {
+  if (request.format == "mot" || request.format == "sto") {
+    const MotionRecord record = readResultRecord(request.directory);
+    writeTextFile(request.path, request.format == "mot" ? formatMot(record) : formatSto(record));
+    return {};
+  }
+  const ReportRun run = readRun(request.directory);
+  if (request.format == "mcap") {
+    writeTextFile(request.path, formatMotionMcap(run.robot, run.record, run.plan, run.summary));
+    return {};
+  }
+  requireApart(request.robot, {run.robot.file});
+  const VectorXd q_ref = findClosedConfiguration(run.robot.model).q;
+  MjcfOptions options;
+  options.rotations = MjcfRotations::Hinges;
+  const ReferenceMotion motion = makeReferenceMotion(run.robot.model, q_ref, run.record, request.rate);
+  writeTextFile(request.path,
+                formatReferenceMotion(motion, request.format == "amp" ? ReferenceFormat::Amp : ReferenceFormat::Mjlab));
+  writeTextFile(request.robot, formatMjcf(run.robot.model, q_ref, options).xml);
+  return motion.warnings;
+}
 
 void addExport(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("export", "Write a trajectory in another program's format");
