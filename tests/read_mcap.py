@@ -190,7 +190,7 @@ def split_fields(data):
 
 
 def read_types(descriptor_set):
-    """Messages by full name: fields by number, each (name, is repeated, type, name of its type)."""
+    """Messages by full name: fields by number, each (name, is repeated, type, name of its type, is optional)."""
     types = {}
 
     def add(scope, descriptor):
@@ -201,7 +201,8 @@ def read_types(descriptor_set):
         types[full] = {}
         for field in fields["field"]:
             parts = dict(split_fields(field))
-            types[full][parts[3]] = (parts[1].decode(), parts[4] == 3, parts[5], parts.get(6, b"").decode())
+            kind = (parts[1].decode(), parts[4] == 3, parts[5], parts.get(6, b"").decode())
+            types[full][parts[3]] = kind + (parts.get(17) == 1,)
         for nested in fields["nested"]:
             add(full, nested)
 
@@ -216,11 +217,11 @@ def read_types(descriptor_set):
 
 
 def decode(types, name, data):
-    """A message as a dictionary; absent messages are None, absent numbers and texts zero and empty."""
-    out = {field: [] if repeated else None if kind == 11 else b"" if kind == 12 else "" if kind == 9 else 0
-           for field, repeated, kind, _ in types[name].values()}
+    """A message as a dictionary; absent messages and optional fields are None, other absent numbers and texts zero and empty."""
+    out = {field: [] if repeated else None if kind == 11 or optional else b"" if kind == 12 else "" if kind == 9 else 0
+           for field, repeated, kind, _, optional in types[name].values()}
     for number, value in split_fields(data):
-        field, repeated, kind, type_name = types[name][number]
+        field, repeated, kind, type_name, _ = types[name][number]
         if kind in SCALARS:
             values = [x for x, in struct.iter_unpack(SCALARS[kind], value)]
         elif kind == 11:

@@ -31,7 +31,8 @@ PUBLISHED = {
     "TriangleListPrimitive": "pose points color colors indices",
     "TextPrimitive": "pose billboard font_size scale_invariant color text",
     "ModelPrimitive": "pose scale color override_color url media_type data",
-    "JointState": "timestamp name position velocity effort",
+    "JointState": "name position velocity acceleration effort",
+    "JointStates": "timestamp joints",
     "PoseInFrame": "timestamp frame_id pose",
     "Pose": "position orientation",
     "Vector3": "x y z",
@@ -126,16 +127,16 @@ def check_nodes(file, table, info):
         assert abs(abs(sum(a * b for a, b in zip(expected, found))) - 1) < 1e-14
         assert len(message["transforms"]) == len(info["joints"])
     motors = [motor["name"] for motor in info["motors"]]
-    for k, (_, state) in enumerate(topics["/joints"]):
-        assert set(motors) <= set(state["name"])
-        assert state["position"] == [table["q." + name][k] for name in state["name"]]
-        assert len(state["velocity"]) == len(state["name"])
-        if k + 1 < len(times):
-            assert state["effort"] == [table["u." + name][k] if name in motors else 0 for name in state["name"]]
-    for k, (_, state) in enumerate(topics["/motors"]):
-        assert state["name"] == motors
-        assert state["velocity"] == [table["v." + name][k] for name in motors]
-        assert state["effort"] == ([table["u." + name][k] for name in motors] if k + 1 < len(times) else [])
+    for topic in ("/joints", "/motors"):
+        for k, (_, states) in enumerate(topics[topic]):
+            names = [joint["name"] for joint in states["joints"]]
+            assert set(motors) <= set(names) if topic == "/joints" else names == motors
+            for joint in states["joints"]:
+                name, last = joint["name"], k + 1 == len(times)
+                rate = name.replace(".angle", ".rate")
+                assert joint["position"] == table["q." + name][k] and joint["velocity"] == table["v." + rate][k]
+                assert joint["acceleration"] == (None if last else table["a." + rate][k])
+                assert joint["effort"] == (table["u." + name][k] if name in motors and not last else None)
     for k, (_, com) in enumerate(topics["/com"]):
         assert vector(com["pose"]["position"]) == [table["com." + axis][k] for axis in "xyz"]
 

@@ -112,8 +112,8 @@ class MotionMcap {
         setQuaternion(ws_.X_WB[i].R, *transform.mutable_rotation());
       }
       send(place + "tf", time, transforms);
-      send(place + "joints", time, makeJointState(record, k, coordinates_));
-      send(place + "motors", time, makeJointState(record, k, listMotors()));
+      send(place + "joints", time, makeJointStates(record, k, coordinates_));
+      send(place + "motors", time, makeJointStates(record, k, listMotors()));
       foxglove::PoseInFrame com;
       setTimestamp(time, *com.mutable_timestamp());
       com.set_frame_id(kWorldFrame);
@@ -130,21 +130,22 @@ class MotionMcap {
     return motors;
   }
 
-  // Efforts are those of the stage that begins at the node: none are known at the last one.
-  foxglove::JointState makeJointState(const MotionRecord& record, Eigen::Index k,
-                                      const Coordinates& coordinates) const {
-    VectorXd effort = VectorXd::Zero(model_.nv());
-    if (k < record.u.rows())
-      for (int m = 0; m < model_.nu(); ++m) effort[model_.motors()[m].dof] = record.u(k, m);
-    foxglove::JointState state;
-    setTimestamp(record.time[k], *state.mutable_timestamp());
+  // Accelerations and efforts are those of the stage that begins at the node; an impact has neither, passive joints no efforts.
+  foxglove::JointStates makeJointStates(const MotionRecord& record, Eigen::Index k,
+                                        const Coordinates& coordinates) const {
+    const bool has_stage = k < record.u.rows() && record.time[k + 1] > record.time[k];
+    foxglove::JointStates states;
+    setTimestamp(record.time[k], *states.mutable_timestamp());
     for (const auto& [q, v] : coordinates) {
-      state.add_name(record.q_names[q]);
-      state.add_position(record.q(k, q));
-      state.add_velocity(record.v(k, v));
-      if (k < record.u.rows()) state.add_effort(effort[v]);
+      foxglove::JointState& joint = *states.add_joints();
+      joint.set_name(record.q_names[q]);
+      joint.set_position(record.q(k, q));
+      joint.set_velocity(record.v(k, v));
+      if (has_stage && std::isfinite(record.a(k, v))) joint.set_acceleration(record.a(k, v));
+      for (int m = 0; has_stage && m < model_.nu(); ++m)
+        if (model_.motors()[m].dof == v) joint.set_effort(record.u(k, m));
     }
-    return state;
+    return states;
   }
 
   bool isImpact(Eigen::Index stage) const { return record_.time[stage + 1] == record_.time[stage]; }

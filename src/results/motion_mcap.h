@@ -8,11 +8,11 @@
 /// | /scene/robot, /scene/plan     | foxglove.SceneUpdate     | the start: shapes and meshes of bodies, steps of the ground |
 /// | /scene/forces                 | foxglove.SceneUpdate     | stages: arrows of the forces of contacts and closures   |
 /// | /scene/footholds              | foxglove.SceneUpdate     | touchdowns: the sole on the ground; predicted ones, if any |
-/// | /joints, /plan/joints         | foxglove.JointState      | nodes: coordinates with one rate each; efforts of motors |
-/// | /motors, /plan/motors         | foxglove.JointState      | nodes: motors alone                                     |
+/// | /joints, /plan/joints         | foxglove.JointStates     | nodes: coordinates with one rate each; efforts of motors |
+/// | /motors, /plan/motors         | foxglove.JointStates     | nodes: motors alone                                     |
 /// | /com, /plan/com               | foxglove.PoseInFrame     | nodes: centre of mass                                   |
-/// | /wrenches/contacts, /closures | bielle.msg.Wrenches          | stages                                                  |
-/// | /footholds, /plan/footholds   | bielle.msg.Footholds         | touchdowns; nodes: predicted ones                       |
+/// | /wrenches/contacts, /closures | bielle.msg.Wrenches      | stages                                                  |
+/// | /footholds, /plan/footholds   | bielle.msg.Footholds     | touchdowns; nodes: predicted ones                       |
 /// | /events                       | foxglove.Log             | phases, touchdowns, pushes, a fall, how it ended        |
 ///
 /// A stage is told at its node, an impact, which has no forces, not at all.
