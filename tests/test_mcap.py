@@ -268,6 +268,32 @@ def check_carried_out(squat, info, output):
     assert events[-1][1].startswith("it "), events
 
 
+def check_told(squat, output):
+    """Steps of the ground and a fall, as a summary tells them."""
+    shutil.copytree(squat, output)
+    step = {"top": [1, 0.2, 0.3], "length": 0.5, "width": 0.7, "yaw": 0.4, "pitch": 0.2, "roll": -0.1}
+    with open(os.path.join(output, "summary.json"), encoding="utf-8") as file:
+        summary = json.load(file)
+    summary.update({"outcome": "fell", "outcome_message": "the trunk leans", "fell": True, "fall_time": 0.5})
+    summary["ground"]["steps"] = [step]
+    with open(os.path.join(output, "summary.json"), "w", encoding="utf-8") as file:
+        json.dump(summary, file)
+    run("export", output, "--format", "mcap")
+    file = read_mcap.read(os.path.join(output, "trajectory.mcap"))
+    (time, log), = file["topics"]["/events"]
+    assert (time, log["level"], log["message"]) == (500_000_000, 4, "it fell: the trunk leans"), log
+    scene = file["topics"]["/scene/robot"][0][1]
+    cube, = next(entity for entity in scene["entities"] if entity["id"] == "ground")["cubes"]
+    thickness = cube["size"]["z"]
+    frame = {"translation": cube["pose"]["position"], "rotation": cube["pose"]["orientation"]}
+    assert distance(place(frame, [0, 0, thickness / 2]), step["top"]) < 1e-12
+    yaw, pitch, roll = step["yaw"], step["pitch"], step["roll"]
+    along = [math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)]
+    assert distance(rotate(frame["rotation"], [1, 0, 0]), along) < 1e-12
+    assert abs(rotate(frame["rotation"], [0, 1, 0])[2] - math.cos(pitch) * math.sin(roll)) < 1e-12
+    assert [cube["size"]["x"], cube["size"]["y"]] == [step["length"], step["width"]]
+
+
 def check_mesh(place_of_files):
     """A mesh is written with its scale, corners that triangles share once; a robot without a drawing gets rods."""
     corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
@@ -314,6 +340,7 @@ def main():
             check_core(path, file)
             return 0
         check_carried_out(squat, info, os.path.join(scratch, "happened"))
+        check_told(squat, os.path.join(scratch, "told"))
         check_mesh(scratch)
         refused = run("export", os.path.join(scratch, "nothing"), "--format", "mcap", status=2)
         assert "summary.json" in refused.stderr, refused.stderr
