@@ -25,13 +25,13 @@ Eigen::Index findStage(const VectorXd& time, double at) {
   return stage;
 }
 
-struct State {
+struct FrameState {
   VectorXd q, v;
 };
 
 // On the loops.
-State interpolateState(const Model& model, Workspace& ws, const ConstraintSet& loops, const MotionRecord& record,
-                       Eigen::Index stage, double time) {
+FrameState interpolateState(const Model& model, Workspace& ws, const ConstraintSet& loops, const MotionRecord& record,
+                            Eigen::Index stage, double time) {
   const double h = record.time[stage + 1] - record.time[stage],
                s = std::clamp((time - record.time[stage]) / h, 0.0, 1.0);
   const VectorXd q0 = record.q.row(stage).transpose(), q1 = record.q.row(stage + 1).transpose(),
@@ -45,7 +45,7 @@ State interpolateState(const Model& model, Workspace& ws, const ConstraintSet& l
 }
 
 // All but a free joint of the first body. \throws InputError for more free joints, which have no names for their coordinates
-std::vector<std::string> listReferenceJoints(const Model& model) {
+std::vector<std::string> listMotionJoints(const Model& model) {
   std::vector<std::string> names = listMjcfJoints(model, MjcfRotations::Hinges);
   for (int i = 1; i < model.numBodies(); ++i) {
     if (!isMjcfFree(model.joints()[i])) continue;
@@ -115,7 +115,7 @@ ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, co
   const Eigen::Index num_bodies = static_cast<Eigen::Index>(bodies.size());
   ReferenceMotion motion;
   motion.rate = rate;
-  motion.joint_names = listReferenceJoints(model);
+  motion.joint_names = listMotionJoints(model);
   for (int body : bodies) motion.body_names.push_back(model.bodies()[body].name);
   motion.motor_names = getNames(model.motors());
   const std::vector<bool> is_of_ball = findHingesOfBalls(model, motion.joint_names);
@@ -131,7 +131,7 @@ ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, co
   for (Eigen::Index k = 0; k < frames; ++k) {
     const double time = record.time[0] + static_cast<double>(k) / rate;
     const Eigen::Index stage = findStage(record.time, time);
-    const State state = interpolateState(model, ws, loops, record, stage, time);
+    const FrameState state = interpolateState(model, ws, loops, record, stage, time);
     motion.joint_pos.row(k) = calcMjcfQpos(model, q_ref, state.q, MjcfRotations::Hinges).tail(num_joints).transpose();
     motion.joint_vel.row(k) =
         calcMjcfQvel(model, q_ref, state.q, state.v, MjcfRotations::Hinges).tail(num_joints).transpose();

@@ -32,7 +32,7 @@ Json listValues(const Pairs& pairs) {
 std::string formatLine(const DatasetEntry& entry) {
   const DatasetMotion& motion = *entry.motion;
   Json json = {{"name", motion.name},
-               {"robot", motion.robot},
+               {"robot", motion.robot_name},
                {"payload_kg", motion.payload},
                {"motion", motion.motion},
                {"set", listValues(motion.set)},

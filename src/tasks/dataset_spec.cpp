@@ -124,7 +124,8 @@ void addMotions(const YamlEntry& entry, DatasetNames& names, DatasetSpec& spec) 
         varied += "_" + axis.name + "_" + value;
       }
     }
-    motion.body = makeFileName(getRobotName(motion.robot) + carried);
+    motion.robot_name = getRobotName(motion.robot);
+    motion.body = makeFileName(motion.robot_name + carried);
     motion.name = makeFileName(motion.body + "_" + solve + varied);
     names.add(motion, entry);
     spec.motions.push_back(std::move(motion));

@@ -23,9 +23,10 @@ namespace bielle::tasks {
 struct DatasetMotion {
   std::string name;  ///< of its files: robot, motion, and what is set, e.g. bipetto_walk_speed_0.3
   std::string motion;
-  std::string robot;   ///< name or path
-  std::string body;    ///< name of the robot with its payload, e.g. bipetto_payload_5
-  double payload = 0;  ///< kg
+  std::string robot;       ///< name or path, as for the command line
+  std::string robot_name;  ///< without directories
+  std::string body;        ///< name of the robot with its payload, e.g. bipetto_payload_5
+  double payload = 0;      ///< kg
   std::vector<std::pair<std::string, std::string>> set, options;  ///< by name, as for the command line
 };
 
