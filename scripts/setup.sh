@@ -16,6 +16,8 @@ bielle_worker_packages=(coop-computing-tools coop-computing-tools-dev)
 bielle_front_packages=(libpagmo-dev)
 # libsdformat, which reads SDF files. Without it everything else is built.
 bielle_sdf_packages=(libsdformat-dev)
+# Protobuf, which writes MCAP files (bielle export). Without it everything else is built.
+bielle_mcap_packages=(libprotobuf-dev protobuf-compiler)
 # Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, what tests the Python
 # package.
 bielle_test_packages=(catch2 python3 chromium pkg-config python3-pytest

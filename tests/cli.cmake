@@ -38,3 +38,8 @@ set_tests_properties(licences PROPERTIES LABELS system)
 add_test(NAME mjcf COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mjcf.py
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(mjcf PROPERTIES LABELS system)
+
+# Motions as MCAP files, read by a reader of our own and, where it is found, by @mcap/core.
+add_test(NAME mcap COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command>)
+add_test(NAME mcap_core COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command> core)
+set_tests_properties(mcap mcap_core PROPERTIES LABELS system SKIP_RETURN_CODE 77)

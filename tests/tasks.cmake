@@ -1,1 +1,5 @@
 bielle_command_test(compare SOURCES test_compare.cpp LIBS bielle_results)
+if(BIELLE_BUILD_VALIDATION)
+  add_test(NAME dataset COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_dataset.py $<TARGET_FILE:bielle_command>)
+  set_tests_properties(dataset PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+endif()

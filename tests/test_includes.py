@@ -34,6 +34,8 @@ OTHERS = {
     "urdf_": ["src/formats/reader_urdf.cpp"],
     "tinyxml": ["src/formats/xml_document.h"],
     "sdf/": ["src/formats/reader_sdf.h", "tests/test_sdf.cpp"],
+    "google/protobuf/": ["src/results/motion_mcap.cpp"],
+    "zlib.h": ["src/results/mcap_file.cpp"],
     "zip.h": ["src/results/npz.cpp"],
     "nlopt": ["src/motion/slsqp.cpp", "src/design/nlopt_search.h"],
     "pagmo/": ["src/design/front_search.cpp"],
@@ -48,7 +50,7 @@ OTHERS = {
 }
 PUBLIC = "include/bielle/"
 OUTSIDE = ("examples/", "python/", "tests/consumer/")  # they see what users see, and the worlds of engines
-GENERATED = ("assets.inc",)
+GENERATED = ("assets.inc", "foxglove.pb.h", "motion.pb.h")
 FOLDERS = ("include/", "src/", "validation/", "workers/", "tests/", "examples/", "python/")
 
 

@@ -33,6 +33,7 @@ void addRatio(CLI::App& app, Action& action);
 void addModes(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
 void addCampaign(CLI::App& app, Action& action);
+void addDataset(CLI::App& app, Action& action);
 
 // bielle validate, bielle check and bielle simulate: only their help lines; their arguments are those of other programs.
 void addCompanions(CLI::App& app);

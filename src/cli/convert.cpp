@@ -5,6 +5,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/formats/robot_writer.h"
+#include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "formats/drake.h"
 #include "formats/mjcf.h"
@@ -19,7 +20,7 @@ namespace {
 
 struct ConvertArguments {
   RobotArgument robot;
-  std::string format = "bielle", output;
+  std::string format = "bielle", joints, output;
   double payload = 0;
   std::vector<double> payload_at;
 };
@@ -29,6 +30,8 @@ void warn(const std::vector<std::string>& warnings) {
 }
 
 int convert(const ConvertArguments& arguments) {
+  if (!arguments.joints.empty() && arguments.format != "mjcf")
+    throw InputError("", "--joints", "it says how a file of MuJoCo is written", "add --to mjcf, or leave it out");
   LoadedRobot robot = arguments.robot.load();
   requireApart(arguments.output, listFiles(robot));
   Payload payload{arguments.payload, {}};
@@ -50,7 +53,9 @@ int convert(const ConvertArguments& arguments) {
     warn(text.warnings);
     writeTextFile(arguments.output, text.xml);
   } else {
-    const MjcfText text = formatMjcf(robot.model, findClosedConfiguration(robot.model).q);
+    MjcfOptions options;
+    if (arguments.joints == "hinges") options.rotations = MjcfRotations::Hinges;
+    const MjcfText text = formatMjcf(robot.model, findClosedConfiguration(robot.model).q, options);
     warn(text.warnings);
     writeTextFile(arguments.output, text.xml);
   }
@@ -71,6 +76,12 @@ void addConvert(CLI::App& app, Action& action) {
                   "Drake; mjcf: a MuJoCo file; sdf: a Gazebo file with loops; urdf: a URDF alone")
       ->check(CLI::IsMember({"bielle", "drake", "mjcf", "sdf", "urdf"}))
       ->capture_default_str();
+  command
+      .add_option(
+          "--joints", arguments->joints,
+          "with --to mjcf: rotations about three axes as balls (default), or as three hinges each, for trainers "
+          "without balls")
+      ->check(CLI::IsMember({"balls", "hinges"}));
   addFixedBase(command, arguments->robot);
   CLI::Option* payload = command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg]")
                              ->check(isWithin(0, 1e6))
@@ -92,6 +103,7 @@ void addConvert(CLI::App& app, Action& action) {
       "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
+      "  bielle convert bipetto --to mjcf --joints hinges -o trained.xml\n"
       "  bielle convert bipetto.xml -o my_bipetto\n"
       "  bielle convert bipetto --payload 5 --payload-at 0 0 0.3 -o loaded\n"
       "  bielle convert belt_biped --to urdf -o belt.urdf");

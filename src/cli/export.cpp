@@ -1,13 +1,21 @@
 // bielle export: a trajectory in the format of another program.
+#include "cli/export.h"
+
 #include <filesystem>
 #include <iostream>
 #include <memory>
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
+#include "formats/mjcf.h"
 #include "formats/text_file.h"
+#include "report/run.h"
+#include "results/motion_mcap.h"
+#include "results/number_option.h"
 #include "results/opensim.h"
 #include "results/output_place.h"
+#include "results/reference_motion.h"
 #include "results/result_files.h"
 
 namespace fs = std::filesystem;
@@ -17,20 +25,54 @@ namespace {
 
 struct ExportArguments {
   std::string directory, format = "sto", output;
+  double rate = 50;
 };
 
+fs::path makePath(const ExportArguments& arguments) {
+  if (!arguments.output.empty()) return arguments.output;
+  return fs::path(arguments.directory) /
+         (isReference(arguments.format) ? arguments.format + ".npz" : "trajectory." + arguments.format);
+}
+
 int exportTrajectory(const ExportArguments& arguments) {
-  const fs::path place = arguments.directory;
-  const MotionRecord record = readResultRecord(place.string());
-  const fs::path path =
-      arguments.output.empty() ? place / ("trajectory." + arguments.format) : fs::path(arguments.output);
-  requireApart(path.string(), listResultFiles(place.string()));
-  writeTextFile(path.string(), arguments.format == "mot" ? formatMot(record) : formatSto(record));
+  const fs::path path = makePath(arguments);
+  requireApart(path.string(), listResultFiles(arguments.directory));
+  ExportRequest request{arguments.directory, arguments.format, path.string(), "", arguments.rate};
+  if (isReference(arguments.format)) {
+    request.robot = fs::path(path).replace_extension(".xml").string();
+    requireApart(request.robot, {path.string()});
+  }
+  for (const std::string& warning : writeExport(request)) std::cerr << "bielle: warning: " << warning << "\n";
   std::cout << path.string() << "\n";
+  if (!request.robot.empty()) std::cout << request.robot << "\n";
   return kOk;
 }
 
 }  // namespace
+
+bool isReference(const std::string& format) { return format == "amp" || format == "mjlab"; }
+
+std::vector<std::string> writeExport(const ExportRequest& request) {
+  if (request.format == "mot" || request.format == "sto") {
+    const MotionRecord record = readResultRecord(request.directory);
+    writeTextFile(request.path, request.format == "mot" ? formatMot(record) : formatSto(record));
+    return {};
+  }
+  const ReportRun run = readRun(request.directory);
+  if (request.format == "mcap") {
+    writeTextFile(request.path, formatMotionMcap(run.robot, run.record, run.plan, run.summary));
+    return {};
+  }
+  requireApart(request.robot, {run.robot.file});
+  const VectorXd q_ref = findClosedConfiguration(run.robot.model).q;
+  MjcfOptions options;
+  options.rotations = MjcfRotations::Hinges;
+  const ReferenceMotion motion = makeReferenceMotion(run.robot.model, q_ref, run.record, request.rate);
+  writeTextFile(request.path,
+                formatReferenceMotion(motion, request.format == "amp" ? ReferenceFormat::Amp : ReferenceFormat::Mjlab));
+  writeTextFile(request.robot, formatMjcf(run.robot.model, q_ref, options).xml);
+  return motion.warnings;
+}
 
 void addExport(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("export", "Write a trajectory in another program's format");
@@ -38,10 +80,17 @@ void addExport(CLI::App& app, Action& action) {
   command.add_option("DIR", arguments->directory, "result of `bielle solve` or `bielle simulate`")->required();
   command
       .add_option("--format", arguments->format,
+                  "amp, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; mjlab, BeyondMimic); "
+                  "mcap: frames, shapes, joints, forces and events (Foxglove, Lichtblick, PlotJuggler, Rerun); "
                   "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim)")
-      ->check(CLI::IsMember({"mot", "sto"}))
+      ->check(CLI::IsMember({"amp", "mcap", "mjlab", "mot", "sto"}))
       ->capture_default_str();
-  command.add_option("-o,--output", arguments->output, "the file; default: trajectory.FORMAT in the directory");
+  command.add_option("--fps", arguments->rate, "frames per second of a reference for learning")
+      ->check(isWithin(1e-3, 1e4))
+      ->capture_default_str();
+  command.add_option(
+      "-o,--output", arguments->output,
+      "the file; default: trajectory.FORMAT in the directory, amp.npz or mjlab.npz with the robot as .xml");
   command.footer(
       "SI units, radians. Without export: trajectory.csv has one named column per quantity and a column 'time', as\n"
       "PlotJuggler and spreadsheets read it; trajectory.npz holds arrays q and v with Pinocchio's frames and orders "
@@ -49,6 +98,8 @@ void addExport(CLI::App& app, Action& action) {
       "a joint, and q_names and v_names to sort the joints by.\n"
       "Examples:\n"
       "  bielle export squat --format mot\n"
+      "  bielle export squat --format mcap\n"
+      "  bielle export squat --format mjlab --fps 50\n"
       "  bielle export squat --format sto -o squat.sto");
   command.callback([&action, arguments] { action = [=] { return exportTrajectory(*arguments); }; });
 }

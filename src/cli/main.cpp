@@ -69,6 +69,7 @@ int run(int argc, char** argv) {
   addModes(app, action);
   addLift(app, action);
   addCampaign(app, action);
+  addDataset(app, action);
   addBench(app, action);
   addCompanions(app);
   bielle::requireFiniteNumbers(app);

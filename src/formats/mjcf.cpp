@@ -120,7 +120,6 @@ class MjcfWriter {
 
   void writeBody(int i, XMLElement& parent) {
     const Joint& joint = model_.joints()[i];
-    order_.push_back(i);
     const SE3 X_PB = joint.X_PJ * calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq));
     XMLElement& body = addPlaced(parent, "body", X_PB, {{"name", model_.bodies()[i].name}});
     writeInertia(i, body);
@@ -179,6 +178,18 @@ class MjcfWriter {
     warn("joint '" + joint.name + "'", "its friction becomes MuJoCo's, which sticks");
   }
 
+  // All three rotations, from coordinate `k` of v on.
+  void writeRotation(const Joint& joint, int k, XMLElement& body) {
+    if (options_.rotations == MjcfRotations::Balls) return writeBall(joint, k, "ball", body);
+    const double armature = model_.armature()[joint.idx_v + k];
+    for (const auto& [suffix, axis] : {std::pair(".rx", "1 0 0"), {".ry", "0 1 0"}, {".rz", "0 0 1"}})
+      addElement(
+          body, "joint",
+          {{"name", joint.name + suffix}, {"type", "hinge"}, {"axis", axis}, {"armature", formatMjcf(armature)}});
+    if (armature != 0) warn("joint '" + joint.name + "'", "its armature acts on the rates of three hinges");
+    reportLimits(joint, k);
+  }
+
   void writeBall(const Joint& joint, int k, const char* type, XMLElement& body) {
     addElement(body, "joint",
                {{"type", type}, {"name", joint.name}, {"armature", formatMjcf(model_.armature()[joint.idx_v + k])}});
@@ -198,7 +209,7 @@ class MjcfWriter {
         writeAxis(joint, 0, "slide", "", joint.axis, body);
         break;
       case JointKind::Spherical:
-        writeBall(joint, 0, "ball", body);
+        writeRotation(joint, 0, body);
         break;
       case JointKind::Universal:
         writeAxis(joint, 0, "hinge", ".angle1", makeAxisRotation(joint.axis2, -q[1]) * joint.axis, body);
@@ -222,7 +233,7 @@ class MjcfWriter {
     const Matrix3d axes = calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq)).R.transpose();
     for (int k = 0; k < 3; ++k)
       writeAxis(joint, k, "slide", std::string(".") + static_cast<char>('x' + k), axes.col(k), body);
-    writeBall(joint, 3, "ball", body);
+    writeRotation(joint, 3, body);
   }
 
   void writeShapes(int body, XMLElement& e) {
@@ -412,25 +423,27 @@ class MjcfWriter {
     }
   }
 
+  // Where hinges in place of a ball come near to locking in a reference.
+  void reportLocks(const Reference& reference, const VectorXd& q) {
+    if (options_.rotations == MjcfRotations::Balls) return;
+    const VectorXd margins = calcHingeMargins(model_, q_ref_, q);
+    for (int i = 1; i < model_.numBodies(); ++i)
+      if (margins[i] < kLeastHingeMargin)
+        warn("joint '" + model_.joints()[i].name + "'", "its hinges nearly lock in reference '" + reference.name + "'");
+  }
+
   void writeKeyframes(XMLElement& section) {
     for (const Reference& reference : model_.references()) {
       const AssemblyResult result = assembleReference(model_, reference.name);
-      if (result.status == AssemblyStatus::Closed)
-        addElement(section, "key", {{"name", reference.name}, {"qpos", formatKeyframe(result.q)}});
-      else
+      if (result.status != AssemblyStatus::Closed) {
         warn("reference '" + reference.name + "'", "it does not close and is left out: " + result.message);
+        continue;
+      }
+      reportLocks(reference, result.q);
+      addElement(section, "key",
+                 {{"name", reference.name},
+                  {"qpos", formatVector(calcMjcfQpos(model_, q_ref_, result.q, options_.rotations))}});
     }
-  }
-
-  std::string formatKeyframe(const VectorXd& q) const {
-    std::string text;
-    for (int i : order_) {
-      const Joint& joint = model_.joints()[i];
-      VectorXd qpos(joint.nq);
-      calcMjcfPosition(joint, q_ref_.segment(joint.idx_q, joint.nq), q.segment(joint.idx_q, joint.nq), qpos);
-      text += (text.empty() ? "" : " ") + formatVector(qpos);
-    }
-    return text;
   }
 
   void warn(const std::string& element, const std::string& problem) { warnings_.add(element, problem); }
@@ -466,7 +479,6 @@ class MjcfWriter {
   const VectorXd q_ref_;
   const MjcfOptions& options_;
   std::vector<std::vector<int>> children_;
-  std::vector<int> order_;  // bodies as written
   std::set<std::string> meshes_;
   FormatWarnings warnings_{model_};
 };

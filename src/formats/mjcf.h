@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "bielle/model/model.h"
+#include "formats/mjcf_coordinates.h"
 
 namespace bielle {
 
@@ -26,6 +27,7 @@ struct MjcfOptions {
   double sole_radius = 5e-3;   ///< of the spheres of soles, m
   double hinge_lever = 0.02;   ///< distance of the two points of a hinge from its frame, m
   double ground_height = 0;    ///< of the plane that soles touch, m
+  MjcfRotations rotations = MjcfRotations::Balls;
   int num_boxes = 0;           ///< that soles touch, too: "box.1" ..., for whoever moves them
 };
 

@@ -1,6 +1,7 @@
 #include "formats/mjcf_coordinates.h"
 
 #include <Eigen/Geometry>
+#include <cmath>
 
 namespace bielle {
 namespace {
@@ -18,6 +19,24 @@ int findQuaternion(const Joint& joint) {
 // The quaternion that MuJoCo's is relative to.
 Eigen::Quaterniond getOrigin(const Joint& joint, ConstVectorRef q_ref) {
   return isMjcfFree(joint) ? Eigen::Quaterniond::Identity() : toQuaternion(q_ref.segment<4>(findQuaternion(joint)));
+}
+
+// Eq. (1), solved for its angles.
+Vector3d calcHingeAngles(const Matrix3d& R) {
+  return {std::atan2(-R(1, 2), R(2, 2)), std::atan2(R(0, 2), std::hypot(R(0, 0), R(0, 1))),
+          std::atan2(-R(0, 1), R(0, 0))};
+}
+
+// Eq. (2), solved for the rates.
+Vector3d calcHingeRates(const Vector3d& angles, const Vector3d& w) {
+  const double cb = std::cos(angles[1]), sb = std::sin(angles[1]), cc = std::cos(angles[2]), sc = std::sin(angles[2]);
+  Matrix3d E;
+  E << cb * cc, sc, 0, -cb * sc, cc, 0, sb, 0, 1;
+  return E.inverse() * w;
+}
+
+bool isWrittenAsHinges(const Joint& joint, MjcfRotations rotations) {
+  return rotations == MjcfRotations::Hinges && findQuaternion(joint) >= 0 && !isMjcfFree(joint);
 }
 
 }  // namespace
@@ -68,6 +87,87 @@ void calcMjcfVelocityRate(const Joint& joint, ConstVectorRef q, ConstVectorRef v
     rate.head<2>() = v[2] * (Eigen::Rotation2Dd(q[2]) * Eigen::Vector2d(-v[1], v[0]));
   if (joint.kind == JointKind::FreeFlyer)
     rate.head<3>() = toQuaternion(q.segment<4>(3)) * Vector3d(v.tail<3>()).cross(Vector3d(v.head<3>()));
+}
+
+std::vector<int> listMjcfBodies(const Model& model) {
+  std::vector<std::vector<int>> children(model.numBodies());
+  for (int i = 1; i < model.numBodies(); ++i) children[model.joints()[i].parent].push_back(i);
+  std::vector<int> order, ahead(children[0].rbegin(), children[0].rend());
+  while (!ahead.empty()) {
+    const int i = ahead.back();
+    ahead.pop_back();
+    order.push_back(i);
+    ahead.insert(ahead.end(), children[i].rbegin(), children[i].rend());
+  }
+  return order;
+}
+
+std::vector<std::string> listMjcfJoints(const Model& model, MjcfRotations rotations) {
+  std::vector<std::string> names;
+  for (int i : listMjcfBodies(model)) {
+    const Joint& joint = model.joints()[i];
+    const auto add = [&](std::initializer_list<const char*> suffixes) {
+      for (const char* suffix : suffixes) names.push_back(joint.name + suffix);
+    };
+    if (joint.kind == JointKind::FreeFlyer && !isMjcfFree(joint)) add({".x", ".y", ".z"});
+    if (isWrittenAsHinges(joint, rotations))
+      add({".rx", ".ry", ".rz"});
+    else if (joint.kind == JointKind::Universal)
+      add({".angle1", ".angle2"});
+    else if (joint.kind == JointKind::Planar)
+      add({".x", ".y", ".angle"});
+    else if (joint.nv > 0)
+      add({""});
+  }
+  return names;
+}
+
+VectorXd calcMjcfQpos(const Model& model, ConstVectorRef q_ref, ConstVectorRef q, MjcfRotations rotations) {
+  VectorXd all(model.nq());
+  Eigen::Index size = 0;
+  for (int i : listMjcfBodies(model)) {
+    const Joint& joint = model.joints()[i];
+    auto qpos = all.segment(size, joint.nq);
+    calcMjcfPosition(joint, q_ref.segment(joint.idx_q, joint.nq), q.segment(joint.idx_q, joint.nq), qpos);
+    size += joint.nq;
+    if (!isWrittenAsHinges(joint, rotations)) continue;
+    const auto wxyz = qpos.tail<4>();
+    const Vector3d angles = calcHingeAngles(Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).toRotationMatrix());
+    qpos.segment<3>(joint.nq - 4) = angles;
+    size -= 1;
+  }
+  return all.head(size);
+}
+
+VectorXd calcMjcfQvel(const Model& model, ConstVectorRef q_ref, ConstVectorRef q, ConstVectorRef v,
+                      MjcfRotations rotations) {
+  const VectorXd all = calcMjcfQpos(model, q_ref, q, rotations);
+  VectorXd out(model.nv());
+  Eigen::Index at_q = 0, at_v = 0;
+  for (int i : listMjcfBodies(model)) {
+    const Joint& joint = model.joints()[i];
+    const bool has_hinges = isWrittenAsHinges(joint, rotations);
+    auto qvel = out.segment(at_v, joint.nv);
+    calcMjcfVelocity(joint, q.segment(joint.idx_q, joint.nq), v.segment(joint.idx_v, joint.nv), qvel);
+    at_q += has_hinges ? joint.nv : joint.nq;
+    at_v += joint.nv;
+    if (has_hinges) qvel.tail<3>() = calcHingeRates(all.segment<3>(at_q - 3), qvel.tail<3>()).eval();
+  }
+  return out;
+}
+
+VectorXd calcHingeMargins(const Model& model, ConstVectorRef q_ref, ConstVectorRef q) {
+  VectorXd margins = VectorXd::Ones(model.numBodies());
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    if (!isWrittenAsHinges(joint, MjcfRotations::Hinges)) continue;
+    VectorXd qpos(joint.nq);
+    calcMjcfPosition(joint, q_ref.segment(joint.idx_q, joint.nq), q.segment(joint.idx_q, joint.nq), qpos);
+    const auto wxyz = qpos.tail<4>();
+    const Matrix3d R = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).toRotationMatrix();
+    margins[i] = std::hypot(R(0, 0), R(0, 1));
+  }
+  return margins;
 }
 
 }  // namespace bielle

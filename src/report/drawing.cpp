@@ -6,11 +6,9 @@
 #include <fstream>
 #include <iterator>
 
-#include "bielle/dynamics/kinematics.h"
-#include "formats/fastenings.h"
 #include "formats/mesh.h"
-#include "math/direction.h"
 #include "report/pack.h"
+#include "results/skeleton.h"
 
 namespace fs = std::filesystem;
 
@@ -54,45 +52,13 @@ class MeshStore {
   Json meshes_ = Json::array();
 };
 
-Json describeShape(const char* shape, int body, const SE3& X_BV, const Vector3d& size, const Eigen::Vector4d& rgba) {
-  return {{"body", body},
-          {"shape", shape},
-          {"pose", packPose(X_BV)},
-          {"size", packVector(size)},
-          {"rgba", packVector(rgba)}};
-}
-
-double calcExtent(const Model& model) {
-  Workspace ws(model);
-  updatePlacements(model, ws, model.makeNeutral());
-  Eigen::AlignedBox3d box;
-  for (int i = 1; i < model.numBodies(); ++i) box.extend(ws.X_WB[i].p);
-  return box.isEmpty() ? 0 : box.diagonal().norm();
-}
-
-void addRods(int body, const std::vector<Vector3d>& points, double radius, Json& visuals) {
-  static const Eigen::Vector4d kRod(0.45, 0.53, 0.62, 1), kJoint(0.22, 0.26, 0.32, 1);
-  visuals.push_back(describeShape("sphere", body, SE3::Identity(), {1.6 * radius, 0, 0}, kJoint));
-  for (const Vector3d& point : points) {
-    if (point.norm() < radius) continue;
-    SE3 X;
-    X.R = calcRotationOfZ(point);
-    X.p = point / 2;
-    visuals.push_back(describeShape("cylinder", body, X, {radius, point.norm(), 0}, kRod));
-  }
-}
-
-// Bodies 1, 2, ... without a drawing.
-void addSkeleton(const Model& model, const std::vector<bool>& is_drawn, Json& visuals) {
-  const std::vector<std::vector<Vector3d>> fastenings = listFastenings(model);
-  const double extent = calcExtent(model), radius = extent > 0 ? 0.012 * extent : 0.01;
-  for (int i = 1; i < model.numBodies(); ++i) {
-    if (is_drawn[i]) continue;
-    std::vector<Vector3d> points = fastenings[i];
-    const bool is_end = std::all_of(points.begin(), points.end(), [=](const Vector3d& p) { return p.norm() < radius; });
-    if (is_end && model.bodies()[i].inertia.mass > 0) points.push_back(model.bodies()[i].inertia.com);
-    addRods(i, points, radius, visuals);
-  }
+Json describeVisual(const Visual& visual) {
+  const char* const names[] = {"box", "cylinder", "sphere", "mesh"};
+  return {{"body", visual.body},
+          {"shape", names[static_cast<int>(visual.shape)]},
+          {"pose", packPose(visual.X_BV)},
+          {"size", packVector(visual.size)},
+          {"rgba", packVector(visual.rgba)}};
 }
 
 }  // namespace
@@ -106,13 +72,11 @@ Json describeDrawing(const LoadedRobot& robot) {
     const bool is_mesh = visual.shape == Visual::Shape::Mesh;
     const int mesh = is_mesh ? meshes.find(visual.mesh) : -1;
     if (is_mesh && mesh < 0) continue;
-    const char* const names[] = {"box", "cylinder", "sphere", "mesh"};
-    visuals.push_back(
-        describeShape(names[static_cast<int>(visual.shape)], visual.body, visual.X_BV, visual.size, visual.rgba));
+    visuals.push_back(describeVisual(visual));
     visuals.back()["mesh"] = mesh;
     is_drawn[visual.body] = true;
   }
-  addSkeleton(model, is_drawn, visuals);
+  for (const Visual& visual : listSkeleton(model, is_drawn)) visuals.push_back(describeVisual(visual));
   return {{"visuals", visuals}, {"meshes", meshes.take()}};
 }
 

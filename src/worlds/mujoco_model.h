@@ -12,7 +12,8 @@ namespace bielle {
 /// Errors of MuJoCo, whose default is to end the program, are thrown as std::runtime_error once there is a MujocoModel.
 class MujocoModel {
  public:
-  /// \param q_ref  closed configuration (nq) at which the loops are tied
+  /// \param q_ref    closed configuration (nq) at which the loops are tied
+  /// \param options  with rotations as balls
   /// \throws InputError with MuJoCo's message when it refuses the robot
   MujocoModel(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options = {});
 

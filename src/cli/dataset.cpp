@@ -1,0 +1,125 @@
+// bielle dataset: many motions of robots, checked, in the formats of other programs, with an index.
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+
+#include "bielle/formats/robot_writer.h"
+#include "bielle/model/error.h"
+#include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
+#include "cli/case_run.h"
+#include "cli/commands.h"
+#include "cli/export.h"
+#include "model/payload.h"
+#include "tasks/dataset_index.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+using namespace bielle::tasks;
+
+struct DatasetArguments {
+  std::string spec, directory;
+  TaskArguments tasks;
+};
+
+// The robots by the names of their bodies; those with a payload are written.
+std::map<std::string, std::string> makeRobots(const DatasetSpec& spec, const std::string& directory) {
+  std::map<std::string, std::string> robots;
+  for (const DatasetMotion& motion : spec.motions) {
+    const auto [it, is_new] = robots.emplace(motion.body, motion.robot);
+    if (!is_new || !(motion.payload > 0)) continue;
+    it->second = (fs::path(directory) / "robots" / motion.body).string();
+    makeOutputDirectory(it->second);
+    writeRobot(addPayload(loadRobot(motion.robot).model, {motion.payload, {}}), it->second,
+               "Written by `bielle dataset`.");
+  }
+  return robots;
+}
+
+// The files of a good motion, by format, in the directory of the format; the robot is there once.
+void exportMotion(const DatasetSpec& spec, const std::string& directory, DatasetEntry& entry,
+                  std::vector<std::string>& notes) {
+  for (const std::string& format : spec.formats) {
+    const fs::path place = fs::path(directory) / format;
+    makeOutputDirectory(place.string());
+    const std::string name = format + "/" + entry.motion->name + (isReference(format) ? ".npz" : "." + format);
+    ExportRequest request{entry.result, format, (fs::path(directory) / name).string(), "", spec.rate};
+    if (isReference(format)) request.robot = (place / (entry.motion->body + ".xml")).string();
+    for (const std::string& warning : writeExport(request)) notes.push_back(entry.motion->name + ": " + warning);
+    entry.files.emplace_back(format, name);
+  }
+}
+
+std::string describeShortfall(const DatasetEntry& entry) {
+  if (!entry.error.empty()) return entry.error;
+  if (!entry.converged) return "the solver did not converge";
+  if (!entry.passed) return "the check did not pass";
+  return "a goal was missed";
+}
+
+int run(const DatasetArguments& arguments) {
+  const DatasetSpec spec = readDatasetSpec(arguments.spec);
+  makeOutputDirectory(arguments.directory);
+  if (findCompanion("bielle-check").find('/') == std::string::npos)
+    throw InputError("", "bielle-check", "it is not installed beside this program, and motions have to be checked",
+                     "build Bielle with -DBIELLE_BUILD_VALIDATION=ON (it needs Simbody)");
+  const std::map<std::string, std::string> robots = makeRobots(spec, arguments.directory);
+  CaseRun cases{arguments.directory + "/motions", {}, {}, arguments.tasks};
+  for (const DatasetMotion& motion : spec.motions)
+    cases.cases.push_back(makeDatasetCase(motion, robots.at(motion.body)));
+  for (const auto& [body, robot] : robots) cases.robots.push_back(loadRobot(robot).directory);
+  return runAndWrite(cases, [&](const CaseOutcomes& outcomes) {
+    std::vector<DatasetEntry> entries;
+    std::vector<std::string> notes;
+    for (const DatasetMotion& motion : spec.motions) {
+      entries.push_back(readDatasetEntry(motion, outcomes.at(motion.name), cases.directory + "/" + motion.name));
+      DatasetEntry& entry = entries.back();
+      if (entry.is_good())
+        exportMotion(spec, arguments.directory, entry, notes);
+      else
+        notes.push_back(motion.name + ": " + describeShortfall(entry));
+    }
+    const auto good = std::count_if(entries.begin(), entries.end(), [](const DatasetEntry& e) { return e.is_good(); });
+    std::cout << good << " of " << entries.size() << " motions are good\n";
+    printPaths(writeDatasetIndex(arguments.directory, spec, entries), notes);
+  });
+}
+
+}  // namespace
+
+void addDataset(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("dataset", "Make many motions, checked and exported, with an index");
+  const auto arguments = std::make_shared<DatasetArguments>();
+  command.add_option("SPEC", arguments->spec, "YAML file: motions, robots, payloads, options, formats")->required();
+  command
+      .add_option("-o,--output", arguments->directory,
+                  "directory for index.jsonl, README.md, a directory per format, and motions/; created if necessary")
+      ->required();
+  addTaskOptions(command, "motions at a time, each in its own process; results do not depend on it", arguments->tasks);
+  command.footer(
+      "SPEC: every combination of the values of an entry is one motion.\n"
+      "  licence: CC-BY-4.0\n"
+      "  formats: [mjlab, mcap]             (of `bielle export`: mjlab, amp, mcap; default: mjlab)\n"
+      "  fps: 50\n"
+      "  motions:\n"
+      "    - solve: walk\n"
+      "      robot: [bipetto, cleobot]      (names, or paths from this file)\n"
+      "      payload: [0, 5]                (kg, fixed to the trunk)\n"
+      "      set: {speed: [0.3, -0.3], steps: 4}\n"
+      "      options: {dead-point-margin: 0.3}      (others of `bielle solve`)\n"
+      "A motion is good if the solver converged, `bielle check` passes and all goals are met; only good ones are "
+      "exported,\n"
+      "all are in the index. Finished motions are kept: after Ctrl-C, a crash or with more values in SPEC, the same\n"
+      "command does what is missing.\n"
+      "Exit status: 0 done, 1 interrupted or a program crashed, 2 bad input.\n"
+      "Example:\n"
+      "  bielle dataset walks.yaml -o walks");
+  command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
+}
+
+}  // namespace bielle::cli

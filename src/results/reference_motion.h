@@ -1,0 +1,37 @@
+#pragma once
+/// \file Motions at a uniform rate, as references for learning: what MuJoCo has, frame by frame, in the robot that formats/mjcf.h
+/// writes with MjcfRotations::Hinges.
+///
+/// Frame k is at k / rate, s. Between the nodes of a record, coordinates follow the cubic of both states in the tangent space,
+/// velocities the straight line; then loops are closed and velocities projected on them. Torques are those of the stage.
+#include <string>
+#include <vector>
+
+#include "bielle/motion/record.h"
+
+namespace bielle {
+
+struct ReferenceMotion {
+  double rate = 0;                       ///< frames per second
+  std::vector<std::string> joint_names;  ///< in the order of the file, but for a free joint of the first body
+  std::vector<std::string> body_names;   ///< in the order of the file: depth first, without the world
+  std::vector<std::string> motor_names;  ///< in the order of u
+  RowMatrixXd joint_pos, joint_vel;      ///< rad, m; turns are counted on, not wrapped
+  RowMatrixXd body_pos, body_quat;       ///< 3 and 4 columns per body: origin and w, x, y, z of its frame in the world
+  RowMatrixXd body_lin_vel, body_ang_vel;  ///< 3 columns per body, of the origin of its frame, in the world
+  RowMatrixXd motor_torque;                ///< N m or N
+  std::vector<std::string> warnings;       ///< of hinges that nearly lock
+};
+
+/// \param q_ref  of formatMjcf()
+/// \throws InputError when the motion has no time, or its loops cannot be closed at a frame
+ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, const MotionRecord& record, double rate);
+
+enum class ReferenceFormat {
+  Mjlab,  ///< of mjlab and BeyondMimic: fps, joint_pos, joint_vel, body_pos_w, body_quat_w, body_lin_vel_w, body_ang_vel_w
+  Amp     ///< of Isaac Lab's AMP: fps, dof_names, body_names, dof_positions, dof_velocities, body_positions, ...
+};
+/// As a NumPy archive. Both have the names of joints, bodies and motors, and motor_torque, as well.
+std::string formatReferenceMotion(const ReferenceMotion& motion, ReferenceFormat format);
+
+}  // namespace bielle

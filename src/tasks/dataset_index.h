@@ -1,0 +1,27 @@
+#pragma once
+/// \file The index of a data set, and its card.
+#include "results/json_text.h"
+#include "tasks/dataset_spec.h"
+
+namespace bielle::tasks {
+
+/// One line of index.jsonl.
+struct DatasetEntry {
+  const DatasetMotion* motion = nullptr;
+  std::string result;                                   ///< directory of its result; empty if there is none
+  std::string error;                                    ///< of a motion that was refused
+  bool converged = false, passed = false, met = false;  ///< the solver; the check; all goals
+  bool is_good() const { return converged && passed && met; }
+  Json goals = Json::array();
+  double duration = 0;                                     ///< s
+  std::vector<std::pair<std::string, std::string>> files;  ///< by format, from the directory of the data set
+};
+
+/// What a finished case has achieved. \param directory  of the case
+DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& outcome, const std::string& directory);
+
+/// Paths are relative to the directory of the data set. \throws InputError when a file cannot be written
+std::vector<std::string> writeDatasetIndex(const std::string& directory, const DatasetSpec& spec,
+                                           const std::vector<DatasetEntry>& entries);
+
+}  // namespace bielle::tasks

@@ -1,0 +1,173 @@
+#include "tasks/dataset_spec.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "bielle/formats/reader.h"
+#include "bielle/motion/registry.h"
+#include "formats/text_file.h"
+#include "formats/yaml_entry.h"
+#include "tasks/campaign_spec.h"
+#include "tasks/cells.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::tasks {
+namespace {
+
+constexpr size_t kMostMotions = 100'000;
+
+// What is varied in one entry of `motions`.
+struct DatasetAxis {
+  enum class Kind { Robot, Payload, Setting, Option } kind;
+  std::string name;
+  std::vector<std::string> values;
+  YamlEntry entry;
+};
+using AxisKind = DatasetAxis::Kind;
+
+DatasetAxis readAxis(AxisKind kind, const std::string& name, const YamlEntry& entry) {
+  DatasetAxis axis{kind, name, {}, entry};
+  for (const YamlEntry& item : entry.isList() ? entry.getList() : std::vector<YamlEntry>{entry})
+    axis.values.push_back(item.getText());
+  if (axis.values.empty()) entry.fail("it is empty", "give at least one value");
+  return axis;
+}
+
+void checkPayloads(const DatasetAxis& axis) {
+  for (const std::string& value : axis.values) {
+    const OptionValue mass = parseOption(value);
+    const bool is_number = std::holds_alternative<int>(mass) || std::holds_alternative<double>(mass);
+    if (!is_number || value[0] == '-') axis.entry.fail("'" + value + "' is no mass", "give kg, 0 or more");
+  }
+}
+
+std::vector<DatasetAxis> readAxes(const YamlFields& fields, const YamlEntry& entry, OptionSet known) {
+  std::vector<DatasetAxis> axes = {readAxis(AxisKind::Robot, "robot", require(fields, "robot", entry))};
+  if (const YamlEntry* payload = find(fields, "payload")) {
+    axes.push_back(readAxis(AxisKind::Payload, "payload", *payload));
+    checkPayloads(axes.back());
+  }
+  if (const YamlEntry* set = find(fields, "set"))
+    for (const auto& [name, value] : set->getMap()) {
+      axes.push_back(readAxis(AxisKind::Setting, name, value));
+      for (const std::string& text : axes.back().values) known.set(name, parseOption(text));  // checks it
+    }
+  if (const YamlEntry* options = find(fields, "options"))
+    for (const auto& [name, value] : options->getMap()) {
+      for (const char* other : {"help", "output", "robot", "set", "threads", "no-check", "no-report", "quiet"})
+        if (name == other) value.fail("it cannot be set here", "remove it");
+      axes.push_back(readAxis(AxisKind::Option, name, value));
+    }
+  return axes;
+}
+
+// Letters, digits, dots and signs; anything else becomes a low line.
+std::string makeFileName(std::string text) {
+  for (char& c : text)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-' && c != '+') c = '_';
+  return text;
+}
+
+std::string getRobotName(const std::string& robot) {
+  const fs::path path = fs::path(robot).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).stem().string();
+}
+
+// Names of files must tell motions and robots apart.
+class DatasetNames {
+ public:
+  void add(const DatasetMotion& motion, const YamlEntry& entry) {
+    constexpr size_t kLongest = 200;  // with an extension, names of files may have 255 bytes
+    if (motion.name.size() > kLongest)
+      entry.fail("the name '" + motion.name + "' is too long for a file", "set fewer options at once");
+    if (!motions_.insert(motion.name).second) entry.fail("it gives the motion '" + motion.name + "' again", "keep one");
+    if (robots_.emplace(motion.body, motion.robot).first->second != motion.robot)
+      entry.fail("another robot is called '" + motion.body + "'", "give their directories different names");
+  }
+
+ private:
+  std::set<std::string> motions_;
+  std::map<std::string, std::string> robots_;  // by the names of bodies
+};
+
+void addMotions(const YamlEntry& entry, DatasetNames& names, DatasetSpec& spec) {
+  const YamlFields fields = entry.getFields({"solve", "robot", "payload", "set", "options"});
+  const std::string solve = require(fields, "solve", entry).getText();
+  const std::vector<DatasetAxis> axes = readAxes(fields, entry, findMotion(spec.path, solve).request.options);
+  size_t count = 1;
+  for (const DatasetAxis& axis : axes) {
+    count *= axis.values.size();
+    if (count > kMostMotions) entry.fail("it has more than a hundred thousand combinations", "give fewer values");
+  }
+  for (size_t i = 0; i < count; ++i) {
+    DatasetMotion motion;
+    motion.motion = solve;
+    std::string varied, carried;
+    size_t rest = i, block = count;
+    for (const DatasetAxis& axis : axes) {
+      block /= axis.values.size();
+      const std::string& value = axis.values[rest / block];
+      rest %= block;
+      if (axis.kind == AxisKind::Robot) {
+        motion.robot = value;
+        if (value.find('/') != std::string::npos)
+          motion.robot = (fs::absolute(spec.path).parent_path() / value).lexically_normal().string();
+      } else if (axis.kind == AxisKind::Payload) {
+        motion.payload = std::stod(value);
+        if (motion.payload > 0) carried = "_payload_" + value;
+      } else {
+        (axis.kind == AxisKind::Setting ? motion.set : motion.options).emplace_back(axis.name, value);
+        varied += "_" + axis.name + "_" + value;
+      }
+    }
+    motion.robot_name = getRobotName(motion.robot);
+    motion.body = makeFileName(motion.robot_name + carried);
+    motion.name = makeFileName(motion.body + "_" + solve + varied);
+    names.add(motion, entry);
+    spec.motions.push_back(std::move(motion));
+  }
+}
+
+}  // namespace
+
+DatasetSpec readDatasetSpec(const std::string& path) {
+  DatasetSpec spec;
+  spec.path = path;
+  spec.text = readTextFile(path);
+  spec.rate = 50;
+  spec.formats = {"mjlab"};
+  readYamlDocument(path, spec.text, [&spec](const YamlEntry& document) {
+    const YamlFields fields = document.getFields({"licence", "formats", "fps", "motions"});
+    if (const YamlEntry* licence = find(fields, "licence")) spec.licence = licence->getText();
+    if (const YamlEntry* rate = find(fields, "fps")) {
+      spec.rate = rate->getNumber();
+      if (!(spec.rate >= 1e-3 && spec.rate <= 1e4)) rate->fail("it is no rate", "give frames per second, up to 10000");
+    }
+    if (const YamlEntry* formats = find(fields, "formats")) {
+      spec.formats = formats->getTexts();
+      for (const std::string& format : spec.formats)
+        if (format != "mjlab" && format != "amp" && format != "mcap")
+          formats->fail("there is no format '" + format + "'", "give some of mjlab, amp, mcap");
+    }
+    const YamlEntry& motions = require(fields, "motions", document);
+    DatasetNames names;
+    for (const YamlEntry& entry : motions.isList() ? motions.getList() : std::vector<YamlEntry>{motions})
+      addMotions(entry, names, spec);
+    if (spec.motions.empty()) motions.fail("it is empty", "give at least one motion");
+  });
+  return spec;
+}
+
+Case makeDatasetCase(const DatasetMotion& motion, const std::string& robot) {
+  std::vector<std::string> solve = {"solve", motion.motion, "--robot", robot};
+  for (const auto& [name, value] : motion.set) solve.insert(solve.end(), {"--set", name + "=" + value});
+  for (const auto& [name, value] : motion.options) addOption(name, value, solve);
+  solve.insert(solve.end(), {"-o", std::string("@") + kDatasetMotion, "--quiet", "--no-report", "--threads", "1"});
+  return {motion.name, {solve}, robot};
+}
+
+}  // namespace bielle::tasks

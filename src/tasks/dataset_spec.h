@@ -1,0 +1,48 @@
+#pragma once
+/// \file A data set in a YAML file: motions of robots, in all combinations of some of their options.
+///
+/// ```yaml
+/// licence: CC-BY-4.0             # of the data, for its card
+/// formats: [mjlab, mcap]         # of bielle export; default: mjlab
+/// fps: 50                        # of mjlab and amp; default: 50
+/// motions:                       # one map or a list; each entry of a map one value or a list of them
+///   - solve: walk
+///     robot: [bipetto, cleobot]  # names, or paths from this file
+///     payload: [0, 5]            # kg, fixed to the trunk; default: 0
+///     set: {speed: [0.3, -0.3], steps: 4}
+///     options: {dead-point-margin: 0.3}      # others of `bielle solve`, by their names
+/// ```
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tasks/cases.h"
+
+namespace bielle::tasks {
+
+struct DatasetMotion {
+  std::string name;  ///< of its files: robot, motion, and what is set, e.g. bipetto_walk_speed_0.3
+  std::string motion;
+  std::string robot;       ///< name or path, as for the command line
+  std::string robot_name;  ///< without directories
+  std::string body;        ///< name of the robot with its payload, e.g. bipetto_payload_5
+  double payload = 0;      ///< kg
+  std::vector<std::pair<std::string, std::string>> set, options;  ///< by name, as for the command line
+};
+
+struct DatasetSpec {
+  std::string path, text;  ///< of the file
+  std::string licence;
+  std::vector<std::string> formats;
+  double rate = 0;  ///< frames per second
+  std::vector<DatasetMotion> motions;
+};
+
+/// \throws InputError naming the file, the key with its line, and the remedy; `options` are not checked
+DatasetSpec readDatasetSpec(const std::string& path);
+
+constexpr const char* kDatasetMotion = "motion";  ///< directory of the result of a case
+/// `bielle solve` with its check. \param robot  that carries the payload
+Case makeDatasetCase(const DatasetMotion& motion, const std::string& robot);
+
+}  // namespace bielle::tasks
