@@ -31,6 +31,7 @@ void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);
 void addRatio(CLI::App& app, Action& action);
 void addModes(CLI::App& app, Action& action);
+void addSynthesize(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
 void addCampaign(CLI::App& app, Action& action);
 void addDataset(CLI::App& app, Action& action);

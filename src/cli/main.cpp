@@ -67,6 +67,7 @@ int run(int argc, char** argv) {
   addCompare(app, action);
   addRatio(app, action);
   addModes(app, action);
+  addSynthesize(app, action);
   addLift(app, action);
   addCampaign(app, action);
   addDataset(app, action);
