@@ -83,7 +83,7 @@ void addExport(CLI::App& app, Action& action) {
   command.add_option("DIR", arguments->directory, "result of `bielle solve` or `bielle simulate`")->required();
   command
       .add_option("--format", arguments->format,
-                  "amp, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; mjlab, BeyondMimic); "
+                  "amp, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; mjlab); "
                   "mcap: frames, shapes, joints, forces and events (Foxglove, Lichtblick, PlotJuggler, Rerun); "
                   "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim)")
       ->check(CLI::IsMember({"amp", "mcap", "mjlab", "mot", "sto"}))
