@@ -340,6 +340,9 @@ def main():
             check_core(path, file)
             return 0
         check_carried_out(squat, info, os.path.join(scratch, "happened"))
+        for arguments in (("mcap", "-o", os.path.join(squat, "trajectory.npz")), ("mjlab", "--fps", 0),
+                          ("mjlab", "-o", os.path.join(squat, "trajectory.npz")), ("amp", "-o", os.path.join(squat, "a.xml"))):
+            run("export", squat, "--format", *arguments, status=2)
         check_told(squat, os.path.join(scratch, "told"))
         check_mesh(scratch)
         refused = run("export", os.path.join(scratch, "nothing"), "--format", "mcap", status=2)

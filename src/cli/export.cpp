@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "formats/mjcf.h"
@@ -40,7 +41,9 @@ int exportTrajectory(const ExportArguments& arguments) {
   ExportRequest request{arguments.directory, arguments.format, path.string(), "", arguments.rate};
   if (isReference(arguments.format)) {
     request.robot = fs::path(path).replace_extension(".xml").string();
-    requireApart(request.robot, {path.string()});
+    if (request.robot == path.string())
+      throw InputError("", "--output " + request.path, "the robot would have the same name",
+                       "give one that ends in .npz");
   }
   for (const std::string& warning : writeExport(request)) std::cerr << "bielle: warning: " << warning << "\n";
   std::cout << path.string() << "\n";
@@ -80,7 +83,7 @@ void addExport(CLI::App& app, Action& action) {
   command.add_option("DIR", arguments->directory, "result of `bielle solve` or `bielle simulate`")->required();
   command
       .add_option("--format", arguments->format,
-                  "amp, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; mjlab, BeyondMimic); "
+                  "amp, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; mjlab); "
                   "mcap: frames, shapes, joints, forces and events (Foxglove, Lichtblick, PlotJuggler, Rerun); "
                   "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim)")
       ->check(CLI::IsMember({"amp", "mcap", "mjlab", "mot", "sto"}))

@@ -28,7 +28,7 @@ struct ReferenceMotion {
 ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, const MotionRecord& record, double rate);
 
 enum class ReferenceFormat {
-  Mjlab,  ///< of mjlab and BeyondMimic: fps, joint_pos, joint_vel, body_pos_w, body_quat_w, body_lin_vel_w, body_ang_vel_w
+  Mjlab,  ///< of mjlab: fps, joint_pos, joint_vel, body_pos_w, body_quat_w, body_lin_vel_w, body_ang_vel_w
   Amp     ///< of Isaac Lab's AMP: fps, dof_names, body_names, dof_positions, dof_velocities, body_positions, ...
 };
 /// As a NumPy archive. Both have the names of joints, bodies and motors, and motor_torque, as well.
