@@ -228,6 +228,69 @@ TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
   CHECK(said.size() > 20);
 }
 
+TEST_CASE("Mutated robots of parts are models or clear errors") {
+  constexpr int kTrials = 3000;
+  const std::string part = R"(mounts: {base: link}
+points: [at]
+parameters:
+  length: {unit: m}
+  density: {value: 2, unit: kg/m, bounds: [1, 10], help: mass per length}
+  radius: {value: 0.01, unit: m, bounds: [0.001, 0.1], help: radius}
+let: {end: -length*z, half: "length > 1 ? 0.5 : length/2"}
+requires: [{that: length > 0, problem: the rod has no length, remedy: make it longer}]
+tree:
+  rod_{part}: {parent: base, joint: "swing_{part}", place: at, axis: y, range: [-1, half + 1],
+               solids: [{rod: [origin, end], radius: radius, density: density}, {box: [0.1, half, 0.1], rpy: [0, half, 0], material: steel}]}
+frames: {"end_{part}": {link: "rod_{part}", place: end}}
+motors: {"swing_{part}": {armature: 0.001*length}}
+)";
+  const std::string robot = R"(parameters:
+  span: {value: 0.5, unit: m, bounds: [0.1, 1], help: length}
+  kind: {value: part, choices: [part], help: which}
+let: {crank: span/5, rod: 3*crank}
+tree:
+  trunk: {solids: [{sphere: 0.1, mass: 5}, {cylinder: [0.1, span], axis: z, density: 3, color: frame, when: 1}]}
+  slide: {parent: trunk, joint: slide, type: prismatic, axis: x, place: [rod + crank, 0, 0], solids: [{box: [0.1, 0.1, 0.1], mass: 1}]}
+  upper: {part: "{kind}", prefix: upper_, role: arm, sides: [_left, _right], mounts: {base: trunk}, set: {at: 0.2*y, length: span}}
+  lower: {part: "{kind}", prefix: lower_, sides: [_left, _right], mounts: {base: "rod_upper{side}"}, set: {at: -span*z, length: span/2}}
+linkage:
+  base: trunk
+  density: 1
+  points: {pivot: [0, 0], end: [crank, 0], pin: [crank + rod, 0]}
+  fixed: {trunk: [pivot], slide: [pin]}
+  bars: {crank: [pivot, end], rod: {points: [end, pin], radius: 0.01}}
+  hinges: {pivot: motor}
+motors: {motor: {armature: 0.001}}
+roles: {arm: {armature: 0.1}}
+references: {start: {joints: {motor: 0.1}, height: {frame: trunk, value: 1 + span}}}
+)";
+  const RobotDirectory directory;
+  std::map<Trial, int> count;
+  std::map<std::string, int> said;
+  for (int i = 0; i < kTrials; ++i) {
+    Random rng(i);
+    const bool in_part = choose(rng, 2);
+    directory.write("part.yaml", in_part ? mutate(part, rng) : part);
+    const std::string file = directory.write("robot.yaml", in_part ? robot : mutate(robot, rng));
+    CAPTURE(i, in_part);
+    try {
+      const Model model = loadRobot(file).model;
+      CHECK(findWrong(model) == "");
+      ++count[Trial::Valid];
+    } catch (const InputError& error) {
+      INFO(error.what());
+      CHECK(isClear(error.what(), directory.path()));
+      ++count[Trial::Refused];
+      ++said[error.remedy()];
+    }
+  }
+  std::cout << kTrials << " mutated robots of parts: " << count[Trial::Valid] << " models, " << count[Trial::Refused]
+            << " refused with " << said.size() << " different remedies\n";
+  CHECK(count[Trial::Valid] > kTrials / 20);
+  CHECK(count[Trial::Refused] > kTrials / 4);
+  CHECK(said.size() > 30);
+}
+
 TEST_CASE("Mutated SDF files are models or clear errors") {
   constexpr int kTrials = 600;  // libsdformat takes its time
   std::vector<std::string> files;

@@ -75,11 +75,14 @@ class PartComposer {
   void compose() {
     define();
     checkRequirements();
-    addLinkage();
+    // Links of the part may hang on bars that hang on what it is mounted on; bars on links of the part come after these.
+    const bool is_on_own = isLinkageOnTree();
+    if (!is_on_own) addLinkage();
     for (const auto& [name, entry] : file_.tree) {
       const YamlEntry scoped = entry.withSymbols(symbols_);
       mountsPart(entry) ? mountPart(name, scoped) : addLink(name, scoped);
     }
+    if (is_on_own) addLinkage();
     addSolidsOfMounts();
     addFrames();
     addShared();
@@ -216,6 +219,15 @@ class PartComposer {
                             parent = resolve(link.getText(), link), X,
                             link] { addFrameTo(urdf, name, parent, X, link); });
     }
+  }
+
+  bool isLinkageOnTree() const {
+    const YamlEntry* linkage = find(file_.fields, "linkage");
+    if (!linkage) return false;
+    for (const auto& [key, base] : linkage->getMap())
+      for (const auto& [name, entry] : file_.tree)
+        if (key == "base" && base.isWord(name)) return true;
+    return false;
   }
 
   void addLinkage() {

@@ -66,7 +66,8 @@ class PlaneLinkage {
   }
 
   void readPoints() {
-    base_ = place_.resolve(require(fields_, "base", entry_).getText(), fields_.at("base"));
+    const YamlEntry& base = require(fields_, "base", entry_);
+    base_ = place_.resolve(base.getText(), base);
     Vector3d through = Vector3d::Zero();
     if (const YamlEntry* given = find(fields_, "through")) through = readPlace(*given, place_.side);
     std::string normal = "y";
