@@ -241,7 +241,7 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
   check("belt_knee,", "chain_knee,", "there is no part 'chain_knee'");
   check("belt_knee,", "belt_knee, belt_knee,", "listed twice");
   check("belt_knee,", "belt, belt_knee,", "listed twice");
-  check("belt_knee,", "serial,", "there is no part 'serial'; use some of serial_knee");  // of which joint?
+  check("belt_knee,", "serial,", "there is no part 'serial'; use some of serial_hip");  // of which joint?
   check("leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "cleobot", "does not compose robots from parts");
   check("generator: leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "robot: bipetto", "one architecture");
   check("ankle: differential", "ankle: belt", "not one of its choices");

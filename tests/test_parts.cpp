@@ -1,6 +1,8 @@
 // Robots composed of parts: every part against a closed form of its linkage, derivatives by parameters, mirror images, and what is
 // wrong with a file.
 #include <catch2/catch.hpp>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <set>
 
@@ -8,6 +10,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/results/robot_info.h"
 #include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
@@ -349,6 +352,18 @@ TEST_CASE("parts: one of one's own beside the robot that chooses it, with what t
     if (closure.name == "knee_belt_left")
       for (const CouplerTerm& term : closure.terms) found = found || term.coefficient == -3;
   CHECK(found);
+}
+
+TEST_CASE("parts: lengths from pivot to pivot are those of the parameters") {
+  const nlohmann::json info = nlohmann::json::parse(makeRobotInfo(loadRobot("leg_biped")));
+  std::map<std::string, double> lengths;
+  for (const nlohmann::json& entry : info["lengths"])
+    lengths[entry["from"].get<std::string>() + " " + entry["to"].get<std::string>()] = entry["length"].get<double>();
+  CHECK(lengths.at("motor_knee_left elbow_knee_left") == Approx(0.05));
+  CHECK(lengths.at("elbow_knee_left knee_rod_left") == Approx(kThigh));  // as of a parallelogram
+  CHECK(lengths.at("hipy_left knee_left") == Approx(kThigh));
+  CHECK(lengths.at("knee_left knee_rod_left") == Approx(std::hypot(0.05, 0.04)));
+  CHECK(lengths.count("root_joint hipz_left") == 0);
 }
 
 TEST_CASE("parts: motors of a catalogue by their role") {

@@ -33,6 +33,8 @@ void printInfo(const Json& robot) {
   printSection(robot, "closures", "closures (gaps in m and rad)",
                {"name", "kind", "frame1", "frame2", "rows", "loop_dofs"});
   printSection(robot, "clusters", "clusters of closures", {"closures", "rows", "dofs"});
+  printSection(robot, "lengths", "lengths from pivot to pivot of bodies in loops (m)",
+               {"body", "from", "to", "length"});
   printSection(robot, "motors", "motors", {"name", "armature", "effort_limit", "velocity_limit"});
   printSection(
       robot, "drives", "windings and gears of motors (N m/A, ohm, V, A, N m; kg, part of the links)",

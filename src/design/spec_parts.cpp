@@ -6,6 +6,7 @@
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
+#include "robots/generator_entry.h"
 
 namespace fs = std::filesystem;
 
@@ -20,12 +21,12 @@ OptionValues readSettings(const YamlEntry& entry) {
 RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map) {
   RobotSpec spec;
   if (const YamlEntry* robot = find(fields, "robot")) spec.name = robot->getText();
-  if (const YamlEntry* generator = find(fields, "generator")) spec.generator = generator->getText();
+  if (const YamlEntry* generator = find(fields, "generator")) spec.generator = locateBeside(*generator);
   if (spec.name.empty() == spec.generator.empty())
     map.fail("it does not name exactly one robot or generator", "give one of `robot` and `generator`");
   if (const YamlEntry* set = find(fields, "set")) {
     if (spec.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
-    spec.settings = readSettings(*set);
+    for (const auto& [name, value] : set->getMap()) spec.settings.emplace_back(name, parseOption(locateBeside(value)));
   }
   return spec;
 }

@@ -9,22 +9,24 @@ namespace fs = std::filesystem;
 
 namespace bielle {
 
+std::string locateBeside(const YamlEntry& entry) {
+  const std::string text = entry.getText();
+  const fs::path file = fs::path(entry.path()).parent_path() / text;
+  std::error_code error;
+  return file.extension() == ".yaml" && fs::is_regular_file(file, error) ? file.lexically_normal().string() : text;
+}
+
 GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settings) {
   YamlEntry entry = name;  // the one that an error is about
   try {
-    const fs::path directory = fs::path(name.path()).parent_path();
-    const auto locate = [&directory](const std::string& text) {
-      const fs::path file = directory / text;
-      return file.extension() == ".yaml" && fs::exists(file) ? file.lexically_normal().string() : text;
-    };
     std::vector<std::pair<YamlEntry, std::pair<std::string, OptionValue>>> given;
     OptionValues values;
     if (settings)
       for (const auto& [key, value] : settings->getMap()) {
-        values.emplace_back(key, parseOption(locate(value.getText())));
+        values.emplace_back(key, parseOption(locateBeside(value)));
         given.emplace_back(value, values.back());
       }
-    Generator generator = findGenerator(locate(name.getText()), values);
+    Generator generator = findGenerator(locateBeside(name), values);
     OptionSet parameters = generator.parameters;
     for (const auto& [value, setting] : given) {
       entry = value;

@@ -13,6 +13,9 @@ struct GeneratorEntry {
   OptionSet parameters;
 };
 
+/// The text of an entry or, if it is the path of a .yaml file relative to that of the entry, that path.
+std::string locateBeside(const YamlEntry& entry);
+
 /// \param name      of the generator
 /// \param settings  a map from parameters to numbers, or to names of choices, of which files (.yaml) are relative to that of the entry; null for none
 /// \throws InputError naming file, line, parameter and remedy

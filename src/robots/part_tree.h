@@ -5,6 +5,9 @@
 
 namespace bielle {
 
+/// The joint of a link in a tree: its kind, place, axes and range. \param side  -1 in a mirror image   \throws InputError
+UrdfJoint readJoint(const YamlFields& fields, const YamlEntry& owner, double side);
+
 void addSolidsTo(UrdfLink& link, const std::vector<Solid>& solids);
 
 /// \param entry  in errors   \throws InputError if there is no such link
