@@ -97,7 +97,7 @@ TEST_CASE("four-bars: the search is the same on any number of threads, and its b
   CHECK(one[0].value < 0.06);
 }
 
-TEST_CASE("four-bars: Bipetto's knee is found again by its ratios, and the part that is written has them") {
+TEST_CASE("four-bars: Bipetto's knee is found again by its ratios, and the biped that is written has them") {
   const RobotDirectory directory;
   const std::string out = directory.path() + "/found";
   const CommandResult result = runCommand({BIELLE_COMMAND, "synthesize", "--range", "0.1:1.1", "--like", "bipetto",
@@ -131,8 +131,8 @@ TEST_CASE("four-bars: Bipetto's knee is found again by its ratios, and the part 
     CHECK(ratio < 1.55);  // Bipetto's: 1.34 to 1.52
   }
   CHECK(compared > 20);
-  CHECK_THAT(readFile(out + "/found_1.yaml"), Contains("--like bipetto"));
-  CHECK_THAT(result.out, Contains("found_2"));
+  CHECK_THAT(readFile(out + "/leg_1/leg_1.yaml"), Contains("--like bipetto"));
+  CHECK_THAT(result.out, Contains("leg_2"));
 
   const CommandResult refused =
       runCommand({BIELLE_COMMAND, "synthesize", "--range", "0:1", "--margin", "1", "-o", out});

@@ -20,7 +20,7 @@ TEST_CASE("files that name a generator: errors give the file, the line, the para
   refuse("generator: leg_biped\nset:\n  nee: belt\n", "key 'set': key 'nee' (line 3)",
          "no such parameter; the nearest is 'knee'");
   refuse("generator: leg_biped\nset: {knee: chain}\n", "key 'knee' (line 2)",
-         "not one of its choices; give one of ball_screw, belt, four_bar");
+         "not one of its choices; give one of ball_screw, belt, drawn");
   refuse("generator: leg_biped\nset: {thigh_length: long}\n", "key 'thigh_length' (line 2)", "not a number");
   refuse("generator: leg_biped\nset: {thigh_length: 50}\n", "key 'thigh_length' (line 2)", "50 m is outside 0.05 .. 1");
   refuse("generator: leg_biped\nset: {thigh_length: .nan}\n", "key 'thigh_length' (line 2)", "not a number");

@@ -13,6 +13,7 @@
 #include "bielle/results/robot_info.h"
 #include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
+#include "leg_biped.h"
 #include "math/so3.h"
 #include "robot_directory.h"
 #include "robots/cleobot.h"
@@ -28,13 +29,6 @@ using namespace bielle::testing;
 namespace {
 
 const std::string kRobots = std::string(BIELLE_SOURCE_DIR) + "/robots/";
-
-Model makeLegBiped(const OptionValues& values) {
-  const Generator generator = findGenerator("leg_biped", values);
-  OptionSet parameters = generator.parameters;
-  for (const auto& [name, value] : values) parameters.set(name, value);
-  return generator.make(parameters);
-}
 
 // Same bodies, joints, closures, motors and feet; placements and inertias to the rounding of the files.
 void checkSame(const Model& a, const Model& b) {
@@ -402,7 +396,7 @@ TEST_CASE("leg biped: eighteen combinations stand, move in 18 ways, and weigh wh
   const double of_ankle[] = {0, 0.2, 2 * (chain + 0.5 * 0.17)};
   const int rows_of_knee[] = {0, 1, 3}, rows_of_ankle[] = {0, 2, 6};
   const char *const knees[] = {"serial", "belt", "four_bar"}, *const ankles[] = {"serial", "differential", "rsu"},
-                   *const hips[] = {"serial", "three_rrs"};
+                    *const hips[] = {"serial", "three_rrs"};
   const double bare = makeLegBiped({{"knee", "serial"}, {"ankle", "serial"}}).mass();
   for (int knee = 0; knee < 3; ++knee)
     for (int ankle = 0; ankle < 3; ++ankle)

@@ -15,6 +15,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 #include "formats/expressions.h"
+#include "leg_biped.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -22,13 +23,6 @@ using namespace bielle::testing;
 using Catch::Contains;
 
 namespace {
-
-Model makeBipedOf(const OptionValues& values) {
-  const Generator generator = findGenerator("leg_biped", values);
-  OptionSet parameters = generator.parameters;
-  for (const auto& [name, value] : values) parameters.set(name, value);
-  return generator.make(parameters);
-}
 
 double& getCoordinate(const Model& model, VectorXd& q, const std::string& joint) {
   return q[model.joints()[static_cast<size_t>(model.findJoint(joint))].idx_q];
@@ -135,7 +129,7 @@ TEST_CASE("parts: every one of the biped stands, closes and moves in as many way
   for (const char* joint : {"hip", "knee", "ankle"})
     for (const std::string& part : generator.parameters.get(joint).choices) {
       CAPTURE(joint, part);
-      const Model model = makeBipedOf({{joint, part}});
+      const Model model = makeLegBiped({{joint, part}});
       const AssemblyResult standing = assembleReference(model, "half_sitting");
       REQUIRE(standing.status == AssemblyStatus::Closed);
       CHECK(model.nu() == 12);
@@ -162,10 +156,10 @@ TEST_CASE("parts: every one of the biped stands, closes and moves in as many way
 
 TEST_CASE("parts: six-bars by circles that meet") {
   const Eigen::Vector2d hip(0, 0), knee(0, -kThigh);
-  const Model watt = makeBipedOf({{"knee", "watt"}});
+  const Model watt = makeLegBiped({{"knee", "watt"}});
   const Eigen::Vector2d bell(0, -0.11), out = 0.04 * Eigen::Vector2d(-std::cos(0.3), -std::sin(0.3));
   const double second = ((bell + out) - (knee + Eigen::Vector2d(-0.05, 0))).norm();
-  const Model stephenson = makeBipedOf({{"knee", "stephenson"}});
+  const Model stephenson = makeLegBiped({{"knee", "stephenson"}});
   double least = 9, most = 0;  // angles of the knee that were tried
   for (const double angle : kKnees) {
     CAPTURE(angle);
@@ -193,9 +187,9 @@ TEST_CASE("parts: six-bars by circles that meet") {
 }
 
 TEST_CASE("parts: parallelograms, screws, leaves and rods by their closed forms") {
-  const Model pantograph = makeBipedOf({{"knee", "pantograph"}}), screw = makeBipedOf({{"knee", "ball_screw"}}),
-              leaf = makeBipedOf({{"knee", "leaf"}}), idlers = makeBipedOf({{"ankle", "thigh_rods"}}),
-              strut = makeBipedOf({{"ankle", "spu"}}), across = makeBipedOf({{"ankle", "biarticular"}});
+  const Model pantograph = makeLegBiped({{"knee", "pantograph"}}), screw = makeLegBiped({{"knee", "ball_screw"}}),
+              leaf = makeLegBiped({{"knee", "leaf"}}), idlers = makeLegBiped({{"ankle", "thigh_rods"}}),
+              strut = makeLegBiped({{"ankle", "spu"}}), across = makeLegBiped({{"ankle", "biarticular"}});
   for (const double angle : kKnees) {
     CAPTURE(angle);
     const std::vector<std::pair<std::string, double>> bent = {{"knee_left", angle}, {"ankley_left", -0.6 * angle}};
@@ -235,7 +229,7 @@ TEST_CASE("parts: parallelograms, screws, leaves and rods by their closed forms"
     CHECK((heel - elbow).norm() == Approx((drawn - axis - point(0.05 * back, 0)).norm()).epsilon(1e-9));
   }
   // A spring beside the motor.
-  const Model spring = makeBipedOf({{"knee", "parallel_spring"}});
+  const Model spring = makeLegBiped({{"knee", "parallel_spring"}});
   REQUIRE(spring.jointForces().size() == 2);
   CHECK(spring.jointForces()[0].stiffness == 10);
   CHECK(spring.jointForces()[0].rest == 0.3);
@@ -248,7 +242,7 @@ TEST_CASE("parts: accelerations by their parameters, against robots made anew") 
   for (const char* joint : {"hip", "knee", "ankle"})
     for (const std::string& part : generator.parameters.get(joint).choices) {
       std::vector<DesignVariable> variables;
-      const Model model = makeBipedOf({{joint, part}});
+      const Model model = makeLegBiped({{joint, part}});
       const std::string file =
           readFile(std::string(BIELLE_SOURCE_DIR) + "/robots/parts/" + joint + "/" + part + ".yaml");
       for (const Option& p : generator.parameters) {

@@ -1,8 +1,7 @@
-// bielle synthesize: linkages for a joint, from what it is asked for.
+// bielle synthesize: linkages for a joint, from what is requested of it.
 #include <cmath>
 #include <filesystem>
 #include <iostream>
-#include <sstream>
 #include <thread>
 
 #include "bielle/dynamics/assembly.h"
@@ -41,7 +40,8 @@ VectorXd readRatios(const std::string& robot, const std::string& joint, const Ve
   const VectorXd q = findClosedConfiguration(model).q;
   const Linkage linkage = makeLinkage(model, q, {joint});
   if (linkage.size() != 1)
-    throw InputError(robot, "joint '" + joint + "'", "its linkage has several motors", "name one of one");
+    throw InputError(robot, "joint '" + joint + "'", "its linkage has several motors",
+                     "name a joint whose linkage has one motor");
   const RatioSweep sweep = sweepRatio(model, linkage, q);
   VectorXd ratios = VectorXd::Constant(angles.size(), -1);
   for (size_t i = 0; i + 1 < sweep.samples.size(); ++i) {
@@ -63,19 +63,22 @@ VectorXd readRatios(const std::string& robot, const std::string& joint, const Ve
   return ratios;
 }
 
-// Angle, torque and speed of a joint that its motor drives, at the stages of a motion; the angles need no order but for the ends.
+// Angle, torque and speed of a joint that its motor drives, at the stages of a motion.
 JointDemand readMotion(const SynthesizeArguments& arguments) {
   const ReportRun run = readRun(arguments.motion);
   const Model& model = run.robot.model;
+  const MotionRecord& record = run.record;
+  const RowMatrixXd &q = record.has_midpoints ? record.q_mid : record.q,
+                    &v = record.has_midpoints ? record.v_mid : record.v;
   JointDemand demand;
   for (int m = 0; m < model.nu(); ++m) {
     const Motor& motor = model.motors()[static_cast<size_t>(m)];
     if (motor.name != arguments.joint) continue;
     const Joint& joint = model.joints()[static_cast<size_t>(motor.joint)];
-    const Eigen::Index n = run.record.u.rows();
-    demand.angles = run.record.q.col(joint.idx_q).head(n);
-    demand.speeds = run.record.v.col(joint.idx_v).head(n);
-    demand.torques = run.record.u.col(m);
+    const Eigen::Index n = record.u.rows();
+    demand.angles = q.col(joint.idx_q).head(n);
+    demand.speeds = v.col(joint.idx_v).head(n);
+    demand.torques = record.u.col(m);
     return demand;
   }
   std::vector<std::string> names;
@@ -120,47 +123,18 @@ FourBarSpace makeSpace(const SynthesizeArguments& a) {
   return space;
 }
 
-// The part, whose parameters are the numbers of its drawing.
-std::string formatPart(const FoundFourBar& found, double drawn_at) {
+// The biped whose knees it moves, as a file.
+std::string formatBiped(const FoundFourBar& found, double drawn_at) {
   const FourBarDrawing& d = found.drawing;
-  const auto number = [](double value) { return formatNumber(value, "%.9g"); };
-  const auto line = [&](const char* name, double value, const char* unit, double low, double high, const char* help) {
-    return std::string("  ") + name + ": {value: " + number(value) + ", unit: " + unit + ", bounds: [" + number(low) +
-           ", " + number(high) + "], help: " + help + "}\n";
-  };
-  std::ostringstream text;
-  text << "# Found by `bielle";
-  for (size_t i = 1; i < getCommandLine().size(); ++i) text << " " << getCommandLine()[i];
-  text
-      << "`.\n"
-      << "# Ratio " << number(found.least_ratio) << " to " << number(found.largest_ratio) << ", least sine "
-      << number(found.least_sine) << ".\n"
-      << "help: a motor, crank and rod (found for its joint)\n"
-      << "mounts: {base: link, output: link, joint: joint}\n"
-      << "parameters:\n  thigh_length: {unit: m}\n  rod_density: {unit: kg/m}\n  motor_mass: {unit: kg}\n"
-      << "  armature: {unit: kg m^2}\n"
-      << line("found_x", d.motor_x, "m", -1, 1, "distance of the motor in front of the joint")
-      << line("found_z", d.motor_z, "m", -1, 1, "height of the motor above the joint")
-      << line("found_crank", d.crank, "m", 0.001, 1, "length of the crank")
-      << line("found_crank_angle", d.crank_angle, "rad", -7, 7, "its angle from x towards z in the drawing")
-      << line("found_arm", d.arm, "m", 0.001, 1, "length of the arm")
-      << line("found_arm_angle", d.arm_angle, "rad", -7, 7, "its angle likewise")
-      << line("found_drawn_at", drawn_at, "rad", -7, 7, "angle of the joint in the drawing")
-      << "let:\n  aside: -0.04*y\n"
-      << "  motor: [found_x, -0.04, found_z - thigh_length]\n"
-      << "  arm_x: found_arm*cos(found_arm_angle)\n  arm_z: found_arm*sin(found_arm_angle)\n"
-      << "linkage:\n  base: base\n  through: aside\n  density: rod_density\n  points:\n"
-      << "    motor: [motor.x, motor.z]\n"
-      << "    crank: [motor.x + found_crank*cos(found_crank_angle), motor.z + found_crank*sin(found_crank_angle)]\n"
-      << "    arm: [arm_x, arm_z - thigh_length]\n"
-      << "  fixed:\n    base: [motor]\n    output: {points: [arm], angles: {joint: found_drawn_at}}\n"
-      << "  bars:\n    crank_{part}: {points: [motor, crank], radius: 0.01}\n    rod_{part}: [crank, arm]\n"
-      << "  hinges: {motor: \"motor_{part}\"}\ntree: {}\n"
-      << "solids:\n  base: [{motor: motor_mass, at: motor, axis: y}]\n"
-      << "  output: [{rod: [aside, [arm_x*cos(found_drawn_at) - arm_z*sin(found_drawn_at), -0.04, "
-         "arm_x*sin(found_drawn_at) + arm_z*cos(found_drawn_at)]], radius: 0.01, density: rod_density, color: steel}]\n"
-      << "motors:\n  motor_{part}: {armature: armature}\n";
-  return text.str();
+  const std::pair<const char*, double> numbers[] = {
+      {"motor_x", d.motor_x}, {"motor_z", d.motor_z},     {"drawn_crank", d.crank}, {"crank_angle", d.crank_angle},
+      {"drawn_arm", d.arm},   {"arm_angle", d.arm_angle}, {"drawn_at", drawn_at}};
+  std::string text = "# Found by `bielle";
+  for (size_t i = 1; i < getCommandLine().size(); ++i) text += " " + getCommandLine()[i];
+  text += "`.\ngenerator: leg_biped\nset:\n  knee: drawn\n";
+  for (const auto& [name, value] : numbers)
+    text += std::string("  knee_") + name + ": " + formatNumber(value, "%.9g") + "\n";
+  return text;
 }
 
 int synthesize(const SynthesizeArguments& arguments) {
@@ -183,18 +157,15 @@ int synthesize(const SynthesizeArguments& arguments) {
   if (has_torques) rows[0].insert(rows[0].end(), {"peak [N m]", "[rad/s]"});
   for (size_t i = 0; i < found.size(); ++i) {
     const FoundFourBar& f = found[i];
-    const std::string number = std::to_string(i + 1), name = "found_" + number;
+    const std::string name = "leg_" + std::to_string(i + 1);
     const auto text = [](double value) { return formatNumber(value, "%.4g"); };
     rows.push_back({name, text(f.value), text(f.least_ratio) + " .. " + text(f.largest_ratio), text(f.least_sine),
                     text(f.drawing.motor_x) + ", " + text(f.drawing.motor_z), text(f.drawing.crank),
                     text(f.drawing.arm)});
     if (has_torques) rows.back().insert(rows.back().end(), {text(f.peak_torque), text(f.peak_speed)});
-    const fs::path directory = arguments.directory;
-    writeTextFile((directory / (name + ".yaml")).string(), formatPart(f, demand.drawn_at));
-    const fs::path leg = directory / ("leg_" + number);
-    makeOutputDirectory(leg.string());
-    writeTextFile((leg / ("leg_" + number + ".yaml")).string(),
-                  "generator: leg_biped\nset: {knee: ../" + name + ".yaml}\n");
+    const fs::path directory = fs::path(arguments.directory) / name;
+    makeOutputDirectory(directory.string());
+    writeTextFile((directory / (name + ".yaml")).string(), formatBiped(f, demand.drawn_at));
   }
   printTable(std::cout, rows);
   std::cout << "  " << arguments.directory << "\n";
@@ -204,18 +175,21 @@ int synthesize(const SynthesizeArguments& arguments) {
 }  // namespace
 
 void addSynthesize(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("synthesize", "Find linkages that move a joint as it is asked for");
+  CLI::App& command = *app.add_subcommand("synthesize", "Find linkages that move a joint as requested");
   const auto a = std::make_shared<SynthesizeArguments>();
   const auto add_pair = [&command](const char* flag, std::vector<double>& pair, const char* help) {
     return command.add_option(flag, pair, help)->expected(2)->delimiter(':')->type_name("LOW:HIGH");
   };
-  add_pair("--range", a->range, "angles of the joint [rad]");
-  command.add_option("--ratio", a->ratio, "wished turns of the motor per turn of the joint, all over the range");
-  command.add_option("--like", a->like, "robot whose linkage has the wished ratios, with --joint");
-  command.add_option("--motion", a->motion,
-                     "result of a motion whose motor is on the joint, with --joint: the least heat of the motor");
-  command.add_option("--joint", a->joint, "joint of --like or --motion");
-  command.add_option("--motor", a->motor, "motor of the catalogue, whose speed must not be exceeded, with --motion");
+  CLI::Option* range = add_pair("--range", a->range, "angles of the joint [rad]");
+  CLI::Option* ratio = command.add_option("--ratio", a->ratio,
+                                          "requested turns of the motor per turn of the joint, over the whole range");
+  CLI::Option* joint = command.add_option("--joint", a->joint, "joint of --like or --motion");
+  CLI::Option* like = command.add_option("--like", a->like, "robot whose linkage has the requested ratios");
+  CLI::Option* motion = command.add_option(
+      "--motion", a->motion, "result of a motion whose motor is on the joint: the least heat of the motor");
+  command.add_option("--motor", a->motor, "motor of the catalogue, whose speed must not be exceeded")->needs(motion);
+  like->needs(joint)->excludes(ratio);
+  motion->needs(joint)->excludes(range)->excludes(ratio)->excludes(like);
   add_pair("--motor-x", a->motor_x, "place of the motor in front of the joint [m]")->capture_default_str();
   add_pair("--motor-z", a->motor_z, "place of the motor above the joint [m]")->capture_default_str();
   add_pair("--crank", a->crank, "length of the crank [m]")->capture_default_str();
@@ -231,13 +205,12 @@ void addSynthesize(CLI::App& app, Action& action) {
   command.add_option("--count", a->count, "four-bars kept")->check(CLI::Range(1, 50))->capture_default_str();
   command.add_option("--seed", a->seed, "of the random numbers")->capture_default_str();
   command.add_option("--threads", a->threads, "threads; 0: one per core")->capture_default_str();
-  command.add_option("-o,--output", a->directory, "directory of the parts and of bipeds with them")->required();
+  command.add_option("-o,--output", a->directory, "directory of the bipeds whose knees they move")->required();
   command.footer(
-      "Draws plane four-bars at random, ranks them by their closed form, refines the best fifty and writes each as a "
-      "part\n"
-      "(docs/parts.md) whose numbers are parameters, with a biped whose knees it moves. Without a wish, the ratio that "
-      "is\n"
-      "most constant is best. Exit status: 0 done, 1 none found, 2 bad input.\n"
+      "Draws plane four-bars at random, ranks them by their closed form, refines the best fifty and writes for each a\n"
+      "biped whose knees it moves: the part `drawn` (docs/parts.md) with its numbers. Without a request, the best "
+      "ratio is\n"
+      "the most constant one. Exit status: 0 done, 1 none found, 2 bad input.\n"
       "Examples:\n"
       "  bielle synthesize --range 0:1.6 --ratio 0.9 -o knees\n"
       "  bielle synthesize --range 0.1:1.1 --like bipetto --joint knee_right -o again\n"

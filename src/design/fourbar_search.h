@@ -1,5 +1,5 @@
 #pragma once
-/// \file Plane four-bars that move a joint as it is asked for, found among many by their closed form.
+/// \file Plane four-bars that move a joint as requested, found among many by their closed form.
 ///
 /// In the plane of a joint at K = 0 with the normal y, x forward and z up in the link that carries it: a crank of length c turns about M,
 /// a rod joins its end B to F on the arm of the joint. All is drawn at the joint's angle theta0, where crank and arm point along the
@@ -37,11 +37,11 @@ struct FourBarState {
 /// \param turn  beta of (1)
 FourBarState calcFourBar(const FourBarDrawing& drawing, double turn);
 
-/// What a joint is asked for at several angles; in order, so that the first and the last one are the ends of its range.
+/// What is requested of a joint at several angles.
 struct JointDemand {
   double drawn_at = 0;       ///< theta0
   VectorXd angles;           ///< rad
-  VectorXd ratios;           ///< wished |R|; or empty
+  VectorXd ratios;           ///< requested |R|; or empty
   VectorXd torques, speeds;  ///< at the joint, N m and rad/s; or empty
   double largest_speed = 0;  ///< of the motor, rad/s; 0: any
 };

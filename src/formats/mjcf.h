@@ -28,7 +28,7 @@ struct MjcfOptions {
   double hinge_lever = 0.02;   ///< distance of the two points of a hinge from its frame, m
   double ground_height = 0;    ///< of the plane that soles touch, m
   MjcfRotations rotations = MjcfRotations::Balls;
-  int num_boxes = 0;           ///< that soles touch, too: "box.1" ..., for whoever moves them
+  int num_boxes = 0;  ///< that soles touch, too: "box.1" ..., for whoever moves them
 };
 
 struct MjcfText {

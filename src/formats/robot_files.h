@@ -83,7 +83,7 @@ struct YamlFile {
   std::string path;
   std::vector<std::string> models;  ///< of the robot that this file completes, in the order in which they are tried
   std::optional<YamlEntry> generator,
-      settings;  ///< of the robot that this file is, or completes; names and values as given
+      settings;                       ///< of the robot that this file is, or completes; names and values as given
   std::optional<YamlEntry> composed;  ///< the whole document of a robot composed of parts; then all else is empty
   std::optional<BaseKind> base;
   std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file

@@ -84,36 +84,32 @@ Json describeLengths(const Model& model) {
     std::string name;
     Vector3d place;
   };
-  std::vector<std::vector<Pivot>> pivots(static_cast<size_t>(model.numBodies()));
-  std::vector<bool> in_loop(static_cast<size_t>(model.numBodies()), false);
+  std::vector<std::vector<Pivot>> pivots(model.numBodies());
+  std::vector<bool> in_loop(model.numBodies(), false);
   for (int i = 1; i < model.numBodies(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    pivots[static_cast<size_t>(i)].push_back({joint.name, Vector3d::Zero()});
-    if (joint.kind != JointKind::FreeFlyer)
-      pivots[static_cast<size_t>(joint.parent)].push_back({joint.name, joint.X_PJ.p});
+    const Joint& joint = model.joints()[i];
+    pivots[i].push_back({joint.name, Vector3d::Zero()});
+    if (joint.kind != JointKind::FreeFlyer) pivots[joint.parent].push_back({joint.name, joint.X_PJ.p});
   }
   for (const LoopCluster& cluster : model.clusters())
     for (const int dof : cluster.dofs) {
-      const int body = model.dofs()[static_cast<size_t>(dof)].joint;
-      in_loop[static_cast<size_t>(body)] = true;
-      in_loop[static_cast<size_t>(model.joints()[static_cast<size_t>(body)].parent)] = true;
+      const int body = model.dofs()[dof].joint;
+      in_loop[body] = in_loop[model.joints()[body].parent] = true;
     }
   for (const Closure& closure : model.closures()) {
     if (closure.kind == ClosureKind::Coupler) continue;
-    pivots[static_cast<size_t>(closure.body1)].push_back({closure.name, closure.X_B1.p});
-    pivots[static_cast<size_t>(closure.body2)].push_back({closure.name, closure.X_B2.p});
+    pivots[closure.body1].push_back({closure.name, closure.X_B1.p});
+    pivots[closure.body2].push_back({closure.name, closure.X_B2.p});
   }
   Json lengths = Json::array();
-  for (size_t body = 1; body < pivots.size(); ++body)
-    for (size_t a = 0; in_loop[body] && a < pivots[body].size(); ++a)
-      for (size_t b = a + 1; b < pivots[body].size(); ++b) {
-        const double length = (pivots[body][b].place - pivots[body][a].place).norm();
-        if (length < kSame || model.joints()[body].kind == JointKind::FreeFlyer) continue;
-        lengths.push_back({{"body", model.bodies()[body].name},
-                           {"from", pivots[body][a].name},
-                           {"to", pivots[body][b].name},
-                           {"length", length}});
-      }
+  for (int body = 1; body < model.numBodies(); ++body) {
+    if (!in_loop[body] || model.joints()[body].kind == JointKind::FreeFlyer) continue;
+    for (auto a = pivots[body].begin(); a != pivots[body].end(); ++a)
+      for (auto b = a + 1; b != pivots[body].end(); ++b)
+        if (const double length = (b->place - a->place).norm(); length > kSame)
+          lengths.push_back(
+              {{"body", model.bodies()[body].name}, {"from", a->name}, {"to", b->name}, {"length", length}});
+  }
   return lengths;
 }
 

@@ -17,7 +17,8 @@ struct GeneratorEntry {
 std::string locateBeside(const YamlEntry& entry);
 
 /// \param name      of the generator
-/// \param settings  a map from parameters to numbers, or to names of choices, of which files (.yaml) are relative to that of the entry; null for none
+/// \param settings  a map from parameters to numbers, or to names of choices, of which files (.yaml) are relative to that of the
+///                  entry; null for none
 /// \throws InputError naming file, line, parameter and remedy
 GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settings);
 

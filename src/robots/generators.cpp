@@ -71,11 +71,14 @@ const std::vector<Generator>& getCompiledGenerators() {
   return generators;
 }
 
-// The file of a robot composed of parts in a directory of robots, or empty.
-std::string findComposition(const fs::path& directory, const std::string& name) {
-  const fs::path path = directory / name / (name + ".yaml");
-  std::error_code error;
-  return fs::is_regular_file(path, error) && readYaml(path.string()).composed ? path.string() : "";
+// The file of a robot composed of parts in the directories of robots, or empty.
+std::string findComposition(const std::string& name) {
+  for (const std::string& directory : getRobotDirectories()) {
+    const fs::path path = fs::path(directory) / name / (name + ".yaml");
+    std::error_code error;
+    if (fs::is_regular_file(path, error) && readYaml(path.string()).composed) return path.string();
+  }
+  return "";
 }
 
 Generator makeComposedGenerator(const std::string& path, const OptionValues& settings) {
@@ -88,17 +91,11 @@ Generator makeComposedGenerator(const std::string& path, const OptionValues& set
           [robot](const OptionSet& parameters) { return combineFiles(robot->make(parameters), {}, nullptr); }};
 }
 
-// Names of all in the directories of robots.
+// All in the directories of robots, by name.
 std::map<std::string, std::string> listCompositions() {
   std::map<std::string, std::string> files;
-  for (const std::string& directory : getRobotDirectories()) {
-    std::error_code error;
-    for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
-      const std::string name = it->path().filename().string();
-      if (files.count(name)) continue;
-      if (const std::string file = findComposition(directory, name); !file.empty()) files[name] = file;
-    }
-  }
+  for (const std::string& name : listRobots())
+    if (const std::string file = findComposition(name); !file.empty()) files[name] = file;
   return files;
 }
 
@@ -118,12 +115,9 @@ Generator findGenerator(const std::string& name, const OptionValues& settings) {
     return makeComposedGenerator(name, settings);
   }
   if (name.find('/') == std::string::npos)
-    for (const std::string& directory : getRobotDirectories())
-      if (const std::string file = findComposition(directory, name); !file.empty())
-        return makeComposedGenerator(file, settings);
+    if (const std::string file = findComposition(name); !file.empty()) return makeComposedGenerator(file, settings);
   std::vector<std::string> known;
-  for (const Generator& generator : getCompiledGenerators()) known.push_back(generator.name);
-  for (const auto& [other, file] : listCompositions()) known.push_back(other);
+  for (const Generator& generator : listGenerators()) known.push_back(generator.name);
   throw InputError("", "robot '" + name + "'", "there is no such generator",
                    "choose one of: " + listItems(known) + ", or give a file that composes a robot");
 }

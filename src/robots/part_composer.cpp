@@ -71,7 +71,7 @@ class PartComposer {
     symbols_->define("side", part_.side);
     for (const PartParameter& p : file_.parameters) {
       if (!p.option.choices.empty()) continue;
-      callFor(find(file_.fields, "parameters")->withSymbols(nullptr),
+      callFor(*find(file_.fields, "parameters"),
               [&] { symbols_->define(p.option.name, toNumber(part_.values.at(p.option.name))); });
     }
     for (const std::string& name : file_.points)
@@ -160,8 +160,9 @@ class PartComposer {
     const YamlEntry* linkage = find(file_.fields, "linkage");
     if (!linkage) return false;
     for (const auto& [key, base] : linkage->getMap())
-      for (const auto& [name, entry] : file_.tree)
-        if (key == "base" && base.isWord(name)) return true;
+      if (key == "base")
+        return std::any_of(file_.tree.begin(), file_.tree.end(),
+                           [&base = base](const auto& link) { return base.isWord(link.first); });
     return false;
   }
 

@@ -99,7 +99,7 @@ const PartParameter* PartFile::findParameter(const std::string& name) const {
 }
 
 bool PartFile::defines(const std::string& name) const {
-  if (findParameter(name)) return true;
+  if (findParameter(name) || contains(points, name)) return true;
   const YamlEntry* let = bielle::find(fields, "let");
   if (!let) return false;
   const auto values = let->getMap();
@@ -113,11 +113,7 @@ std::string fillIn(const std::string& text, const std::map<std::string, std::str
     if (open == std::string::npos || close == std::string::npos || close < open) return out + text.substr(begin);
     const std::string name = text.substr(open + 1, close - open - 1);
     const auto it = values.find(name);
-    if (it == values.end()) {
-      std::vector<std::string> known;
-      for (const auto& [key, value] : values) known.push_back(key);
-      entry.fail("'{" + name + "}' is unknown", "known are " + listItems(known));
-    }
+    if (it == values.end()) entry.fail("'{" + name + "}' is unknown", "known are " + listKeys(values));
     out += text.substr(begin, open - begin) + it->second;
     begin = close + 1;
   }

@@ -29,7 +29,7 @@ struct PartFile {
   std::vector<std::pair<std::string, YamlEntry>> tree;    ///< links, and parts mounted at their place among them
 
   const PartParameter* findParameter(const std::string& name) const;
-  bool defines(const std::string& name) const;  ///< a parameter, or a value of `let`
+  bool defines(const std::string& name) const;  ///< a parameter, a point, or a value of `let`
 };
 
 /// A name with {placeholders} replaced. \throws InputError of `entry` for one that is unknown

@@ -22,9 +22,7 @@ template <typename Value>
 Value findNamed(const std::map<std::string, Value>& table, const YamlEntry& entry) {
   const auto it = table.find(entry.getText());
   if (it != table.end()) return it->second;
-  std::vector<std::string> known;
-  for (const auto& [name, value] : table) known.push_back(name);
-  entry.fail("'" + entry.getText() + "' is unknown", "use one of " + listItems(known));
+  entry.fail("'" + entry.getText() + "' is unknown", "use one of " + listKeys(table));
 }
 
 double readPositive(const YamlEntry& entry) {
@@ -45,12 +43,8 @@ double readMass(const YamlFields& fields, const Solid& solid, const YamlEntry& o
   const YamlEntry *mass = find(fields, "mass"), *density = find(fields, "density"),
                   *material = find(fields, "material");
   if (!!mass + !!density + !!material != 1)
-    owner.fail(
-        "its mass is not given once", "give `mass` [kg], `density` [kg/m] of what is long, or `material` (" + [] {
-          std::vector<std::string> names;
-          for (const auto& [name, value] : kMaterials) names.push_back(name);
-          return listItems(names);
-        }() + ")");
+    owner.fail("its mass is not given once",
+               "give `mass` [kg], `density` [kg/m] of what is long, or `material` (" + listKeys(kMaterials) + ")");
   if (mass) return readPositive(*mass);
   if (material) return findNamed(kMaterials, *material) * calcVolume(solid);
   if (solid.shape != Visual::Shape::Cylinder) density->fail("only rods and cylinders have a length", "give `mass`");

@@ -48,12 +48,7 @@ UrdfJoint readJoint(const YamlFields& fields, const YamlEntry& owner, double sid
 void addSolidsTo(UrdfLink& link, const std::vector<Solid>& solids) {
   for (const Solid& solid : solids) {
     link.inertia = link.inertia + calcInertia(solid);
-    Visual visual;
-    visual.shape = solid.shape;
-    visual.X_BV = solid.X_LS;
-    visual.size = solid.size;
-    visual.rgba = solid.rgba;
-    link.visuals.push_back(visual);
+    link.visuals.push_back(makeVisual(solid));
   }
 }
 

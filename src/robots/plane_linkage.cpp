@@ -59,10 +59,7 @@ class PlaneLinkage {
 
  private:
   void requirePoint(const std::string& point, const YamlEntry& entry) const {
-    if (points_.count(point)) return;
-    std::vector<std::string> known;
-    for (const auto& [name, place] : points_) known.push_back(name);
-    entry.fail("there is no point '" + point + "'", "known are " + listItems(known));
+    if (!points_.count(point)) entry.fail("there is no point '" + point + "'", "known are " + listKeys(points_));
   }
 
   void readPoints() {

@@ -61,6 +61,15 @@ Inertia calcInertia(const std::vector<Solid>& solids) {
   return sum;
 }
 
+Visual makeVisual(const Solid& solid) {
+  Visual visual;
+  visual.shape = solid.shape;
+  visual.X_BV = solid.X_LS;
+  visual.size = solid.size;
+  visual.rgba = solid.rgba;
+  return visual;
+}
+
 void addSolidLink(const std::string& link, const std::string& parent, const Joint& joint,
                   const std::vector<Solid>& solids, ModelBuilder& builder) {
   builder.addLink(link, parent, joint, {});
@@ -69,14 +78,7 @@ void addSolidLink(const std::string& link, const std::string& parent, const Join
 
 void addSolids(const std::string& link, const std::vector<Solid>& solids, ModelBuilder& builder) {
   builder.addInertia(link, calcInertia(solids));
-  for (const Solid& solid : solids) {
-    Visual visual;
-    visual.shape = solid.shape;
-    visual.X_BV = solid.X_LS;
-    visual.size = solid.size;
-    visual.rgba = solid.rgba;
-    builder.addVisual(link, visual);
-  }
+  for (const Solid& solid : solids) builder.addVisual(link, makeVisual(solid));
 }
 
 Joint makeRevolute(const std::string& name, const Vector3d& place, const Vector3d& axis) {

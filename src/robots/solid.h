@@ -42,6 +42,8 @@ Solid makeRod(const Vector3d& a, const Vector3d& b, double radius, double densit
 Inertia calcInertia(const Solid& solid);
 Inertia calcInertia(const std::vector<Solid>& solids);
 
+Visual makeVisual(const Solid& solid);
+
 /// Adds a link made of solids, and draws it.
 void addSolidLink(const std::string& link, const std::string& parent, const Joint& joint,
                   const std::vector<Solid>& solids, ModelBuilder& builder);

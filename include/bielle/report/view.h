@@ -19,7 +19,7 @@ struct ViewParameter {
   std::string name, unit;
   std::vector<double> values;
   std::vector<std::optional<LoadedRobot>> robots;  ///< none where the value is impossible
-  size_t start = 0;  ///< whose value is that of the robot itself
+  size_t start = 0;                                ///< whose value is that of the robot itself
 };
 
 /// \throws InputError when no closed configuration of the robot is found; those of parameters are then said not to close
