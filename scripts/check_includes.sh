@@ -1,11 +1,11 @@
 #!/bin/bash
 # check_includes.sh [--all]: compiles sources without precompiled headers, each by itself, so that a file that forgets an include
-# is noticed. Without --all it takes every twelfth file, other ones for each commit. Needs build/test (scripts/test.sh).
+# is noticed. Without --all it takes every twelfth file, other ones for each state of the tree. Needs build/test (scripts/test.sh).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 cd "$bielle_root"
 turn=0 turns=12
-if [ "${1:-}" = --all ]; then turns=1; else turn=$((16#$(git rev-parse HEAD | head -c 6) % turns)); fi
+if [ "${1:-}" = --all ]; then turns=1; else turn=$((16#$(git rev-parse "HEAD^{tree}" | head -c 6) % turns)); fi
 cmake -S . -B build/includes -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-fsyntax-only -DBIELLE_PRECOMPILE=OFF \
   -DCMAKE_UNITY_BUILD=OFF -DBIELLE_BUILD_TESTS=OFF -DBIELLE_BUILD_EXAMPLES=OFF >/dev/null
 # Headers that are generated come first.

@@ -162,3 +162,67 @@ TEST_CASE("an adopted robot bends its knees the way that their ranges allow") {
     CHECK(2 * std::asin(posture.q.segment<3>(3).norm()) < 0.1);  // the trunk is upright
   }
 }
+
+namespace {
+
+// A leg of a biped of MuJoCo, straight down from the hip. The frames of thigh, shank and toe have x down, and the toe's
+// is turned by another 40 degrees; that of the hip alone is upright.
+// \param geom  of the toe, without its place: 3 cm before and 5 cm below the ankle
+std::string makeBareLeg(const std::string& side, double y, const std::string& geom) {
+  const auto begin = [&side](const std::string& name, const std::string& place, const std::string& joint) {
+    return "<body name='" + name + "_" + side + "' " + place +
+           "><inertial pos='0.1 0 0' mass='0.5' diaginertia='.01 .01 .01'/>" + "<joint name='" + joint + "_" + side +
+           "' ";
+  };
+  return begin("hip", "pos='0 " + std::to_string(y) + " 0'", "roll") +
+         "axis='1 0 0'/><geom type='sphere' size='.05'/>" + begin("thigh", "euler='0 90 0'", "pitch") +
+         "axis='0 1 0'/><geom type='capsule' size='.04' fromto='0 0 0 .4 0 0'/>" +
+         begin("shank", "pos='.4 0 0'", "knee") +
+         "axis='0 1 0' range='-5 120'/><geom type='capsule' size='.03' fromto='0 0 0 .4 0 0'/>" +
+         begin("toe", "pos='.4 0 0' euler='0 40 0'", "ankle") + "axis='0 1 0'/><geom pos='.0190185 0 .0551207' " +
+         geom + "/></body></body></body></body>";
+}
+
+}  // namespace
+
+TEST_CASE("feet without an upright frame are made on the lowest points of their shapes, along their flat side") {
+  struct Case {
+    std::string shape;
+    double turn;  // about y, of x of the sole from the axes of the shape, degrees
+    ContactKind kind;
+    double length, thickness;  // m, from the middle of the shape to the sole
+  };
+  for (const Case& c : {Case{"type='capsule' size='.02 .07'", 90, ContactKind::Edge5D, 0.14, 0.02},
+                        Case{"type='box' size='.1 .04 .01'", 0, ContactKind::Surface6D, 0.2, 0.01}})
+    for (double tilt : {0.0, 10.0}) {  // of the toe in the posture of the file, degrees
+      CAPTURE(c.shape, tilt);
+      const std::string geom = c.shape + " euler='0 " + std::to_string(c.turn + tilt - 130) + " 0'";
+      const RobotDirectory directory;
+      const LoadedRobot bare = loadRobot(directory.write(
+          "bare.xml",
+          "<mujoco><worldbody><body name='trunk' pos='0 0 0.9'><freejoint/><inertial pos='0 0 0' mass='5' "
+          "diaginertia='.1 .1 .1'/>" +
+              makeBareLeg("left", 0.1, geom) + makeBareLeg("right", -0.1, geom) + "</body></worldbody></mujoco>"));
+      const Adoption adoption = adoptRobot(bare, "../bare.xml");
+      CAPTURE(adoption.yaml);
+      const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+      REQUIRE(model.contacts().size() == 2);
+      Workspace ws(model);
+      updatePositions(model, ws, model.makeNeutral());  // the legs straight down
+      const Vector3d hip = ws.X_WB[1].p;
+      const double angle = tilt * M_PI / 180;
+      for (const ContactFrame& contact : model.contacts()) {
+        const double side = contact.name == "foot_left" ? 1 : -1;
+        CHECK(model.bodies()[contact.body].name == (side > 0 ? "toe_left" : "toe_right"));
+        CHECK(contact.kind == c.kind);
+        CHECK(2 * contact.half_length == Approx(c.length));
+        const SE3 X = getPlacement(ws, contact.body, contact.X_BF);
+        const Vector3d ahead(std::cos(angle), 0, -std::sin(angle)), up(std::sin(angle), 0, std::cos(angle));
+        const Vector3d place = hip + Vector3d(0.03, side * 0.1, -0.85) - c.thickness * up;
+        CHECK((X.p - place).norm() < 1e-6);
+        CHECK((X.R.col(0) - ahead).norm() < 1e-6);
+        CHECK((X.R.col(2) - up).norm() < 1e-6);
+      }
+      CHECK(assembleReference(model, "half_sitting").status == AssemblyStatus::Closed);
+    }
+}

@@ -55,6 +55,26 @@ TEST_CASE("bielle world: a robot is pushed, and the work of the push is booked")
   testing::checkPushed(*makeTestWorld(), getBipetto(), kBielleTolerances);
 }
 
+TEST_CASE("bielle world: a push of another body than the trunk moves it as steps of controlled error do") {
+  const Model model = bielle::testing::loadOwn("fivebar").model;
+  const VectorXd q = findClosedConfiguration(model).q, v = VectorXd::Zero(model.nv());
+  const auto push = [&](double tolerance, int body) {
+    WorldOptions options;
+    options.tolerance = tolerance;
+    options.pushed_body = body;
+    const std::unique_ptr<World> world = makeWorld("bielle", model, options);
+    world->reset(q, v);
+    world->setPush(Vector3d(3, 0, 1));
+    REQUIRE(world->advance(0.1));
+    const Books books = world->getBooks();
+    CHECK(books.push_work != 0);
+    return world->getConfiguration();
+  };
+  const VectorXd fixed = push(0, 2), controlled = push(1e-9, 2);
+  CHECK((fixed - controlled).cwiseAbs().maxCoeff() < 1e-5);
+  CHECK((push(0, 1) - controlled).cwiseAbs().maxCoeff() > 1e-3);
+}
+
 TEST_CASE("bielle world: a stop holds a joint, and takes energy") {
   testing::checkStopped(*makeTestWorld(), getBipetto(), kBielleTolerances);
 }

@@ -5,7 +5,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/results/record_files.h"
+#include "bielle/robots/robot_loader.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -93,6 +96,76 @@ TEST_CASE("free motion: a robot with feet falls to the ground") {
   const MotionRecord record = readRecord((scratch.path / "fall/trajectory.npz").string());
   CHECK(record.com(record.com.rows() - 1, 2) < record.com(0, 2));
   CHECK(record.contact_wrenches.cwiseAbs().maxCoeff() > 10);
+}
+
+TEST_CASE("free motion: a push of any body is the same in all worlds, and gives a pendulum its momentum") {
+  const FreeScratch scratch;
+  // Two links without gravity in the plane of the push; the second one is pushed for a tenth of a second, and then all is free.
+  const std::string robot = scratch.write("two.urdf", R"(<robot name="two"><link name="world"/>
+    <link name="upper"><inertial><origin xyz="0 0 -0.2"/><mass value="2"/>
+      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <link name="lower"><inertial><origin xyz="0 0 -0.3"/><mass value="1"/>
+      <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="slide" type="prismatic"><parent link="world"/><child link="upper"/><axis xyz="1 0 0"/>
+      <limit lower="-9" upper="9" effort="0" velocity="0"/></joint>
+    <joint name="hinge" type="continuous"><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/></joint></robot>)");
+  scratch.write("two.yaml", "base: fixed\ngravity: [0, 0, 0]\n");
+  MatrixXd ends[3];
+  const std::string worlds[] = {"bielle", "simbody", "mujoco"};
+  for (int w = 0; w < 3; ++w) {
+    CAPTURE(worlds[w]);
+    const CommandResult result = move(robot, scratch.path / worlds[w],
+                                      {"--push", "t=0,impulse=0.6,duration=0.1", "--push-body", "lower", "--duration",
+                                       "0.5", "--world", worlds[w], "--no-report"});
+    CAPTURE(result.out, result.err);
+    if (result.err.find("there is no world") != std::string::npos) continue;
+    REQUIRE(result.status == 0);
+    const MotionRecord record = readRecord((scratch.path / worlds[w] / "trajectory.npz").string());
+    const Eigen::Index last = record.q.rows() - 1;
+    // Momentum along the slide: (m1 + m2) x' + m2 c cos(angle) angle' with the centre of mass at -c: p = impulse.
+    const double angle = record.q(last, 1);
+    const double momentum = 3 * record.v(last, 0) - 0.3 * std::cos(angle) * record.v(last, 1);
+    CHECK(momentum == Approx(0.6).epsilon(2e-3));
+    CHECK(record.v(last, 1) < -0.5);  // pushed, the upper link would turn the lower one the other way
+    CHECK(parseFreeSummary(scratch.path / worlds[w])["pushed_body"]["index"] == 2);
+    ends[w] = record.q.row(last);
+    if (w > 0) CHECK((ends[w] - ends[0]).cwiseAbs().maxCoeff() < 2e-3);
+  }
+  const CommandResult upper = move(robot, scratch.path / "upper",
+                                   {"--push", "t=0,impulse=0.6,duration=0.1", "--duration", "0.5", "--no-report"});
+  REQUIRE(upper.status == 0);
+  const MotionRecord other = readRecord((scratch.path / "upper/trajectory.npz").string());
+  CHECK(other.v(other.v.rows() - 1, 1) > 0.3);
+  const CommandResult result = move(robot, scratch.path / "no", {"--push-body", "middle"});
+  CHECK(result.status == 2);
+  CHECK(result.err.find("the robot has no such link") != std::string::npos);
+}
+
+TEST_CASE("free motion: neutral is another posture than that of the reference, with the feet on the ground") {
+  const FreeScratch scratch;
+  VectorXd starts[2];
+  for (const bool is_neutral : {false, true}) {
+    std::vector<std::string> options = {"--duration", "0.01", "--accuracy", "1e-5", "--no-report"};
+    if (is_neutral) options.insert(options.end(), {"--posture", "neutral"});
+    const CommandResult result = move(BIELLE_SOURCE_DIR "/robots/bipetto", scratch.path / "start", options);
+    CAPTURE(result.out, result.err);
+    REQUIRE(result.status == 0);
+    starts[is_neutral] = readRecord((scratch.path / "start/trajectory.npz").string()).q.row(0).transpose();
+  }
+  const Model model = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto").model;
+  const VectorXd closed = closeConfiguration(model, model.makeNeutral()).q;
+  CHECK((starts[1] - closed).tail(model.nq() - 7).cwiseAbs().maxCoeff() < 1e-12);
+  CHECK((starts[0] - closed).tail(model.nq() - 7).cwiseAbs().maxCoeff() > 0.1);
+  Workspace ws(model);
+  updatePositions(model, ws, starts[1]);
+  double lowest = 1;
+  for (const ContactFrame& contact : model.contacts())
+    for (double x : {-1, 1})
+      for (double y : {-1, 1}) {
+        const Vector3d corner(x * contact.half_length, y * contact.half_width, 0);
+        lowest = std::min(lowest, getPlacement(ws, contact.body, contact.X_BF).act(corner).z());
+      }
+  CHECK(std::abs(lowest) < 1e-12);
 }
 
 TEST_CASE("free motion: what does not fit is refused, with the remedy") {

@@ -1,5 +1,5 @@
 // Rigid impacts: momentum, energy, derivatives against central differences (fourth order, step 1e-3), every joint kind
-// times every closure kind; a dropped block as the closed form.
+// times every closure kind; a dropped block and a body that falls on its edge as closed forms.
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/impact.h"
@@ -90,6 +90,80 @@ TEST_CASE("a block that lands flat stops; redundant loops meet the same velocity
   REQUIRE(updateImpact(block, flat, makeConstraintSet(block, {{0, SE3::Identity(), 0, 0}}), block.makeNeutral(),
                        randomVector(rng, 6, 1)) == DynamicsStatus::Ok);
   CHECK(flat.v_plus.norm() < 1e-12);
+}
+
+TEST_CASE("a body that lands on an edge goes on rolling about it, by its angular momentum about the edge") {
+  std::mt19937 rng(54);
+  for (int trial = 0; trial < 5; ++trial) {
+    ModelBuilder builder("blade");
+    Joint joint;
+    joint.name = "free";
+    joint.kind = JointKind::FreeFlyer;
+    const Inertia inertia = randomInertia(rng);
+    builder.addLink("blade", "world", joint, inertia);
+    builder.addFrame("edge", "blade", randomPlacement(rng));
+    builder.addContact("edge", "edge", ContactKind::Edge5D, 0.1, 0);
+    const Model model = builder.build();
+    const VectorXd q = model.integrate(model.makeNeutral(), randomVector(rng, 6, 1)), v = randomVector(rng, 6, 1);
+    Workspace ws(model);
+    updatePositions(model, ws, q);
+    const SE3 X_WB = ws.X_WB[1], X_WE = getPlacement(ws, 1, model.contacts()[0].X_BF);
+    const ConstraintSet set = makeConstraintSet(model, {{0, X_WE, 0, 0}});
+    REQUIRE(set.rows == 5);
+    ImpactWorkspace iws(model);
+    REQUIRE(updateImpact(model, iws, set, q, v) == DynamicsStatus::Ok);
+
+    // In the axes of the world: the impulse acts on the edge and has no moment about it.
+    const Vector3d axis = X_WE.R.col(0), com = X_WB.act(inertia.com), arm = com - X_WE.p;
+    const Vector3d velocity = X_WB.R * v.head<3>(), rate = X_WB.R * v.tail<3>();
+    const Matrix3d I = X_WB.R * inertia.I_com * X_WB.R.transpose();  // about the centre of mass
+    const Vector3d momentum = inertia.mass * (velocity + rate.cross(com - X_WB.p));
+    const double about_edge = axis.dot(arm.cross(momentum) + I * rate);
+    const double roll = about_edge / (axis.dot(I * axis) + inertia.mass * axis.cross(arm).squaredNorm());
+    VectorXd expected(6);
+    expected << X_WB.R.transpose() * (roll * axis).cross(X_WB.p - X_WE.p), X_WB.R.transpose() * (roll * axis);
+    REQUIRE(std::abs(roll) > 0.01);
+    const auto calcError = [&](const VectorXd& v_plus) { return (v_plus - expected).cwiseAbs().maxCoeff(); };
+    CHECK(calcError(iws.v_plus) < 1e-11);
+    for (int i = 0; i < 6; ++i) CHECK(calcError(iws.v_plus + 1e-3 * VectorXd::Unit(6, i)) > 1e-4);
+
+    const MatrixXd M = iws.ws.M;
+    CHECK((iws.J * iws.v_plus).norm() < 1e-11);
+    CHECK((M * (iws.v_plus - v) - iws.J.transpose() * iws.impulse).norm() < 1e-11 * (M * v).norm());
+    CHECK(calcEnergy(M, v) - calcEnergy(M, iws.v_plus) == Approx(calcEnergy(M, iws.v_plus - v)).epsilon(1e-9));
+    CHECK(calcEnergy(M, iws.v_plus) < calcEnergy(M, v));
+  }
+}
+
+TEST_CASE("impacts of edges on mechanisms: derivatives agree with differences") {
+  std::mt19937 rng(55);
+  for (ClosureKind closure : kClosureKinds) {
+    CAPTURE(getName(closure));
+    const Mechanism mechanism = makeRandomMechanism(rng, JointKind::Revolute, closure, MechanismBase::FreeFlyer);
+    ModelParts parts = takeParts(mechanism.model);
+    parts.contacts[0].kind = ContactKind::Edge5D;
+    parts.contacts[0].half_width = 0;
+    const Model model = ModelBuilder::restore(std::move(parts));
+    const ConstraintSet set = makeConstraintSet(model, {{0, randomPlacement(rng), 0, 0}});
+    const VectorXd q = mechanism.q_closed, v = randomVector(rng, model.nv(), 1);
+    const int nv = model.nv();
+    ImpactWorkspace iws(model), other(model);
+    REQUIRE(updateImpact(model, iws, set, q, v) == DynamicsStatus::Ok);
+    CHECK((iws.J * iws.v_plus).norm() < 1e-10);
+    REQUIRE(updateImpactDerivatives(model, iws, set) == DynamicsStatus::Ok);
+    const auto solve = [&](const VectorXd& x, const VectorXd& y) {
+      updateImpact(model, other, set, x, y);
+      VectorXd out(nv + set.rows);
+      out << other.v_plus, other.impulse;
+      return out;
+    };
+    MatrixXd numeric = differentiateTangent(model, q, 4e-3, [&](const VectorXd& x) { return solve(x, v); });
+    checkDerivative(iws.dv_dq, numeric.topRows(nv), "v+ by q");
+    checkDerivative(iws.dimpulse_dq, numeric.bottomRows(set.rows), "impulse by q");
+    numeric = differentiate(v, 1, [&](const VectorXd& y) { return solve(q, y); });
+    checkDerivative(iws.dv_dv, numeric.topRows(nv), "v+ by v");
+    checkDerivative(iws.dimpulse_dv, numeric.bottomRows(set.rows), "impulse by v");
+  }
 }
 
 TEST_CASE("impacts allocate nothing after the first") {

@@ -142,6 +142,26 @@ TEST_CASE("a universal joint with a cross that has inertia is two joints") {
   CHECK((of_split.M - of_plain.M - 0.02 * turn.transpose() * turn).norm() < 1e-8);
 }
 
+TEST_CASE("frames of the YAML file are placed in their links, and contacts stand on them") {
+  const Model model =
+      load(kToyUrdf,
+           "frames: {tip: {link: hand, place: [0.1, 0.2, 0.3], rpy: [0.4, 0.5, 0.6]}, bare: {link: arm}}\n"
+           "contacts: {point: {frame: tip, type: 3d}}");
+  const Model plain = load(kToyUrdf, "");
+  const Frame &hand = plain.frames()[plain.findFrame("hand")], &tip = model.frames()[model.findFrame("tip")];
+  CHECK(tip.body == hand.body);
+  const SE3 X = hand.X_BF.inverse() * tip.X_BF;
+  CHECK((X.p - Vector3d(0.1, 0.2, 0.3)).norm() < 1e-15);
+  const Eigen::Quaterniond turn(
+      std::cos(0.3) * std::cos(0.25) * std::cos(0.2) + std::sin(0.3) * std::sin(0.25) * std::sin(0.2),
+      std::cos(0.3) * std::cos(0.25) * std::sin(0.2) - std::sin(0.3) * std::sin(0.25) * std::cos(0.2),
+      std::cos(0.3) * std::sin(0.25) * std::cos(0.2) + std::sin(0.3) * std::cos(0.25) * std::sin(0.2),
+      std::sin(0.3) * std::cos(0.25) * std::cos(0.2) - std::cos(0.3) * std::sin(0.25) * std::sin(0.2));
+  CHECK((X.R - turn.toRotationMatrix()).norm() < 1e-14);
+  CHECK((model.contacts()[0].X_BF.p - tip.X_BF.p).norm() == 0);
+  CHECK(model.frames()[model.findFrame("bare")].X_BF.R.isIdentity(0));
+}
+
 TEST_CASE("closures: joints stand for their child, pairs for their common name, gains and axes arrive") {
   const Model by_joint = load(kToyUrdf, "closed_loop: [[wrist, rod_joint]]\ntype: ['3D']\nclosure_name: [tip]");
   REQUIRE(by_joint.closures().size() == 1);

@@ -93,6 +93,8 @@ const std::vector<Mistake> kYamlMistakes = {
     {kType, "type: [6d, 6d]", "key 'type' (line 2)", "2 element(s)", "give 1"},
     {kType, "", "document", "no 'type'", "add it"},
     {kLoops, "", "key 'type'", "no closed_loop", "frames"},
+    {kType, kType + "\nframes: {tip: {link: nail}}", "frame 'tip'", "no link 'nail'", "name"},
+    {kType, kType + "\nframes: {rod: {link: arm}}", "frame 'rod'", "of this name already", "rename"},
     {kType, kType + "\nclosure_name: [a, b]", "key 'closure_name'", "2 element(s)", "give 1"},
     {kLoops, "closed_loop: [[hand]]", "key 'closed_loop'[0] (line 1)", "1 element(s)", "give 2"},
     {kLoops, "closed_loop: hand", "key 'closed_loop'", "not a list", "[a, b, ...]"},

@@ -346,7 +346,7 @@ class ReportPage(unittest.TestCase):
             self.assertGreater(differ(before, self.browser.evaluate(PICTURE)), 100, index)
         self.assertGreater(closed, 48)
         self.assertGreater(refused, 0)  # the knee's linkage has a dead point
-        self.browser.evaluate("document.querySelector('#sliders > div:last-child > button').click()")
+        self.browser.evaluate("document.querySelector('#sliders button').click()")
         self.assertLess(differ(start, self.browser.evaluate(PICTURE)), 200)
 
     def test_parameters_have_sliders_whose_robots_close(self):
@@ -386,8 +386,50 @@ class ReportPage(unittest.TestCase):
         # One parameter at a time; in its middle it is the robot again.
         self.assertEqual(self.browser.evaluate("document.querySelectorAll('.parameters output')[1].textContent"), "0.22 m")
         self.browser.evaluate(f"{move}(0, 3)")
-        self.browser.evaluate("document.querySelector('#sliders > div:last-child > button').click()")
+        self.browser.evaluate("document.querySelector('#sliders button').click()")
         self.assertLess(differ(start, self.browser.evaluate(PICTURE)), 200)
+
+    def test_modes_swing_as_their_shapes(self):
+        """Angles of hinges on the page against the shapes that the command prints."""
+        page = self.root / "modes.html"
+        answer = json.loads(run("modes", "spring_biped", "--lock-motors", "--json", "-o", page).stdout)
+        self.browser.open(page)
+        self.browser.evaluate("document.querySelector('#sliders button').click()")  # stands still
+        self.assertEqual(self.browser.evaluate("report.viewer.list.length"), len(answer["modes"]))
+        angles = """((mode, amplitude) => {
+          const viewer = report.viewer;
+          const show = size => {
+            viewer.list.value = mode;
+            viewer.list.onchange();
+            viewer.amplitude.value = size;
+            viewer.amplitude.dispatchEvent(new Event('input'));
+            return viewer.run.robot.joints.map((joint, j) => viewer.local[j + 1].clone());
+          };
+          const before = show(0), after = show(amplitude);
+          return viewer.run.robot.joints.filter(joint => joint.kind === 'revolute').map(joint => {
+            const j = viewer.run.robot.joints.indexOf(joint);
+            const turn = new THREE.Matrix4().getInverse(before[j]).multiply(after[j]);
+            const quaternion = new THREE.Quaternion().setFromRotationMatrix(turn).normalize();
+            return [joint.name, 2 * Math.asin(Math.min(1, Math.hypot(quaternion.x, quaternion.y, quaternion.z)))];
+          });
+        })"""
+        amplitude, pictures = 0.02, []
+        for number, mode in enumerate(answer["modes"]):
+            shape = dict(zip(answer["order"], mode["shape"]))
+            shown = self.browser.evaluate(f"{angles}({number}, {amplitude})")
+            self.assertGreater(len(shown), 10)
+            errors = [abs(angle - abs(amplitude * shape[name])) for name, angle in shown]
+            self.assertLess(max(errors), 5e-4)  # of second order: less than amplitude^2
+            poisoned = [abs(angle - abs(amplitude * (shape[name] + 0.1))) for name, angle in shown]
+            self.assertGreater(min(poisoned), 5e-4)
+            self.assertLess(self.browser.evaluate("report.viewer.getLargestGap()"), 1e-4)
+            self.browser.evaluate(f"{angles}({number}, 0.2)")
+            pictures.append(self.browser.evaluate(PICTURE))
+        self.assertGreater(differ(pictures[0], pictures[-1]), 100)
+        self.browser.evaluate("document.querySelector('#sliders button').click()")
+        phase = self.browser.evaluate("report.viewer.phase")
+        time.sleep(0.5)
+        self.assertNotEqual(phase, self.browser.evaluate("report.viewer.phase"))
 
     def test_springs_between_points_follow_the_bodies(self):
         robot = self.root / "sprung"

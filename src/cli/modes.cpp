@@ -8,9 +8,11 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
+#include "bielle/report/mode_view.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "results/number_option.h"
+#include "results/output_place.h"
 
 namespace bielle::cli {
 namespace {
@@ -25,6 +27,7 @@ struct ModesArguments {
   RobotArgument robot;
   std::string reference;
   std::vector<std::string> locked;
+  std::string output;
   double contact_stiffness = 0;
   bool lock_motors = false, in_the_air = false, json = false;
 };
@@ -32,6 +35,7 @@ struct ModesArguments {
 struct ModesReport {
   std::string posture;
   std::vector<std::string> contacts, locked;
+  std::vector<int> standing;  // contacts that do not move
   VectorXd q, u;
   Modes modes;
 };
@@ -83,6 +87,7 @@ ModesReport analyse(const LoadedRobot& robot, const ModesArguments& arguments) {
     addLock(model, report.q, joint, constraints);
     report.locked.push_back(model.joints()[joint].name);
   }
+  report.standing = contacts;
   const VectorXd tau = calcMotorForces(model, report.u);
   report.modes = calcModes(model, constraints, report.q, tau);
   if (arguments.contact_stiffness > 0 && !contacts.empty() && report.modes.status == DynamicsStatus::Ok) {
@@ -90,6 +95,7 @@ ModesReport analyse(const LoadedRobot& robot, const ModesArguments& arguments) {
         makeCompliantContacts(model, constraints, report.q, report.modes.lambda, arguments.contact_stiffness);
     ConstraintSet loops = makeConstraintSet(compliant);
     for (const int joint : locked) addLock(compliant, report.q, joint, loops);
+    report.standing.clear();
     report.modes = calcModes(compliant, loops, report.q, tau);
   }
   if (report.modes.status != DynamicsStatus::Ok) throw std::runtime_error(getMessage(report.modes.status));
@@ -164,11 +170,15 @@ void print(std::ostream& out, const Model& model, const ModesReport& report) {
 
 int run(const ModesArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
+  const std::string& page = arguments.output;
+  if (!page.empty()) requireApart(page, listFiles(robot));
   const ModesReport report = analyse(robot, arguments);
+  if (!page.empty()) writeModeView(page, robot, report.q, report.standing, report.modes.modes);
   if (arguments.json)
     std::cout << formatJson(describe(robot.model, report)) << "\n";
   else
     print(std::cout, robot.model, report);
+  if (!page.empty() && !arguments.json) std::cout << page << "\n";
   return kOk;
 }
 
@@ -187,6 +197,7 @@ void addModes(CLI::App& app, Action& action) {
                   "of every sole in all directions, shared by its corners [N/m]; by default soles stand still")
       ->check(isPositive());
   command.add_flag("--in-the-air", arguments->in_the_air, "the robot does not stand on its contacts");
+  command.add_option("-o,--output", arguments->output, "a page on which the robot swings in its modes");
   command.add_flag("--json", arguments->json, "print JSON, with all of the shapes");
   addFixedBase(command, arguments->robot);
   command.footer(
@@ -200,7 +211,7 @@ void addModes(CLI::App& app, Action& action) {
       "how\n"
       "neighbouring motions part.\n"
       "Examples:\n"
-      "  bielle modes spring_biped --lock-motors\n"
+      "  bielle modes spring_biped --lock-motors -o modes.html\n"
       "  bielle modes fourbar --json");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
 }

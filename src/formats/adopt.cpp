@@ -4,44 +4,29 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <optional>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
+#include "formats/adopt_feet.h"
+#include "formats/robot_text.h"
 
 namespace bielle {
 namespace {
 
 using YAML::BeginMap, YAML::BeginSeq, YAML::EndMap, YAML::EndSeq, YAML::Flow, YAML::Key, YAML::Value;
 
-constexpr double kUpright = 0.9;                      // least cosine between the z axis of a sole and up
-constexpr double kMirror = 0.06, kSameHeight = 0.02;  // of a pair of feet, m: published models are not quite symmetric
 constexpr double kHighest = 0.94, kLowest = 0.5, kStep = 0.04;  // shares of the height of the base
 constexpr double kOver = 0.005;                                 // from the centre of mass to the middle of the feet, m
 constexpr int kShifts = 20;
 constexpr double kRotor = 1e-3, kLever = 0.02, kSole = 0.1;
-constexpr double kRound = 1.05;  // extent of a round shape across, over its radius
-constexpr double kBlade = 0.03;  // m, the width of a foot that stands on an edge is less
-
-struct Foot {
-  int frame = 0;
-  SE3 X_WF;
-  bool is_named = false;
-};
 
 std::string format(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", std::abs(value) < 1e-9 ? 0.0 : value);
   return text;
-}
-
-bool isNamedFoot(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
-  return name.find("foot") != std::string::npos || name.find("sole") != std::string::npos;
 }
 
 double round(double length) { return std::round(length * 1e4) / 1e4; }
@@ -59,7 +44,7 @@ class Adopter {
   }
 
   Adoption write() {
-    findFeet();
+    nameFeet();
     out_ << YAML::Comment("A first guess by `bielle adopt`: correct each entry, then delete the comment above it.")
          << BeginMap << Key << "model" << Value << path_;
     writeMotors();
@@ -81,35 +66,16 @@ class Adopter {
     out_ << YAML::Newline << YAML::Newline << YAML::Comment(text);
   }
 
-  void findFeet() {
-    std::vector<Foot> candidates;
-    for (size_t i = 0; i < model_.frames().size(); ++i) {
-      const Frame& frame = model_.frames()[i];
-      const SE3 X = getPlacement(ws_, frame.body, frame.X_BF);
-      if (frame.body > 1 && X.R(2, 2) > kUpright)
-        candidates.push_back({static_cast<int>(i), X, isNamedFoot(frame.name)});
-    }
-    if (candidates.empty())
-      fail("no frame on a leg has its z axis up in the closed neutral configuration",
+  void nameFeet() {
+    feet_ = findFeet(model_, ws_);
+    if (feet_.empty())
+      fail("no frame on a leg has its z axis up in the closed neutral configuration, and no body has a shape",
            "add a link without mass under each foot, z up and x forward");
-    std::sort(candidates.begin(), candidates.end(), [](const Foot& a, const Foot& b) {
-      return std::make_tuple(!a.is_named, a.X_WF.p.z()) < std::make_tuple(!b.is_named, b.X_WF.p.z());
-    });
-    feet_ = {candidates.front()};
-    double nearest = kMirror;
-    const Foot& first = candidates.front();
-    const Vector3d image(first.X_WF.p.x(), -first.X_WF.p.y(), first.X_WF.p.z());
-    for (const Foot& other : candidates) {
-      const Vector3d apart = other.X_WF.p - image;
-      if (model_.frames()[other.frame].body == model_.frames()[first.frame].body || other.is_named != first.is_named ||
-          std::abs(apart.z()) > kSameHeight || std::abs(first.X_WF.p.y()) < kSameHeight || apart.norm() >= nearest)
-        continue;
-      nearest = apart.norm();
-      feet_.resize(1);
-      feet_.push_back(other);
+    has_made_frames_ = feet_[0].frame.empty();
+    for (size_t i = 0; i < feet_.size() && has_made_frames_; ++i) {
+      feet_[i].frame = "sole" + getContactName(i).substr(4);
+      while (model_.findFrame(feet_[i].frame) >= 0) feet_[i].frame += "_";
     }
-    // Left is where y is positive.
-    if (feet_.size() == 2 && feet_[0].X_WF.p.y() < 0) std::swap(feet_[0], feet_[1]);
   }
 
   std::string getContactName(size_t i) const {
@@ -148,34 +114,20 @@ class Adopter {
     out_ << EndMap;
   }
 
-  // What a foot stands on, from the extent of its shapes along x and y of its frame; empty without shapes. A capsule along x, and
-  // a box that is hardly wider than a rod, are blades; a ball is a point.
-  std::optional<ContactFrame> measureFoot(const Foot& foot) const {
-    const Frame& frame = model_.frames()[foot.frame];
-    Eigen::Vector2d half = Eigen::Vector2d::Zero();
-    double radius = std::numeric_limits<double>::infinity();
-    for (const Shape& shape : model_.shapes()) {
-      if (shape.body != frame.body) continue;
-      const SE3 X = frame.X_BF.inverse() * shape.X_BS;
-      for (int corner = 0; corner < 8; ++corner) {
-        const Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
-        const Vector3d place = X.act(sign.cwiseProduct(shape.half)).cwiseAbs();
-        half = half.cwiseMax(place.head<2>() + Eigen::Vector2d::Constant(shape.radius));
-      }
-      radius = std::min(radius, shape.radius);
+  void writeFrames() {
+    const auto write = [this](const char* key, const Vector3d& v) {
+      out_ << Key << key << Value << BeginSeq << formatRounded(v.x()) << formatRounded(v.y()) << formatRounded(v.z())
+           << EndSeq;
+    };
+    out_ << Key << "frames" << Value << BeginMap;
+    for (const FoundFoot& foot : feet_) {
+      out_ << Key << foot.frame << Value << Flow << BeginMap << Key << "link" << Value;
+      out_ << model_.bodies()[foot.body].name;
+      write("place", foot.X_BF.p);
+      write("rpy", calcRollPitchYaw(foot.X_BF.R));
+      out_ << EndMap;
     }
-    if (half.isZero()) return {};
-    ContactFrame contact{"", frame.body, frame.X_BF, ContactKind::Surface6D, half.x(), half.y()};
-    const bool is_round = radius > 0 && half.y() <= kRound * radius;
-    if (is_round && half.x() <= kRound * radius) {
-      contact.kind = ContactKind::Point3D;
-      contact.half_length = contact.half_width = 0;
-    } else if (is_round || 2 * half.y() < kBlade) {
-      contact.kind = ContactKind::Edge5D;
-      contact.half_length -= is_round ? radius : 0;
-      contact.half_width = 0;
-    }
-    return contact;
+    out_ << EndMap;
   }
 
   void writeContacts() {
@@ -184,27 +136,31 @@ class Adopter {
     parts.contacts.clear();
     parts.references.clear();
     for (size_t i = 0; i < feet_.size(); ++i) {
-      const Frame& frame = model_.frames()[feet_[i].frame];
-      std::optional<ContactFrame> contact = measureFoot(feet_[i]);
+      const FoundFoot& foot = feet_[i];
+      std::optional<ContactFrame> contact = measureFoot(model_, foot);
       is_measured &= contact.has_value();
-      if (!contact) contact = ContactFrame{"", frame.body, frame.X_BF, ContactKind::Surface6D, kSole / 2, kSole / 2};
+      if (!contact) contact = ContactFrame{"", foot.body, foot.X_BF, ContactKind::Surface6D, kSole / 2, kSole / 2};
       contact->name = getContactName(i);
       is_flat &= contact->kind == ContactKind::Surface6D;
       parts.contacts.push_back(*contact);
     }
-    guess("Feet: the lowest frames with z up" +
-          std::string(feet_[0].is_named ? " that are named like feet" : ", although not named like feet") +
+    guess(std::string(has_made_frames_ ? "Feet: new frames on the lowest points of shapes in the posture below"
+                                       : "Feet: the lowest frames with z up" +
+                                             std::string(feet_[0].is_named ? " that are named like feet"
+                                                                           : ", although not named like feet")) +
           (feet_.size() == 2 ? ", mirror images of each other; left is where y is positive."
                              : ": only one, without a mirror image."));
     guesses_.push_back(is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
                                    : "Soles: 0.1 m square, because the feet have no readable shapes.");
     if (!is_flat) guesses_.back() += " Narrow or round ones are edges (5d) or points (3d), which roll.";
     with_feet_ = ModelBuilder::restore(std::move(parts));
-    out_ << YAML::Newline << YAML::Comment(guesses_.back()) << Key << "contacts" << Value << BeginMap;
+    out_ << YAML::Newline << YAML::Comment(guesses_.back());
+    if (has_made_frames_) writeFrames();
+    out_ << Key << "contacts" << Value << BeginMap;
     for (size_t i = 0; i < feet_.size(); ++i) {
       const ContactFrame& contact = with_feet_->contacts()[i];
       out_ << Key << contact.name << Value << Flow << BeginMap;
-      out_ << Key << "frame" << Value << model_.frames()[feet_[i].frame].name;
+      out_ << Key << "frame" << Value << feet_[i].frame;
       out_ << Key << "type" << Value << getName(contact.kind);
       if (contact.kind == ContactKind::Edge5D) out_ << Key << "length" << Value << format(2 * contact.half_length);
       if (contact.kind == ContactKind::Surface6D)
@@ -220,9 +176,8 @@ class Adopter {
     const SE3& base = ws.X_WB[1];
     std::vector<Vector3d> places;
     Vector3d middle = Vector3d::Zero();
-    for (const Foot& foot : feet_) {
-      const Frame& frame = model_.frames()[foot.frame];
-      places.push_back(getPlacement(ws, frame.body, frame.X_BF).p);
+    for (const FoundFoot& foot : feet_) {
+      places.push_back(getPlacement(ws, foot.body, foot.X_BF).p);
       middle += places.back() / static_cast<double>(feet_.size());
     }
     Reference reference;
@@ -328,10 +283,10 @@ class Adopter {
 
   void writeSerialJoints() {
     std::vector<std::string> all;
-    for (const Foot& foot : feet_) {
+    for (const FoundFoot& foot : feet_) {
       std::vector<std::string> joints;
       bool is_simple = true;
-      for (int i = model_.frames()[foot.frame].body; i > 1; i = model_.joints()[i].parent) {
+      for (int i = foot.body; i > 1; i = model_.joints()[i].parent) {
         is_simple &= model_.joints()[i].nv == 1;
         joints.insert(joints.begin(), model_.joints()[i].name);
       }
@@ -347,7 +302,8 @@ class Adopter {
   const Model& model_;
   const std::string path_;
   Workspace ws_;
-  std::vector<Foot> feet_;
+  std::vector<FoundFoot> feet_;
+  bool has_made_frames_ = false;
   std::optional<Model> with_feet_;
   YAML::Emitter out_;
   std::vector<std::string> guesses_;

@@ -13,8 +13,8 @@ struct Adoption {
 };
 
 /// Guesses from the closed configuration nearest to neutral, x forward and z up:
-/// - feet: the lowest frames whose z axis is up, those named foot or sole before others; two of them, if one is the mirror
-///   image of the other;
+/// - feet (formats/adopt_feet.h): the lowest frames whose z axis is up and that are named foot or sole, or new ones on the lowest
+///   points of shapes; two of them, if one is the mirror image of the other;
 /// - soles: the extent of the shapes of the foot; narrow ones are edges, balls are points; without shapes, 0.1 m square;
 /// - the posture `half_sitting`: feet flat, as far apart as there and two soles at least, the centre of mass over their middle,
 ///   the base at the greatest of 94, 90, .. 50 % of its height there that can be assembled within the ranges of the joints;

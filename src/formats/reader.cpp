@@ -43,6 +43,25 @@ void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
   }
 }
 
+// Links without mass, fixed to others.
+void addFrames(const YamlFile& yaml, UrdfFile& urdf) {
+  for (const FrameSpec& frame : yaml.frames) {
+    const std::string element = "frame '" + frame.name + "'", joint_name = frame.name + "_joint";
+    if (!urdf.links.count(frame.link))
+      throw InputError(yaml.path, element, "there is no link '" + frame.link + "'", "correct the name");
+    if (findJoint(urdf.joints, joint_name) != urdf.joints.end() ||
+        !urdf.links.emplace(frame.name, UrdfLink{frame.name, {}, {}, {}}).second)
+      throw InputError(yaml.path, element, "there is a link or joint of this name already", "rename it");
+    UrdfJoint joint;
+    joint.parent = frame.link;
+    joint.child = frame.name;
+    joint.joint.name = joint_name;
+    joint.joint.kind = JointKind::Fixed;
+    joint.joint.X_PJ = frame.X_LF;
+    urdf.joints.push_back(joint);
+  }
+}
+
 // Two revolute joints, with a cross in between, for every universal one.
 void splitUniversalJoints(double cross_inertia, UrdfFile& urdf) {
   constexpr double kMass = 1e-9;  // kg: nothing without mass has inertia
@@ -86,6 +105,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   };
   yaml.path = own.path;
   replace(own.joint_types, yaml.joint_types);
+  yaml.frames.insert(yaml.frames.end(), own.frames.begin(), own.frames.end());
   replace(own.closures, yaml.closures);
   replace(own.motors, yaml.motors);
   for (const MotorSpec& motor : own.motors)
@@ -298,6 +318,7 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
   auto& [urdf, yaml] = files;
   retypeJoints(yaml, urdf);
   if (yaml.cross_inertia) splitUniversalJoints(*yaml.cross_inertia, urdf);
+  addFrames(yaml, urdf);
   setImportance(yaml, urdf);
 
   const BaseKind base = overriding.value_or(yaml.base.value_or(BaseKind::Free));

@@ -7,6 +7,7 @@
 #include "bielle/model/error.h"
 #include "formats/motor_catalogue.h"
 #include "formats/robot_files.h"
+#include "formats/robot_text.h"
 #include "formats/yaml_entry.h"
 
 namespace bielle {
@@ -130,6 +131,16 @@ void readJointTypes(const Fields& fields, YamlFile& file) {
   for (size_t i = 0; i < joints.size(); ++i) {
     if (!seen.insert(joints[i]).second) names->fail("joint '" + joints[i] + "' is listed twice", "list it once");
     file.joint_types.emplace_back(joints[i], readJointType(kinds[i]));
+  }
+}
+
+void readFrames(const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"link", "place", "rpy"});
+    FrameSpec frame{name, require(fields, "link", entry).getText(), {}};
+    if (const Entry* place = find(fields, "place")) frame.X_LF.p = place->getVector3();
+    if (const Entry* rpy = find(fields, "rpy")) frame.X_LF.R = makeRotation(rpy->getVector3());
+    file.frames.push_back(frame);
   }
 }
 
@@ -276,13 +287,14 @@ void readRoot(const Entry& root, YamlFile& file) {
       }
   std::vector<std::string> known = {"closed_loop", "type", "closure_name", "name_mot"};
   known.insert(known.end(), listSharedKeys().begin(), listSharedKeys().end());
-  for (const char* key : {"joint_name", "joint_type", "cross_inertia", "model", "generator", "set"})
+  for (const char* key : {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set"})
     known.push_back(key);
   const Fields fields = root.getFields(known);
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
   if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
   readSharedKeys(fields, file);
+  if (const Entry* entry = find(fields, "frames")) readFrames(*entry, file);
   if (const Entry* entry = find(fields, "model"))
     file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};
   readGenerator(fields, file);

@@ -55,6 +55,12 @@ struct ClosureSpec {
   double kp = 0, kd = 0;
 };
 
+/// A frame that the tree does not have.
+struct FrameSpec {
+  std::string name, link;
+  SE3 X_LF;
+};
+
 struct MotorSpec {
   std::string joint;
   std::optional<double> armature, effort, velocity, torque_loss, continuous_effort;
@@ -88,6 +94,7 @@ struct YamlFile {
   std::optional<BaseKind> base;
   std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file
   std::optional<double> cross_inertia;                             ///< of universal joints, kg m^2
+  std::vector<FrameSpec> frames;
   std::vector<ClosureSpec> closures;
   std::vector<MotorSpec> motors;
   std::map<std::string, double> armature;  ///< joint -> kg m^2

@@ -10,14 +10,6 @@
 namespace bielle {
 namespace {
 
-// R = Rz(yaw) Ry(pitch) Rx(roll)
-Vector3d calcRollPitchYaw(const Matrix3d& R) {
-  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
-  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9)  // roll and yaw turn about one axis: no yaw
-    return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0};
-  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
-}
-
 void addOrigin(XMLElement& e, const SE3& X) {
   XMLElement& origin = addElement(e, "origin", {{"xyz", formatRounded(X.p)}});
   if (!X.R.isIdentity(1e-15)) setAttributes(origin, {{"rpy", formatRounded(calcRollPitchYaw(X.R))}});

@@ -147,13 +147,18 @@ void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactF
 
 void addRest(const Model& model, StageSpec& terminal) {
   std::vector<PathConstraint>& constraints = terminal.path_constraints;
-  const bool flies = model.hasFreeFlyer();
-  const Vector3d bound(flies ? 0 : kFree, flies ? 0 : kFree, 0);
+  const bool flies = model.hasFreeFlyer(), is_planar = hasPlanarBase(model);
+  Vector3d bound(flies ? 0 : kFree, flies ? 0 : kFree, 0);
+  if (is_planar)  // along the axes of the world that are in its plane
+    bound = model.joints()[1].axis.cwiseAbs().unaryExpr([](double x) { return x > 0.5 ? kFree : 0.0; });
   constraints.push_back({"rest of the centre of mass at the end", makeComVelocity(Vector3d::Zero()), -bound, bound,
                          Vector3d::Constant(kVelocity)});
   if (flies)
     constraints.push_back(
         makeEquation("rest of the torso at the end", makeJointVelocity({3, 4, 5}), 3, Vector3d::Constant(kVelocity)));
+  if (is_planar)
+    constraints.push_back(
+        makeEquation("rest of the torso at the end", makeJointVelocity({2}), 1, VectorXd::Constant(1, kVelocity)));
 }
 
 }  // namespace bielle

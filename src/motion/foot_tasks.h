@@ -34,9 +34,14 @@ double chooseRamp(const Model& model, const Ground& ground, const std::vector<Co
 void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing, const SE3& X_standing,
                  double least, StageSpec& stage);
 
+// Whether the first body moves freely in a plane: along two axes, and by an angle, its coordinate 2.
+inline bool hasPlanarBase(const Model& model) {
+  return model.numBodies() > 1 && model.joints()[1].kind == JointKind::Planar;
+}
+
 // The motion ends with the centre of mass at rest and without rotation of the torso. With the feet on the ground, all
 // other velocities follow from these; constraints on them too would contradict what contacts are off by. Of a robot on
-// a rail that leaves the vertical velocity alone.
+// a rail that leaves the vertical velocity alone, of one in a plane those along it.
 void addRest(const Model& model, StageSpec& terminal);
 
 }  // namespace bielle

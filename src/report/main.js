@@ -53,7 +53,7 @@ class Report {
     });
   }
 
-  // A robot with sliders instead of a motion.
+  // A robot with sliders, or one that swings in its modes, instead of a motion.
   showRobot(json) {
     document.body.className = 'view';
     document.getElementById('title').textContent = this.runs[0].robot.name;
@@ -69,27 +69,29 @@ class Report {
           'largest gap of a loop ' + formatNumber(this.viewer.getLargestGap(), 2) + ' m' :
           '';
     };
-    const viewers = json.views.map((view, i) => new RobotViewer(this.scene, this.runs[i], view, update));
+    const viewers = json.views.map(
+        (view, i) => new (view.modes ? ModeViewer : RobotViewer)(this.scene, this.runs[i], view, update));
     const parameters = addElement(document.getElementById('sliders'), 'div');
-    const motors = addElement(document.getElementById('sliders'), 'div');
+    const controls = addElement(document.getElementById('sliders'), 'div');
     this.showVariant = index => {
-      const values = this.viewer ? this.viewer.listValues() : {};
+      const last = this.viewer;
       this.viewer = viewers[index];
       this.scene.robots.forEach((robot, i) => {
         robot.root.visible = i === index;
       });
-      this.viewer.takeValues(values);
-      motors.textContent = '';
-      this.viewer.addControls(motors);
+      if (last) this.viewer.takeValues(last.listValues());
+      controls.textContent = '';
+      this.viewer.addControls(controls);
       this.viewer.place();
     };
-    this.parameters = new RobotParameters(parameters, json.parameters, this.showVariant);
+    this.parameters = new RobotParameters(parameters, json.parameters || [], this.showVariant);
     this.showVariant(0);
-    const tick = () => {
+    const tick = now => {
+      this.viewer.tick(now);
       if (this.isStale) this.draw();
       requestAnimationFrame(tick);
     };
-    tick();
+    requestAnimationFrame(tick);
   }
 
   isLayer(name) {

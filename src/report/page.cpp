@@ -48,7 +48,7 @@ std::string makePage(const Json& data) {
   for (const char* library : {"three.min.js", "OrbitControls.js", "STLLoader.js", "dygraph.min.js"})
     texts["libraries"] += "<script>" + guardScript(getAsset(library)) + "</script>\n";
   for (const char* script : {"data.js", "shapes.js", "robot.js", "scene.js", "camera.js", "transport.js", "plot.js",
-                             "plots.js", "tables.js", "film.js", "view.js", "live.js", "main.js"})
+                             "plots.js", "tables.js", "film.js", "view.js", "modes.js", "live.js", "main.js"})
     texts["scripts"] += "<script>" + guardScript(getAsset(script)) + "</script>\n";
   return fillPage(getAsset("page.html"), texts);
 }

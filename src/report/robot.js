@@ -231,7 +231,7 @@ class RobotView extends BodyView {
     });
   }
 
-  // An arrow at the trunk while something pushes it.
+  // An arrow at the body that is pushed, while it is.
   addPush() {
     this.push = new Arrow('#e03131', 0.008 * this.size);
     if (this.run.getLargestPush() > 0) this.add(this.add(this.root, new THREE.Group(), 'push'), this.push.object);
@@ -239,8 +239,9 @@ class RobotView extends BodyView {
 
   setPush(t, scale) {
     if (!this.push.object.parent) return;
-    const trunk = this.bodies[1], [x, y] = this.run.calcPush(t);
-    const at = new THREE.Vector3(...this.run.robot.trunk_com).applyQuaternion(trunk.quaternion).add(trunk.position);
+    const {index, com} = this.run.summary.pushed_body || {index: 1, com: this.run.robot.trunk_com};
+    const body = this.bodies[index], [x, y] = this.run.calcPush(t);
+    const at = new THREE.Vector3(...com).applyQuaternion(body.quaternion).add(body.position);
     this.push.set(new THREE.Vector3(x, y, 0).multiplyScalar(scale), at.x, at.y, at.z);
   }
 

@@ -2,10 +2,12 @@
 
 #include <filesystem>
 
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/motion/serial_model.h"
+#include "bielle/results/record_files.h"
 #include "bielle/robots/robot_loader.h"
 
 namespace fs = std::filesystem;
@@ -61,6 +63,23 @@ ReportRun readRun(const std::string& directory) {
   const fs::path plan = place / "plan.npz";
   run.record = readRecordOf(run.robot, place / "trajectory.npz");
   if (run.summary.contains("outcome") && fs::exists(plan, error)) run.plan = readRecordOf(run.robot, plan);
+  return run;
+}
+
+ReportRun makeStillRun(const LoadedRobot& robot, ConstVectorRef q, const std::string& motion) {
+  const Model& model = robot.model;
+  ReportRun run;
+  run.robot = robot;
+  run.summary = {{"robot", model.name()}, {"motion", motion}};
+  run.record.time = VectorXd::Zero(1);
+  run.record.q = q.transpose();
+  run.record.v = RowMatrixXd::Zero(1, model.nv());
+  run.record.u = RowMatrixXd(0, model.nu());
+  run.record.closure_wrenches = RowMatrixXd(0, 6 * model.closures().size());
+  run.record.contact_wrenches = RowMatrixXd(0, 6 * model.contacts().size());
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  run.record.com = calcCom(model, ws).transpose();
   return run;
 }
 

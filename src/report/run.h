@@ -20,6 +20,9 @@ struct ReportRun {
 // \throws InputError naming the file and what is wrong
 ReportRun readRun(const std::string& directory);
 
+// A posture as a motion of one node. \param motion  its name
+ReportRun makeStillRun(const LoadedRobot& robot, ConstVectorRef q, const std::string& motion);
+
 // The robot: its drawing (drawing.h), joints, motors, closures, contacts.
 Json describeRobot(const LoadedRobot& robot);
 

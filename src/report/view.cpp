@@ -46,9 +46,7 @@ std::vector<Group> listGroups(const Model& model) {
 
 VectorXd makeStart(const LoadedRobot& robot) {
   const Model& model = robot.model;
-  AssemblyResult start;
-  if (!model.references().empty()) start = assembleReference(model, model.references().front().name);
-  if (start.status != AssemblyStatus::Closed) start = findClosedConfiguration(model);
+  const AssemblyResult start = findClosedConfiguration(model);
   if (start.status != AssemblyStatus::Closed) throw makeClosingError(model, robot.directory, start);
   return start.q;
 }
@@ -152,24 +150,6 @@ class GroupGrid {
   std::vector<VectorXd> nodes_;  // configurations; empty where it does not close
 };
 
-// The start posture as a motion of one node.
-ReportRun makeStill(const LoadedRobot& robot, const VectorXd& q) {
-  const Model& model = robot.model;
-  ReportRun run;
-  run.robot = robot;
-  run.summary = {{"robot", model.name()}, {"motion", "view"}};
-  run.record.time = VectorXd::Zero(1);
-  run.record.q = q.transpose();
-  run.record.v = RowMatrixXd::Zero(1, model.nv());
-  run.record.u = RowMatrixXd(0, model.nu());
-  run.record.closure_wrenches = RowMatrixXd(0, 6 * model.closures().size());
-  run.record.contact_wrenches = RowMatrixXd(0, 6 * model.contacts().size());
-  Workspace ws(model);
-  updatePositions(model, ws, q);
-  run.record.com = calcCom(model, ws).transpose();
-  return run;
-}
-
 // A robot as a run of the page, and its grids.
 struct StillView {
   Json run, view;
@@ -178,7 +158,7 @@ struct StillView {
 StillView makeStillView(const LoadedRobot& robot, const std::string& label) {
   const Model& model = robot.model;
   const VectorXd start = makeStart(robot);
-  const ReportRun still = makeStill(robot, start);
+  const ReportRun still = makeStillRun(robot, start, "view");
   const std::vector<Group> groups = listGroups(model);
   Json grids = Json::array(), parents = Json::array();
   for (const Group& group : groups) grids.push_back(GroupGrid(model, group, start).describe());

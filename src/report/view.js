@@ -104,6 +104,9 @@ class RobotViewer {
     this.onChange();
   }
 
+  // Called once per frame; it moves by its sliders alone.
+  tick() {}
+
   getLargestGap() {
     return this.run.robot.closures.reduce((gap, closure, c) => Math.max(gap, this.run.gaps.get(0, 2 * c)), 0);
   }
@@ -134,7 +137,8 @@ class RobotViewer {
     this.sliders = [];
     this.grids.forEach((grid, g) => {
       const card = addElement(parent, 'div', 'card motors');
-      const sliders = grid.motors.map(entry => this.addSlider(card, robot.motors[entry.motor].name, entry));
+      const sliders = grid.motors.map(
+          (entry, i) => this.addSlider(card, robot.motors[entry.motor].name, entry, grid.values[i]));
       const status = addElement(card, 'p', 'status', '');
       const change = () => {
         const closes = this.setValues(g, sliders.map(slider => Number(slider.value)));
@@ -160,18 +164,11 @@ class RobotViewer {
     });
   }
 
-  addSlider(card, name, entry) {
+  addSlider(card, name, entry, start = entry.start) {
     const row = addElement(card, 'label', 'motor');
     addElement(row, 'span', 'name', name);
     const slider = addElement(row, 'input');
-    const grid = this.grids.find(grid => grid.motors.includes(entry));
-    Object.assign(slider, {
-      type: 'range',
-      min: entry.low,
-      max: entry.high,
-      step: 'any',
-      value: grid.values[grid.motors.indexOf(entry)]
-    });
+    Object.assign(slider, {type: 'range', min: entry.low, max: entry.high, step: 'any', value: start});
     const value = addElement(row, 'output');
     slider.show = () => {
       value.textContent = Number(slider.value).toFixed(3);

@@ -229,6 +229,8 @@ void describeSpringLeg(OptionFields& f, SpringLegParameters& p, const std::strin
 
 void describe(OptionFields& f, SpringLegParameters& p) {
   describeSpringLeg(f, p, "rotor inertia of every motor, after its gear");
+  f.number("carriage_mass", p.carriage_mass, "kg", {0, 100},
+           "mass of a carriage on a vertical rail that bears the hip, so that the leg can hop; 0: the hip is fixed");
 }
 
 void addSpringLeg(const std::string& robot, const SpringLegParameters& p, const SpringLegMount& mount,
@@ -255,10 +257,41 @@ Vector3d calcSolePlace(const std::string& robot, const SpringLegParameters& p) {
          Vector3d(p.sole_offset, 0, -p.ankle_height);
 }
 
+namespace {
+
+// The carriage, as high as puts the sole on the ground, and how the leg stands.
+void addCarriage(const SpringLegParameters& p, ModelBuilder& builder) {
+  Joint rail;
+  rail.name = "rail";
+  rail.kind = JointKind::Prismatic;
+  rail.axis = kZ;
+  rail.X_PJ.p = -calcSolePlace("spring_leg", p).z() * kZ;
+  addSolidLink("carriage", "world", rail, {makeBox(0.06 * kZ, {0.1, 0.1, 0.08}, p.carriage_mass, colors::kShell)},
+               builder);
+}
+
+void addStand(const SpringLegParameters& p, ModelBuilder& builder) {
+  builder.addContact("foot", "foot", ContactKind::Edge5D, p.toe_length / 2, 0);
+  Reference standing;
+  standing.name = "half_sitting";
+  standing.feet["foot"] = calcSolePlace("spring_leg", p).x() * kX;
+  for (const char* joint : {"rail", "hip_roll", "hip_yaw", "hip_pitch", "knee"}) standing.joints[joint] = {0};
+  builder.addReference(standing);
+}
+
+}  // namespace
+
 Model makeSpringLeg(const SpringLegParameters& p) {
   checkParameters("spring_leg", p);
   ModelBuilder builder("spring_leg");
-  addSpringLeg("spring_leg", p, {}, builder);
+  const bool slides = p.carriage_mass > 0;
+  SpringLegMount mount;
+  if (slides) {
+    mount.base = "carriage";
+    addCarriage(p, builder);
+  }
+  addSpringLeg("spring_leg", p, mount, builder);
+  if (slides) addStand(p, builder);
   for (const char* joint : {"hip_roll", "hip_yaw", "hip_pitch", "knee", "motor_toe"})
     builder.addMotor(joint, p.armature);
   for (const char* joint : {"hip_roll", "hip_yaw", "hip_pitch", "knee", "toe_joint"}) builder.addSerialJoint(joint);

@@ -70,6 +70,8 @@ struct SpringLegParameters {
 
   double shin_stiffness = 0;  ///< of the leaf between knee and shin, N m/rad; 0: rigid
   double heel_stiffness = 0;  ///< of the leaf between tarsus and heel, N m/rad; 0: rigid
+
+  double carriage_mass = 0;  ///< that bears a leg alone on a vertical rail, kg; 0: the hip is fixed
 };
 
 void describe(OptionFields& fields, SpringLegParameters& parameters);

@@ -21,10 +21,10 @@ constexpr int kMaxNewton = 8;
 constexpr double kNewtonTolerance = 1e-10;  // of a change of velocity, relative to 1 (m/s, rad/s) and the largest
 
 // The bodies of all contacts, then the trunk, then those of point springs, two of each.
-std::vector<int> listTips(const Model& model) {
+std::vector<int> listTips(const Model& model, int pushed_body) {
   std::vector<int> tips;
   for (const ContactFrame& contact : model.contacts()) tips.push_back(contact.body);
-  tips.push_back(1);
+  tips.push_back(pushed_body);
   for (const PointSpring& spring : model.pointSprings()) tips.push_back(spring.body1), tips.push_back(spring.body2);
   return tips;
 }
@@ -66,6 +66,7 @@ class BielleWorld : public World {
   Model model_;
   const double time_step_;
   const std::atomic<bool>* const interrupt_;
+  const int pushed_body_;
   const Terrain terrain_;
   const ConstraintSet loops_;
   ClosedTree tree_;
@@ -76,7 +77,7 @@ class BielleWorld : public World {
   std::vector<double> stop_forces_;
   SoleTrack soles_;
   VectorXd u_, tau_;                                              // nu, nv
-  Vector3d push_ = Vector3d::Zero(), com_ = Vector3d::Zero();     // of the trunk
+  Vector3d push_ = Vector3d::Zero(), com_ = Vector3d::Zero();     // of the pushed body
   VectorXd w_mean_, dw_, correction_, loads_, half_last_, zero_;  // size
   MatrixXd damping_, system_;                                     // size x size
   Eigen::LLT<MatrixXd> factors_;
@@ -91,9 +92,10 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
     : model_(model),
       time_step_(options.world.time_step > 0 ? options.world.time_step : kBielleTimeStep),
       interrupt_(options.world.interrupt),
+      pushed_body_(options.world.pushed_body),
       terrain_(options.world.ground),
       loops_(makeConstraintSet(model)),
-      tree_(model, findPosture(model), listTips(model)),
+      tree_(model, findPosture(model), listTips(model, options.world.pushed_body)),
       points_(makeContactPoints(model, options.world.ground, options.contact)),
       forces_(points_.size()),
       places_(points_.size(), Vector3d::Zero()),
@@ -162,7 +164,7 @@ bool BielleWorld::kick(double h) {
   tree_.updateMassMatrix();
   tree_.updateLoads(tau_, half_last_);
   for (size_t i = 0; i < points_.size(); ++i) places_[i] = tree_.getPlacement(points_[i].body).act(points_[i].p);
-  com_ = tree_.getPlacement(1).act(model_.bodies()[1].inertia.com);
+  com_ = tree_.getPlacement(pushed_body_).act(model_.bodies()[pushed_body_].inertia.com);
   dw_.setZero();
   for (int i = 0; i < kMaxNewton; ++i) {
     w_mean_ = tree_.getReducedVelocity() + 0.5 * dw_;

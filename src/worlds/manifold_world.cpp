@@ -62,6 +62,7 @@ class ManifoldWorld : public World {
 
   Model model_;
   const std::atomic<bool>* const interrupt_;
+  const int pushed_body_;
   const double tolerance_, longest_step_;
   const Terrain terrain_;
   ClosedField field_;
@@ -83,6 +84,7 @@ class ManifoldWorld : public World {
 ManifoldWorld::ManifoldWorld(const Model& model, const ManifoldWorldOptions& options)
     : model_(model),
       interrupt_(options.world.interrupt),
+      pushed_body_(options.world.pushed_body),
       tolerance_(std::max(options.tolerance, kLeastTolerance)),
       longest_step_(options.world.time_step > 0 ? options.world.time_step : std::numeric_limits<double>::infinity()),
       terrain_(options.world.ground),
@@ -272,9 +274,9 @@ void ManifoldWorld::calcForces(VectorXd& tau, std::array<double, kWorks>& power)
     return ws.V[body].head<3>() + ws.V[body].tail<3>().cross(x);
   };
   if (!push_.isZero(0)) {
-    const Vector3d com = ws.X_WB[1].act(model_.bodies()[1].inertia.com);
-    addForce(1, com, push_, tau);
-    power[kPush] = push_.dot(calcVelocityAt(1, com));
+    const Vector3d com = ws.X_WB[pushed_body_].act(model_.bodies()[pushed_body_].inertia.com);
+    addForce(pushed_body_, com, push_, tau);
+    power[kPush] = push_.dot(calcVelocityAt(pushed_body_, com));
   }
   for (const ContactPoint& point : points_) {
     const Vector3d x = ws.X_WB[point.body].act(point.p), velocity = calcVelocityAt(point.body, x);

@@ -38,6 +38,7 @@ class MujocoWorld : public World {
         ground_(model, options.world.ground),
         options_(makeRobotOptions(options, ground_)),
         interrupt_(options.world.interrupt),
+        pushed_body_(options.world.pushed_body),
         mujoco_(model, findPosture(model), options_),
         data_(mujoco_.makeData()),
         contact_of_geom_(mujoco_.get()->ngeom, -1),
@@ -81,6 +82,7 @@ class MujocoWorld : public World {
   MujocoGround ground_;
   const MjcfOptions options_;
   const std::atomic<bool>* const interrupt_;
+  const int pushed_body_;
   MujocoModel mujoco_;
   std::unique_ptr<mjData, void (*)(mjData*)> data_;
   std::vector<int> contact_of_geom_;  // of the model, -1 if the geom is not one of a sole
@@ -114,7 +116,7 @@ void MujocoWorld::setTorques(ConstVectorRef u) {
 }
 
 void MujocoWorld::setPush(const Vector3d& force) {
-  Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * mujoco_.getBody(1)) = force;
+  Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * mujoco_.getBody(pushed_body_)) = force;
 }
 
 bool MujocoWorld::advance(double duration) {
@@ -168,11 +170,11 @@ void MujocoWorld::book(double h) {
   const mjModel& mj = *mujoco_.get();
   v_mean_ = 0.5 * (v_before_ + Eigen::Map<const VectorXd>(data_->qvel, mj.nv));
   motor_work_ += h * v_mean_.dot(Eigen::Map<const VectorXd>(data_->qfrc_actuator, mj.nv));
-  const int trunk = mujoco_.getBody(1);
-  const Eigen::Map<const Vector3d> push(data_->xfrc_applied + 6 * trunk);
+  const int pushed = mujoco_.getBody(pushed_body_);
+  const Eigen::Map<const Vector3d> push(data_->xfrc_applied + 6 * pushed);
   if (!push.isZero(0)) {
     push_force_.setZero();
-    mj_applyFT(&mj, data_.get(), push.data(), nullptr, data_->xipos + 3 * trunk, trunk, push_force_.data());
+    mj_applyFT(&mj, data_.get(), push.data(), nullptr, data_->xipos + 3 * pushed, pushed, push_force_.data());
     push_work_ += h * v_mean_.dot(push_force_);
   }
   // MuJoCo takes dampers at the end of a step.

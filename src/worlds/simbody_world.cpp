@@ -27,6 +27,7 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
   WorldForces(const SimbodyTree& tree, const SimbodyWorldOptions& options)
       : tree_(tree),
         terrain(options.world.ground),
+        pushed_body(options.world.pushed_body),
         points(makeContactPoints(tree.model, options.world.ground, options.contact)),
         stops(makeJointStops(tree.model)),
         u(VectorXd::Zero(tree.model.nu())) {}
@@ -43,7 +44,7 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
       if (force != 0) mobility_forces[tree_.u_index[stop.dof]] += force;
     }
     for (int m = 0; m < tree_.model.nu(); ++m) mobility_forces[tree_.u_index[tree_.model.motors()[m].dof]] += u[m];
-    tree_.bodies[1].applyForceToBodyPoint(state, toSimTK(getPushPoint()), toSimTK(push), body_forces);
+    tree_.bodies[pushed_body].applyForceToBodyPoint(state, toSimTK(getPushPoint()), toSimTK(push), body_forces);
   }
   double calcPotentialEnergy(const State&) const override { return 0; }  // Books keeps it apart
 
@@ -84,7 +85,8 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
                                                      findVelocity(state, spring.body1, spring.point1));
       powers.joint -= spring.damping * rate * rate;
     }
-    powers.push = push.dot(toEigen(tree_.bodies[1].findStationVelocityInGround(state, toSimTK(getPushPoint()))));
+    powers.push =
+        push.dot(toEigen(tree_.bodies[pushed_body].findStationVelocityInGround(state, toSimTK(getPushPoint()))));
     return powers;
   }
   double calcElasticEnergy(const State& state, double& of_stops) const {
@@ -98,12 +100,13 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
 
  private:
   double getRate(const State& state, int dof) const { return state.getU()[tree_.u_index[dof]]; }
-  Vector3d getPushPoint() const { return tree_.model.bodies()[1].inertia.com; }
+  Vector3d getPushPoint() const { return tree_.model.bodies()[pushed_body].inertia.com; }
 
   const SimbodyTree& tree_;
 
  public:
   const Terrain terrain;
+  const int pushed_body;
   std::vector<ContactPoint> points;
   const std::vector<JointStop> stops;
   VectorXd u;

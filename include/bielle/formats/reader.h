@@ -27,6 +27,8 @@
 ///
 /// ## The YAML, our keys (all optional; an unknown key is an error)
 /// - `base: free | fixed`
+/// - `frames: {name: {link, place: [x, y, z], rpy: [roll, pitch, yaw]}, ...}` further frames, placed in a link of the tree, m and
+///   rad (default 0); a robot that is completed keeps its own
 /// - `closures: [{name, frames: [A, B], type, axis, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge,
 ///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0). A coupler: `{name, type: coupler, joints: {joint:
 ///   coefficient, ...}, offset, kp, kd}`, sum of coefficient times coordinate = offset (default 0)

@@ -22,6 +22,7 @@ struct WorldOptions {
   const std::atomic<bool>* interrupt = nullptr;
   /// Error allowed per step of worlds that control it (manifold_world.h); 0: the world's own.
   double tolerance = 0;
+  int pushed_body = 1;  ///< at whose centre of mass World::setPush() acts; 1: the trunk, the body of the first joint
 };
 
 /// Energies at present and work since reset(), J. With E = kinetic + potential + elastic,
@@ -56,7 +57,7 @@ class World {
   virtual void reset(ConstVectorRef q, ConstVectorRef v) = 0;
   /// Torques of the motors in their order (nu, N m or N), cut at their limits and held until the next call.
   virtual void setTorques(ConstVectorRef u) = 0;
-  /// A force at the centre of mass of the trunk (the body of the first joint), N (world), held until the next call.
+  /// A force at the centre of mass of the pushed body (WorldOptions), N (world), held until the next call.
   virtual void setPush(const Vector3d& force) = 0;
   /// Advances by a duration, s.
   /// \returns false if the integration broke off; the state is then the last one that is finite, and getMessage() says

@@ -150,6 +150,8 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   app.add_option("--torques", a.torques,
                  "free motion: YAML file, torques: [{time: 0, MOTOR: 3}, {time: 0.5, MOTOR: 0}] [s, N m or N], each "
                  "valid until the next");
+  app.add_option("--push-body", a.push_body,
+                 "free motion: the link that is pushed, at the centre of mass of its body; default: the first body");
   app.add_option("--spring", a.springs,
                  "free motion: a spring on a motor, e.g. stiffness=50,damping=1,motor=crank,angle=0.3 [N m/rad, N m "
                  "s/rad, rad]; without motor: on each; without angle: where it starts; may be repeated")

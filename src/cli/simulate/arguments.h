@@ -24,6 +24,7 @@ struct SimulateArguments {
   double friction = 0;  // 0: that of the plan
   // Of a free motion.
   std::string posture, state, torques;  // name of a reference; files
+  std::string push_body;                // link; empty: the first body
   std::vector<std::string> springs;
   double accuracy = 0;  // 0: that of the world
   bool has_record_period = false;

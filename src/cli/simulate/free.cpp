@@ -65,6 +65,15 @@ std::vector<TimedTorques> readTorques(const Model& model, const std::string& pat
   return torques;
 }
 
+int findPushedBody(const Model& model, const std::string& name) {
+  if (name.empty()) return 1;
+  const int frame = model.findFrame(name);
+  const int body = frame < 0 ? 0 : model.frames()[frame].body;
+  if (body > 0) return body;
+  throw InputError("", "--push-body " + name, frame < 0 ? "the robot has no such link" : "it is fixed to the ground",
+                   "name a link that moves");
+}
+
 // E.g. kSpringExample; without a motor, all of them; without an angle, where it starts.
 void addSprings(const Model& model, const std::string& text, const VectorXd& q, std::vector<MotorSpring>& springs) {
   MotorSpring spring;
@@ -163,6 +172,9 @@ std::vector<std::string> writeRun(const SimulateArguments& arguments, const Load
   Json summary = makeHappenedSummary(result);
   summary["world"] = run.world;
   summary["pushes"] = listPushes(arguments.execution.pushes);
+  const int pushed = findPushedBody(model, arguments.push_body);
+  const Vector3d& com = model.bodies()[pushed].inertia.com;
+  summary["pushed_body"] = {{"index", pushed}, {"com", std::vector<double>(com.data(), com.data() + 3)}};
   summary["outcome"] = getName(e.outcome);
   summary["outcome_message"] = e.message;
   summary["duration"] = e.duration;
@@ -246,6 +258,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   for (const std::string& spring : arguments.springs) addSprings(robot.model, spring, start.q, springs);
   const Model model = addMotorSprings(robot.model, springs);
   const Ground ground = makeGround(arguments, {});
+  const int pushed_body = findPushedBody(model, arguments.push_body);
   FreeMotionOptions options;
   options.duration = execution.duration;
   options.record_period = execution.record_period;
@@ -263,6 +276,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
     world_options.tolerance = arguments.accuracy > 0 ? arguments.accuracy
                               : name == "simbody"    ? kSimbodyTolerance
                                                      : kOwnTolerance;
+    world_options.pushed_body = pushed_body;
     const std::unique_ptr<World> world = makeWorld(name, model, world_options);
     FreeRun run{name, names.size() > 1 ? (fs::path(arguments.output) / name).string() : arguments.output, {}};
     Watch watch{Watch::Show()};

@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <cmath>
 #include <iostream>
+#include <limits>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kept_motion.h"
@@ -17,16 +20,28 @@ namespace {
 constexpr double kFollows = 1e-6;         // weight of joints that are not given, relative to those that are
 constexpr double kToldDifference = 1e-6;  // rad, m, rad/s or m/s: differences from what is given that are told
 
-VectorXd makePosture(const Model& model, const std::string& name) {
-  AssemblyResult result;
-  if (!name.empty() && name != "neutral") {
-    result = assembleReference(model, name);
-  } else {
-    if (name.empty() && !model.references().empty()) result = assembleReference(model, model.references().front().name);
-    if (result.status != AssemblyStatus::Closed) result = findClosedConfiguration(model);
+// The base of a robot with feet as high as puts the lowest sole on the ground.
+void lift(const Model& model, VectorXd& q) {
+  if (!model.hasFreeFlyer() || model.contacts().empty()) return;
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const ContactFrame& contact : model.contacts()) {
+    const SE3 X = getPlacement(ws, contact.body, contact.X_BF);
+    const double depth = std::abs(X.R(2, 0)) * contact.half_length + std::abs(X.R(2, 1)) * contact.half_width;
+    lowest = std::min(lowest, X.p.z() - depth);
   }
+  q[2] -= lowest;
+}
+
+VectorXd makePosture(const Model& model, const std::string& name) {
+  const AssemblyResult result = name.empty()        ? findClosedConfiguration(model)
+                                : name == "neutral" ? closeConfiguration(model, model.makeNeutral())
+                                                    : assembleReference(model, name);
   if (result.status != AssemblyStatus::Closed) throw makeClosingError(model, model.name(), result);
-  return result.q;
+  VectorXd q = result.q;
+  if (name == "neutral") lift(model, q);
+  return q;
 }
 
 void warn(const std::string& file, const Joint& joint, const std::string& what, double given, double taken) {

@@ -40,6 +40,7 @@ void requirePlan(const SimulateArguments& arguments) {
   const std::pair<bool, const char*> options[] = {{!arguments.posture.empty(), "--posture"},
                                                   {!arguments.state.empty(), "--state"},
                                                   {!arguments.torques.empty(), "--torques"},
+                                                  {!arguments.push_body.empty(), "--push-body"},
                                                   {!arguments.springs.empty(), "--spring"}};
   for (const auto& [is_given, name] : options)
     if (is_given)

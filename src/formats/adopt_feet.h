@@ -1,0 +1,29 @@
+#pragma once
+/// \file The feet of a robot whose files do not say what it stands on.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bielle/dynamics/workspace.h"
+
+namespace bielle {
+
+struct FoundFoot {
+  std::string frame;  ///< empty: there is none yet
+  int body = 0;
+  SE3 X_BF, X_WF;  ///< z up and x forward
+  bool is_named = false;
+};
+
+/// One foot, or the left and the right one, which are mirror images of each other, in the posture of the workspace:
+/// - frames with z up that are named foot or sole, the lowest ones;
+/// - otherwise new frames on the bodies whose shapes reach lowest, below the middle of what touches the ground there: z along
+///   their flat side, x forward, along them if they are long;
+/// - of a robot without shapes the lowest frames with z up. Empty if there are none.
+std::vector<FoundFoot> findFeet(const Model& model, const Workspace& ws);
+
+/// What a foot stands on, without a name: the extent of its shapes along x and y of its frame; empty without shapes. A capsule along
+/// x, and a box that is hardly wider than a rod, are blades; a ball is a point.
+std::optional<ContactFrame> measureFoot(const Model& model, const FoundFoot& foot);
+
+}  // namespace bielle
