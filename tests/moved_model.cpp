@@ -46,6 +46,12 @@ ModelParts moveParts(const Model& model, const ModelVariation& direction, double
     spring.preload += step * direction.springs[s][2];
     spring.damping += step * direction.springs[s][3];
   }
+  for (size_t f = 0; f < parts.joint_forces.size(); ++f) {
+    JointForce& force = parts.joint_forces[f];
+    const Vector5d change = step * direction.joint_forces[f];
+    force.stiffness += change[0], force.rest += change[1], force.preload += change[2];
+    force.damping += change[3], force.friction += change[4];
+  }
   for (size_t c = 0; c < parts.contacts.size(); ++c) move(parts.contacts[c].X_BF, direction.contacts[c]);
   for (size_t s = 0; s < parts.shapes.size(); ++s) {
     Shape& shape = parts.shapes[s];

@@ -57,6 +57,11 @@ std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model
     out.push_back(ends);
     out.push_back(numbers);
   }
+  for (size_t f = 0; f < model.jointForces().size(); ++f) {
+    ModelVariation numbers(model);
+    all.joint_forces[f] = numbers.joint_forces[f] = randomVector(rng, 5);
+    out.push_back(numbers);
+  }
   ModelVariation inertias(model);
   inertias.inertias = all.inertias, inertias.armature = all.armature;
   out.push_back(inertias);

@@ -12,7 +12,8 @@ bool isSameButForPlaces(const Model& a, const Model& b) {
   const auto same = [](const Vector3d& x, const Vector3d& y) { return (x - y).norm() < 1e-12; };
   bool out = a.numBodies() == b.numBodies() && a.closures().size() == b.closures().size() &&
              a.contacts().size() == b.contacts().size() && a.pointSprings().size() == b.pointSprings().size() &&
-             a.shapes().size() == b.shapes().size() && same(a.gravity(), b.gravity());
+             a.jointForces().size() == b.jointForces().size() && a.shapes().size() == b.shapes().size() &&
+             same(a.gravity(), b.gravity());
   for (int i = 1; out && i < a.numBodies(); ++i) {
     const Joint &j = a.joints()[i], &k = b.joints()[i];
     out = j.kind == k.kind && same(j.axis, k.axis) && same(j.axis2, k.axis2);
@@ -20,6 +21,10 @@ bool isSameButForPlaces(const Model& a, const Model& b) {
   for (size_t c = 0; out && c < a.closures().size(); ++c) {
     const Closure &j = a.closures()[c], &k = b.closures()[c];
     out = j.kind == k.kind && same(j.axis, k.axis) && j.kp == k.kp && j.kd == k.kd && j.terms.size() == k.terms.size();
+  }
+  for (size_t f = 0; out && f < a.jointForces().size(); ++f) {
+    const JointForce &j = a.jointForces()[f], &k = b.jointForces()[f];
+    out = j.joint == k.joint && j.friction_speed == k.friction_speed;
   }
   return out;
 }
@@ -50,6 +55,13 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
     out.points2[s] += weight * (b.point2 - a.point2);
     out.springs[s] += weight * (getNumbers(b) - getNumbers(a));
   }
+  const auto getForces = [](const JointForce& f) {
+    Vector5d numbers;
+    numbers << f.stiffness, f.rest, f.preload, f.damping, f.friction;
+    return numbers;
+  };
+  for (size_t f = 0; f < from.jointForces().size(); ++f)
+    out.joint_forces[f] += weight * (getForces(to.jointForces()[f]) - getForces(from.jointForces()[f]));
   for (size_t c = 0; c < from.contacts().size(); ++c)
     addTwist(from.contacts()[c].X_BF, to.contacts()[c].X_BF, out.contacts[c]);
   for (size_t s = 0; s < from.shapes().size(); ++s) {
@@ -73,7 +85,8 @@ std::vector<ModelVariation> calcVariations(const Parametrization& robot, const V
       const Model there = make(x + steps * h * VectorXd::Unit(x.size(), i));
       if (!isSameButForPlaces(here, there))
         throw InputError(here.name(), "variable '" + robot.variables()[i].name + "'",
-                         "it changes an axis, a gain or gravity, for which motor torques have no gradient",
+                         "it changes an axis, a gain, gravity or which joints have springs, for which motor torques "
+                         "have no gradient",
                          "search without gradients, with bobyqa or sbplx");
       addChange(here, there, weight / (12 * h), out[i]);
     }

@@ -40,6 +40,14 @@ T calcResistance(const JointForce& force, const WorkspaceOf<T>& ws) {
   return out;
 }
 
+/// Derivatives of the force by stiffness, rest, preload, damping and friction: Eq. (11) of variation.h.
+inline Eigen::Matrix<double, 5, 1> calcJointForceSlopes(const JointForce& force, const Workspace& ws) {
+  const double v = ws.v[force.dof];
+  Eigen::Matrix<double, 5, 1> slopes;
+  slopes << force.rest - ws.q[force.idx_q], force.stiffness, 1, -v, -calcSmoothSign(v, force.friction_speed).value;
+  return slopes;
+}
+
 inline double calcSpringEnergy(const JointForce& force, ConstVectorRef q) {
   const double stretch = q[force.idx_q] - force.rest;
   return stretch * (force.stiffness / 2 * stretch - force.preload);

@@ -167,6 +167,7 @@ ModelVariation::ModelVariation(const Model& model)
       points1(model.pointSprings().size(), Vector3d::Zero()),
       points2(points1),
       springs(model.pointSprings().size(), Eigen::Vector4d::Zero()),
+      joint_forces(model.jointForces().size(), Vector5d::Zero()),
       contacts(model.contacts().size(), Vector6d::Zero()),
       shapes(model.shapes().size()),
       inertias(model.numBodies(), Matrix6d::Zero()),
@@ -208,8 +209,11 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
   }
   for (size_t s = 0; s < model.pointSprings().size(); ++s) addPointSpringVariation(model, ws, s, change, variation);
   VectorXd out = model.armature().cwiseProduct(motion.a) + change.armature.cwiseProduct(ws.a);
-  for (const JointForce& force : model.jointForces())
-    out[force.dof] += force.stiffness * motion.q[force.dof] + calcResistance(force, ws) * motion.v[force.dof];
+  for (size_t f = 0; f < model.jointForces().size(); ++f) {
+    const JointForce& force = model.jointForces()[f];
+    out[force.dof] += force.stiffness * motion.q[force.dof] + calcResistance(force, ws) * motion.v[force.dof] -
+                      change.joint_forces[f].dot(calcJointForceSlopes(force, ws));
+  }
   for (size_t c = 0; c < constraints.closures.size(); ++c)
     for (size_t i = 0; i < constraints.closures[c].terms.size(); ++i)
       out[constraints.closures[c].terms[i].dof] -=

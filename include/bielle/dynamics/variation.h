@@ -26,11 +26,17 @@
 /// velocity of that, with r = p_2 - p_1 and u = r / l, by
 ///     dl = u . dr,   du = (dr - u dl) / l,   dl' = du . r' + u . dr'
 ///     d(f u) = (k dl + c dl' + dk (l - rest) - k d rest + d preload + dc l') u + f du                             (10)
+/// and the force tau of a spring, damper and friction on a joint (model.h), with s(v) the smooth sign, by
+///     dtau = d preload - dk (q - rest) + k d rest - dc v - d friction s(v)                                        (11)
+/// beside its changes with q and v.
 /// Forward dynamics change by Eq. (5) of saddle_point.h. With redundant rows, this holds for changes that keep them
 /// redundant: any other change would alter the rank.
 #include "bielle/dynamics/constrained.h"
 
 namespace bielle {
+
+/// Of a joint's force: by stiffness, rest, preload, damping and friction.
+using Vector5d = Eigen::Matrix<double, 5, 1>;
 
 /// Change of a shape: twist of its frame, and of its sizes.
 struct ShapeVariation {
@@ -52,6 +58,7 @@ struct ModelVariation {
   std::vector<Vector3d> points1;         ///< per point spring of the model, of PointSpring::point1
   std::vector<Vector3d> points2;         ///< and point2
   std::vector<Eigen::Vector4d> springs;  ///< and of its stiffness, rest, preload and damping
+  std::vector<Vector5d> joint_forces;    ///< per joint force of the model
   std::vector<Vector6d> contacts;        ///< per contact of the model, of ContactFrame::X_BF
   std::vector<ShapeVariation> shapes;    ///< per shape of the model
   std::vector<Matrix6d> inertias;        ///< nb, of Inertia::toMatrix() in the body's frame
