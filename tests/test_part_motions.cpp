@@ -1,4 +1,4 @@
-// Parts of leg_biped, each in one of seven robots: dynamics against Simbody, a squat and a walk that pass the check.
+// Parts of leg_biped, each in one of eight robots: dynamics against Simbody, a squat and a walk that pass the check.
 #include <catch2/catch.hpp>
 
 #include "robot_directory.h"
@@ -15,7 +15,8 @@ TEST_CASE("parts: bipeds of them squat and walk, and have Simbody's dynamics") {
                                 "hip: serial, knee: pantograph, ankle: thigh_rods",
                                 "hip: serial, knee: ball_screw, ankle: stacked_rods",
                                 "hip: serial, knee: drawn, ankle: serial",
-                                "hip: serial, knee: leaf, ankle: serial"};
+                                "hip: serial, knee: leaf, ankle: serial",
+                                "hip: serial, knee: passive, ankle: cable_differential"};
   int count = 0;
   for (const char* parts : robots) {
     CAPTURE(parts);
