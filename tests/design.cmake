@@ -4,7 +4,7 @@ bielle_command_test(design_goals SOURCES test_design_goals.cpp LIBS bielle_desig
 bielle_command_test(design_fronts SOURCES test_design_fronts.cpp LIBS bielle_design)
 bielle_command_test(design_gradient SOURCES test_design_gradient.cpp LIBS bielle_design)
 bielle_command_test(design_constraints SOURCES test_design_constraints.cpp LIBS bielle_design)
-bielle_command_test(fourbar_search SOURCES test_fourbar_search.cpp LIBS bielle_design)
+bielle_command_test(synthesize SOURCES test_synthesize.cpp LIBS bielle_design)
 bielle_test(design_measures SOURCES test_design_measures.cpp LIBS bielle_design)
 bielle_test(envelope SOURCES test_envelope.cpp LIBS bielle_design)
 set_tests_properties(envelope PROPERTIES LABELS system)

@@ -11,6 +11,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "design/front_search.h"
 #include "design/run.h"
+#include "design/spec.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -18,8 +19,6 @@ using namespace bielle;
 using namespace bielle::testing;
 using Catch::Matchers::Contains;
 namespace fs = std::filesystem;
-
-namespace {}  // namespace
 
 TEST_CASE("design: choices among numbers, on the front of two distances") {
   if (!hasFrontSearch()) return;
@@ -29,7 +28,7 @@ TEST_CASE("design: choices among numbers, on the front of two distances") {
   std::vector<VectorXd> designs;
   std::vector<std::vector<double>> objectives;
   FrontProblem problem{
-      Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 3, 1), Eigen::Vector3d(1, 3, 1), 2, {}, {false, true}};
+      Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 3, 1), {Eigen::Vector3d(1, 3, 1)}, 2, {}, {false, true}};
   problem.evaluate = [&](const std::vector<VectorXd>& xs) {
     std::vector<std::vector<double>> out;
     for (const VectorXd& x : xs) {
@@ -52,7 +51,7 @@ TEST_CASE("design: choices among numbers, on the front of two distances") {
   CHECK(chosen == std::set<double>{0, 2});
   CHECK_THROWS_AS(searchFront(problem, {SearchAlgorithm::Moead, 24, 3}, 3), std::invalid_argument);
   // One choice alone stays what it is.
-  problem.lower[1] = problem.upper[1] = problem.start[1] = 2;
+  problem.lower[1] = problem.upper[1] = problem.starts[0][1] = 2;
   seen.clear();
   searchFront(problem, {SearchAlgorithm::Nsga2, 8, 3}, 3);
   CHECK(seen == std::set<std::pair<double, double>>{{2, 0}});
@@ -83,7 +82,8 @@ TEST_CASE("design: the front of two distances is the line between the points") {
   std::vector<VectorXd> designs;
   std::vector<std::vector<double>> objectives;
   int batches = 0;
-  FrontProblem problem{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 1), Eigen::Vector2d(1, 0), 2, {}};
+  FrontProblem problem{
+      Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 1), {Eigen::Vector2d(1, 0), Eigen::Vector2d(0.5, 0)}, 2, {}};
   problem.evaluate = [&](const std::vector<VectorXd>& xs) {
     ++batches;
     std::vector<std::vector<double>> out;
@@ -103,7 +103,7 @@ TEST_CASE("design: the front of two distances is the line between the points") {
     };
     const std::vector<VectorXd> first = search(7);
     CAPTURE(getName(algorithm), designs.size(), batches);
-    CHECK(first.front() == problem.start);
+    CHECK(std::equal(problem.starts.begin(), problem.starts.end(), first.begin()));
     CHECK(first.size() == 24 * 41);
     if (algorithm == SearchAlgorithm::Nsga2) CHECK(batches == 41);
     const std::vector<size_t> front = selectFront(objectives, 24);
@@ -263,6 +263,29 @@ TEST_CASE("design: a front with constraints is refined within them, and resumed 
   }
 }
 
+TEST_CASE("design: a front of given starts alone, refined") {
+  if (!hasFrontSearch()) return;
+  const RobotDirectory directory;
+  const std::string text =
+      replaceOnce(kFrontSpec, "pareto: {population: 12, generations: 4",
+                  "starts: [{upper: 0.11}, {lower: 0.22}]\n  pareto: {population: 8, generations: 0");
+  const std::string spec = directory.write("spec.yaml", text), out = directory.path() + "/out";
+  const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", out});
+  INFO(result.err << result.out);
+  REQUIRE(result.status == 0);
+  std::ifstream log(out + "/front.jsonl");
+  std::set<std::vector<double>> first, refined;
+  std::string line;
+  std::getline(log, line);
+  while (std::getline(log, line)) {
+    const LoggedEvaluation e = readEvaluation(line);
+    (e.stage == "nsga2" ? first : refined).insert({e.x.begin(), e.x.end()});
+  }
+  const Eigen::Vector2d start = makeParametrization(readDesignSpec(spec)).start();
+  CHECK(first == std::set<std::vector<double>>{{start[0], start[1]}, {0.11, start[1]}, {start[0], 0.22}});
+  CHECK(refined.size() > first.size());
+}
+
 TEST_CASE("design: fronts that cannot be are refused") {
   const RobotDirectory directory;
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
@@ -284,6 +307,9 @@ TEST_CASE("design: fronts that cannot be are refused") {
   check("algorithm: slsqp", "algorithm: sbplx", "use one of slsqp, mma");
   check("measure: cost", "measure: conditioning", "which conditioning does not have");
   check("search:\n", "search:\n  searches: 2\n", "it cannot be combined with `stages` and `searches`");
+  check("search:\n", "search:\n  starts: [{upper: 9}]\n", "outside the bounds of variable 'upper'");
+  check("search:\n", "search:\n  starts: [{uppper: 0.1}]\n", "there is no variable 'uppper'");
+  check("search:\n", "search:\n  starts: [{}, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}]\n", "enlarge `population`");
   CHECK_THROWS_AS(minimizeByStages({VectorXd::Zero(1), VectorXd::Ones(1), VectorXd::Zero(1), {}, {}},
                                    {{SearchAlgorithm::Nsga2, 10, 0}}, 1),
                   std::invalid_argument);

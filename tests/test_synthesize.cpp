@@ -4,7 +4,9 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/robots/robot_loader.h"
-#include "design/fourbar_search.h"
+#include "design/fourbar_drawing.h"
+#include "design/robot_ratios.h"
+#include "leg_biped.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -64,37 +66,107 @@ TEST_CASE("four-bars: what a motor must bear is by the ratio, limits are kept") 
   demand.torques = Eigen::VectorXd::LinSpaced(5, 10, 30);
   demand.speeds = VectorXd::Constant(5, 3);
   FourBarSpace space = makeUsualSpace();
-  const FoundFourBar found = rateFourBar(d, demand, space);
+  const auto rate = [&] { return rateLinkage(makeFourBars(space, demand), d.toVector(), demand); };
+  const FoundLinkage found = rate();
   CHECK(found.value == Approx(demand.torques.norm() / std::sqrt(5)));
   CHECK(found.peak_torque == Approx(30));
   CHECK(found.peak_speed == Approx(3));
-  CHECK(found.least_sine == Approx(std::cos(0.5)));
+  CHECK(found.margin == Approx(std::cos(0.5)));
   demand.largest_speed = 2.9;
-  CHECK(std::isinf(rateFourBar(d, demand, space).value));
+  CHECK(std::isinf(rate().value));
   demand.largest_speed = 0;
   space.margin = 0.9;
-  CHECK(std::isinf(rateFourBar(d, demand, space).value));
+  CHECK(std::isinf(rate().value));
   space.margin = 0.3, space.clearance = 0.06;  // the rod is 0.05 m beside the joint
-  CHECK(std::isinf(rateFourBar(d, demand, space).value));
+  CHECK(std::isinf(rate().value));
 }
 
 TEST_CASE("four-bars: the search is the same on any number of threads, and its best is no worse than its samples") {
   JointDemand demand;
   demand.angles = VectorXd::LinSpaced(25, 0, 1.6);
   demand.ratios = VectorXd::Constant(25, 0.9);
-  demand.drawn_at = 0.8;
   const FourBarSpace space = makeUsualSpace();
-  const std::vector<FoundFourBar> one = searchFourBars(demand, space, 60000, 5, 1, 1),
-                                  three = searchFourBars(demand, space, 60000, 5, 1, 3);
+  const LinkageFamily family = makeFourBars(space, demand);
+  LinkageSearchOptions options;
+  options.samples = 60000, options.count = 5;
+  const std::vector<FoundLinkage> one = searchLinkages(family, demand, options);
+  options.threads = 3;
+  const std::vector<FoundLinkage> three = searchLinkages(family, demand, options);
   REQUIRE(one.size() == 5);
   REQUIRE(three.size() == 5);
   for (size_t i = 0; i < one.size(); ++i) {
-    CHECK(one[i].drawing.toVector() == three[i].drawing.toVector());
+    CHECK(one[i].x == three[i].x);
     if (i > 0) CHECK(one[i].value >= one[i - 1].value);
-    CHECK(one[i].least_sine >= 0.3);
-    CHECK(rateFourBar(one[i].drawing, demand, space).value == one[i].value);
+    CHECK(one[i].margin >= 0.3);
+    CHECK(rateLinkage(family, one[i].x, demand).value == one[i].value);
   }
   CHECK(one[0].value < 0.06);
+}
+
+TEST_CASE("synthesize: the mechanism of a drawing has the ratios of the closed form, and its dead points") {
+  JointDemand demand;
+  demand.angles = VectorXd::LinSpaced(9, 0.5, 1.5);
+  demand.ratios = VectorXd::LinSpaced(9, 0.6, 0.9);  // no parallelogram
+  LinkageSearchOptions options;
+  options.samples = 20000, options.count = 3, options.refined = 5;
+  const LinkageFamily drawings = makeFourBars(makeUsualSpace(), demand);
+  for (const FoundLinkage& found : searchLinkages(drawings, demand, options)) {
+    const FourBarDrawing d = FourBarDrawing::fromVector(found.x);
+    const OptionValues numbers = {{"knee", std::string("drawn")},      {"knee_motor_x", d.motor_x},
+                                  {"knee_motor_z", d.motor_z},         {"knee_drawn_crank", d.crank},
+                                  {"knee_crank_angle", d.crank_angle}, {"knee_drawn_arm", d.arm},
+                                  {"knee_arm_angle", d.arm_angle},     {"knee_drawn_at", demand.getMiddle()}};
+    CAPTURE(found.x.transpose());
+    const JointRatios ratios = calcJointRatios(makeLegBiped(numbers), "knee_left", demand.angles);
+    VectorXd expected(demand.angles.size());
+    double sine = 0;
+    REQUIRE(drawings.calcRatios(found.x, expected, sine));
+    CHECK((ratios.ratios - expected).norm() < 1e-6 * expected.norm());
+    // Steps from either end of the range, ever shorter, until the closed form is at a dead point.
+    double way = 10;
+    for (const double direction : {-1, 1}) {
+      const double end = direction < 0 ? demand.angles[0] : demand.angles[8];
+      const FourBarState from = calcFourBar(d, end - demand.getMiddle());
+      FourBarState here = from;
+      double angle = end, turned = 0;
+      for (double step = 1e-3; step > 1e-9 && std::abs(angle - end) < 3;) {
+        const FourBarState next = calcFourBar(d, angle + direction * step - demand.getMiddle());
+        if (!next.closes || next.ratio * here.ratio < 0) {
+          step /= 10;
+          continue;
+        }
+        turned += std::remainder(next.turn - here.turn, 2 * M_PI);
+        angle += direction * step;
+        here = next;
+      }
+      if (here.sine < 1e-3) way = std::min(way, std::max(std::abs(angle - end), std::abs(turned)));
+    }
+    CAPTURE(ratios.distance, way);
+    CHECK(ratios.distance == Approx(way).margin(1e-3));
+  }
+}
+
+TEST_CASE("synthesize: lengths of any generated robot, as robots within their ranges") {
+  const RobotDirectory directory;
+  const std::string out = directory.path() + "/found";
+  const auto search = [&](std::vector<std::string> more) {
+    std::vector<std::string> command = {BIELLE_COMMAND, "synthesize", "leg_biped", "--joint", "knee_left",
+                                        "--range",      "0.8:1.6",    "--ratio",   "1.1",     "--samples",
+                                        "60",           "--count",    "2",         "-o",      out};
+    command.insert(command.end(), more.begin(), more.end());
+    return runCommand(command);
+  };
+  const CommandResult result = search({"--parameter", "knee_crank=0.03:0.08", "--parameter", "knee_arm"});
+  INFO(result.out << result.err);
+  REQUIRE(result.status == 0);
+  const VectorXd angles = VectorXd::LinSpaced(25, 0.8, 1.6);
+  const JointRatios found = calcJointRatios(loadRobot(out + "/leg_1").model, "knee_left", angles),
+                    usual = calcJointRatios(loadRobot("leg_biped").model, "knee_left", angles);
+  const auto calc_deviation = [](const JointRatios& r) { return (r.ratios.array() / 1.1 - 1).abs().maxCoeff(); };
+  CHECK(calc_deviation(found) < 0.7 * calc_deviation(usual));
+  CHECK(found.distance >= 0.2);
+  CHECK_THAT(search({"--parameter", "knee_length"}).err, Contains("knee_crank"));
+  CHECK_THAT(search({"--parameter", "knee_crank=0.1:0.2"}).err, Contains("is not in the range"));
 }
 
 TEST_CASE("four-bars: Bipetto's knee is found again by its ratios, and the biped that is written has them") {

@@ -2,70 +2,46 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <thread>
 
-#include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/ratio.h"
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
+#include "cli/parameter_range.h"
+#include "cli/synthesis.h"
 #include "cli/table.h"
-#include "design/fourbar_search.h"
+#include "design/robot_ratios.h"
 #include "formats/motor_catalogue.h"
 #include "formats/text_file.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "report/run.h"
+#include "robots/generator_entry.h"
 
 namespace fs = std::filesystem;
 
 namespace bielle::cli {
 namespace {
 
-constexpr int kAngles = 25;  // of a range
+constexpr int kAngles = 25;                           // of a range
+constexpr long kDrawings = 1000000, kRobots = 10000;  // usual samples, in closed form and by their mechanism
+constexpr int kRobotEvaluations = 200;                // of a refinement, likewise by its mechanism
+constexpr long kShownSamples = 1000;
 
 struct SynthesizeArguments {
   std::vector<double> range, motor_x = {-0.1, 0.1}, motor_z = {0.08, 0.25}, crank = {0.02, 0.1}, arm = {0.02, 0.1};
   std::optional<double> ratio;
-  std::string like, joint, motion, motor, directory;
-  long samples = 1000000;
+  std::string robot, like, joint, motion, motor, directory;
+  std::vector<std::string> parameters;
+  std::optional<long> samples;
   int count = 10, threads = 0;
   unsigned seed = 1;
-  double margin = 0.3, clearance = 0.01;
+  double margin = 0.3, clearance = 0.01, distance = 0.2;
 };
 
-// |R| of a robot's linkage at these angles, on the branch of its posture.
-VectorXd readRatios(const std::string& robot, const std::string& joint, const VectorXd& angles) {
-  const Model model = RobotArgument{robot}.load().model;
-  const VectorXd q = findClosedConfiguration(model).q;
-  const Linkage linkage = makeLinkage(model, q, {joint});
-  if (linkage.size() != 1)
-    throw InputError(robot, "joint '" + joint + "'", "its linkage has several motors",
-                     "name a joint whose linkage has one motor");
-  const RatioSweep sweep = sweepRatio(model, linkage, q);
-  VectorXd ratios = VectorXd::Constant(angles.size(), -1);
-  for (size_t i = 0; i + 1 < sweep.samples.size(); ++i) {
-    const RatioSample &a = sweep.samples[i], &b = sweep.samples[i + 1];
-    if (a.branch != 0 || b.branch != 0 || a.dead != DeadPointKind::None || b.dead != DeadPointKind::None) continue;
-    for (Eigen::Index k = 0; k < angles.size(); ++k) {
-      const double share = (angles[k] - a.joints[0]) / (b.joints[0] - a.joints[0]);
-      if (share < 0 || share > 1) continue;
-      // Cubic with both derivatives: the samples are as far apart as the sweep's steps.
-      const double w = b.joints[0] - a.joints[0], t = share, p = a.ratio.R(0, 0), r = b.ratio.R(0, 0);
-      const double m = w * a.ratio.dR[0](0, 0), n = w * b.ratio.dR[0](0, 0);
-      ratios[k] = std::abs((2 * t * t * t - 3 * t * t + 1) * p + (t * t * t - 2 * t * t + t) * m +
-                           (3 * t * t - 2 * t * t * t) * r + (t * t * t - t * t) * n);
-    }
-  }
-  if (ratios.minCoeff() < 0)
-    throw InputError(robot, "joint '" + joint + "'", "its linkage does not reach the whole range without a dead point",
-                     "`bielle ratio` shows how far it goes; narrow --range");
-  return ratios;
-}
-
 // Angle, torque and speed of a joint that its motor drives, at the stages of a motion.
-JointDemand readMotion(const SynthesizeArguments& arguments) {
-  const ReportRun run = readRun(arguments.motion);
+JointDemand readDemand(const ReportRun& run, const SynthesizeArguments& arguments) {
   const Model& model = run.robot.model;
   const MotionRecord& record = run.record;
   const RowMatrixXd &q = record.has_midpoints ? record.q_mid : record.q,
@@ -87,10 +63,10 @@ JointDemand readMotion(const SynthesizeArguments& arguments) {
                    "solve the motion with a robot whose motor is on the joint; its motors are on " + listItems(names));
 }
 
-JointDemand makeDemand(const SynthesizeArguments& arguments) {
+JointDemand makeDemand(const SynthesizeArguments& arguments, const std::optional<ReportRun>& motion) {
   JointDemand demand;
-  if (!arguments.motion.empty()) {
-    demand = readMotion(arguments);
+  if (motion) {
+    demand = readDemand(*motion, arguments);
   } else {
     if (arguments.range.empty())
       throw InputError("", "option --range", "it is missing", "give it, or --motion with --joint");
@@ -98,9 +74,10 @@ JointDemand makeDemand(const SynthesizeArguments& arguments) {
       throw InputError("", "option --range", "it is empty", "give the smaller angle first");
     demand.angles = VectorXd::LinSpaced(kAngles, arguments.range[0], arguments.range[1]);
     if (arguments.ratio) demand.ratios = VectorXd::Constant(kAngles, *arguments.ratio);
-    if (!arguments.like.empty()) demand.ratios = readRatios(arguments.like, arguments.joint, demand.angles);
+    if (!arguments.like.empty())
+      demand.ratios =
+          calcJointRatios(RobotArgument{arguments.like}.load().model, arguments.joint, demand.angles).ratios;
   }
-  demand.drawn_at = 0.5 * (demand.angles.minCoeff() + demand.angles.maxCoeff());
   if (!arguments.motor.empty()) {
     Motor motor;
     readYamlDocument("--motor", "[" + arguments.motor + "]", [&](const YamlEntry& root) {
@@ -123,52 +100,82 @@ FourBarSpace makeSpace(const SynthesizeArguments& a) {
   return space;
 }
 
-// The biped whose knees it moves, as a file.
-std::string formatBiped(const FoundFourBar& found, double drawn_at) {
-  const FourBarDrawing& d = found.drawing;
-  const std::pair<const char*, double> numbers[] = {
-      {"motor_x", d.motor_x}, {"motor_z", d.motor_z},     {"drawn_crank", d.crank}, {"crank_angle", d.crank_angle},
-      {"drawn_arm", d.arm},   {"arm_angle", d.arm_angle}, {"drawn_at", drawn_at}};
-  std::string text = "# Found by `bielle";
+SoughtLinkage makeSought(const SynthesizeArguments& a, const JointDemand& demand,
+                         const std::optional<ReportRun>& motion) {
+  if (a.parameters.empty()) {
+    // The robot of the motion, with other knees.
+    const bool is_generated = a.robot.empty() && motion && readGeneratorOf(motion->robot.file);
+    return makeDrawnKnees(is_generated      ? motion->robot.file
+                          : a.robot.empty() ? "leg_biped"
+                                            : a.robot,
+                          makeSpace(a), demand);
+  }
+  if (a.robot.empty()) throw InputError("", "option --parameter", "there is no robot that has it", "name one first");
+  if (a.joint.empty()) throw InputError("", "option --joint", "it is missing", "name the joint that the linkage moves");
+  return makeVariedLinkages(a.robot, a.parameters, a.joint, demand, a.distance);
+}
+
+std::string joinCommandLine() {
+  std::string text = "bielle";
   for (size_t i = 1; i < getCommandLine().size(); ++i) text += " " + getCommandLine()[i];
-  text += "`.\ngenerator: leg_biped\nset:\n  knee: drawn\n";
-  for (const auto& [name, value] : numbers)
-    text += std::string("  knee_") + name + ": " + formatNumber(value, "%.9g") + "\n";
   return text;
 }
 
+std::vector<Row> makeTable(const SoughtLinkage& sought, const std::vector<FoundLinkage>& found,
+                           const JointDemand& demand) {
+  const bool has_torques = demand.torques.size() > 0;
+  const char* value = has_torques ? "rms [N m]" : demand.ratios.size() ? "deviation" : "spread";
+  std::vector<Row> rows = {{"", value, "ratio", sought.margin}};
+  if (has_torques) rows[0].insert(rows[0].end(), {"peak [N m]", "[rad/s]"});
+  for (const DesignVariable& variable : sought.variables)
+    rows[0].push_back(variable.name + (variable.unit == "1" ? "" : " [" + variable.unit + "]"));
+  const auto format = [](double number) { return formatNumber(number, "%.4g"); };
+  for (const FoundLinkage& f : found) {
+    rows.push_back({"leg_" + std::to_string(rows.size()), format(f.value),
+                    format(f.least_ratio) + " .. " + format(f.largest_ratio), format(f.margin)});
+    if (has_torques) rows.back().insert(rows.back().end(), {format(f.peak_torque), format(f.peak_speed)});
+    for (const double number : f.x) rows.back().push_back(format(number));
+  }
+  return rows;
+}
+
 int synthesize(const SynthesizeArguments& arguments) {
-  const JointDemand demand = makeDemand(arguments);
-  const int threads = arguments.threads > 0 ? arguments.threads : static_cast<int>(std::thread::hardware_concurrency());
-  const std::vector<FoundFourBar> found =
-      searchFourBars(demand, makeSpace(arguments), arguments.samples, arguments.count, arguments.seed, threads);
+  std::optional<ReportRun> motion;
+  if (!arguments.motion.empty()) motion = readRun(arguments.motion);
+  const JointDemand demand = makeDemand(arguments, motion);
+  const SoughtLinkage sought = makeSought(arguments, demand, motion);
+  const bool is_drawn = arguments.parameters.empty();
+  LinkageSearchOptions options;
+  options.samples = arguments.samples.value_or(is_drawn ? kDrawings : kRobots);
+  if (!is_drawn) options.refined = arguments.count, options.evaluations = kRobotEvaluations;
+  options.count = arguments.count;
+  options.seed = arguments.seed;
+  options.threads = arguments.threads > 0 ? arguments.threads : static_cast<int>(std::thread::hardware_concurrency());
+  if (!is_drawn)
+    options.progress = [&options](long rated) {
+      if (rated % kShownSamples == 0) std::cerr << "bielle: " << rated << " of " << options.samples << " robots\n";
+    };
+  const std::vector<FoundLinkage> found = searchLinkages(sought.family, demand, options);
   if (found.empty()) {
-    std::cerr << "bielle: none of " << arguments.samples
-              << " four-bars closes over the whole range with this margin; widen the bounds, or lower --margin\n";
+    std::cerr << "bielle: none of " << options.samples << " linkages closes over the whole range with this "
+              << (is_drawn ? "margin; widen the bounds, or lower --margin\n"
+                           : "distance; widen the ranges, or lower --distance\n");
     return kFailed;
   }
   makeOutputDirectory(arguments.directory);
-  const bool has_torques = demand.torques.size() > 0;
-  std::vector<Row> rows = {{"",
-                            has_torques            ? "rms [N m]"
-                            : demand.ratios.size() ? "deviation"
-                                                   : "spread",
-                            "ratio", "sine", "motor x, z [m]", "crank", "arm [m]"}};
-  if (has_torques) rows[0].insert(rows[0].end(), {"peak [N m]", "[rad/s]"});
   for (size_t i = 0; i < found.size(); ++i) {
-    const FoundFourBar& f = found[i];
     const std::string name = "leg_" + std::to_string(i + 1);
-    const auto text = [](double value) { return formatNumber(value, "%.4g"); };
-    rows.push_back({name, text(f.value), text(f.least_ratio) + " .. " + text(f.largest_ratio), text(f.least_sine),
-                    text(f.drawing.motor_x) + ", " + text(f.drawing.motor_z), text(f.drawing.crank),
-                    text(f.drawing.arm)});
-    if (has_torques) rows.back().insert(rows.back().end(), {text(f.peak_torque), text(f.peak_speed)});
     const fs::path directory = fs::path(arguments.directory) / name;
     makeOutputDirectory(directory.string());
-    writeTextFile((directory / (name + ".yaml")).string(), formatBiped(f, demand.drawn_at));
+    writeTextFile((directory / (name + ".yaml")).string(), formatRobot(sought, found[i], joinCommandLine()));
   }
-  printTable(std::cout, rows);
+  printTable(std::cout, makeTable(sought, found, demand));
   std::cout << "  " << arguments.directory << "\n";
+  if (motion) {
+    const std::string design = (fs::path(arguments.directory) / "design.yaml").string();
+    writeTextFile(design, formatDesign(sought, found, *motion, arguments.joint, arguments.motor, joinCommandLine()));
+    std::cout << "  " << design << "\n";
+  }
   return kOk;
 }
 
@@ -180,42 +187,70 @@ void addSynthesize(CLI::App& app, Action& action) {
   const auto add_pair = [&command](const char* flag, std::vector<double>& pair, const char* help) {
     return command.add_option(flag, pair, help)->expected(2)->delimiter(':')->type_name("LOW:HIGH");
   };
+  command.add_option("robot", a->robot,
+                     "generated robot whose linkage is looked for; default: that of --motion, or leg_biped");
   CLI::Option* range = add_pair("--range", a->range, "angles of the joint [rad]");
   CLI::Option* ratio = command.add_option("--ratio", a->ratio,
                                           "requested turns of the motor per turn of the joint, over the whole range");
-  CLI::Option* joint = command.add_option("--joint", a->joint, "joint of --like or --motion");
+  CLI::Option* joint =
+      command.add_option("--joint", a->joint, "joint of --like, --motion and --parameter, of the same name in all");
   CLI::Option* like = command.add_option("--like", a->like, "robot whose linkage has the requested ratios");
   CLI::Option* motion = command.add_option(
       "--motion", a->motion, "result of a motion whose motor is on the joint: the least heat of the motor");
   command.add_option("--motor", a->motor, "motor of the catalogue, whose speed must not be exceeded")->needs(motion);
   like->needs(joint)->excludes(ratio);
   motion->needs(joint)->excludes(range)->excludes(ratio)->excludes(like);
-  add_pair("--motor-x", a->motor_x, "place of the motor in front of the joint [m]")->capture_default_str();
-  add_pair("--motor-z", a->motor_z, "place of the motor above the joint [m]")->capture_default_str();
-  add_pair("--crank", a->crank, "length of the crank [m]")->capture_default_str();
-  add_pair("--arm", a->arm, "length of the joint's arm [m]")->capture_default_str();
-  command.add_option("--margin", a->margin, "least sine of the angles between rod, crank and arm; 0 at dead points")
+  command
+      .add_option("--parameter", a->parameters,
+                  "this parameter of the robot varies, 30 % about its value or over a range; may be repeated. "
+                  "Without: four-bars by their drawing")
+      ->type_name(kParameterRange);
+  command
+      .add_option("--distance", a->distance,
+                  "least way from the range to a dead point, of linkages by --parameter [rad]")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  add_pair("--motor-x", a->motor_x, "four-bars: place of the motor in front of the joint [m]")->capture_default_str();
+  add_pair("--motor-z", a->motor_z, "four-bars: place of the motor above the joint [m]")->capture_default_str();
+  add_pair("--crank", a->crank, "four-bars: length of the crank [m]")->capture_default_str();
+  add_pair("--arm", a->arm, "four-bars: length of the joint's arm [m]")->capture_default_str();
+  command
+      .add_option("--margin", a->margin,
+                  "four-bars: least sine of the angles between rod, crank and arm; 0 at dead points")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--clearance", a->clearance, "least distance of the rod from the joint's axis [m]")
+  command.add_option("--clearance", a->clearance, "four-bars: least distance of the rod from the joint's axis [m]")
       ->capture_default_str();
-  command.add_option("--samples", a->samples, "four-bars at random")
-      ->check(CLI::Range(1L, 1000000000L))
-      ->capture_default_str();
-  command.add_option("--count", a->count, "four-bars kept")->check(CLI::Range(1, 50))->capture_default_str();
+  command
+      .add_option("--samples", a->samples,
+                  "linkages at random; default: 1000000 by their drawing, 10000 by --parameter")
+      ->check(CLI::Range(1L, 1000000000L));
+  command.add_option("--count", a->count, "linkages kept")->check(CLI::Range(1, 50))->capture_default_str();
   command.add_option("--seed", a->seed, "of the random numbers")->capture_default_str();
   command.add_option("--threads", a->threads, "threads; 0: one per core")->capture_default_str();
-  command.add_option("-o,--output", a->directory, "directory of the bipeds whose knees they move")->required();
+  command.add_option("-o,--output", a->directory, "directory of the robots that have them")->required();
   command.footer(
-      "Draws plane four-bars at random, ranks them by their closed form, refines the best fifty and writes for each a\n"
-      "biped whose knees it moves: the part `drawn` (docs/parts.md) with its numbers. Without a request, the best "
-      "ratio is\n"
-      "the most constant one. Exit status: 0 done, 1 none found, 2 bad input.\n"
+      "Draws linkages at random, ranks them by the ratio of motor to joint, refines the best and writes a robot for "
+      "each.\n"
+      "Four-bars are ranked by their closed form; their robots have the part `drawn` (docs/parts.md) as knees. By "
+      "--parameter\n"
+      "any generated robot is searched, some hundred linkages per second and core. Without a request, the best ratio "
+      "is the "
+      "most\n"
+      "constant one.\n"
+      "With --motion, design.yaml is written as well: `bielle design` solves the motion anew for each robot, refines "
+      "the "
+      "best\n"
+      "by gradients and gives the front of energy and peak torque.\n"
+      "Exit status: 0 done, 1 none found, 2 bad input.\n"
       "Examples:\n"
       "  bielle synthesize --range 0:1.6 --ratio 0.9 -o knees\n"
       "  bielle synthesize --range 0.1:1.1 --like bipetto --joint knee_right -o again\n"
+      "  bielle synthesize leg_biped --joint knee_left --range 0.8:1.6 --parameter knee_crank --parameter knee_arm -o "
+      "lengths\n"
       "  bielle solve walk --robot rsu_biped -o walk\n"
-      "  bielle synthesize --motion walk --joint knee_left -o for_walks");
+      "  bielle synthesize --motion walk --joint knee_left -o for_walks\n"
+      "  bielle design for_walks/design.yaml -o best");
   command.callback([&action, a] { action = [a] { return synthesize(*a); }; });
 }
 

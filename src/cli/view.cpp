@@ -9,14 +9,14 @@
 
 #include "bielle/model/error.h"
 #include "cli/commands.h"
+#include "cli/parameter_range.h"
 #include "results/output_place.h"
 #include "robots/generator_entry.h"
 
 namespace bielle::cli {
 namespace {
 
-constexpr int kSamples = 7;     // of a parameter
-constexpr double kWidth = 0.3;  // on either side of its value, relative to it, unless a range is given
+constexpr int kSamples = 7;  // of a parameter
 
 struct ViewArguments {
   RobotArgument robot;
@@ -26,32 +26,15 @@ struct ViewArguments {
 
 // Robots of a parameter from low to high, that of the robot itself among them.
 ViewParameter makeParameter(const std::string& text, const LoadedRobot& robot, const GeneratorEntry& entry) {
-  const size_t equals = text.find('='), colon = text.find(':');
-  const Option& option = entry.parameters.get(text.substr(0, equals));
-  const double* value = std::get_if<double>(&option.value);
-  if (!value) throw InputError("", "parameter '" + option.name + "'", "it is no number", "name one that is");
-  const double width = kWidth * std::abs(*value);
-  double low = std::max(option.bounds.lower, *value - width), high = std::min(option.bounds.upper, *value + width);
-  if (equals != std::string::npos) {
-    const OptionValue from = parseOption(text.substr(equals + 1, colon - equals - 1)),
-                      to = colon == std::string::npos ? OptionValue("") : parseOption(text.substr(colon + 1));
-    const auto read = [&text](const OptionValue& number) {
-      if (const int* whole = std::get_if<int>(&number)) return static_cast<double>(*whole);
-      if (const double* real = std::get_if<double>(&number)) return *real;
-      throw InputError("", "--parameter " + text, "its range is not given by two numbers", "write NAME=LOW:HIGH");
-    };
-    low = read(from), high = read(to);
-  }
-  if (!(low <= *value && *value <= high && low < high))
-    throw InputError("", "--parameter " + text, "its value, " + formatNumber(*value) + ", is not in the range",
-                     "write NAME=LOW:HIGH with LOW below it and HIGH above it");
-  ViewParameter out{option.name, option.unit, {}, {}, 0};
-  for (int i = 0; i < kSamples; ++i) out.values.push_back(low + (high - low) * i / (kSamples - 1));
-  out.start = static_cast<size_t>(std::lround((*value - low) / (high - low) * (kSamples - 1)));
-  out.values[out.start] = *value;
+  const ParameterRange range = readParameterRange("--parameter", text, entry.parameters);
+  ViewParameter out{range.name, range.unit, {}, {}, 0};
+  const double width = range.high - range.low;
+  for (int i = 0; i < kSamples; ++i) out.values.push_back(range.low + width * i / (kSamples - 1));
+  out.start = static_cast<size_t>(std::lround((range.value - range.low) / width * (kSamples - 1)));
+  out.values[out.start] = range.value;
   for (const double sample : out.values) {
     OptionSet parameters = entry.parameters;
-    parameters.set(option.name, sample);
+    parameters.set(range.name, sample);
     out.robots.emplace_back(robot);
     try {
       out.robots.back()->model = entry.generator.make(parameters);
@@ -92,7 +75,7 @@ void addView(CLI::App& app, Action& action) {
       .add_option(
           "--parameter", arguments->parameters,
           "a slider for this parameter of a generated robot, 30 % about its value or over a range; may be repeated")
-      ->type_name("NAME[=LOW:HIGH]");
+      ->type_name(kParameterRange);
   command.add_option("-o,--output", arguments->output, "the page; default: NAME.html here");
   command.footer(
       "The loops close as the sliders move, from precomputed samples; the page reports where they cannot close.\n"

@@ -40,7 +40,9 @@ class FrontRunner {
     const FrontSpec& front = *spec_.front;
     std::vector<bool> whole;
     for (const DesignVariable& variable : robot.variables()) whole.push_back(variable.isChoice());
-    searchFront({robot.lower(), robot.upper(), robot.start(), static_cast<int>(evaluator_.objective().size()),
+    std::vector<VectorXd> starts = listStarts(spec_, robot);
+    starts.insert(starts.begin(), robot.start());
+    searchFront({robot.lower(), robot.upper(), starts, static_cast<int>(evaluator_.objective().size()),
                  [this](const std::vector<VectorXd>& designs) { return evaluate(designs); }, whole},
                 front.options, spec_.seed);
     selectDesigns();

@@ -26,7 +26,7 @@ struct PagmoProblem {
 
   explicit PagmoProblem(const FrontProblem* p = nullptr) : problem(p) {
     for (const bool whole : {false, true})
-      for (Eigen::Index i = 0; p && i < p->start.size(); ++i) {
+      for (Eigen::Index i = 0; p && i < p->lower.size(); ++i) {
         const bool is_whole = static_cast<size_t>(i) < p->whole.size() && p->whole[static_cast<size_t>(i)];
         if (is_whole != whole || p->lower[i] == p->upper[i]) continue;
         order.push_back(i);
@@ -34,7 +34,7 @@ struct PagmoProblem {
       }
   }
   VectorXd makeDesign(const double* x) const {
-    VectorXd design = problem->start;
+    VectorXd design = problem->starts.front();
     for (size_t i = 0; i < order.size(); ++i) design[order[i]] = x[i];
     return design;
   }
@@ -72,7 +72,7 @@ struct PagmoBatch {
 pagmo::algorithm makeAlgorithm(const FrontProblem& problem, const FrontOptions& options, unsigned seed) {
   const auto generations = static_cast<unsigned>(options.generations);
   if (options.algorithm == SearchAlgorithm::Nsga2) {
-    const double mutation = 1.0 / static_cast<double>(problem.start.size());
+    const double mutation = 1.0 / static_cast<double>(problem.lower.size());
     pagmo::nsga2 nsga2(generations, kCrossover, kCrossoverIndex, mutation, kMutationIndex, seed);
     nsga2.set_bfe(pagmo::bfe(PagmoBatch()));
     return pagmo::algorithm(nsga2);
@@ -89,11 +89,15 @@ pagmo::algorithm makeAlgorithm(const FrontProblem& problem, const FrontOptions& 
 bool hasFrontSearch() { return true; }
 
 void searchFront(const FrontProblem& problem, const FrontOptions& options, unsigned seed) {
+  if (options.generations == 0) {
+    problem.evaluate(problem.starts);
+    return;
+  }
   const PagmoProblem of_pagmo(&problem);
   if (of_pagmo.num_whole > 0 && options.algorithm == SearchAlgorithm::Moead)
     throw std::invalid_argument("moead does not support integers");
   pagmo::population population(pagmo::problem(of_pagmo), 0, seed);
-  std::vector<VectorXd> designs = {problem.start};
+  std::vector<VectorXd> designs = problem.starts;
   while (static_cast<int>(designs.size()) < options.population) {
     const pagmo::vector_double x = population.random_decision_vector();
     designs.push_back(of_pagmo.makeDesign(x.data()));

@@ -15,7 +15,7 @@ using FrontObjectives = std::function<std::vector<std::vector<double>>(const std
 
 struct FrontProblem {
   VectorXd lower, upper;
-  VectorXd start;  ///< one of the first generation
+  std::vector<VectorXd> starts;  ///< of the first generation; one or more
   int objectives = 2;
   FrontObjectives evaluate;      ///< of a whole generation with Nsga2, of one design after the other with Moead
   std::vector<bool> whole = {};  ///< variables that are numbers of choices, without an order among them; not for Moead
@@ -24,7 +24,7 @@ struct FrontProblem {
 struct FrontOptions {
   SearchAlgorithm algorithm = SearchAlgorithm::Nsga2;  ///< or Moead
   int population = 24;                                 ///< a multiple of 4 of at least 8
-  int generations = 10;                                ///< after the first one, which is random
+  int generations = 10;  ///< after the first one, which is filled up at random; 0: the starts alone
 };
 
 /// Whether Bielle was built with pagmo. The functions below throw std::logic_error without it.

@@ -29,8 +29,10 @@ class DesignRunner {
   DesignRunner(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options)
       : evaluator_(evaluator), spec_(spec), options_(options) {
     makeOutputDirectory(options.directory);
-    for (const VectorXd& combination : evaluator.robot().listCombinations())
-      starts_.insert(starts_.end(), static_cast<size_t>(spec.searches), combination);
+    starts_ = listStarts(spec, evaluator.robot());
+    if (starts_.empty())
+      for (const VectorXd& combination : evaluator.robot().listCombinations())
+        starts_.insert(starts_.end(), static_cast<size_t>(spec.searches), combination);
     for (size_t i = 0; i < starts_.size(); ++i)
       logs_.push_back(std::make_unique<EvaluationLog>(options.directory + "/search" + std::to_string(i + 1) + ".jsonl",
                                                       makeLogHeader(evaluator, spec, std::to_string(i + 1)),

@@ -35,10 +35,10 @@ Vector3d readDirection(const Entry& entry) {
   return direction.normalized();
 }
 
-int readCount(const Entry& entry, int most) {
+int readCount(const Entry& entry, int most, int least = 1) {
   const double value = entry.getNumber();
-  if (value != std::floor(value) || value < 1 || value > most)
-    entry.fail("it is not a whole number in 1 .. " + std::to_string(most), "give one");
+  if (value != std::floor(value) || value < least || value > most)
+    entry.fail("it is not a whole number in " + std::to_string(least) + " .. " + std::to_string(most), "give one");
   return static_cast<int>(value);
 }
 
@@ -320,7 +320,7 @@ FrontSpec readFront(const Entry& entry, const DesignSpec& spec) {
     if (options.population < 8 || options.population % 4 != 0)
       population->fail("it is not a multiple of 4, or less than 8", "give e.g. 24");
   }
-  if (const Entry* generations = find(fields, "generations")) options.generations = readCount(*generations, 100000);
+  if (const Entry* generations = find(fields, "generations")) options.generations = readCount(*generations, 100000, 0);
   if (const Entry* refine = find(fields, "refine"))
     front.refine = readStage(*refine, {SearchAlgorithm::Slsqp, SearchAlgorithm::Mma}, spec);
   const bool has_choices = std::any_of(spec.variables.begin(), spec.variables.end(),
@@ -331,15 +331,40 @@ FrontSpec readFront(const Entry& entry, const DesignSpec& spec) {
   return front;
 }
 
+// Values by the names of variables.
+VectorXd readStart(const Entry& entry, const std::vector<DesignVariable>& variables) {
+  VectorXd x = VectorXd::Constant(static_cast<Eigen::Index>(variables.size()), NAN);
+  for (const auto& [name, value] : entry.getMap()) {
+    const auto is_it = [&name = name](const DesignVariable& variable) { return variable.name == name; };
+    const auto variable = std::find_if(variables.begin(), variables.end(), is_it);
+    if (variable == variables.end()) value.fail("there is no variable '" + name + "'", "name one of `variables`");
+    double& number = x[variable - variables.begin()];
+    number = variable->isChoice() ? readChoiceNumber(value, variable->choices) : value.getNumber();
+    if (!variable->isChoice() && !(number >= variable->lower && number <= variable->upper))
+      value.fail("it is outside the bounds of variable '" + name + "'", "correct it, or widen the bounds");
+  }
+  return x;
+}
+
 void readSearch(const Entry& entry, DesignSpec& spec) {
-  const Fields fields = entry.getFields({"seed", "searches", "stages", "pareto"});
+  const Fields fields = entry.getFields({"seed", "searches", "starts", "stages", "pareto"});
   if (const Entry* seed = find(fields, "seed")) spec.seed = static_cast<unsigned>(readCount(*seed, 1000000000));
   if (const Entry* searches = find(fields, "searches")) spec.searches = readCount(*searches, 1000);
-  const Entry* stages = find(fields, "stages");
+  const Entry *stages = find(fields, "stages"), *starts = find(fields, "starts");
+  if (starts) {
+    if (find(fields, "searches"))
+      starts->fail("it cannot be combined with `searches`", "remove either: there is one search from each start");
+    for (const Entry& item : starts->getList()) spec.starts.push_back(readStart(item, spec.variables));
+    if (spec.starts.empty()) starts->fail("there are none", "give one, or leave the key out");
+  }
   if (const Entry* pareto = find(fields, "pareto")) {
     if (stages || find(fields, "searches"))
       pareto->fail("it cannot be combined with `stages` and `searches`", "remove them, or `pareto`");
     spec.front = readFront(*pareto, spec);
+    if (static_cast<int>(spec.starts.size()) >= spec.front->options.population)
+      pareto->fail(
+          "its population has no room for the start design and " + std::to_string(spec.starts.size()) + " `starts`",
+          "enlarge `population`");
   }
   if (!stages) return;
   spec.stages.clear();
@@ -382,6 +407,12 @@ DesignSpec readDesignSpec(const std::string& path) {
   spec.text = readTextFile(path, "give the path of a specification");
   readYamlDocument(path, spec.text, [&](const Entry& root) { readRoot(root, spec); });
   return spec;
+}
+
+std::vector<VectorXd> listStarts(const DesignSpec& spec, const Parametrization& robot) {
+  std::vector<VectorXd> starts = spec.starts;
+  for (VectorXd& x : starts) x = x.array().isNaN().select(robot.start(), x);
+  return starts;
 }
 
 Parametrization makeParametrization(const DesignSpec& spec) {

@@ -49,7 +49,8 @@
 ///   regeneration: 0              # recovered share of negative electrical power
 /// search:
 ///   seed: 1
-///   searches: 2                  # independent ones, one thread each
+///   searches: 2                  # independent ones, one thread each; or
+///   starts: [{crank: 0.05}, {crank: 0.055, foot: 0.06}]      # one search each; what is left out is that of the robot
 ///   stages:                      # crs or isres, then bobyqa or sbplx; slsqp or mma (gradients)
 ///     - {algorithm: crs, evaluations: 200, tolerance: 1e-3}
 /// ```
@@ -96,6 +97,7 @@ struct DesignSpec {
   DriveTable drives;
   unsigned seed = 1;
   int searches = 2;
+  std::vector<VectorXd> starts;  ///< of searches, in place of their number; NaN: the value of the start design
   std::vector<SearchStage> stages = {{SearchAlgorithm::Crs, 200, 1e-3}, {SearchAlgorithm::Sbplx, 100, 1e-3}};
   std::optional<FrontSpec> front;  ///< then there are no searches and stages
 };
@@ -105,5 +107,8 @@ DesignSpec readDesignSpec(const std::string& path);
 
 /// The robot of a file with its variables. \throws InputError when there is no such robot or variable
 Parametrization makeParametrization(const DesignSpec& spec);
+
+/// DesignSpec::starts, complete.
+std::vector<VectorXd> listStarts(const DesignSpec& spec, const Parametrization& robot);
 
 }  // namespace bielle

@@ -1,13 +1,28 @@
 #include "robots/generator_entry.h"
 
+#include <algorithm>
 #include <filesystem>
 
+#include "bielle/formats/reader.h"
 #include "bielle/model/error.h"
 #include "formats/robot_files.h"
 
 namespace fs = std::filesystem;
 
 namespace bielle {
+
+namespace {
+
+// Of a file in the directories of robots its name, of any other its path.
+std::string findShortName(const std::string& file) {
+  const std::string name = fs::path(file).stem().string();
+  const std::vector<std::string> known = listRobots();
+  std::error_code error;
+  const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
+  return is_known && fs::equivalent(findRobotFile(name), file, error) ? name : fs::absolute(file).string();
+}
+
+}  // namespace
 
 std::string locateBeside(const YamlEntry& entry) {
   const std::string text = entry.getText();
@@ -32,11 +47,18 @@ GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settin
       entry = value;
       parameters.set(setting.first, setting.second);
     }
-    return {std::move(generator), std::move(parameters)};
+    return {locateBeside(name), std::move(generator), std::move(parameters)};
   } catch (const InputError& error) {
     if (!error.source().empty() && error.source() != name.getText()) throw;  // it names file and line
     entry.fail(error.problem(), error.remedy());
   }
+}
+
+OptionValues GeneratorEntry::listChanges() const {
+  OptionValues changes;
+  for (const Option& option : parameters)
+    if (option.value != generator.parameters.get(option.name).value) changes.emplace_back(option.name, option.value);
+  return changes;
 }
 
 std::optional<GeneratorEntry> readGeneratorOf(const std::string& file) {
@@ -46,7 +68,7 @@ std::optional<GeneratorEntry> readGeneratorOf(const std::string& file) {
   if (!yaml.composed) return {};
   Generator generator = findGenerator(file);
   OptionSet parameters = generator.parameters;
-  return GeneratorEntry{std::move(generator), std::move(parameters)};
+  return GeneratorEntry{findShortName(file), std::move(generator), std::move(parameters)};
 }
 
 }  // namespace bielle

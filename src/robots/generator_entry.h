@@ -9,8 +9,11 @@
 namespace bielle {
 
 struct GeneratorEntry {
+  std::string name;  ///< by which findGenerator() finds it, from anywhere
   Generator generator;
   OptionSet parameters;
+
+  OptionValues listChanges() const;  ///< values that differ from the defaults
 };
 
 /// The text of an entry or, if it is the path of a .yaml file relative to that of the entry, that path.

@@ -1,0 +1,198 @@
+#include "cli/synthesis.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/linkage.h"
+#include "bielle/model/error.h"
+#include "bielle/motion/registry.h"
+#include "bielle/robots/robot_loader.h"
+#include "cli/parameter_range.h"
+#include "design/robot_ratios.h"
+#include "model/number_text.h"
+#include "robots/generator_entry.h"
+
+namespace bielle::cli {
+namespace {
+
+constexpr int kRefinement = 10;       // evaluations from every robot of the front
+constexpr double kMarginShare = 0.9;  // of the margin from dead points that a joint has at the largest ratio
+
+GeneratorEntry findEntry(const std::string& robot) {
+  const std::string file = findRobotFile(robot);
+  std::optional<GeneratorEntry> entry = readGeneratorOf(file);
+  if (!entry)
+    throw InputError(file, "robot", "it is given by its figures and has no parameters",
+                     "give a robot of a generator, or one composed of parts");
+  return std::move(*entry);
+}
+
+void setValue(OptionValues& values, const std::string& name, const OptionValue& value) {
+  for (auto& [known, old] : values)
+    if (known == name) {
+      old = value;
+      return;
+    }
+  values.emplace_back(name, value);
+}
+
+std::string formatValue(double value) { return formatNumber(value, "%.9g"); }
+
+YAML::Node makeFlow(YAML::NodeType::value type) {
+  YAML::Node node(type);
+  node.SetStyle(YAML::EmitterStyle::Flow);
+  return node;
+}
+
+YAML::Node makeRobot(const SoughtLinkage& sought, const VectorXd& x) {
+  OptionValues values = sought.settings;
+  for (size_t i = 0; i < sought.variables.size(); ++i)
+    setValue(values, sought.variables[i].parameter, x[static_cast<Eigen::Index>(i)]);
+  YAML::Node robot;
+  robot["generator"] = sought.generator;
+  for (const auto& [name, value] : values) {
+    const double* number = std::get_if<double>(&value);
+    robot["set"][name] = number ? formatValue(*number) : formatOption(value);
+  }
+  return robot;
+}
+
+YAML::Node makeVariable(const DesignVariable& variable) {
+  YAML::Node node = makeFlow(YAML::NodeType::Map);
+  node["name"] = variable.name;
+  node["parameter"] = variable.parameter;
+  node["unit"] = variable.unit;
+  node["bounds"].push_back(formatValue(variable.lower));
+  node["bounds"].push_back(formatValue(variable.upper));
+  return node;
+}
+
+YAML::Node makeMotion(const Json& summary) {
+  YAML::Node node = makeFlow(YAML::NodeType::Map);
+  const auto motion = summary.at("motion").get<std::string>();
+  node["motion"] = motion;
+  const OptionSet usual = findMotion("", motion).request.options;
+  OptionSet options = usual;
+  for (const auto& [name, value] : summary.at("options").items()) {
+    const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+    options.set(name, parseOption(text));
+    if (options.get(name).value != usual.get(name).value) node["set"][name] = text;
+  }
+  return node;
+}
+
+YAML::Node makeMeasure(const std::string& measure, const std::string& motors) {
+  YAML::Node node = makeFlow(YAML::NodeType::Map);
+  node["measure"] = measure;
+  if (!motors.empty()) node["motors"].push_back(motors);
+  return node;
+}
+
+YAML::Node makeStart(const std::vector<DesignVariable>& variables, const VectorXd& x) {
+  YAML::Node node = makeFlow(YAML::NodeType::Map);
+  for (size_t i = 0; i < variables.size(); ++i) node[variables[i].name] = formatValue(x[static_cast<Eigen::Index>(i)]);
+  return node;
+}
+
+std::string formatFile(const std::string& comment, const YAML::Node& content) {
+  YAML::Emitter out;
+  out << YAML::Comment(comment) << YAML::Newline << content;
+  return std::string(out.c_str()) + "\n";
+}
+
+// Of this side and the other.
+std::string coverSides(std::string name) {
+  for (const char* side : {"_left", "_right"})
+    if (const size_t at = name.find(side); at != std::string::npos) name.replace(at, std::string(side).size(), "_*");
+  return name;
+}
+
+}  // namespace
+
+SoughtLinkage makeDrawnKnees(const std::string& robot, const FourBarSpace& space, const JointDemand& demand) {
+  const GeneratorEntry entry = findEntry(robot);
+  const Option* knee = entry.parameters.find("knee");
+  if (!knee || std::find(knee->choices.begin(), knee->choices.end(), "drawn") == knee->choices.end())
+    throw InputError(robot, "parameter 'knee'", "the robot has no part `drawn` to choose",
+                     "give leg_biped or a robot with its legs, or say by --parameter what varies");
+  SoughtLinkage sought{entry.name, {}, {}, makeFourBars(space, demand), "sine"};
+  for (const auto& [name, value] : entry.listChanges())
+    if (entry.parameters.find(name)->name.rfind("knee_", 0) != 0 || name == "knee_motor_mass")
+      sought.settings.emplace_back(name, value);
+  setValue(sought.settings, "knee", std::string("drawn"));
+  setValue(sought.settings, "knee_drawn_at", demand.getMiddle());
+  const char* names[] = {"motor_x", "motor_z", "drawn_crank", "crank_angle", "drawn_arm", "arm_angle"};
+  for (Eigen::Index i = 0; i < space.lower.size(); ++i) {
+    DesignVariable variable;
+    variable.name = names[i];
+    variable.parameter = std::string("knee_") + names[i];
+    variable.unit = variable.name.find("angle") == std::string::npos ? "m" : "rad";
+    variable.lower = space.lower[i], variable.upper = space.upper[i];
+    sought.variables.push_back(variable);
+  }
+  return sought;
+}
+
+SoughtLinkage makeVariedLinkages(const std::string& robot, const std::vector<std::string>& parameters,
+                                 const std::string& joint, const JointDemand& demand, double distance) {
+  const GeneratorEntry entry = findEntry(robot);
+  SoughtLinkage sought{entry.name, entry.listChanges(), {}, {}, "dead point [rad]"};
+  for (const std::string& text : parameters) {
+    const ParameterRange range = readParameterRange("--parameter", text, entry.parameters);
+    DesignVariable variable;
+    variable.name = variable.parameter = range.name;
+    variable.unit = range.unit;
+    variable.lower = range.low, variable.upper = range.high;
+    sought.variables.push_back(variable);
+  }
+  sought.family =
+      makeRobotLinkages(Parametrization(entry.name, sought.settings, sought.variables), joint, demand.angles, distance);
+  return sought;
+}
+
+std::string formatRobot(const SoughtLinkage& sought, const FoundLinkage& found, const std::string& origin) {
+  return formatFile("Found by `" + origin + "`.", makeRobot(sought, found.x));
+}
+
+std::string formatDesign(const SoughtLinkage& sought, const std::vector<FoundLinkage>& found, const ReportRun& motion,
+                         const std::string& joint, const std::string& motor, const std::string& origin) {
+  const Parametrization robot(sought.generator, sought.settings, sought.variables);
+  const Model best = robot.make(found.front().x);
+  const Linkage linkage = makeLinkage(best, findClosedConfiguration(best).q, {joint});
+  const std::string motors = coverSides(linkage.motor_names.front());
+  YAML::Node design = makeRobot(sought, found.front().x);
+  for (const DesignVariable& variable : sought.variables) design["variables"].push_back(makeVariable(variable));
+  design["motions"].push_back(makeMotion(motion.summary));
+  for (const char* measure : {"electrical_energy", "peak_torque"})
+    design["objective"].push_back(makeMeasure(measure, motors));
+  YAML::Node margin = makeMeasure("margin", "");
+  double largest = 0;
+  for (const FoundLinkage& f : found) largest = std::max(largest, f.largest_ratio);
+  margin["at_least"] = formatNumber(kMarginShare / std::hypot(1, largest), "%.3g");
+  design["constraints"].push_back(margin);
+  if (!motor.empty()) {
+    YAML::Node type = makeFlow(YAML::NodeType::Map);
+    type["name"] = "motor";
+    type["motor"].push_back(motors);
+    type["choices"].push_back(motor);
+    design["variables"].push_back(type);
+    design["constraints"].push_back(makeMeasure("envelope", motors));
+  }
+  YAML::Node search;
+  for (size_t k = 1; k < found.size(); ++k) search["starts"].push_back(makeStart(sought.variables, found[k].x));
+  YAML::Node refinement = makeFlow(YAML::NodeType::Map);
+  refinement["algorithm"] = "slsqp";
+  refinement["evaluations"] = kRefinement;
+  search["pareto"]["population"] = std::max<size_t>(8, (found.size() + 3) / 4 * 4);
+  search["pareto"]["generations"] = 0;
+  search["pareto"]["refine"] = refinement;
+  design["search"] = search;
+  return formatFile("Robots found by `" + origin + "`, their motion solved anew; the best refined by gradients.",
+                    design);
+}
+
+}  // namespace bielle::cli
