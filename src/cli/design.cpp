@@ -25,18 +25,6 @@ struct DesignArguments {
   TaskArguments tasks;
 };
 
-DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion) {
-  MotionRequest request = findMotion(file, motion.motion).request;
-  MotionRequest usual = request;
-  for (const auto& [name, value] : motion.settings) {
-    request.options.set(name, value);
-    if (name != "time_step") usual.options.set(name, value);
-  }
-  return {motion.motion,
-          [request](const Model& model, const StandingRobot& standing) { return request.plan(model, standing); },
-          motion.weight, motion.payload, usual};
-}
-
 // One design, for others that search.
 int evaluateRequest(const DesignEvaluator& evaluator, const tasks::DesignRequest& request, const std::string& file) {
   if (request.x.size() != evaluator.robot().start().size())
@@ -112,21 +100,13 @@ int run(const DesignArguments& arguments) {
   }
   // Before there are threads: the engine blocks signals, which none of them may take.
   auto engine = arguments.tasks.workers.empty() ? nullptr : makeTaskEngine(arguments.tasks);
-  const Parametrization robot = makeParametrization(spec);
-  std::vector<DesignMotion> motions;
-  for (const MotionSpec& motion : spec.motions) motions.push_back(makeDesignMotion(spec.path, motion));
-  EvaluationOptions options;
-  options.mode = spec.mode;
-  options.drives = spec.drives;
-  options.margin = spec.margin;
-  options.constraints = spec.constraints;
   requireApart(arguments.directory + "/best", {findRobotDirectory(spec.robot, spec.path)});
-  const DesignEvaluator evaluator(robot, motions, spec.objective, options);
+  const DesignEvaluator evaluator = makeEvaluator(spec);
   if (request) return evaluateRequest(evaluator, *request, arguments.directory);
   warn("the start design", evaluator.start());
   DesignRun run = runSearches(arguments, evaluator, spec, engine.get());
   engine.reset();  // signals have their usual effect again
-  if (!motions.empty()) run.usual = evaluator.solveUsually(run.best);
+  if (!spec.motions.empty()) run.usual = evaluator.solveUsually(run.best);
   printRun(evaluator, spec, run);
   for (const std::string& path : writeDesign(arguments.directory, evaluator, spec, run))
     std::cout << "  " << path << "\n";

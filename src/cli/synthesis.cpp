@@ -13,6 +13,8 @@
 #include "bielle/robots/robot_loader.h"
 #include "cli/parameter_range.h"
 #include "design/robot_ratios.h"
+#include "design/spec.h"
+#include "formats/text_file.h"
 #include "model/number_text.h"
 #include "robots/generator_entry.h"
 
@@ -111,6 +113,44 @@ std::string coverSides(std::string name) {
   return name;
 }
 
+// The first of the robots found is the start design.
+std::string formatDesign(const SoughtLinkage& sought, const std::vector<FoundLinkage>& found, const ReportRun& motion,
+                         const std::string& joint, const std::string& motor, const std::string& origin) {
+  const Parametrization robot(sought.generator, sought.settings, sought.variables);
+  const Model best = robot.make(found.front().x);
+  const Linkage linkage = makeLinkage(best, findClosedConfiguration(best).q, {joint});
+  const std::string motors = coverSides(linkage.motor_names.front());
+  YAML::Node design = makeRobot(sought, found.front().x);
+  for (const DesignVariable& variable : sought.variables) design["variables"].push_back(makeVariable(variable));
+  design["motions"].push_back(makeMotion(motion.summary));
+  for (const char* measure : {"electrical_energy", "peak_torque"})
+    design["objective"].push_back(makeMeasure(measure, motors));
+  YAML::Node margin = makeMeasure("margin", "");
+  double largest = 0;
+  for (const FoundLinkage& f : found) largest = std::max(largest, f.largest_ratio);
+  margin["at_least"] = formatNumber(kMarginShare / std::hypot(1, largest), "%.3g");
+  design["constraints"].push_back(margin);
+  if (!motor.empty()) {
+    YAML::Node type = makeFlow(YAML::NodeType::Map);
+    type["name"] = "motor";
+    type["motor"].push_back(motors);
+    type["choices"].push_back(motor);
+    design["variables"].push_back(type);
+    design["constraints"].push_back(makeMeasure("envelope", motors));
+  }
+  YAML::Node search;
+  for (size_t k = 1; k < found.size(); ++k) search["starts"].push_back(makeStart(sought.variables, found[k].x));
+  YAML::Node refinement = makeFlow(YAML::NodeType::Map);
+  refinement["algorithm"] = "slsqp";
+  refinement["evaluations"] = kRefinement;
+  search["pareto"]["population"] = std::max<size_t>(8, (found.size() + 3) / 4 * 4);
+  search["pareto"]["generations"] = 0;
+  search["pareto"]["refine"] = refinement;
+  design["search"] = search;
+  return formatFile("Robots found by `" + origin + "`, their motion solved anew; the best refined by gradients.",
+                    design);
+}
+
 }  // namespace
 
 SoughtLinkage makeDrawnKnees(const std::string& robot, const FourBarSpace& space, const JointDemand& demand) {
@@ -158,41 +198,19 @@ std::string formatRobot(const SoughtLinkage& sought, const FoundLinkage& found, 
   return formatFile("Found by `" + origin + "`.", makeRobot(sought, found.x));
 }
 
-std::string formatDesign(const SoughtLinkage& sought, const std::vector<FoundLinkage>& found, const ReportRun& motion,
-                         const std::string& joint, const std::string& motor, const std::string& origin) {
-  const Parametrization robot(sought.generator, sought.settings, sought.variables);
-  const Model best = robot.make(found.front().x);
-  const Linkage linkage = makeLinkage(best, findClosedConfiguration(best).q, {joint});
-  const std::string motors = coverSides(linkage.motor_names.front());
-  YAML::Node design = makeRobot(sought, found.front().x);
-  for (const DesignVariable& variable : sought.variables) design["variables"].push_back(makeVariable(variable));
-  design["motions"].push_back(makeMotion(motion.summary));
-  for (const char* measure : {"electrical_energy", "peak_torque"})
-    design["objective"].push_back(makeMeasure(measure, motors));
-  YAML::Node margin = makeMeasure("margin", "");
-  double largest = 0;
-  for (const FoundLinkage& f : found) largest = std::max(largest, f.largest_ratio);
-  margin["at_least"] = formatNumber(kMarginShare / std::hypot(1, largest), "%.3g");
-  design["constraints"].push_back(margin);
-  if (!motor.empty()) {
-    YAML::Node type = makeFlow(YAML::NodeType::Map);
-    type["name"] = "motor";
-    type["motor"].push_back(motors);
-    type["choices"].push_back(motor);
-    design["variables"].push_back(type);
-    design["constraints"].push_back(makeMeasure("envelope", motors));
+std::optional<size_t> writeDesign(const std::string& path, const SoughtLinkage& sought, std::vector<FoundLinkage> found,
+                                  const ReportRun& motion, const std::string& joint, const std::string& motor,
+                                  const std::string& origin) {
+  for (size_t start = 0; start < found.size(); ++start) {
+    std::rotate(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(start > 0), found.end());
+    writeTextFile(path, formatDesign(sought, found, motion, joint, motor, origin));
+    try {
+      makeEvaluator(readDesignSpec(path));
+      return start;
+    } catch (const InputError&) {  // it does not make the motion from its plan, but may from that of another
+    }
   }
-  YAML::Node search;
-  for (size_t k = 1; k < found.size(); ++k) search["starts"].push_back(makeStart(sought.variables, found[k].x));
-  YAML::Node refinement = makeFlow(YAML::NodeType::Map);
-  refinement["algorithm"] = "slsqp";
-  refinement["evaluations"] = kRefinement;
-  search["pareto"]["population"] = std::max<size_t>(8, (found.size() + 3) / 4 * 4);
-  search["pareto"]["generations"] = 0;
-  search["pareto"]["refine"] = refinement;
-  design["search"] = search;
-  return formatFile("Robots found by `" + origin + "`, their motion solved anew; the best refined by gradients.",
-                    design);
+  return {};
 }
 
 }  // namespace bielle::cli

@@ -1,5 +1,6 @@
 #pragma once
 // What `bielle synthesize` looks for, and what it writes.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,9 +30,12 @@ SoughtLinkage makeVariedLinkages(const std::string& robot, const std::vector<std
 // A robot's file. \param origin  how it was found
 std::string formatRobot(const SoughtLinkage& sought, const FoundLinkage& found, const std::string& origin);
 
-// A specification for `bielle design`: the motion solved anew for each, and the best refined by gradients.
+// Writes a specification for `bielle design`: the motion solved anew for each, and the best refined by gradients. Its start design is
+// the first that makes the motion from its plan.
 // \param motor  type of the catalogue, or empty
-std::string formatDesign(const SoughtLinkage& sought, const std::vector<FoundLinkage>& found, const ReportRun& motion,
-                         const std::string& joint, const std::string& motor, const std::string& origin);
+// \returns the number of that one in `found`; none if there is none
+std::optional<size_t> writeDesign(const std::string& path, const SoughtLinkage& sought, std::vector<FoundLinkage> found,
+                                  const ReportRun& motion, const std::string& joint, const std::string& motor,
+                                  const std::string& origin);
 
 }  // namespace bielle::cli

@@ -1,5 +1,6 @@
 // bielle synthesize: linkages for a joint, from what is requested of it.
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -173,7 +174,13 @@ int synthesize(const SynthesizeArguments& arguments) {
   std::cout << "  " << arguments.directory << "\n";
   if (motion) {
     const std::string design = (fs::path(arguments.directory) / "design.yaml").string();
-    writeTextFile(design, formatDesign(sought, found, *motion, arguments.joint, arguments.motor, joinCommandLine()));
+    const std::optional<size_t> start =
+        writeDesign(design, sought, found, *motion, arguments.joint, arguments.motor, joinCommandLine());
+    if (!start) {
+      std::remove(design.c_str());
+      std::cerr << "bielle: warning: none of the robots makes the motion from its plan; there is no design.yaml\n";
+      return kFailed;
+    }
     std::cout << "  " << design << "\n";
   }
   return kOk;

@@ -18,7 +18,7 @@ struct DesignEvaluator::Data {
     std::optional<ArchitectureStart> start;
   };
 
-  const Parametrization& robot;
+  Parametrization robot;
   std::vector<DesignMotion> motions;
   std::vector<ObjectiveTerm> objective;
   EvaluationOptions options;

@@ -108,6 +108,9 @@ DesignSpec readDesignSpec(const std::string& path);
 /// The robot of a file with its variables. \throws InputError when there is no such robot or variable
 Parametrization makeParametrization(const DesignSpec& spec);
 
+/// With the motions of its start design. \throws InputError as makeParametrization() and DesignEvaluator do
+DesignEvaluator makeEvaluator(const DesignSpec& spec);
+
 /// DesignSpec::starts, complete.
 std::vector<VectorXd> listStarts(const DesignSpec& spec, const Parametrization& robot);
 
