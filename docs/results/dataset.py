@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+"""Writes docs/results/dataset.md and docs/images/dataset.svg: what became of the motions of examples/dataset/thousand_motions.yaml.
+
+    docs/results/dataset.py                                        the page from the tables in docs/results/data
+    docs/results/dataset.py --record DIR --cpu-seconds 9000        takes the tables from a directory of `bielle dataset` first
+
+`--cpu-seconds` is the processor time of the command and its children. `--quick` makes a data set of two motions and prints the page.
+"""
+import collections
+import json
+import pathlib
+import re
+import statistics
+import tempfile
+
+import common
+from common import show
+
+DATA = common.HERE / "data"
+IMAGE = common.SOURCE / "docs/images/dataset.svg"
+SPEC = common.SOURCE / "examples/dataset/thousand_motions.yaml"
+REASONS = {"rejected": "the request was refused", "no end": "the solver did not converge", "check": "the check did not pass",
+           "goal": "a goal was missed"}
+SMALL = """licence: CC-BY-4.0
+motions:
+  - {solve: squat, robot: bipetto, set: {depth: 0.9, com_weight: [1, 1e5], duration: 0.6, settle: 0, time_step: 0.02}}
+"""
+
+
+def find_reason(entry):
+    """The first thing that is not good, of REASONS; None of a good motion."""
+    if entry["good"]:
+        return None
+    if entry.get("error"):
+        return "rejected"
+    return "no end" if not entry["converged"] else "check" if not entry["check_passed"] else "goal"
+
+
+def describe_failure(directory, entry, reason):
+    """Which row, which goal, or the message."""
+    result = pathlib.Path(directory) / "motions" / entry["name"] / "motion"
+    if reason == "rejected":
+        return entry["error"]
+    if reason == "goal":
+        return ", ".join(f"{goal['name']} {goal['requested']:.4g} → {goal['achieved']:.4g}" for goal in entry["goals"]
+                         if not goal["met"])
+    if reason == "check":
+        rows = json.loads((result / "check.json").read_text(encoding="utf-8"))["rows"]
+        return ", ".join(row["name"] for row in rows if not row["pass"])
+    return json.loads((result / "summary.json").read_text(encoding="utf-8"))["message"]
+
+
+def collect(directory):
+    """A compact line per motion."""
+    lines = []
+    for line in (pathlib.Path(directory) / "index.jsonl").read_text(encoding="utf-8").splitlines():
+        entry = json.loads(line)
+        reason = find_reason(entry)
+        compact = {"motion": entry["motion"], "robot": entry["robot"], "payload_kg": entry["payload_kg"], "set": entry["set"],
+                   "goals": {goal["name"]: goal["achieved"] for goal in entry["goals"]}, "duration_s": entry["duration_s"]}
+        if entry["options"]:
+            compact["options"] = entry["options"]
+        if reason:
+            compact.update(failed=reason, why=describe_failure(directory, entry, reason))
+        else:
+            result = pathlib.Path(directory) / "motions" / entry["name"] / "motion"
+            compact["iterations"] = json.loads((result / "summary.json").read_text(encoding="utf-8"))["iterations"]
+        lines.append(compact)
+    return lines
+
+
+def record(directory, run, cpu, data=DATA):
+    lines = collect(directory)
+    head = {"run": run, "cpu_seconds": cpu, "bytes": sum(path.stat().st_size for path in
+                                                         (pathlib.Path(directory) / "mjlab").rglob("*") if path.is_file())}
+    (data / "dataset_index.jsonl").write_text(
+        "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in [head, *lines]), encoding="utf-8")
+    (data / "dataset_card.md").write_text((pathlib.Path(directory) / "README.md").read_text(encoding="utf-8"), encoding="utf-8")
+
+
+def read(data=DATA):
+    head, *lines = (json.loads(line) for line in (data / "dataset_index.jsonl").read_text(encoding="utf-8").splitlines())
+    return head, lines
+
+
+def draw(lines, path):
+    """Good motions by robot and motion, and their durations and iterations."""
+    import matplotlib
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "dataset", "svg.fonttype": "none", "font.size": 9})
+    from matplotlib import pyplot
+    motions = list(dict.fromkeys(line["motion"] for line in lines))
+    robots = list(dict.fromkeys(line["robot"] for line in lines))
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.6, 3.6))
+    width = 0.8 / len(robots)
+    for i, robot in enumerate(robots):
+        places = [k + (i - (len(robots) - 1) / 2) * width for k in range(len(motions))]
+        good, asked = ([sum(line["motion"] == motion and line["robot"] == robot and ("failed" not in line or every)
+                            for line in lines) for motion in motions] for every in (False, True))
+        left.bar(places, asked, width, color="none", edgecolor="#888888", lw=0.6)
+        left.bar(places, good, width, color=f"C{i}", label=robot)
+    left.set_xticks(range(len(motions)), motions, rotation=35, ha="right")
+    left.set_ylabel("motions: asked for (outlined), good")
+    left.legend(fontsize=8)
+    for i, robot in enumerate(robots):
+        chosen = [line for line in lines if line["robot"] == robot and "failed" not in line]
+        right.plot([line["duration_s"] for line in chosen], [line["iterations"] for line in chosen], ".", ms=3, color=f"C{i}",
+                   alpha=0.6)
+    right.set_yscale("log")
+    right.set_xlabel("duration of the motion [s]")
+    right.set_ylabel("iterations of the solver")
+    right.grid(True, which="both", lw=0.3)
+    figure.tight_layout()
+    figure.savefig(path, metadata={"Date": None})
+    pyplot.close(figure)
+
+
+def describe_values(line):
+    text = ", ".join(f"{name} {value}" for name, value in line["set"].items())
+    return text + (f", {line['payload_kg']:g} kg" if line["payload_kg"] else "")
+
+
+def make_page(head, lines, figure):
+    page = common.Page(__file__, "A data set of a thousand motions", head["run"])
+    good = [line for line in lines if "failed" not in line]
+    hours = head["cpu_seconds"] / 3600
+    page.add(f"""`bielle dataset` of `examples/dataset/{SPEC.name}`, format `mjlab`: {len(lines)} motions were asked for,
+{len(good)} are good, {sum(line['duration_s'] for line in good) / 60:.1f} minutes together, {head['bytes'] / 1e6:.0f} MB. They
+took {hours:.2f} hours of one core, solves, checks and export: {len(lines) / hours:.0f} motions per core-hour. A motion is good if
+the solver converged, `bielle check` passes and all goals are met ([data sets](../datasets.md)). The index is
+`docs/results/data/dataset_index.jsonl`, one line per motion behind a line about the run, the card `dataset_card.md` beside it; the
+motions follow from the specification.""")
+    page.lines += ["", "```console", f"bielle dataset examples/dataset/{SPEC.name} -o thousand", "```"]
+    if figure:
+        page.lines += ["", "![motions by robot; iterations over duration](../images/dataset.svg)"]
+    robots = list(dict.fromkeys(line["robot"] for line in lines))
+    rows = []
+    for motion in dict.fromkeys(line["motion"] for line in lines):
+        ours = [line for line in lines if line["motion"] == motion]
+        cells = []
+        for robot in robots:
+            asked = [line for line in ours if line["robot"] == robot]
+            cells.append(f"{sum('failed' not in line for line in asked)} of {len(asked)}" if asked else "–")
+        iterations = [line["iterations"] for line in ours if "failed" not in line]
+        rows.append([motion, *cells, show(statistics.median(iterations) if iterations else None, "{:.0f}")])
+    page.heading("Good motions")
+    page.table(["", *robots, "median of the iterations"], rows)
+    page.heading("What failed, and why")
+    failed = [line for line in lines if "failed" in line]
+    if not failed:
+        page.add("Nothing.")
+        return page
+    counts = collections.Counter(line["failed"] for line in failed)
+    page.add("; ".join(f"{REASONS[reason]}: {count}" for reason, count in counts.most_common()) + ".")
+    page.lines += ["", f"<details><summary>All {len(failed)}</summary>"]
+    page.table(["robot", "motion", "values", "", "details"],
+               [[line["robot"], line["motion"], describe_values(line), REASONS[line["failed"]],
+                 re.sub(r"\s+", " ", line["why"]).replace("|", "/")[:200]] for line in failed])
+    page.lines += ["", "</details>"]
+    return page
+
+
+def run_quick(runner, run):
+    spec, directory = pathlib.Path(runner.place("small.yaml")), runner.place()
+    spec.write_text(SMALL, encoding="utf-8")
+    runner.run("dataset", spec, "-o", directory, allowed=(0,))
+    with tempfile.TemporaryDirectory() as data:
+        record(directory, run, 10.0, pathlib.Path(data))
+        head, lines = read(pathlib.Path(data))
+    assert [line.get("failed") for line in lines] == ["goal", None], lines
+    make_page(head, lines, figure=False).write(True)
+
+
+def main():
+    parser = common.make_parser(__doc__)
+    parser.add_argument("--record", metavar="DIR", help="take the tables from here")
+    parser.add_argument("--cpu-seconds", type=float, help="processor time that the data set took")
+    arguments = parser.parse_args()
+    run = common.describe_run(arguments.commit)
+    if arguments.quick:
+        run_quick(common.Runner(arguments.bielle), run)
+        return
+    if arguments.record:
+        if arguments.cpu_seconds is None:
+            parser.error("--record needs --cpu-seconds")
+        record(arguments.record, run, arguments.cpu_seconds)
+    head, lines = read()
+    draw(lines, IMAGE)
+    make_page(head, lines, figure=True).write(False)
+
+
+if __name__ == "__main__":
+    main()
