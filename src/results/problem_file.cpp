@@ -82,7 +82,7 @@ class ProblemWriter {
     if (running) {
       json["kind"] = spec.kind == StageKind::Impact ? "impact" : "step";
       json["dt"] = spec.dt;
-      json["contacts"] = contact_sets_.add(describeContacts(spec.constraints));
+      json["contacts"] = contact_sets_.add(describePlaces(spec.constraints));
       json["effort_limit"] = limits_.add(listVector(spec.effort_limits));
       if (spec.control.weight != 0)
         json["control_cost"] = controls_.add({{"weight", spec.control.weight},
@@ -105,7 +105,7 @@ class ProblemWriter {
     return json;
   }
 
-  static Json describeContacts(const ConstraintSet& set) {
+  static Json describePlaces(const ConstraintSet& set) {
     Json contacts = Json::array();
     for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
       const Closure& closure = set.closures[c];
@@ -165,15 +165,15 @@ class ProblemWriter {
   SharedEntries contact_sets_, states_, controls_, limits_, costs_, constraints_;
 };
 
-NpyArray makeArray(std::vector<size_t> shape, const double* data, Eigen::Index size) {
+NpyArray makeNumbers(std::vector<size_t> shape, const double* data, Eigen::Index size) {
   return {std::move(shape), {data, data + size}, {}, false};
 }
 
 NpyArray makeTable(const RowMatrixXd& table, int entries = 0) {
   const auto rows = static_cast<size_t>(table.rows()), columns = static_cast<size_t>(table.cols());
-  return makeArray(entries > 0 ? std::vector<size_t>{rows, columns / entries, static_cast<size_t>(entries)}
-                               : std::vector<size_t>{rows, columns},
-                   table.data(), table.size());
+  return makeNumbers(entries > 0 ? std::vector<size_t>{rows, columns / entries, static_cast<size_t>(entries)}
+                                 : std::vector<size_t>{rows, columns},
+                     table.data(), table.size());
 }
 
 NpyArray makeList(const std::vector<double>& list) { return {{list.size()}, list, {}, false}; }
@@ -229,7 +229,7 @@ void addGuess(const Motion& motion, NpyArrays& arrays) {
 
 std::string formatOptimum(const Motion& motion, const MotionSummary& summary, const MotionRecord& record) {
   NpyArrays arrays;
-  arrays["time"] = makeArray({static_cast<size_t>(record.time.size())}, record.time.data(), record.time.size());
+  arrays["time"] = makeNumbers({static_cast<size_t>(record.time.size())}, record.time.data(), record.time.size());
   for (const auto& [name, table] : {std::pair("q", &record.q),
                                     {"v", &record.v},
                                     {"u", &record.u},
