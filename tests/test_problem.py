@@ -85,8 +85,8 @@ def check_poisons(path):
             (("effort_limits", 0, 0), lambda x: 1e-3, "torques over their limits"),
             (("initial", "q", 9), lambda x: x + 1e-6, "start"),
             (("mechanism", "bodies", 3, "mass"), thousandth, "equations of motion"),
-            (("mechanism", "joints", 2, "p_PJ", 2), lambda x: x + 1e-6, "closures"),
-            (("mechanism", "metric", 7), thousandth, "first drift"),
+            (("mechanism", "joints", 2, "p_PJ", 2), lambda x: x + 1e-6, "URDF: places of the links"),
+            (("mechanism", "metric", 12), lambda x: 10 * x, "first drift"),
             (("mechanism", "armature", 12), lambda x: x + 1e-3, "equations of motion"),
             (("stages", 3, "dt"), thousandth, "second drift")):
         assert noticed in find_failures(change(path, keys, make)), (keys, find_failures(change(path, keys, make)))

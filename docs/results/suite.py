@@ -57,7 +57,7 @@ def record(directory, runs, run):
     counts = collections.Counter((line["problem"], line["variant"]) for line in lines)
     least = min(counts[row[0], variant] for row in rows for _, variant in counts)
     kept = [line for line in lines if line["guess"] < least]  # as many guesses of every problem
-    write_table("suite_runs", run, RUNS, [[f"{line[key]:.9g}" if isinstance(line[key], float) else line[key] for key in RUNS]
+    write_table("suite_runs", run, RUNS, [[f"{line[key]:.9g}" if isinstance(line[key], float) else "" if line[key] is None else line[key] for key in RUNS]
                                           for line in kept])
 
 
@@ -67,7 +67,7 @@ def judge(runs):
     for run in runs:
         run["converged"] = run["converged"] == "True"
         for key in ("cost", "violation", "seconds"):
-            run[key] = float(run[key])
+            run[key] = float(run[key]) if run[key] else math.inf
         key = run["problem"], run["variant"]
         holds = run["converged"] and run["violation"] <= 1e-8
         least[key] = min(least.get(key, math.inf), run["cost"] if holds else math.inf)
@@ -128,7 +128,7 @@ thread from the guess of its archive.""")
     guesses = len({run["guess"] for run in runs})
     page.heading("From perturbed guesses")
     page.add(f"""{guesses} guesses of seed 0 for each problem, one thread, ended after 120 s at the latest, while other programs ran
-on the machine: times are those of the clock. A run succeeds if it converges, holds its constraints and costs at
+on the machine: times are those of the clock. The protocol asks for 100. A run succeeds if it converges, holds its constraints and costs at
 most one per cent more than the best one of its variant. *Solved within twice the time*: of the fastest variant for the same problem
 and guess, with success.""")
     rows = []
