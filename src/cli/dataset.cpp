@@ -51,7 +51,11 @@ void exportMotion(const DatasetSpec& spec, const std::string& directory, Dataset
     const std::string name = format + "/" + entry.motion->name + extension;
     ExportRequest request{entry.result, format, (fs::path(directory) / name).string(), "", spec.rate};
     if (hasRobot(format)) request.robot = (place / (entry.motion->body + ".xml")).string();
-    for (const std::string& warning : writeExport(request)) notes.push_back(entry.motion->name + ": " + warning);
+    for (const std::string& warning : writeExport(request)) {
+      // What the files of a robot leave out is the same for all of its motions.
+      const std::string note = (format == "problem" ? entry.motion->body : entry.motion->name) + ": " + warning;
+      if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
+    }
     entry.files.emplace_back(format, name);
   }
 }
