@@ -9,7 +9,10 @@ are there are not repeated. Runs go guess by guess, so that what is cut off has 
 import argparse
 import datetime
 import json
+import os
 import pathlib
+import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -19,7 +22,7 @@ import numpy as np
 from guesses import make_guess
 from problem import Problem
 
-LONGEST = 120    # s, of the clock, of a run on one thread
+LONGEST = 20     # s of processor time, of a run on one thread
 ITERATIONS = 300
 
 # Options of `bielle solve`. All but the first change one thing.
@@ -41,6 +44,17 @@ def write_guess(directory, solved, guess):
     np.savez(directory / "trajectory.npz", **{**arrays, **guess})
 
 
+def run_limited(command):
+    """Exit status, processor time and errors of a command that ends after LONGEST."""
+    with tempfile.TemporaryFile("w+") as errors:
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors,
+                                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST + 1)))
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        errors.seek(0)
+        return process.returncode, usage.ru_utime + usage.ru_stime, errors.read()
+
+
 def run(bielle, entry, solved, start, output, options):
     """What a run leaves of itself: outcome, cost, violation, iterations, seconds."""
     summary = json.loads((solved / "summary.json").read_text(encoding="utf-8"))
@@ -50,19 +64,18 @@ def run(bielle, entry, solved, start, output, options):
         if name != "dead-point-margin":
             command += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
     none = {"converged": False, "cost": None, "violation": None, "iterations": None, "seconds": None}
-    try:
-        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=LONGEST)
-    except subprocess.TimeoutExpired:
+    status, seconds, errors = run_limited(list(map(str, command)))
+    if status == -signal.SIGXCPU:
         return {**none, "end": "too late"}
-    if done.returncode not in (0, 1):
-        sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
+    if status not in (0, 1):
+        sys.exit(f"{' '.join(map(str, command))}\nexit status {status}\n{errors}")
     result = json.loads((output / "summary.json").read_text(encoding="utf-8"))
     if result["options"] != {**summary["options"], **{key: result["options"][key] for key in ("dead-point-margin",)
                                                       if key in result["options"]}}:
         return {**none, "end": "other stages"}  # the solver made them shorter: another problem
     return {"converged": result["converged"], "cost": result["cost"],
             "violation": result["constraints"]["largest_violation"], "iterations": result["iterations"],
-            "seconds": round(result["seconds"], 4), "end": result["termination"]}
+            "seconds": round(seconds, 3), "end": result["termination"]}
 
 
 def main():
