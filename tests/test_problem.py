@@ -1,4 +1,4 @@
-"""test_problem.py BIELLE SOURCE: problems as data, read by NumPy alone; a changed entry is noticed; guesses of the protocol are closed.
+"""test_problem.py BIELLE SOURCE: problems as data, read by NumPy alone; changed entries are noticed; guesses are closed.
 
 Ends with status 77 where there is no NumPy.
 """

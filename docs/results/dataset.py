@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes docs/results/dataset.md and docs/images/dataset.svg: what became of the motions of examples/dataset/thousand_motions.yaml.
+"""Writes docs/results/dataset.md and docs/images/dataset.svg: the motions of examples/dataset/thousand_motions.yaml.
 
     docs/results/dataset.py                                        the page from the tables in docs/results/data
     docs/results/dataset.py --record DIR --cpu-seconds 9000        takes the tables from a directory of `bielle dataset` first

@@ -63,8 +63,11 @@ def record(directory, runs, run):
     counts = collections.Counter((line["problem"], line["variant"]) for line in lines)
     least = min(counts[row[0], variant] for row in rows for _, variant in counts)
     kept = [line for line in lines if line["guess"] < least]  # as many guesses of every problem
-    write_table("suite_runs", run, RUNS, [[f"{line[key]:.9g}" if isinstance(line[key], float) else "" if line[key] is None else line[key] for key in RUNS]
-                                          for line in kept])
+    write_table("suite_runs", run, RUNS, [[show_entry(line[key]) for key in RUNS] for line in kept])
+
+
+def show_entry(value):
+    return "" if value is None else f"{value:.9g}" if isinstance(value, float) else value
 
 
 def judge(runs):
@@ -135,9 +138,9 @@ in the files, of costs, constraints, equations of motion, steps, loops and URDF;
     guesses = len({run["guess"] for run in runs})
     page.heading("From perturbed guesses")
     page.add(f"""{guesses} guesses of seed 0 for each problem, one thread, ended after 20 s of processor time at the latest. Times
-are processor times of the command, reading and writing included. The protocol asks for 100 guesses. A run succeeds if it converges, holds its constraints and costs at
-most one per cent more than the best one of its variant. *Solved within twice the time*: of the fastest variant for the same problem
-and guess, with success.""")
+are processor times of the command, reading and writing included. The protocol asks for 100 guesses. A run succeeds if it
+converges, holds its constraints and costs at most one per cent more than the best one of its variant. *Solved within twice the
+time*: of the fastest variant for the same problem and guess, with success.""")
     rows = []
     for variant, ratios in profiles.items():
         ours = [run for run in runs if run["variant"] == variant]
