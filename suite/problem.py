@@ -266,7 +266,7 @@ class Problem:
         start, end, half = (State(m, t["q"][:-1], t["v"][:-1]), State(m, t["q"][1:]), State(m, t["q_mid"], t["v_mid"]))
         loops, loops_half, loops_end = Loops(start), Loops(half), Loops(end)
         speed, pace = np.abs(t["v"]).max() + 1, np.abs(t["a"]).max() + 1
-        out = {"closures": max(np.abs(x.residual).max(initial=0) for x in (loops, loops_half, loops_end)),
+        out = {"closures": np.max([np.abs(x.residual).max(initial=0) for x in (loops, loops_half, loops_end)]),
                "closures: velocities": np.abs(apply(loops.J, t["v"][:-1])).max(initial=0) / speed}
         # Drifts (3): along the closures where they begin; where they end, the velocity is projected.
         first, second = m.subtract(t["q_mid"], t["q"][:-1]) / (h / 2), m.subtract(t["q"][1:], t["q_mid"]) / (h / 2)
@@ -274,7 +274,7 @@ class Problem:
         out["first drift"] = loops.measure(t["v"][:-1] - first) / speed
         out["second drift"] = loops_half.measure(begin + h * t["a"] - second) / speed
         out["velocity at the end"] = np.abs(loops_end.project(second) - t["v"][1:]).max() / speed
-        # The kick (4) and, without stabilization, the velocity foreseen for it (5).
+        # The kick: (2) at (4), whose velocity is foreseen without stabilization.
         before = State(m, t["q_mid"], begin)
         gain = (t["v_mid"] - begin) / (h / 2)
         foreseen = gain - loops_half.solve(Loops(before).gamma)
@@ -289,9 +289,9 @@ class Problem:
                 r, J0, _ = at_start.calc_contact(place)
                 _, J, gamma = at_half.calc_contact(place)
                 stabilization = place["kd"] * apply(J0, t["v"][ks]) - place["kp"] * r
-                slip = max(slip, np.abs(apply(J, t["a"][ks]) + gamma + stabilization).max())
-                slip_foreseen = max(slip_foreseen,
-                                    np.abs(apply(J, foreseen[ks]) + at_before.calc_contact(place)[2]).max())
+                slip = np.maximum(slip, np.abs(apply(J, t["a"][ks]) + gamma + stabilization).max())
+                gamma = at_before.calc_contact(place)[2]
+                slip_foreseen = np.maximum(slip_foreseen, np.abs(apply(J, foreseen[ks]) + gamma).max())
                 rows[ks, 6 * c:6 * c + J.shape[1]] = J
                 ground[ks] += at_half.generalize_contact(c, t["contact_wrenches"][ks, c])
         needed, inside = half.calc_inverse_dynamics(t["a"]), half.generalize_closures(t["closure_wrenches"])
@@ -320,7 +320,7 @@ def check(path):
              ("rows of the constraints", np.abs(rows - t["constraints"]).max(initial=0) / size, TOLERANCE),
              ("violation of the constraints", np.maximum(lower - rows, rows - upper).max(initial=0), BOUND),
              ("torques over their limits", np.maximum(0, np.abs(t["u"]) - limits).max(), 0.0),
-             ("start", max(np.abs(t["q"][0] - start["q"]).max(), np.abs(t["v"][0] - start["v"]).max()), TOLERANCE)]
+             ("start", np.maximum(np.abs(t["q"][0] - start["q"]).max(), np.abs(t["v"][0] - start["v"]).max()), TOLERANCE)]
     table += [(name, value, TOLERANCE) for name, value in problem.check_steps(t).items()]
     table += [(name, value, TOLERANCE) for name, value in check_urdf(problem, t)]
     return problem, cost.sum(), table

@@ -64,7 +64,7 @@ def check_urdf(problem, trajectory):
 
     links = {link.get("name"): link for link in robot.findall("link")}
     state = State(m, q)
-    off = max(np.abs(place(name)[1] - state.X[i][1]).max() for i, name in enumerate(m.names) if i > 0)
+    off = np.max([np.abs(place(name)[1] - state.X[i][1]).max() for i, name in enumerate(m.names) if i > 0])
     masses = {name: link.find("inertial/mass") for name, link in links.items()}
     weights = [abs(float(masses[name].get("value")) if masses[name] is not None else 0.0) - mass
                for name, mass in zip(m.names[1:], m.masses[1:])]
@@ -74,6 +74,6 @@ def check_urdf(problem, trajectory):
         for body, point in (("A", "AP"), ("B", "BQ")):
             R, p = place(ball.find(f"{DRAKE}ball_constraint_body_{body}").get("name"))
             ends.append(p + apply(R, read_vector(ball.find(f"{DRAKE}ball_constraint_p_{point}"), "value", "")))
-        apart = max(apart, np.abs(ends[0] - ends[1]).max())
+        apart = np.maximum(apart, np.abs(ends[0] - ends[1]).max())
     return [("URDF: places of the links", off), ("URDF: masses", np.abs(weights).max()),
             ("URDF: points that balls tie", apart)]

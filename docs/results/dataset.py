@@ -4,7 +4,8 @@
     docs/results/dataset.py                                        the page from the tables in docs/results/data
     docs/results/dataset.py --record DIR --cpu-seconds 9000        takes the tables from a directory of `bielle dataset` first
 
-`--cpu-seconds` is the processor time of the command and its children. `--quick` makes a data set of two motions and prints the page.
+`--cpu-seconds` is the processor time of the command and its children. A part of the specification may be recorded. `--quick`
+makes a data set of two motions and prints the page.
 """
 import collections
 import json
@@ -19,6 +20,7 @@ from common import show
 DATA = common.HERE / "data"
 IMAGE = common.SOURCE / "docs/images/dataset.svg"
 SPEC = common.SOURCE / "examples/dataset/thousand_motions.yaml"
+ASKED = 1000  # motions of it
 REASONS = {"rejected": "the request was refused", "no end": "the solver did not converge", "check": "the check did not pass",
            "goal": "a goal was missed"}
 SMALL = """licence: CC-BY-4.0
@@ -50,6 +52,10 @@ def describe_failure(directory, entry, reason):
     return json.loads((result / "summary.json").read_text(encoding="utf-8"))["message"]
 
 
+def round_off(value):
+    return None if value is None else float(f"{value:.5g}")
+
+
 def collect(directory):
     """A compact line per motion."""
     lines = []
@@ -57,7 +63,8 @@ def collect(directory):
         entry = json.loads(line)
         reason = find_reason(entry)
         compact = {"motion": entry["motion"], "robot": entry["robot"], "payload_kg": entry["payload_kg"], "set": entry["set"],
-                   "goals": {goal["name"]: goal["achieved"] for goal in entry["goals"]}, "duration_s": entry["duration_s"]}
+                   "goals": {goal["name"]: round_off(goal["achieved"]) for goal in entry["goals"]},
+                   "duration_s": round_off(entry["duration_s"])}
         if entry["options"]:
             compact["options"] = entry["options"]
         if reason:
@@ -121,12 +128,13 @@ def describe_values(line):
 
 
 def make_page(head, lines, figure):
-    page = common.Page(__file__, "A data set of a thousand motions", head["run"])
+    page = common.Page(__file__, "A data set of motions", head["run"])
     good = [line for line in lines if "failed" not in line]
     hours = head["cpu_seconds"] / 3600
-    page.add(f"""`bielle dataset` of `examples/dataset/{SPEC.name}`, format `mjlab`: {len(lines)} motions were asked for,
-{len(good)} are good, {sum(line['duration_s'] for line in good) / 60:.1f} minutes together, {head['bytes'] / 1e6:.0f} MB. They
-took {hours:.2f} hours of one core, solves, checks and export: {len(lines) / hours:.0f} motions per core-hour. A motion is good if
+    made = "" if len(lines) == ASKED else f" These are the first {len(lines)} of its {ASKED} motions that were made."
+    page.add(f"""`bielle dataset` of `examples/dataset/{SPEC.name}`, format `mjlab`.{made} Of {len(lines)} motions {len(good)} are
+good, {sum(line['duration_s'] for line in good) / 60:.1f} minutes together, {head['bytes'] / 1e6:.0f} MB. They took {hours:.2f}
+hours of one core, solves, checks and export: {len(lines) / hours:.0f} motions per core-hour. A motion is good if
 the solver converged, `bielle check` passes and all goals are met ([data sets](../datasets.md)). The index is
 `docs/results/data/dataset_index.jsonl`, one line per motion behind a line about the run, the card `dataset_card.md` beside it; the
 motions follow from the specification.""")
