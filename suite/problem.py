@@ -310,6 +310,9 @@ def check(path):
     """[(what, value, bound), ...] of a problem and the optimum beside it."""
     problem = Problem(path)
     t = problem.read_optimum()
+    strange = sum(np.count_nonzero(~np.isfinite(array)) for array in t.values())
+    if strange:
+        return problem, np.nan, [("entries that are no number", strange, 0.0)]
     cost, rows, lower, upper = problem.evaluate(t)
     size = np.abs(rows).max(initial=1)
     limits = np.array([read_bounds({"l": problem.data["effort_limits"][stage["effort_limit"]]}, "l", np.inf)

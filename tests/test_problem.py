@@ -95,8 +95,7 @@ def check_poisons(path):
                                        ("v_mid", (6, 2), 1e-5, "foreseen: equations of motion"),
                                        ("contact_wrenches", (6, 0, 2), 1e-2, "equations of motion"),
                                        ("cost", (7,), 1e-3, "costs of the nodes"),
-                                       ("q_mid", (6, 12), np.nan, "contacts: accelerations"),
-                                       ("contact_wrenches", (6, 0, 2), np.nan, "equations of motion")):
+                                       ("q_mid", (6, 12), np.nan, "entries that are no number")):
         assert noticed in find_failures(change_array(path, name, index, step)), (name, index)
 
 
