@@ -51,7 +51,7 @@ class ForceResidual : public DescribedResidual {
         rows_(getRows(set.closures[constraint].kind)),
         size_(countForces(set, constraint)),
         axes_(axes),
-        contact_(set.getContact(constraint)),
+        contact_(constraint < set.num_loops ? -1 : set.getContact(constraint)),
         turns_(axes != ForceAxes::Contact),
         body_(set.closures[constraint].body1),
         R_BF_(set.closures[constraint].X_B1.R) {
@@ -77,6 +77,7 @@ class ForceResidual : public DescribedResidual {
   }
 
   ResidualData describeForce(const std::string& kind, ResidualData data) const {
+    if (contact_ < 0) return {};  // forces of closures are in no motion
     data.kind = kind;
     data.values.emplace_back("contact", contact_);
     data.values.emplace_back("axes", std::string(axes_ == ForceAxes::Contact ? "contact"
@@ -117,7 +118,7 @@ class ForceResidual : public DescribedResidual {
   Matrix3d getAxes(const NodeView& node) const { return R_AW_ * node.ws.X_WB[body_].R * R_BF_; }
 
   ForceAxes axes_;
-  int contact_;  // index into Model::contacts()
+  int contact_;  // index into Model::contacts(), -1 of a closure
   bool turns_;
   int body_;
   Matrix3d R_BF_;

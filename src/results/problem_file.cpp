@@ -145,7 +145,7 @@ class ProblemWriter {
   Json describeData(const std::string& name, const Residual& residual) const {
     const ResidualData data = describeResidual(residual);
     if (data.kind.empty())
-      throw InputError(summary_.file, "residual '" + name + "'", "it is none of the library, so nothing describes it",
+      throw InputError(summary_.file, "residual '" + name + "'", "nothing describes it as data",
                        "export the motion without it");
     struct Writer {
       Json operator()(const VectorXd& x) const { return listVector(x); }
