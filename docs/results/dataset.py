@@ -91,7 +91,7 @@ def read(data=DATA):
 
 
 def draw(lines, path):
-    """Good motions by robot and motion, and their durations and iterations."""
+    """Good motions by robot and motion, and the iterations of each."""
     import matplotlib
     matplotlib.use("svg")
     matplotlib.rcParams.update({"svg.hashsalt": "dataset", "svg.fonttype": "none", "font.size": 9})
@@ -111,12 +111,12 @@ def draw(lines, path):
     left.legend(fontsize=8)
     for i, robot in enumerate(robots):
         chosen = [line for line in lines if line["robot"] == robot and "failed" not in line]
-        right.plot([line["duration_s"] for line in chosen], [line["iterations"] for line in chosen], ".", ms=3, color=f"C{i}",
-                   alpha=0.6)
-    right.set_yscale("log")
-    right.set_xlabel("duration of the motion [s]")
+        right.plot([motions.index(line["motion"]) + (i - (len(robots) - 1) / 2) * width for line in chosen],
+                   [line["iterations"] for line in chosen], ".", ms=4, color=f"C{i}", alpha=0.5)
+    right.set_xticks(range(len(motions)), motions, rotation=35, ha="right")
     right.set_ylabel("iterations of the solver")
-    right.grid(True, which="both", lw=0.3)
+    right.set_ylim(bottom=0)
+    right.grid(True, axis="y", lw=0.3)
     figure.tight_layout()
     figure.savefig(path, metadata={"Date": None})
     pyplot.close(figure)
@@ -140,7 +140,7 @@ the solver converged, `bielle check` passes and all goals are met ([data sets](.
 motions follow from the specification.""")
     page.lines += ["", "```console", f"bielle dataset examples/dataset/{SPEC.name} -o thousand", "```"]
     if figure:
-        page.lines += ["", "![motions by robot; iterations over duration](../images/dataset.svg)"]
+        page.lines += ["", "![motions and iterations by robot](../images/dataset.svg)"]
     robots = list(dict.fromkeys(line["robot"] for line in lines))
     rows = []
     for motion in dict.fromkeys(line["motion"] for line in lines):

@@ -102,13 +102,15 @@ def draw(profiles, count):
     import matplotlib
     matplotlib.use("svg")
     matplotlib.rcParams.update({"svg.hashsalt": "suite", "svg.fonttype": "none", "font.size": 9})
-    from matplotlib import pyplot
+    from matplotlib import pyplot, ticker
     figure, axes = pyplot.subplots(figsize=(7.2, 3.6))
     end = 1.1 * max(ratios[-1] for ratios in profiles.values() if ratios)
     for variant, ratios in profiles.items():
         axes.step([1, *ratios, end], [sum(x <= 1 for x in ratios) / count, *((i + 1) / count for i in range(len(ratios))),
                                       len(ratios) / count], where="post", lw=1.3, label=variant)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(ticker.ScalarFormatter())
+    axes.xaxis.set_minor_formatter(ticker.ScalarFormatter())
     axes.set_xlim(1, end)
     axes.set_ylim(0, 1.02)
     axes.set_xlabel("time over that of the fastest variant, τ")
