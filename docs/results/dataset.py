@@ -2,10 +2,9 @@
 """Writes docs/results/dataset.md and docs/images/dataset.svg: the motions of examples/dataset/thousand_motions.yaml.
 
     docs/results/dataset.py                                        the page from the tables in docs/results/data
-    docs/results/dataset.py --record DIR --cpu-seconds 9000        takes the tables from a directory of `bielle dataset` first
+    docs/results/dataset.py --record DIR --cpu-seconds 9000        takes them from a directory of `bielle dataset` first
 
-`--cpu-seconds` is the processor time of the command and its children. A part of the specification may be recorded. `--quick`
-makes a data set of two motions and prints the page.
+`--cpu-seconds` is the processor time of the command and its children. A run that was cut off may be recorded. `--quick` makes a data set of two motions and prints the page.
 """
 import collections
 import json
@@ -29,60 +28,58 @@ motions:
 """
 
 
-def find_reason(entry):
-    """The first thing that is not good, of REASONS; None of a good motion."""
-    if entry["good"]:
-        return None
-    if entry.get("error"):
-        return "rejected"
-    return "no end" if not entry["converged"] else "check" if not entry["check_passed"] else "goal"
-
-
-def describe_failure(directory, entry, reason):
-    """Which row, which goal, or the message."""
-    result = pathlib.Path(directory) / "motions" / entry["name"] / "motion"
-    if reason == "rejected":
-        return entry["error"]
-    if reason == "goal":
-        return ", ".join(f"{goal['name']} {goal['requested']:.4g} → {goal['achieved']:.4g}" for goal in entry["goals"]
-                         if not goal["met"])
-    if reason == "check":
-        rows = json.loads((result / "check.json").read_text(encoding="utf-8"))["rows"]
-        return ", ".join(row["name"] for row in rows if not row["pass"])
-    return json.loads((result / "summary.json").read_text(encoding="utf-8"))["message"]
+def judge(result, outcome):
+    """(summary, first thing that is not good, of REASONS, and its details); of a good motion (summary, None, "")."""
+    if outcome["status"] > 1 or not (result / "summary.json").exists():
+        return None, "rejected", outcome["error"]
+    summary = json.loads((result / "summary.json").read_text(encoding="utf-8"))
+    if not summary["converged"]:
+        return summary, "no end", summary["message"]
+    check = json.loads((result / "check.json").read_text(encoding="utf-8"))
+    if not check["pass"]:
+        return summary, "check", ", ".join(row["name"] for row in check["rows"] if not row["pass"])
+    missed = [f"{goal['name']} {goal['requested']:.4g} → {goal['achieved']:.4g}" for goal in summary["goals"] if not goal["met"]]
+    return summary, "goal" if missed else None, ", ".join(missed)
 
 
 def round_off(value):
     return None if value is None else float(f"{value:.5g}")
 
 
+def parse(text):
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
 def collect(directory):
-    """A compact line per motion."""
+    """A compact line per finished motion, from its own files: a run that was cut off has no index yet."""
     lines = []
-    for line in (pathlib.Path(directory) / "index.jsonl").read_text(encoding="utf-8").splitlines():
-        entry = json.loads(line)
-        reason = find_reason(entry)
-        compact = {"motion": entry["motion"], "robot": entry["robot"], "payload_kg": entry["payload_kg"], "set": entry["set"],
-                   "goals": {goal["name"]: round_off(goal["achieved"]) for goal in entry["goals"]},
-                   "duration_s": round_off(entry["duration_s"])}
-        if entry["options"]:
-            compact["options"] = entry["options"]
+    for case in sorted((pathlib.Path(directory) / "motions").glob("*/case.json")):
+        data = json.loads(case.read_text(encoding="utf-8"))
+        step, outcome = data["request"]["steps"][0], data["outcome"][0]
+        robot, _, payload = pathlib.Path(step[step.index("--robot") + 1]).name.partition("_payload_")
+        values = dict(step[i + 1].split("=", 1) for i, word in enumerate(step) if word == "--set")
+        summary, reason, why = judge(case.parent / "motion", outcome)
+        line = {"motion": step[1], "robot": robot, "payload_kg": float(payload or 0),
+                "set": {name: parse(value) for name, value in values.items()}}
+        if summary:
+            line.update(goals={goal["name"]: round_off(goal["achieved"]) for goal in summary["goals"]},
+                        duration_s=round_off(summary["duration_s"]), iterations=summary["iterations"])
         if reason:
-            compact.update(failed=reason, why=describe_failure(directory, entry, reason))
-        else:
-            result = pathlib.Path(directory) / "motions" / entry["name"] / "motion"
-            compact["iterations"] = json.loads((result / "summary.json").read_text(encoding="utf-8"))["iterations"]
-        lines.append(compact)
+            line.update(failed=reason, why=why)
+        lines.append(line)
     return lines
 
 
 def record(directory, run, cpu, data=DATA):
-    lines = collect(directory)
-    head = {"run": run, "cpu_seconds": cpu, "bytes": sum(path.stat().st_size for path in
-                                                         (pathlib.Path(directory) / "mjlab").rglob("*") if path.is_file())}
+    head = {"run": run, "cpu_seconds": cpu}
     (data / "dataset_index.jsonl").write_text(
-        "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in [head, *lines]), encoding="utf-8")
-    (data / "dataset_card.md").write_text((pathlib.Path(directory) / "README.md").read_text(encoding="utf-8"), encoding="utf-8")
+        "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in [head, *collect(directory)]), encoding="utf-8")
+    card = pathlib.Path(directory) / "README.md"
+    if card.exists():
+        (data / "dataset_card.md").write_text(card.read_text(encoding="utf-8"), encoding="utf-8")
 
 
 def read(data=DATA):
@@ -131,13 +128,12 @@ def make_page(head, lines, figure):
     page = common.Page(__file__, "A data set of motions", head["run"])
     good = [line for line in lines if "failed" not in line]
     hours = head["cpu_seconds"] / 3600
-    made = "" if len(lines) == ASKED else f" These are the first {len(lines)} of its {ASKED} motions that were made."
-    page.add(f"""`bielle dataset` of `examples/dataset/{SPEC.name}`, format `mjlab`.{made} Of {len(lines)} motions {len(good)} are
-good, {sum(line['duration_s'] for line in good) / 60:.1f} minutes together, {head['bytes'] / 1e6:.0f} MB. They took {hours:.2f}
-hours of one core, solves, checks and export: {len(lines) / hours:.0f} motions per core-hour. A motion is good if
-the solver converged, `bielle check` passes and all goals are met ([data sets](../datasets.md)). The index is
-`docs/results/data/dataset_index.jsonl`, one line per motion behind a line about the run, the card `dataset_card.md` beside it; the
-motions follow from the specification.""")
+    made = "" if len(lines) == ASKED else f" {len(lines)} of its {ASKED} motions were made; the run was cut off, before it exported any."
+    page.add(f"""`bielle dataset` of `examples/dataset/{SPEC.name}`.{made} Of {len(lines)} motions {len(good)} are
+good, {sum(line['duration_s'] for line in good) / 60:.1f} minutes together. They took {hours:.2f} hours of one core, solves and
+checks: {len(lines) / hours:.0f} motions per core-hour. A motion is good if the solver converged, `bielle check` passes and all
+goals are met ([data sets](../datasets.md)). The index is `docs/results/data/dataset_index.jsonl`, one line per motion behind a line
+about the run; the motions follow from the specification.""")
     page.lines += ["", "```console", f"bielle dataset examples/dataset/{SPEC.name} -o thousand", "```"]
     if figure:
         page.lines += ["", "![motions and iterations by robot](../images/dataset.svg)"]
@@ -175,7 +171,7 @@ def run_quick(runner, run):
     with tempfile.TemporaryDirectory() as data:
         record(directory, run, 10.0, pathlib.Path(data))
         head, lines = read(pathlib.Path(data))
-    assert [line.get("failed") for line in lines] == ["goal", None], lines
+    assert {line.get("failed") for line in lines} == {"goal", None}, lines
     make_page(head, lines, figure=False).write(True)
 
 
