@@ -4,7 +4,8 @@
     docs/results/dataset.py                                        the page from the tables in docs/results/data
     docs/results/dataset.py --record DIR --cpu-seconds 9000        takes them from a directory of `bielle dataset` first
 
-`--cpu-seconds` is the processor time of the command and its children. A run that was cut off may be recorded. `--quick` makes a data set of two motions and prints the page.
+`--cpu-seconds` is the processor time of the command and its children. A run that was cut off may be recorded. `--quick`
+makes a data set of two motions and prints the page.
 """
 import collections
 import json
