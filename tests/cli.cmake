@@ -39,6 +39,11 @@ add_test(NAME mjcf COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/tes
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(mjcf PROPERTIES LABELS system)
 
+# Problems as data, read by a program that shares no code.
+add_test(NAME problem COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_problem.py
+  $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
+set_tests_properties(problem PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+
 # Motions as MCAP files, read by a reader of our own and, where it is found, by @mcap/core.
 add_test(NAME mcap COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command>)
 add_test(NAME mcap_core COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command> core)

@@ -1,6 +1,6 @@
 # Runs every command of the pages as a reader would and compares its output; compares programs with the examples.
 set(pages tutorial tutorial_walker modelling springs signs new_robot parts formats motions objectives constraints linkages checks
-  execution datasets free_motions speed design design_reference new_controller on_a_robot installing)
+  execution datasets problems suite ten_results free_motions speed design design_reference new_controller on_a_robot installing)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()
@@ -23,7 +23,7 @@ if(BIELLE_BUILD_VALIDATION)
     set_tests_properties(documents_${page} PROPERTIES LABELS system FIXTURES_REQUIRED solved_motions)
   endforeach()
   # A few rows of each page of results.
-  foreach(page checks execution formulations motions objectives speed synthesis)
+  foreach(page checks dataset execution formulations motions objectives speed suite synthesis)
     add_test(NAME results_${page} COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/${page}.py --quick
       --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
     set_tests_properties(results_${page} PROPERTIES LABELS system)

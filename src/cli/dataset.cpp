@@ -47,10 +47,15 @@ void exportMotion(const DatasetSpec& spec, const std::string& directory, Dataset
   for (const std::string& format : spec.formats) {
     const fs::path place = fs::path(directory) / format;
     makeOutputDirectory(place.string());
-    const std::string name = format + "/" + entry.motion->name + (isReference(format) ? ".npz" : "." + format);
+    const char* extension = isReference(format) ? ".npz" : format == "problem" ? ".json" : ".mcap";
+    const std::string name = format + "/" + entry.motion->name + extension;
     ExportRequest request{entry.result, format, (fs::path(directory) / name).string(), "", spec.rate};
-    if (isReference(format)) request.robot = (place / (entry.motion->body + ".xml")).string();
-    for (const std::string& warning : writeExport(request)) notes.push_back(entry.motion->name + ": " + warning);
+    if (hasRobot(format)) request.robot = (place / (entry.motion->body + ".xml")).string();
+    for (const std::string& warning : writeExport(request)) {
+      // What the files of a robot leave out is the same for all of its motions.
+      const std::string note = (format == "problem" ? entry.motion->body : entry.motion->name) + ": " + warning;
+      if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
+    }
     entry.files.emplace_back(format, name);
   }
 }
@@ -104,7 +109,7 @@ void addDataset(CLI::App& app, Action& action) {
   command.footer(
       "SPEC: every combination of the values of an entry is one motion.\n"
       "  licence: CC-BY-4.0\n"
-      "  formats: [mjlab, mcap]             (of `bielle export`: mjlab, amp, mcap; default: mjlab)\n"
+      "  formats: [mjlab, mcap]             (of `bielle export`: mjlab, amp, mcap, problem; default: mjlab)\n"
       "  fps: 50\n"
       "  motions:\n"
       "    - solve: walk\n"

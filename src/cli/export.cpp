@@ -9,6 +9,7 @@
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
+#include "formats/drake.h"
 #include "formats/mjcf.h"
 #include "formats/text_file.h"
 #include "report/run.h"
@@ -16,6 +17,7 @@
 #include "results/number_option.h"
 #include "results/opensim.h"
 #include "results/output_place.h"
+#include "results/problem_file.h"
 #include "results/reference_motion.h"
 #include "results/result_files.h"
 
@@ -31,22 +33,27 @@ struct ExportArguments {
 
 fs::path makePath(const ExportArguments& arguments) {
   if (!arguments.output.empty()) return arguments.output;
-  return fs::path(arguments.directory) /
-         (isReference(arguments.format) ? arguments.format + ".npz" : "trajectory." + arguments.format);
+  const std::string& format = arguments.format;
+  return fs::path(arguments.directory) / (isReference(format)   ? format + ".npz"
+                                          : format == "problem" ? format + ".json"
+                                                                : "trajectory." + format);
 }
 
 int exportTrajectory(const ExportArguments& arguments) {
   const fs::path path = makePath(arguments);
   requireApart(path.string(), listResultFiles(arguments.directory));
   ExportRequest request{arguments.directory, arguments.format, path.string(), "", arguments.rate};
-  if (isReference(arguments.format)) {
+  if (hasRobot(arguments.format)) {
     request.robot = fs::path(path).replace_extension(".xml").string();
     if (request.robot == path.string())
       throw InputError("", "--output " + request.path, "the robot would have the same name",
-                       "give one that ends in .npz");
+                       arguments.format == "problem" ? "give one that ends in .json" : "give one that ends in .npz");
   }
   for (const std::string& warning : writeExport(request)) std::cerr << "bielle: warning: " << warning << "\n";
   std::cout << path.string() << "\n";
+  if (arguments.format == "problem")
+    for (const char* extension : {".npz", ".urdf"})
+      std::cout << fs::path(path).replace_extension(extension).string() << "\n";
   if (!request.robot.empty()) std::cout << request.robot << "\n";
   return kOk;
 }
@@ -54,6 +61,28 @@ int exportTrajectory(const ExportArguments& arguments) {
 }  // namespace
 
 bool isReference(const std::string& format) { return format == "amp" || format == "mjlab"; }
+
+bool hasRobot(const std::string& format) { return isReference(format) || format == "problem"; }
+
+namespace {
+
+// The problem, its optimum, and the robot for Drake and MuJoCo. Returns what these lose.
+std::vector<std::string> writeProblem(const ExportRequest& request, const ReportRun& run) {
+  const Model& model = run.robot.model;
+  const fs::path path = request.path, mjcf = request.robot;
+  const fs::path urdf = fs::path(mjcf).replace_extension(".urdf"), npz = fs::path(path).replace_extension(".npz");
+  requireApart(urdf.string(), {run.robot.file});
+  const ProblemText text = formatProblem(model, readSummary(request.directory), run.record,
+                                         {{"urdf", urdf.filename().string()}, {"mjcf", mjcf.filename().string()}});
+  const UrdfText robot = formatDrake(model);
+  writeTextFile(urdf.string(), robot.urdf);
+  writeTextFile(mjcf.string(), formatMjcf(model, findClosedConfiguration(model).q, {}).xml);
+  writeTextFile(npz.string(), text.npz);
+  writeTextFile(path.string(), text.json);
+  return robot.warnings;
+}
+
+}  // namespace
 
 std::vector<std::string> writeExport(const ExportRequest& request) {
   if (request.format == "mot" || request.format == "sto") {
@@ -67,6 +96,7 @@ std::vector<std::string> writeExport(const ExportRequest& request) {
     return {};
   }
   requireApart(request.robot, {run.robot.file});
+  if (request.format == "problem") return writeProblem(request, run);
   const VectorXd q_ref = findClosedConfiguration(run.robot.model).q;
   MjcfOptions options;
   options.rotations = MjcfRotations::Hinges;
@@ -85,15 +115,18 @@ void addExport(CLI::App& app, Action& action) {
       .add_option("--format", arguments->format,
                   "amp, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; mjlab); "
                   "mcap: frames, shapes, joints, forces and events (Foxglove, Lichtblick, PlotJuggler, Rerun); "
-                  "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim)")
-      ->check(CLI::IsMember({"amp", "mcap", "mjlab", "mot", "sto"}))
+                  "mot: coordinates over time (OpenSim); "
+                  "problem: the optimal control problem with its optimum, for other solvers (JSON, npz, URDF, MJCF); "
+                  "sto: everything over time (OpenSim)")
+      ->check(CLI::IsMember({"amp", "mcap", "mjlab", "mot", "problem", "sto"}))
       ->capture_default_str();
   command.add_option("--fps", arguments->rate, "frames per second of a reference for learning")
       ->check(isWithin(1e-3, 1e4))
       ->capture_default_str();
-  command.add_option(
-      "-o,--output", arguments->output,
-      "the file; default: trajectory.FORMAT in the directory, amp.npz or mjlab.npz with the robot as .xml");
+  command.add_option("-o,--output", arguments->output,
+                     "the file; default: trajectory.FORMAT in the directory, amp.npz or mjlab.npz with the robot as "
+                     ".xml, problem.json with\n"
+                     "problem.npz and the robot as .urdf and .xml");
   command.footer(
       "SI units, radians. Without export: trajectory.csv has one named column per quantity and a column 'time', as\n"
       "PlotJuggler and spreadsheets read it; trajectory.npz holds arrays q and v with Pinocchio's frames and orders "
@@ -103,6 +136,7 @@ void addExport(CLI::App& app, Action& action) {
       "  bielle export squat --format mot\n"
       "  bielle export squat --format mcap\n"
       "  bielle export squat --format mjlab --fps 50\n"
+      "  bielle export squat --format problem\n"
       "  bielle export squat --format sto -o squat.sto");
   command.callback([&action, arguments] { action = [=] { return exportTrajectory(*arguments); }; });
 }

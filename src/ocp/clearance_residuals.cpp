@@ -4,7 +4,7 @@
 
 #include "bielle/dynamics/distance.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/ocp/residual.h"
+#include "ocp/residual_data.h"
 
 namespace bielle {
 namespace {
@@ -38,7 +38,7 @@ Ramp calcRamp(const GroundStep& step, double floor, double width, const Eigen::V
   return ramp;
 }
 
-class SoleClearance : public Residual {
+class SoleClearance : public DescribedResidual {
  public:
   SoleClearance(const BodyFrame& sole, double X, double Y, const Ground& ground, double ramp)
       : sole_(sole), ground_(ground), ramp_(ramp) {
@@ -65,6 +65,20 @@ class SoleClearance : public Residual {
       }
     }
   }
+  ResidualData describe() const override {
+    MatrixXd corners(corners_.size(), 3), steps(ground_.steps.size(), 8);
+    for (size_t i = 0; i < corners_.size(); ++i) corners.row(static_cast<Eigen::Index>(i)) = corners_[i].transpose();
+    for (size_t i = 0; i < ground_.steps.size(); ++i) {
+      const GroundStep& step = ground_.steps[i];
+      steps.row(static_cast<Eigen::Index>(i)) << step.top.transpose(), step.length, step.width, step.yaw, step.pitch,
+          step.roll;
+    }
+    ResidualData data{"sole_clearance", {{"body", sole_.body}}};
+    addPlacement("_BF", sole_.X_BF, data);
+    data.values.insert(data.values.end(),
+                       {{"corners", corners}, {"height", ground_.height}, {"steps", steps}, {"ramp", ramp_}});
+    return data;
+  }
 
  private:
   Ramp calcGround(const Eigen::Vector2d& point) const {
@@ -82,7 +96,7 @@ class SoleClearance : public Residual {
   std::vector<Vector3d> corners_;
 };
 
-class ShapeDistanceResidual : public Residual {
+class ShapeDistanceResidual : public DescribedResidual {
  public:
   ShapeDistanceResidual(const Shape& a, const Shape& b) : a_(a), b_(b) {}
   int size() const override { return 1; }
@@ -94,6 +108,16 @@ class ShapeDistanceResidual : public Residual {
     for (int body : {a_.body, b_.body})
       for (int k : node.model.supportDofs(body)) rows.q(0, k) = 0;
     addDistanceGradient(node.model, node.ws, a_, b_, distance, rows.q.topRows(1));
+  }
+  ResidualData describe() const override {
+    ResidualData data{"shape_distance", {}};
+    for (const auto& [suffix, shape] : {std::pair("_a", &a_), {"_b", &b_}}) {
+      data.values.emplace_back(std::string("body") + suffix, shape->body);
+      addPlacement(suffix, shape->X_BS, data);
+      data.values.emplace_back(std::string("half") + suffix, VectorXd(shape->half));
+      data.values.emplace_back(std::string("radius") + suffix, shape->radius);
+    }
+    return data;
   }
 
  private:

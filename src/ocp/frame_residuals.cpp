@@ -2,8 +2,8 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
-#include "bielle/ocp/residual.h"
 #include "math/so3.h"
+#include "ocp/residual_data.h"
 
 namespace bielle {
 namespace {
@@ -15,7 +15,7 @@ SE3 getPlacement(const NodeView& node, const BodyFrame& frame) {
 // Velocity of the world point p carried by a spatial world velocity V: v + w x p.
 Vector3d calcPointVelocity(const Vector6d& V, const Vector3d& p) { return V.head<3>() + V.tail<3>().cross(p); }
 
-class FramePlacement : public Residual {
+class FramePlacement : public DescribedResidual {
  public:
   FramePlacement(const BodyFrame& frame, const SE3& X_WT) : frame_(frame), X_WT_(X_WT) {}
   int size() const override { return 6; }
@@ -27,13 +27,19 @@ class FramePlacement : public Residual {
     const Matrix6d dlog = calcLogJacobian6(X_WT_.inverseTimes(X_WF));
     for (int k : node.model.supportDofs(frame_.body)) rows.q.col(k) = dlog * X_WF.actInvMotion(node.ws.J.col(k));
   }
+  ResidualData describe() const override {
+    ResidualData data{"frame_placement", {{"body", frame_.body}}};
+    addPlacement("_BF", frame_.X_BF, data);
+    addPlacement("_WT", X_WT_, data);
+    return data;
+  }
 
  private:
   BodyFrame frame_;
   SE3 X_WT_;
 };
 
-class FrameTranslation : public Residual {
+class FrameTranslation : public DescribedResidual {
  public:
   FrameTranslation(const BodyFrame& frame, const Vector3d& reference) : frame_(frame), reference_(reference) {}
   int size() const override { return 3; }
@@ -42,13 +48,17 @@ class FrameTranslation : public Residual {
     const Vector3d p = getPlacement(node, frame_).p;
     for (int k : node.model.supportDofs(frame_.body)) rows.q.col(k) = calcPointVelocity(node.ws.J.col(k), p);
   }
+  ResidualData describe() const override {
+    return {"frame_translation",
+            {{"body", frame_.body}, {"p_BF", VectorXd(frame_.X_BF.p)}, {"reference", VectorXd(reference_)}}};
+  }
 
  private:
   BodyFrame frame_;
   Vector3d reference_;
 };
 
-class FrameRotation : public Residual {
+class FrameRotation : public DescribedResidual {
  public:
   FrameRotation(const BodyFrame& frame, const Matrix3d& R_WT) : frame_(frame), R_WT_(R_WT) {}
   int size() const override { return 3; }
@@ -59,6 +69,9 @@ class FrameRotation : public Residual {
     const Matrix3d R = getPlacement(node, frame_).R;
     const Matrix3d dlog = calcRightJacobianInverse3(log3(R_WT_.transpose() * R)) * R.transpose();
     for (int k : node.model.supportDofs(frame_.body)) rows.q.col(k) = dlog * node.ws.J.col(k).tail<3>();
+  }
+  ResidualData describe() const override {
+    return {"frame_rotation", {{"body", frame_.body}, {"R_BF", MatrixXd(frame_.X_BF.R)}, {"R_WT", MatrixXd(R_WT_)}}};
   }
 
  private:
@@ -71,7 +84,7 @@ Vector6d calcVelocityDerivative(const NodeView& node, int body, int k) {
   return node.ws.dV.col(k) + crossMotion(node.ws.J.col(k), node.ws.V[body]);
 }
 
-class FrameVelocity : public Residual {
+class FrameVelocity : public DescribedResidual {
  public:
   FrameVelocity(const BodyFrame& frame, const Vector6d& reference) : frame_(frame), reference_(reference) {}
   int size() const override { return 6; }
@@ -91,6 +104,10 @@ class FrameVelocity : public Residual {
       rows.v.col(k).tail<3>() = J.tail<3>();
     }
     rows.s = reference_ / (node.time_scale * node.time_scale);
+  }
+  ResidualData describe() const override {
+    return {"frame_velocity",
+            {{"body", frame_.body}, {"p_BF", VectorXd(frame_.X_BF.p)}, {"reference", VectorXd(reference_)}}};
   }
 
  private:

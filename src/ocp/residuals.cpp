@@ -2,14 +2,14 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
-#include "bielle/ocp/residual.h"
+#include "ocp/residual_data.h"
 
 namespace bielle {
 namespace {
 
 constexpr int kMostRows = 17;  // of a force residual
 
-class ComPosition : public Residual {
+class ComPosition : public DescribedResidual {
  public:
   explicit ComPosition(const Vector3d& reference) : reference_(reference) {}
   int size() const override { return 3; }
@@ -17,12 +17,13 @@ class ComPosition : public Residual {
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     rows.q = node.ws.YJ.topRows<3>() / node.model.mass();
   }
+  ResidualData describe() const override { return {"com_position", {{"reference", VectorXd(reference_)}}}; }
 
  private:
   Vector3d reference_;
 };
 
-class ComVelocity : public Residual {
+class ComVelocity : public DescribedResidual {
  public:
   explicit ComVelocity(const Vector3d& reference) : reference_(reference) {}
   int size() const override { return 3; }
@@ -34,6 +35,7 @@ class ComVelocity : public Residual {
     rows.v = node.ws.YJ.topRows<3>() / node.model.mass();
     rows.s = reference_ / (node.time_scale * node.time_scale);
   }
+  ResidualData describe() const override { return {"com_velocity", {{"reference", VectorXd(reference_)}}}; }
 
  private:
   Vector3d reference_;
@@ -42,12 +44,14 @@ class ComVelocity : public Residual {
 // Residuals linear or smooth in the force of one contact, F = blockdiag(R, R) E lambda with R = 1 in the axes of the
 // contact, R = R_WF in those of the world and R = R_WT^T R_WF in those of the ground where the contact belongs. E expands the
 // rows of an edge to a wrench, and is the identity otherwise.
-class ForceResidual : public Residual {
+class ForceResidual : public DescribedResidual {
  public:
   ForceResidual(const ConstraintSet& set, int constraint, ForceAxes axes)
       : row_(set.offsets[constraint]),
         rows_(getRows(set.closures[constraint].kind)),
         size_(countForces(set, constraint)),
+        axes_(axes),
+        contact_(constraint < set.num_loops ? -1 : set.getContact(constraint)),
         turns_(axes != ForceAxes::Contact),
         body_(set.closures[constraint].body1),
         R_BF_(set.closures[constraint].X_B1.R) {
@@ -70,6 +74,16 @@ class ForceResidual : public Residual {
     const Matrix3d R = getAxes(node);
     for (int i = 0; i < size_; i += 3) f.segment<3>(i) = (R * f.segment<3>(i)).eval();
     return f;
+  }
+
+  ResidualData describeForce(const std::string& kind, ResidualData data) const {
+    if (contact_ < 0) return {};  // forces of closures are in no motion
+    data.kind = kind;
+    data.values.emplace_back("contact", contact_);
+    data.values.emplace_back("axes", std::string(axes_ == ForceAxes::Contact ? "contact"
+                                                 : axes_ == ForceAxes::World ? "world"
+                                                                             : "ground"));
+    return data;
   }
 
   // dF/dlambda = blockdiag(R, R) E, and the forces turn with the body: dF/dq_k = (R_AW J_k) x F, axis by axis.
@@ -103,6 +117,8 @@ class ForceResidual : public Residual {
  private:
   Matrix3d getAxes(const NodeView& node) const { return R_AW_ * node.ws.X_WB[body_].R * R_BF_; }
 
+  ForceAxes axes_;
+  int contact_;  // index into Model::contacts(), -1 of a closure
   bool turns_;
   int body_;
   Matrix3d R_BF_;
@@ -119,6 +135,7 @@ class ContactForce : public ForceResidual {
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     addChain(node, getForce(node), Gradient::Identity(size_, size_), rows);
   }
+  ResidualData describe() const override { return describeForce("contact_force", {"", {{"reference", reference_}}}); }
 
  private:
   VectorXd reference_;
@@ -145,6 +162,7 @@ class CenterOfPressure : public ForceResidual {
     gradient(1, 2) = free ? -f[3] / (fz * fz) : 0;
     addChain(node, f, gradient, rows);
   }
+  ResidualData describe() const override { return describeForce("center_of_pressure", {}); }
 
  private:
   // Below 1 N of load the centre of pressure is not meaningful.
@@ -186,12 +204,13 @@ class WrenchCone : public ForceResidual {
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     addChain(node, getForce(node), A_, rows);
   }
+  ResidualData describe() const override { return describeForce("wrench_cone", {"", {{"matrix", A_}}}); }
 
  private:
   MatrixXd A_;
 };
 
-class JointPosition : public Residual {
+class JointPosition : public DescribedResidual {
  public:
   JointPosition(const Model& model, std::vector<int> dofs) : dofs_(std::move(dofs)) {
     if (!dofs_.empty()) return;
@@ -211,12 +230,13 @@ class JointPosition : public Residual {
   void calcJacobian(const NodeView&, ResidualRows rows) const override {
     for (size_t i = 0; i < dofs_.size(); ++i) rows.q(i, dofs_[i]) = 1;
   }
+  ResidualData describe() const override { return {"joint_position", {{"dofs", dofs_}}}; }
 
  private:
   std::vector<int> dofs_;
 };
 
-class JointVelocity : public Residual {
+class JointVelocity : public DescribedResidual {
  public:
   explicit JointVelocity(std::vector<int> dofs) : dofs_(std::move(dofs)) {}
   int size() const override { return static_cast<int>(dofs_.size()); }
@@ -226,12 +246,13 @@ class JointVelocity : public Residual {
   void calcJacobian(const NodeView&, ResidualRows rows) const override {
     for (size_t i = 0; i < dofs_.size(); ++i) rows.v(i, dofs_[i]) = 1;
   }
+  ResidualData describe() const override { return {"joint_velocity", {{"dofs", dofs_}}}; }
 
  private:
   std::vector<int> dofs_;
 };
 
-class MotorPower : public Residual {
+class MotorPower : public DescribedResidual {
  public:
   MotorPower(const Model& model, std::vector<int> motors) : motors_(std::move(motors)) {
     for (int m : motors_) dofs_.push_back(model.motors().at(m).dof);
@@ -247,12 +268,13 @@ class MotorPower : public Residual {
       rows.u(i, motors_[i]) = node.ws.v[dofs_[i]];
     }
   }
+  ResidualData describe() const override { return {"motor_power", {{"motors", motors_}}}; }
 
  private:
   std::vector<int> motors_, dofs_;
 };
 
-class MotorVoltage : public Residual {
+class MotorVoltage : public DescribedResidual {
  public:
   MotorVoltage(const Model& model, std::vector<int> motors) : motors_(std::move(motors)) {
     for (int m : motors_) {
@@ -277,13 +299,19 @@ class MotorVoltage : public Residual {
       rows.speeds(i, motors_[i]) = per_speed_[i];
     }
   }
+  ResidualData describe() const override {
+    return {"motor_voltage",
+            {{"motors", motors_},
+             {"per_effort", VectorXd(VectorXd::Map(per_effort_.data(), static_cast<Eigen::Index>(per_effort_.size())))},
+             {"per_speed", VectorXd(VectorXd::Map(per_speed_.data(), static_cast<Eigen::Index>(per_speed_.size())))}}};
+  }
 
  private:
   std::vector<int> motors_;
   std::vector<double> per_effort_, per_speed_;
 };
 
-class ElectricalPower : public Residual {
+class ElectricalPower : public DescribedResidual {
  public:
   struct Law {
     double loss, drive = 1, back = 1;  // loss, c_1, c_2
@@ -313,6 +341,15 @@ class ElectricalPower : public Residual {
       rows.u(m, m) = w * by_p + 2 * law.loss * u * (law.getMean(2) + law.getHalf(2) * p / root);
       rows.u(motors_.size() + m, m) = 1;
     }
+  }
+  ResidualData describe() const override {
+    VectorXd losses(motors_.size()), drive(losses), back(losses);
+    for (size_t m = 0; m < motors_.size(); ++m) {
+      const Eigen::Index i = static_cast<Eigen::Index>(m);
+      losses[i] = motors_[m].loss, drive[i] = motors_[m].drive, back[i] = motors_[m].back;
+    }
+    return {"electrical_power",
+            {{"losses", losses}, {"drive", drive}, {"back", back}, {"smoothing", double(kGearSmoothing)}}};
   }
 
  private:

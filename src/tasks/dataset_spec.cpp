@@ -150,8 +150,8 @@ DatasetSpec readDatasetSpec(const std::string& path) {
     if (const YamlEntry* formats = find(fields, "formats")) {
       spec.formats = formats->getTexts();
       for (const std::string& format : spec.formats)
-        if (format != "mjlab" && format != "amp" && format != "mcap")
-          formats->fail("there is no format '" + format + "'", "give some of mjlab, amp, mcap");
+        if (format != "mjlab" && format != "amp" && format != "mcap" && format != "problem")
+          formats->fail("there is no format '" + format + "'", "give some of mjlab, amp, mcap, problem");
     }
     const YamlEntry& motions = require(fields, "motions", document);
     DatasetNames names;

@@ -8,6 +8,7 @@
 #include "bielle/motion/solve.h"
 #include "bielle/robots/robot_loader.h"
 #include "results/interrupt.h"
+#include "results/remade_motion.h"
 
 namespace bielle::worlds {
 namespace {
@@ -18,28 +19,6 @@ constexpr double kFootholdRoom = 0.4, kFootholdRoomOnSteps = 0.02;  // m
 constexpr double kFeedbackMargin = 0.2;
 constexpr double kStopShare = 0.5;   // of the margin to dead points that the plan keeps
 constexpr int kMaxIterations = 200;  // more than a motion takes from its own solution
-
-// Whole numbers may be written without a point.
-double getNumber(const MotionSummary& summary, const std::string& name, const OptionValue& value) {
-  if (const int* whole = std::get_if<int>(&value)) return *whole;
-  if (const double* number = std::get_if<double>(&value)) return *number;
-  throw InputError(summary.file, "option '" + name + "'", "it is not a number", "solve the motion again");
-}
-
-// Limits given by motor are recorded with the options of the motion.
-LimitOptions readLimits(const MotionSummary& summary) {
-  LimitOptions limits;
-  const auto read = [&summary](const std::string& prefix, std::map<std::string, double>& to) {
-    for (const auto& [name, value] : summary.options)
-      if (name.rfind(prefix, 0) == 0) to[name.substr(prefix.size())] = getNumber(summary, name, value);
-  };
-  read(kEffortLimit, limits.efforts);
-  read(kVelocityLimit, limits.velocities);
-  read(kPowerLimit, limits.powers);
-  for (const auto& [name, value] : summary.options)
-    if (name == kDeadPointMargin) limits.dead_point_margin = getNumber(summary, name, value);
-  return limits;
-}
 
 // Sets an option of a motion, or of the parts of a sequence, where it has one.
 void setWherePresent(const std::string& name, double value, OptionSet& options) {

@@ -1,0 +1,198 @@
+#!/usr/bin/env python3
+"""Writes docs/results/suite.md and docs/images/suite.svg: the suite of problems, and the protocol of docs/suite.md.
+
+    docs/results/suite.py                                 the page from the tables in docs/results/data
+    docs/results/suite.py --record DIR RUNS.jsonl ...     takes them from the suite's data set and runs of the protocol first
+
+`--quick` exports a small problem, has it read, and prints the page.
+"""
+import collections
+import csv
+import json
+import math
+import pathlib
+import statistics
+import subprocess
+import sys
+
+import common
+from common import show
+
+DATA = common.HERE / "data"
+IMAGE = common.SOURCE / "docs/images/suite.svg"
+READER = common.SOURCE / "suite/problem.py"
+SUCCESS = 0.01  # over the least cost
+PROBLEMS = ["problem", "bodies", "velocities", "rows", "stages", "duration", "cost", "violation", "iterations", "reader"]
+RUNS = ["problem", "variant", "seed", "guess", "converged", "cost", "violation", "iterations", "seconds", "end"]
+
+
+def write_table(name, run, columns, rows, data=DATA):
+    with open(data / f"{name}.csv", "w", encoding="utf-8", newline="") as file:
+        file.write(f"# {run}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def read_table(name):
+    with open(DATA / f"{name}.csv", encoding="utf-8", newline="") as file:
+        return file.readline()[1:].strip(), list(csv.DictReader(file))
+
+
+def record(directory, runs, run):
+    sys.path.insert(0, str(READER.parent))
+    import problem as reader
+    directory, rows = pathlib.Path(directory), []
+    for line in (directory / "index.jsonl").read_text(encoding="utf-8").splitlines():
+        entry = json.loads(line)
+        if not entry["good"]:
+            sys.exit(f"{entry['name']} is not good")
+        problem = json.loads((directory / entry["files"]["problem"]).read_text(encoding="utf-8"))
+        summary = json.loads((directory / "motions" / entry["name"] / "motion/summary.json").read_text(encoding="utf-8"))
+        found = reader.check(directory / entry["files"]["problem"])[2]
+        if not all(value <= bound for _, value, bound in found):
+            sys.exit(f"{entry['name']}: the reader disagrees: {found}")
+        mechanism, sizes = problem["mechanism"], {"6d": 6, "5d": 5, "3d": 3, "coupler": 1}
+        rows.append([entry["name"], len(mechanism["bodies"]) - 1, mechanism["nv"],
+                     sum(sizes[closure["kind"]] for closure in mechanism["closures"]), len(problem["stages"]) - 1,
+                     f"{entry['duration_s']:.4g}", f"{summary['cost']:.10g}",
+                     f"{summary['constraints']['largest_violation']:.1e}", summary["iterations"],
+                     f"{max(value for _, value, bound in found if bound == reader.TOLERANCE):.1e}"])
+    write_table("suite_problems", run, PROBLEMS, rows)
+    lines = [json.loads(line) for path in runs for line in pathlib.Path(path).read_text(encoding="utf-8").splitlines()]
+    counts = collections.Counter((line["problem"], line["variant"]) for line in lines)
+    least = min(counts[row[0], variant] for row in rows for _, variant in counts)
+    kept = [line for line in lines if line["guess"] < least]  # as many guesses of every problem
+    write_table("suite_runs", run, RUNS, [[show_entry(line[key]) for key in RUNS] for line in kept])
+
+
+def show_entry(value):
+    return "" if value is None else f"{value:.9g}" if isinstance(value, float) else value
+
+
+def judge(runs):
+    """Adds `success` and numbers to the runs."""
+    least = {}
+    for run in runs:
+        run["converged"] = run["converged"] == "True"
+        for key in ("cost", "violation", "seconds"):
+            run[key] = float(run[key]) if run[key] else math.inf
+        key = run["problem"], run["variant"]
+        holds = run["converged"] and run["violation"] <= 1e-8
+        least[key] = min(least.get(key, math.inf), run["cost"] if holds else math.inf)
+    for run in runs:
+        run["success"] = (run["converged"] and run["violation"] <= 1e-8 and
+                          run["cost"] <= (1 + SUCCESS) * least[run["problem"], run["variant"]])
+
+
+def make_profiles(runs):
+    """{variant: sorted ratios of successful runs to the fastest variant of the same problem and guess}, and the number of pairs."""
+    fastest = {}
+    for run in runs:
+        if run["success"]:
+            key = run["problem"], run["guess"]
+            fastest[key] = min(fastest.get(key, math.inf), run["seconds"])
+    variants = list(dict.fromkeys(run["variant"] for run in runs))
+    return {variant: sorted(run["seconds"] / fastest[run["problem"], run["guess"]] for run in runs
+                            if run["variant"] == variant and run["success"])
+            for variant in variants}, len({(run["problem"], run["guess"]) for run in runs})
+
+
+def draw(profiles, count):
+    import matplotlib
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "suite", "svg.fonttype": "none", "font.size": 9})
+    from matplotlib import pyplot, ticker
+    figure, axes = pyplot.subplots(figsize=(7.2, 3.6))
+    end = 1.1 * max(ratios[-1] for ratios in profiles.values() if ratios)
+    for variant, ratios in profiles.items():
+        axes.step([1, *ratios, end], [sum(x <= 1 for x in ratios) / count, *((i + 1) / count for i in range(len(ratios))),
+                                      len(ratios) / count], where="post", lw=1.3, label=variant)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(ticker.ScalarFormatter())
+    axes.xaxis.set_minor_formatter(ticker.ScalarFormatter())
+    axes.set_xlim(1, end)
+    axes.set_ylim(0, 1.02)
+    axes.set_xlabel("time over that of the fastest variant, τ")
+    axes.set_ylabel("share of the runs solved within τ")
+    axes.grid(True, which="both", lw=0.3)
+    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
+    figure.tight_layout()
+    figure.savefig(IMAGE, metadata={"Date": None})
+    pyplot.close(figure)
+
+
+def show_problem(name):
+    return "`" + name + "`"
+
+
+def make_page(figure):
+    run, problems = read_table("suite_problems")
+    _, runs = read_table("suite_runs")
+    judge(runs)
+    profiles, count = make_profiles(runs)
+    page = common.Page(__file__, "The suite of problems with closed chains", run)
+    page.add("""[The suite](../suite.md) has the problems, their files and the protocol. Each optimum is that of one solve on one
+thread from the guess of its archive. *Reader*: the largest of all relative differences and residuals that `suite/problem.py` finds
+in the files, of costs, constraints, equations of motion, steps, loops and URDF; it shares no code with Bielle.""")
+    page.table(["problem", "bodies", "velocities", "closure rows", "stages", "duration [s]", "cost", "largest violation",
+                "iterations", "reader"], [[show_problem(row["problem"]), *(row[key] for key in PROBLEMS[1:])] for row in problems])
+    guesses = len({run["guess"] for run in runs})
+    page.heading("From perturbed guesses")
+    page.add(f"""{guesses} guesses of seed 0 for each problem, one thread, ended after 20 s of processor time at the latest. Times
+are processor times of the command, reading and writing included. The protocol asks for 100 guesses. A run succeeds if it
+converges, holds its constraints and costs at most one per cent more than the best one of its variant. *Solved within twice the
+time*: of the fastest variant for the same problem and guess, with success.""")
+    rows = []
+    for variant, ratios in profiles.items():
+        ours = [run for run in runs if run["variant"] == variant]
+        good = [run for run in ours if run["success"]]
+        rows.append([variant, f"{len(good)} of {len(ours)}", f"{sum(x <= 2 for x in ratios)} of {len(ours)}",
+                     show(statistics.median(int(run["iterations"]) for run in good) if good else None, "{:.0f}"),
+                     show(statistics.median(run["seconds"] for run in good) if good else None, "{:.2f}"),
+                     ", ".join(f"{sum(run['end'] == end and not run['success'] for run in ours)} {end.replace('_', ' ')}"
+                               for end in dict.fromkeys(run["end"] for run in ours if not run["success"])) or "–"])
+    page.table(["variant", "success", "solved within twice the time", "median of the iterations", "median of the time [s]",
+                "ends of the others"], rows)
+    if figure:
+        draw(profiles, count)
+        page.lines += ["", "![performance profiles](../images/suite.svg)"]
+    page.heading("By problem")
+    page.add("Successes, and the median time of these [s].")
+    variants = list(profiles)
+    rows = []
+    for problem in problems:
+        cells = []
+        for variant in variants:
+            ours = [run for run in runs if (run["problem"], run["variant"]) == (problem["problem"], variant)]
+            good = [run["seconds"] for run in ours if run["success"]]
+            cells.append(f"{len(good)}" + (f", {statistics.median(good):.2f}" if good else ""))
+        rows.append([show_problem(problem["problem"]), *cells])
+    page.table(["problem", *variants], rows)
+    return page
+
+
+def run_quick(runner):
+    result = runner.solve("squat", "bipetto", ["--depth", 0.9, "--duration", 0.6, "--set", "settle=0", "--set", "time_step=0.02"])
+    runner.run("export", result.directory, "--format", "problem", allowed=(0,))
+    read = subprocess.run([sys.executable, str(READER), str(result.directory / "problem.json")], capture_output=True, text=True)
+    print(read.stdout)
+    if read.returncode:
+        sys.exit(read.stderr or 1)
+    make_page(figure=False).write(True)
+
+
+def main():
+    parser = common.make_parser(__doc__)
+    parser.add_argument("--record", nargs="+", metavar="PATH", help="take the tables from a data set and files of runs")
+    arguments = parser.parse_args()
+    if arguments.quick:
+        run_quick(common.Runner(arguments.bielle))
+        return
+    if arguments.record:
+        record(arguments.record[0], arguments.record[1:], common.describe_run(arguments.commit))
+    make_page(figure=True).write(False)
+
+
+if __name__ == "__main__":
+    main()

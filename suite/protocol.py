@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""The protocol of docs/suite.md: every problem of the suite from perturbed guesses, by Bielle with each ingredient on and off.
+
+    suite/protocol.py DIR RUNS.jsonl [--count 100] [--seed 0] [--variants NAME ...] [--until HH:MM] [--bielle build/bin/bielle]
+
+DIR is what `bielle dataset suite/suite.yaml -o DIR` wrote. A run is a line of RUNS.jsonl, appended when it is finished; those that
+are there are not repeated. Runs go guess by guess, so that what is cut off has as many guesses of every problem.
+"""
+import argparse
+import datetime
+import json
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+from guesses import make_guess
+from problem import Problem
+
+LONGEST = 20     # s of processor time, of a run on one thread
+ITERATIONS = 300
+
+# Options of `bielle solve`. All but the first change one thing.
+VARIANTS = {
+    "exact loops": [],
+    "full formulation": ["--formulation", "full"],
+    "Euler steps": ["--step", "euler"],
+    "no margin to dead points": ["--dead-point-margin", "0"],
+}
+
+
+def write_guess(directory, solved, guess):
+    """A result for --warm-start: the archive of the solved motion with states and torques of the guess, without multipliers."""
+    with np.load(solved / "trajectory.npz", allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files if not name.startswith("multiplier")}
+    for key in ("q", "v", "u"):
+        assert arrays[key].shape == guess[key].shape, key
+    directory.mkdir()
+    np.savez(directory / "trajectory.npz", **{**arrays, **guess})
+
+
+def run_limited(command):
+    """Exit status, processor time and errors of a command that ends after LONGEST."""
+    with tempfile.TemporaryFile("w+") as errors:
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors,
+                                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST + 1)))
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        errors.seek(0)
+        return process.returncode, usage.ru_utime + usage.ru_stime, errors.read()
+
+
+def run(bielle, entry, solved, start, output, options):
+    """What a run leaves of itself: outcome, cost, violation, iterations, seconds."""
+    summary = json.loads((solved / "summary.json").read_text(encoding="utf-8"))
+    command = [bielle, "solve", entry["motion"], "--robot", summary["robot_file"], "--warm-start", start, "-o", output,
+               "--threads", "1", "--max-iterations", ITERATIONS, "--quiet", "--no-check", "--no-report", *options]
+    for name, value in summary["options"].items():
+        if name != "dead-point-margin":
+            command += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
+    none = {"converged": False, "cost": None, "violation": None, "iterations": None, "seconds": None}
+    status, seconds, errors = run_limited(list(map(str, command)))
+    if status == -signal.SIGXCPU:
+        return {**none, "end": "too late"}
+    if status not in (0, 1):
+        sys.exit(f"{' '.join(map(str, command))}\nexit status {status}\n{errors}")
+    result = json.loads((output / "summary.json").read_text(encoding="utf-8"))
+    if result["options"] != {**summary["options"], **{key: result["options"][key] for key in ("dead-point-margin",)
+                                                      if key in result["options"]}}:
+        return {**none, "end": "other stages"}  # the solver made them shorter: another problem
+    return {"converged": result["converged"], "cost": result["cost"],
+            "violation": result["constraints"]["largest_violation"], "iterations": result["iterations"],
+            "seconds": round(seconds, 3), "end": result["termination"]}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("directory", type=pathlib.Path)
+    parser.add_argument("runs", type=pathlib.Path)
+    parser.add_argument("--bielle", default="bielle", help="the command")
+    parser.add_argument("--count", type=int, default=100, help="guesses of each problem")
+    parser.add_argument("--seed", type=int, default=0, help="of the guesses")
+    parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=VARIANTS, metavar="NAME",
+                        help="some of: " + ", ".join(VARIANTS))
+    parser.add_argument("--until", help="begin no run after this time of today, UTC")
+    arguments = parser.parse_args()
+    lines = (arguments.directory / "index.jsonl").read_text(encoding="utf-8").splitlines()
+    entries = [entry for entry in map(json.loads, lines) if entry["good"] and "problem" in entry["files"]]
+    done = set()
+    if arguments.runs.exists():
+        done = {tuple(json.loads(line)[key] for key in ("problem", "variant", "seed", "guess"))
+                for line in arguments.runs.read_text(encoding="utf-8").splitlines()}
+    with open(arguments.runs, "a", encoding="utf-8") as file:
+        for trial in range(arguments.count):
+            for entry in entries:
+                name = entry["name"]
+                missing = [variant for variant in arguments.variants if (name, variant, arguments.seed, trial) not in done]
+                if not missing:
+                    continue
+                solved = arguments.directory / "motions" / name / "motion"
+                with tempfile.TemporaryDirectory() as directory:
+                    start = pathlib.Path(directory) / "guess"
+                    problem = Problem(arguments.directory / entry["files"]["problem"])
+                    write_guess(start, solved, make_guess(problem, trial, arguments.seed))
+                    for i, variant in enumerate(missing):
+                        if arguments.until and f"{datetime.datetime.utcnow():%H:%M}" >= arguments.until:
+                            return 0
+                        outcome = run(arguments.bielle, entry, solved, start, pathlib.Path(directory) / str(i), VARIANTS[variant])
+                        line = {"problem": name, "variant": variant, "seed": arguments.seed, "guess": trial, **outcome}
+                        file.write(json.dumps(line) + "\n")
+                        file.flush()
+                        print(f"{trial:3} {name:40} {variant:25} {outcome['end']:20} {outcome['iterations'] or 0:4} "
+                              f"{outcome['seconds'] or 0:8.2f} s", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
