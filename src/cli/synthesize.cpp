@@ -8,13 +8,17 @@
 #include "bielle/dynamics/ratio.h"
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "design/fourbar_search.h"
+#include "design/marks.h"
+#include "design/page_data.h"
 #include "formats/motor_catalogue.h"
 #include "formats/text_file.h"
 #include "model/listing.h"
 #include "model/number_text.h"
+#include "report/page.h"
 #include "report/run.h"
 
 namespace fs = std::filesystem;
@@ -87,6 +91,14 @@ JointDemand readMotion(const SynthesizeArguments& arguments) {
                    "solve the motion with a robot whose motor is on the joint; its motors are on " + listItems(names));
 }
 
+// Of the catalogue.
+Motor readMotor(const std::string& name) {
+  Motor motor;
+  readYamlDocument("--motor", "[" + name + "]",
+                   [&](const YamlEntry& root) { motor = readMotorTypes(root.getList(), "--motor", nullptr).front(); });
+  return motor;
+}
+
 JointDemand makeDemand(const SynthesizeArguments& arguments) {
   JointDemand demand;
   if (!arguments.motion.empty()) {
@@ -101,13 +113,7 @@ JointDemand makeDemand(const SynthesizeArguments& arguments) {
     if (!arguments.like.empty()) demand.ratios = readRatios(arguments.like, arguments.joint, demand.angles);
   }
   demand.drawn_at = 0.5 * (demand.angles.minCoeff() + demand.angles.maxCoeff());
-  if (!arguments.motor.empty()) {
-    Motor motor;
-    readYamlDocument("--motor", "[" + arguments.motor + "]", [&](const YamlEntry& root) {
-      motor = readMotorTypes(root.getList(), "--motor", nullptr).front();
-    });
-    demand.largest_speed = motor.velocity_limit;
-  }
+  if (!arguments.motor.empty()) demand.largest_speed = readMotor(arguments.motor).velocity_limit;
   return demand;
 }
 
@@ -123,6 +129,8 @@ FourBarSpace makeSpace(const SynthesizeArguments& a) {
   return space;
 }
 
+std::string getLegName(size_t i) { return "leg_" + std::to_string(i + 1); }
+
 // The biped whose knees it moves, as a file.
 std::string formatBiped(const FoundFourBar& found, double drawn_at) {
   const FourBarDrawing& d = found.drawing;
@@ -137,11 +145,104 @@ std::string formatBiped(const FoundFourBar& found, double drawn_at) {
   return text;
 }
 
+const char* nameValue(const JointDemand& demand) {
+  return demand.torques.size() > 0 ? "rms torque"
+         : demand.ratios.size()    ? "deviation of the ratio"
+                                   : "spread of the ratio";
+}
+
+// Columns and values of the page.
+struct FourBarTable {
+  Json columns = Json::array(), values = Json::array();
+  void add(Json column, double value, const std::string& mark = "") {
+    columns.push_back(std::move(column));
+    values.push_back({{"value", value}});
+    if (!mark.empty()) values.back()["mark"] = mark;
+  }
+};
+
+FourBarTable makeFourBarTable(const FoundFourBar& f, const JointDemand& demand, const FourBarSpace& space) {
+  FourBarTable table;
+  const bool has_torques = demand.torques.size() > 0;
+  table.add({{"kind", "objective"}, {"name", nameValue(demand)}, {"unit", has_torques ? "N m" : ""}}, f.value);
+  table.add({{"kind", "margin"},
+             {"name", "least sine, 0 at dead points"},
+             {"unit", ""},
+             {"bound", "≥ " + formatNumber(space.margin, "%.4g")}},
+            f.least_sine, f.least_sine < 1.001 * space.margin ? "at its bound" : "");
+  table.add({{"kind", "measure"}, {"name", "least ratio"}, {"unit", ""}}, f.least_ratio);
+  table.add({{"kind", "measure"}, {"name", "largest ratio"}, {"unit", ""}}, f.largest_ratio);
+  if (has_torques) {
+    table.add({{"kind", "measure"}, {"name", "peak torque"}, {"unit", "N m"}}, f.peak_torque);
+    table.add({{"kind", "measure"}, {"name", "peak speed"}, {"unit", "rad/s"}}, f.peak_speed);
+  }
+  const VectorXd x = f.drawing.toVector();
+  const std::pair<const char*, const char*> names[] = {{"motor x", "m"},       {"motor z", "m"}, {"crank", "m"},
+                                                       {"crank angle", "rad"}, {"arm", "m"},     {"arm angle", "rad"}};
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const auto& [name, unit] = names[i];
+    const std::string bound = findBound(space.lower[i], space.upper[i], x[i]);
+    table.add({{"kind", "variable"},
+               {"name", name},
+               {"unit", unit},
+               {"bound", formatNumber(space.lower[i], "%.4g") + " to " + formatNumber(space.upper[i], "%.4g")}},
+              x[i], bound.empty() ? "" : bound + " bound");
+  }
+  return table;
+}
+
+// What the motor of the joint does through the linkage.
+Json describeMotor(const FoundFourBar& f, const JointDemand& demand, const Motor& motor) {
+  std::vector<std::pair<double, double>> points;
+  for (Eigen::Index k = 0; k < demand.torques.size(); ++k) {
+    const double ratio = calcFourBar(f.drawing, demand.angles[k] - demand.drawn_at).ratio;
+    points.emplace_back(ratio * demand.speeds[k], demand.torques[k] / ratio);
+  }
+  return describeCloud(motor, points);
+}
+
+void writeFourBars(const SynthesizeArguments& arguments, const std::vector<FoundFourBar>& found,
+                   const JointDemand& demand, const FourBarSpace& space) {
+  Motor motor;
+  if (!arguments.motor.empty()) motor = readMotor(arguments.motor);
+  motor.name = arguments.joint;
+  Json columns, designs = Json::array();
+  for (size_t i = 0; i < found.size(); ++i) {
+    const std::string name = getLegName(i);
+    const FourBarTable table = makeFourBarTable(found[i], demand, space);
+    columns = table.columns;
+    const Json mechanism = describeMechanism(loadRobot((fs::path(arguments.directory) / name).string()).model);
+    Json motions = Json::array();
+    if (demand.torques.size() > 0)
+      motions.push_back(
+          {{"name", arguments.motion}, {"page", Json()}, {"motors", {describeMotor(found[i], demand, motor)}}});
+    designs.push_back({{"name", name},
+                       {"architecture", ""},
+                       {"status", ""},
+                       {"values", table.values},
+                       {"svg", mechanism["svg"]},
+                       {"distances", mechanism["distances"]},
+                       {"directory", name},
+                       {"files", {name + "/" + name + ".yaml"}},
+                       {"text", formatBiped(found[i], demand.drawn_at)},
+                       {"motions", motions}});
+  }
+  writeTextFile((fs::path(arguments.directory) / "synthesis.html").string(),
+                makeDesignPage({{"title", "Four-bars for a joint"},
+                                {"baseline", false},
+                                {"best", 0},
+                                {"plot", "Value and margin"},
+                                {"axes", {0, 1}},
+                                {"columns", columns},
+                                {"designs", designs}}));
+}
+
 int synthesize(const SynthesizeArguments& arguments) {
   const JointDemand demand = makeDemand(arguments);
+  const FourBarSpace space = makeSpace(arguments);
   const int threads = arguments.threads > 0 ? arguments.threads : static_cast<int>(std::thread::hardware_concurrency());
   const std::vector<FoundFourBar> found =
-      searchFourBars(demand, makeSpace(arguments), arguments.samples, arguments.count, arguments.seed, threads);
+      searchFourBars(demand, space, arguments.samples, arguments.count, arguments.seed, threads);
   if (found.empty()) {
     std::cerr << "bielle: none of " << arguments.samples
               << " four-bars closes over the whole range with this margin; widen the bounds, or lower --margin\n";
@@ -157,7 +258,7 @@ int synthesize(const SynthesizeArguments& arguments) {
   if (has_torques) rows[0].insert(rows[0].end(), {"peak [N m]", "[rad/s]"});
   for (size_t i = 0; i < found.size(); ++i) {
     const FoundFourBar& f = found[i];
-    const std::string name = "leg_" + std::to_string(i + 1);
+    const std::string name = getLegName(i);
     const auto text = [](double value) { return formatNumber(value, "%.4g"); };
     rows.push_back({name, text(f.value), text(f.least_ratio) + " .. " + text(f.largest_ratio), text(f.least_sine),
                     text(f.drawing.motor_x) + ", " + text(f.drawing.motor_z), text(f.drawing.crank),
@@ -167,8 +268,9 @@ int synthesize(const SynthesizeArguments& arguments) {
     makeOutputDirectory(directory.string());
     writeTextFile((directory / (name + ".yaml")).string(), formatBiped(f, demand.drawn_at));
   }
+  writeFourBars(arguments, found, demand, space);
   printTable(std::cout, rows);
-  std::cout << "  " << arguments.directory << "\n";
+  std::cout << "  " << arguments.directory << "/synthesis.html\n  " << arguments.directory << "\n";
   return kOk;
 }
 
@@ -205,7 +307,10 @@ void addSynthesize(CLI::App& app, Action& action) {
   command.add_option("--count", a->count, "four-bars kept")->check(CLI::Range(1, 50))->capture_default_str();
   command.add_option("--seed", a->seed, "of the random numbers")->capture_default_str();
   command.add_option("--threads", a->threads, "threads; 0: one per core")->capture_default_str();
-  command.add_option("-o,--output", a->directory, "directory of the bipeds whose knees they move")->required();
+  command
+      .add_option("-o,--output", a->directory,
+                  "directory of the bipeds whose knees they move, with the page synthesis.html")
+      ->required();
   command.footer(
       "Draws plane four-bars at random, ranks them by their closed form, refines the best fifty and writes for each a\n"
       "biped whose knees it moves: the part `drawn` (docs/parts.md) with its numbers. Without a request, the best "
