@@ -203,8 +203,8 @@ TEST_CASE("design: a front that is killed goes on and ends at the same bytes") {
   INFO(last.err);
   REQUIRE(last.status == 0);
   CHECK_THAT(last.out, Contains(", " + std::to_string(done) + " of them from the logs"));
-  std::vector<std::string> files = {"/design.md", "/best/best.urdf", "/best/best.yaml", "/front/01/01.urdf",
-                                    "/front/02/02.yaml"};
+  std::vector<std::string> files = {"/design.md",        "/best/best.urdf", "/best/best.yaml",      "/front/01/01.urdf",
+                                    "/front/02/02.yaml", "/design.html",    "/design_mechanism.svg"};
   if (fs::exists(whole + "/design.svg")) files.insert(files.end(), {"/design.svg", "/design_front.svg"});
   for (const std::string& file : files) {
     CAPTURE(file);

@@ -9,6 +9,7 @@
 #include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "design/evaluation.h"
+#include "design/page_data.h"
 #include "design/spec.h"
 #include "robot_directory.h"
 #include "robots/fivebar_leg.h"
@@ -350,4 +351,82 @@ objective:
   kept.mode = MotionMode::Kept;
   const DesignEvaluator without(robot, {}, spec.objective, kept);
   CHECK_THROWS_WITH(without.differentiate(robot.start()), Contains("workspace does not have"));
+}
+
+namespace {
+
+// An arm of 2 kg that includes the motor of its elbow.
+const char* const kArmUrdf = R"(<robot name="robot"><link name="world"/>
+  <link name="arm"><inertial><origin xyz="0.1 0 0"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="hand"><inertial><origin xyz="0.1 0 0"/><mass value="0.5"/>
+    <inertia ixx="0.001" iyy="0.002" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="continuous"><parent link="world"/><child link="arm"/><axis xyz="0 1 0"/></joint>
+  <joint name="elbow" type="continuous"><origin xyz="0.3 0 0.02"/><parent link="arm"/><child link="hand"/>
+    <axis xyz="0 1 0"/></joint></robot>)";
+
+DesignSpec readArmSpec(const RobotDirectory& directory, const std::string& elbow) {
+  directory.writeRobot(kArmUrdf, "base: fixed\nmotors:\n  elbow: " + elbow + "\n");
+  return readDesignSpec(directory.write("spec.yaml", "robot: " + directory.path() + R"(
+variables:
+  - {name: motor, motor: elbow, choices: [ak80-9, ak10-9]}
+objective: [{measure: mass}]
+)"));
+}
+
+}  // namespace
+
+TEST_CASE("design: a given robot has other motors with their masses") {
+  const RobotDirectory directory;
+  const Parametrization robot = makeParametrization(readArmSpec(directory, "{type: ak80-9}"));
+  CHECK(robot.start()[0] == 0);
+  const Model small = robot.make(VectorXd::Zero(1)), large = robot.make(VectorXd::Ones(1));
+  CHECK(small.mass() == Approx(2.5).epsilon(1e-12));
+  CHECK(large.mass() - small.mass() == Approx(0.94 - 0.49).epsilon(1e-12));
+  CHECK(large.motors()[0].drive.type == "ak10-9");
+  // By hand, about the joint of the elbow: the difference adds nothing there, and its weight moves the centre of mass.
+  const Inertia &before = small.bodies()[1].inertia, &after = large.bodies()[1].inertia;
+  const Vector3d elbow(0.3, 0, 0.02);
+  CHECK((after.mass * after.com - before.mass * before.com - 0.45 * elbow).norm() < 1e-12);
+  const SE3 to_elbow(Matrix3d::Identity(), -elbow);
+  const Matrix6d difference = after.transformed(to_elbow).toMatrix() - before.transformed(to_elbow).toMatrix();
+  CHECK(difference.bottomRightCorner<3, 3>().norm() < 1e-12);
+  const SE3 beside(Matrix3d::Identity(), -elbow + Vector3d(0.01, 0, 0));  // would the check see another place?
+  CHECK(
+      (after.transformed(beside).toMatrix() - before.transformed(beside).toMatrix()).bottomRightCorner<3, 3>().norm() >
+      1e-5);
+  // There and back.
+  CHECK(robot.make(VectorXd::Zero(1)).bodies()[1].inertia.mass == before.mass);
+
+  CHECK_THROWS_WITH(makeParametrization(readArmSpec(directory, "{effort: 10}")),
+                    Contains("the mass of motor 'elbow', which its link includes, is not known"));
+  CHECK_THROWS_WITH(makeParametrization(readArmSpec(directory, "{effort: 10, mass: 30}")),
+                    Contains("link 'arm': it cannot include the mass of the motor"));
+}
+
+TEST_CASE("design: corners of what a motor can give lie on its limits") {
+  Motor motor;
+  motor.effort_limit = 50, motor.velocity_limit = 30;
+  motor.drive.ratio = 9, motor.drive.torque_constant = 0.16, motor.drive.resistance = 0.25, motor.drive.voltage = 48;
+  const auto corners = listEnvelopeCorners(motor, 100, 100);
+  REQUIRE(corners.size() == 6);
+  double area = 0;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const auto& [w, u] = corners[i];
+    const auto& [next_w, next_u] = corners[(i + 1) % corners.size()];
+    CAPTURE(w, u);
+    area += (w * next_u - next_w * u) / 2;
+    const double volts = motor.getVoltsPerEffort() * u + motor.getVoltsPerSpeed() * w;
+    const auto shares = {std::abs(u) / 50, std::abs(w) / 30, std::abs(volts) / 48};
+    CHECK(std::max(shares) == Approx(1).epsilon(1e-12));
+    CHECK(std::count_if(shares.begin(), shares.end(), [](double share) { return share > 1 - 1e-12; }) == 2);
+    CHECK(motor.clampEffort(u, w) == Approx(u).epsilon(1e-12));
+    CHECK(motor.clampEffort(1.01 * u, 1.01 * w) != Approx(1.01 * u).epsilon(1e-12));
+  }
+  CHECK(area > 0);
+  CHECK(area < 4 * 50 * 30);  // two corners are cut off
+  // Without a winding, a box; a side without limit is as far away as is asked for.
+  motor.drive = {}, motor.velocity_limit = HUGE_VAL;
+  CHECK(listEnvelopeCorners(motor, 100, 100) ==
+        std::vector<std::pair<double, double>>{{100, -50}, {100, 50}, {-100, 50}, {-100, -50}});
 }

@@ -349,6 +349,51 @@ class ReportPage(unittest.TestCase):
         self.browser.evaluate("document.querySelector('#sliders button').click()")
         self.assertLess(differ(start, self.browser.evaluate(PICTURE)), 200)
 
+    def test_readouts_follow_the_sliders(self):
+        """Angles, ratio and distance from dead points beside the sliders against `bielle ratio`, which follows the linkage by itself."""
+        page = self.root / "readouts.html"
+        run("view", "bipetto", "-o", page)
+        run("ratio", "bipetto", "--joint", "knee_left", "-o", self.root / "ratio")
+        with open(self.root / "ratio/ratio.csv") as file:
+            curve = [row for row in csv.DictReader(file) if not row["dead"]]
+        names = ["q.knee_left", "R.motor_knee_left/knee_left", "distance"]
+        self.browser.open(page)
+        read = """(place => {
+          const grid = report.viewer.grids.findIndex(g => g.motors.some(
+              m => report.viewer.run.robot.motors[m.motor].name === 'motor_knee_left'));
+          const slider = report.viewer.sliders[grid].sliders[0], low = Number(slider.min);
+          slider.value = low + place / (report.viewer.grids[grid].count - 1) * (slider.max - low);
+          slider.dispatchEvent(new Event('input'));
+          const card = slider.closest('.card');
+          return [report.viewer.grids[grid].values[0], card.querySelector('.status').textContent, Object.fromEntries(
+              [...card.querySelectorAll('.readouts div')].map(row => [...row.children].map(child => child.textContent)))];
+        })"""
+        compared, seen = 0, set()
+        for place in range(0, 41, 2):
+            motor, status, values = self.browser.evaluate(f"{read}({place})")
+            distance = values["distance from dead points"]
+            self.assertRegex(distance, r"^(over 0.5|[\d.]+) rad$")
+            angle = "q.motor_knee_left"
+            near = [pair for pair in zip(curve, curve[1:])
+                    if pair[0]["branch"] == pair[1]["branch"] and float(pair[0][angle]) <= motor <= float(pair[1][angle])]
+            if status or not near:
+                continue
+            a, b = near[0]
+            share = (motor - float(a[angle])) / (float(b[angle]) - float(a[angle]))
+            shown = [float(values["knee_left"].split()[0]), float(values["ratio motor_knee_left : knee_left"]),
+                     None if "over" in distance else float(distance.split()[0])]
+            for name, value in zip(names, shown):
+                if value is None or not a[name] or not b[name]:
+                    self.assertTrue(name == "distance")
+                    continue
+                expected = (1 - share) * float(a[name]) + share * float(b[name])
+                self.assertAlmostEqual(value, expected, delta=2e-3 * max(1, abs(expected)), msg=f"{name} at {place}")
+                self.assertNotAlmostEqual(value + 0.01 * max(1, abs(expected)), expected, delta=2e-3 * max(1, abs(expected)))
+            compared += 1
+            seen.add(values["ratio motor_knee_left : knee_left"])
+        self.assertGreater(compared, 5)
+        self.assertEqual(len(seen), compared)  # they move with the slider
+
     def test_parameters_have_sliders_whose_robots_close(self):
         page = self.root / "parameters.html"
         run("view", "leg_biped", "--parameter", "knee_crank", "--parameter", "thigh_length=0.1:0.3", "-o", page)

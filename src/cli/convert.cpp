@@ -8,12 +8,14 @@
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "formats/drake.h"
+#include "formats/dxf.h"
 #include "formats/mjcf.h"
 #include "formats/sdf.h"
 #include "formats/text_file.h"
 #include "model/payload.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
+#include "results/workshop_sheet.h"
 
 namespace bielle::cli {
 namespace {
@@ -21,7 +23,7 @@ namespace {
 struct ConvertArguments {
   RobotArgument robot;
   std::string format = "bielle", joints, output;
-  double payload = 0;
+  double payload = 0, hole = 8;
   std::vector<double> payload_at;
 };
 
@@ -48,6 +50,19 @@ int convert(const ConvertArguments& arguments) {
     const UrdfText text = formatDrake(robot.model);
     warn(text.warnings);
     writeTextFile(arguments.output, text.urdf);
+  } else if (arguments.format == "dxf") {
+    const DxfText text = formatDxf(robot.model, 1e-3 * arguments.hole);
+    warn(text.warnings);
+    writeTextFile(arguments.output, text.text);
+  } else if (arguments.format == "sheet") {
+    const std::filesystem::path table = std::filesystem::path(arguments.output).replace_extension(".csv");
+    if (table == arguments.output)
+      throw InputError("", "--output " + arguments.output, "the table would have the same name",
+                       "give one that ends in .svg");
+    requireApart(table.string(), listFiles(robot));
+    writeTextFile(arguments.output, formatSheet(robot.model));
+    writeTextFile(table.string(), formatSheetTable(robot.model));
+    std::cout << table.string() << "\n";
   } else if (arguments.format == "sdf") {
     const SdfText text = formatSdf(robot.model, findClosedConfiguration(robot.model).q);
     warn(text.warnings);
@@ -73,8 +88,10 @@ void addConvert(CLI::App& app, Action& action) {
   command
       .add_option("--to", arguments->format,
                   "bielle: a directory with URDF and YAML, without losses; drake: a URDF with loops and motors for "
-                  "Drake; mjcf: a MuJoCo file; sdf: a Gazebo file with loops; urdf: a URDF alone")
-      ->check(CLI::IsMember({"bielle", "drake", "mjcf", "sdf", "urdf"}))
+                  "Drake; dxf: plates of the plane links, for a workshop; mjcf: a MuJoCo file; sdf: a Gazebo file with "
+                  "loops; sheet: an SVG drawing with distances, and a CSV file of lengths, masses and motors; urdf: a "
+                  "URDF alone")
+      ->check(CLI::IsMember({"bielle", "drake", "dxf", "mjcf", "sdf", "sheet", "urdf"}))
       ->capture_default_str();
   command
       .add_option(
@@ -82,6 +99,9 @@ void addConvert(CLI::App& app, Action& action) {
           "with --to mjcf: rotations about three axes as balls (default), or as three hinges each, for trainers "
           "without balls")
       ->check(CLI::IsMember({"balls", "hinges"}));
+  command.add_option("--hole", arguments->hole, "with --to dxf: diameter of the holes [mm]")
+      ->check(isWithin(0.1, 1000))
+      ->capture_default_str();
   addFixedBase(command, arguments->robot);
   CLI::Option* payload = command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg]")
                              ->check(isWithin(0, 1e6))
@@ -100,10 +120,15 @@ void addConvert(CLI::App& app, Action& action) {
       "MuJoCo closes loops by soft constraints, which are so stiff that they need steps of 0.25 ms.\n"
       "In SDF, coordinates are measured from the posture in the file; couplers are left out.\n"
       "For Drake, loops are ball constraints: one for a ball, two for a hinge, three for a weld.\n"
+      "A DXF (R12, mm) has a layer for each link whose hinges are parallel: outline and holes; names and distances are "
+      "on "
+      "NOTES.\n"
       "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
       "  bielle convert bipetto --to mjcf --joints hinges -o trained.xml\n"
+      "  bielle convert leg_biped --to dxf -o plates.dxf\n"
+      "  bielle convert leg_biped --to sheet -o leg.svg\n"
       "  bielle convert bipetto.xml -o my_bipetto\n"
       "  bielle convert bipetto --payload 5 --payload-at 0 0 0.3 -o loaded\n"
       "  bielle convert belt_biped --to urdf -o belt.urdf");

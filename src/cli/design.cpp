@@ -1,4 +1,5 @@
 // bielle design: lengths of a robot chosen by optimization.
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <numeric>
@@ -6,12 +7,17 @@
 
 #include "bielle/model/error.h"
 #include "bielle/motion/registry.h"
+#include "bielle/report/report.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "cli/task_options.h"
+#include "design/marks.h"
+#include "design/page_data.h"
 #include "design/run.h"
+#include "design/shown_designs.h"
 #include "design/spec_parts.h"
 #include "formats/text_file.h"
+#include "report/page.h"
 #include "results/output_place.h"
 #include "tasks/design_tasks.h"
 
@@ -81,13 +87,38 @@ void printRun(const DesignEvaluator& evaluator, const DesignSpec& spec, const De
     const DesignVariable& variable = robot.variables()[i];
     const std::string from =
         variable.isChoice() ? describeValue(variable, robot.start()[k]) : formatNumber(robot.start()[k], "%.5g");
-    rows.push_back({variable.name, from + " -> " + describeValue(variable, run.best[k])});
+    const std::string bound = findBound(variable, run.best[k]);
+    rows.push_back({variable.name, from + " -> " + describeValue(variable, run.best[k]) +
+                                       (bound.empty() ? "" : " (" + bound + " bound)")});
   }
+  if (evaluator.start().margin && run.evaluation.margin)
+    rows.push_back({"margin", formatNumber(*evaluator.start().margin, "%.3f") + " -> " +
+                                  formatNumber(*run.evaluation.margin, "%.3f") + " from dead points"});
+  for (size_t i = 0; i < std::min(spec.constraints.size(), run.evaluation.constraints.size()); ++i)
+    if (const std::string text = describeViolation(spec.constraints[i], run.evaluation.constraints[i]); !text.empty())
+      rows.push_back({"violated", text});
   if (const double mass = calcMassInLinks(robot, run.best); mass > 0)
     rows.push_back(
         {"motor masses", formatNumber(mass, "%.4g") + " kg of the catalogue, included in the links as they are"});
   if (spec.front) rows.push_back({"front", std::to_string(run.front.size()) + " non-dominated designs"});
   printTable(std::cout, rows);
+}
+
+// The page, with the robots and motions that it shows.
+std::vector<std::string> writePage(const DesignArguments& arguments, const DesignEvaluator& evaluator,
+                                   const DesignRun& run) {
+  const std::string& directory = arguments.directory;
+  const auto report = [](const std::string& line) { std::cout << line << std::endl; };
+  const std::vector<ShownDesign> designs = writeShownDesigns(directory, evaluator, run, arguments.tasks.jobs, report);
+  std::vector<std::string> paths;
+  for (const ShownDesign& design : designs) {
+    paths.push_back(directory + "/" + design.directory);
+    for (const std::string& result : design.results)
+      if (!result.empty()) writeReport(directory + "/" + result + "/report.html", {directory + "/" + result});
+  }
+  paths.push_back(directory + "/design.html");
+  writeTextFile(paths.back(), makeDesignPage(describeDesignRun(evaluator, run, designs)));
+  return paths;
 }
 
 int run(const DesignArguments& arguments) {
@@ -107,9 +138,11 @@ int run(const DesignArguments& arguments) {
   DesignRun run = runSearches(arguments, evaluator, spec, engine.get());
   engine.reset();  // signals have their usual effect again
   if (!spec.motions.empty()) run.usual = evaluator.solveUsually(run.best);
+  std::vector<std::string> paths = writeDesign(arguments.directory, evaluator, spec, run);
+  const std::vector<std::string> shown = writePage(arguments, evaluator, run);
+  paths.insert(paths.end(), shown.begin(), shown.end());
   printRun(evaluator, spec, run);
-  for (const std::string& path : writeDesign(arguments.directory, evaluator, spec, run))
-    std::cout << "  " << path << "\n";
+  for (const std::string& path : paths) std::cout << "  " << path << "\n";
   std::cout.flush();
   if (run.evaluation.status != DesignStatus::Feasible)
     std::cerr << "bielle: warning: no design is feasible; the best one is the start design\n";
@@ -125,9 +158,10 @@ void addDesign(CLI::App& app, Action& action) {
   command.add_option("SPEC", arguments->spec, "YAML file: robot, variables with bounds, motions, objective, search")
       ->required();
   command
-      .add_option(
-          "-o,--output", arguments->directory,
-          "directory for best/ (a robot), front/ (robots), design.md, figures and the logs; created if necessary")
+      .add_option("-o,--output", arguments->directory,
+                  "directory for best/ (a robot), front/ or ranked/ (robots with their motions), design.html, "
+                  "design.md, figures and "
+                  "the logs; created if necessary")
       ->required();
   addTaskOptions(command, "searches, or designs of a front, at a time, each on one thread; results do not depend on it",
                  arguments->tasks);
@@ -148,8 +182,8 @@ void addDesign(CLI::App& app, Action& action) {
       "      shift: [{of: motor_knee_right, along: [1, 0, 0]}, {of: motor_knee_left, along: [1, 0, 0]}]\n"
       "    - {name: gear, ratio: \"*knee*\", bounds: [6, 20]}             (turns of the rotor; * stands for any text "
       "in a motor's name)\n"
-      "    - {name: motor, motor: \"*knee*\", choices: [ak80-9, ak10-9], mass: knee_motor_mass}     (with a "
-      "generator)\n"
+      "    - {name: motor, motor: \"*knee*\", choices: [ak80-9, ak10-9], mass: knee_motor_mass}     (mass: "
+      "of a generator)\n"
       "  architecture: [four_bar_knee, belt_knee, rsu_ankle, differential_ankle]     (parts of `generator: "
       "leg_biped`)\n"
       "  motions:\n"

@@ -159,7 +159,7 @@ SoughtLinkage makeDrawnKnees(const std::string& robot, const FourBarSpace& space
   if (!knee || std::find(knee->choices.begin(), knee->choices.end(), "drawn") == knee->choices.end())
     throw InputError(robot, "parameter 'knee'", "the robot has no part `drawn` to choose",
                      "give leg_biped or a robot with its legs, or say by --parameter what varies");
-  SoughtLinkage sought{entry.name, {}, {}, makeFourBars(space, demand), "sine"};
+  SoughtLinkage sought{entry.name, {}, {}, makeFourBars(space, demand), "sine", space.margin};
   for (const auto& [name, value] : entry.listChanges())
     if (entry.parameters.find(name)->name.rfind("knee_", 0) != 0 || name == "knee_motor_mass")
       sought.settings.emplace_back(name, value);
@@ -180,7 +180,7 @@ SoughtLinkage makeDrawnKnees(const std::string& robot, const FourBarSpace& space
 SoughtLinkage makeVariedLinkages(const std::string& robot, const std::vector<std::string>& parameters,
                                  const std::string& joint, const JointDemand& demand, double distance) {
   const GeneratorEntry entry = findEntry(robot);
-  SoughtLinkage sought{entry.name, entry.listChanges(), {}, {}, "dead point [rad]"};
+  SoughtLinkage sought{entry.name, entry.listChanges(), {}, {}, "dead point [rad]", distance};
   for (const std::string& text : parameters) {
     const ParameterRange range = readParameterRange("--parameter", text, entry.parameters);
     DesignVariable variable;

@@ -18,6 +18,7 @@ struct SoughtLinkage {
   std::vector<DesignVariable> variables;
   LinkageFamily family;
   std::string margin;  // what that of the family is
+  double least_margin = 0;
 };
 
 // Four-bars by their drawing, at the knees of a biped with the part `drawn`. \param robot  name or path

@@ -11,6 +11,7 @@
 #include "cli/commands.h"
 #include "cli/parameter_range.h"
 #include "cli/synthesis.h"
+#include "cli/synthesis_page.h"
 #include "cli/table.h"
 #include "design/robot_ratios.h"
 #include "formats/motor_catalogue.h"
@@ -64,6 +65,14 @@ JointDemand readDemand(const ReportRun& run, const SynthesizeArguments& argument
                    "solve the motion with a robot whose motor is on the joint; its motors are on " + listItems(names));
 }
 
+// Of the catalogue.
+Motor readMotor(const std::string& name) {
+  Motor motor;
+  readYamlDocument("--motor", "[" + name + "]",
+                   [&](const YamlEntry& root) { motor = readMotorTypes(root.getList(), "--motor", nullptr).front(); });
+  return motor;
+}
+
 JointDemand makeDemand(const SynthesizeArguments& arguments, const std::optional<ReportRun>& motion) {
   JointDemand demand;
   if (motion) {
@@ -79,13 +88,7 @@ JointDemand makeDemand(const SynthesizeArguments& arguments, const std::optional
       demand.ratios =
           calcJointRatios(RobotArgument{arguments.like}.load().model, arguments.joint, demand.angles).ratios;
   }
-  if (!arguments.motor.empty()) {
-    Motor motor;
-    readYamlDocument("--motor", "[" + arguments.motor + "]", [&](const YamlEntry& root) {
-      motor = readMotorTypes(root.getList(), "--motor", nullptr).front();
-    });
-    demand.largest_speed = motor.velocity_limit;
-  }
+  if (!arguments.motor.empty()) demand.largest_speed = readMotor(arguments.motor).velocity_limit;
   return demand;
 }
 
@@ -125,14 +128,14 @@ std::string joinCommandLine() {
 std::vector<Row> makeTable(const SoughtLinkage& sought, const std::vector<FoundLinkage>& found,
                            const JointDemand& demand) {
   const bool has_torques = demand.torques.size() > 0;
-  const char* value = has_torques ? "rms [N m]" : demand.ratios.size() ? "deviation" : "spread";
-  std::vector<Row> rows = {{"", value, "ratio", sought.margin}};
+  const auto [value, unit] = nameValue(demand);
+  std::vector<Row> rows = {{"", unit.empty() ? value : value + " [" + unit + "]", "ratio", sought.margin}};
   if (has_torques) rows[0].insert(rows[0].end(), {"peak [N m]", "[rad/s]"});
   for (const DesignVariable& variable : sought.variables)
     rows[0].push_back(variable.name + (variable.unit == "1" ? "" : " [" + variable.unit + "]"));
   const auto format = [](double number) { return formatNumber(number, "%.4g"); };
   for (const FoundLinkage& f : found) {
-    rows.push_back({"leg_" + std::to_string(rows.size()), format(f.value),
+    rows.push_back({getLegName(rows.size() - 1), format(f.value),
                     format(f.least_ratio) + " .. " + format(f.largest_ratio), format(f.margin)});
     if (has_torques) rows.back().insert(rows.back().end(), {format(f.peak_torque), format(f.peak_speed)});
     for (const double number : f.x) rows.back().push_back(format(number));
@@ -165,13 +168,17 @@ int synthesize(const SynthesizeArguments& arguments) {
   }
   makeOutputDirectory(arguments.directory);
   for (size_t i = 0; i < found.size(); ++i) {
-    const std::string name = "leg_" + std::to_string(i + 1);
+    const std::string name = getLegName(i);
     const fs::path directory = fs::path(arguments.directory) / name;
     makeOutputDirectory(directory.string());
     writeTextFile((directory / (name + ".yaml")).string(), formatRobot(sought, found[i], joinCommandLine()));
   }
+  Motor motor;
+  if (!arguments.motor.empty()) motor = readMotor(arguments.motor);
+  motor.name = arguments.joint;
+  writeSynthesisPage(arguments.directory, sought, found, demand, arguments.motion, motor);
   printTable(std::cout, makeTable(sought, found, demand));
-  std::cout << "  " << arguments.directory << "\n";
+  std::cout << "  " << arguments.directory << "/synthesis.html\n  " << arguments.directory << "\n";
   if (motion) {
     const std::string design = (fs::path(arguments.directory) / "design.yaml").string();
     const std::optional<size_t> start =

@@ -1,6 +1,10 @@
 #include "design/draft.h"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
 #include "bielle/model/builder.h"
+#include "bielle/model/error.h"
 
 namespace bielle {
 
@@ -93,6 +97,20 @@ void RobotDraft::stretch(const std::string& link, const Vector3d& origin, const 
   }
   for (Shape& shape : shapes_)
     if (shape.body == body) stretchShape(shape);
+}
+
+void RobotDraft::addMass(int body, const Vector3d& at, double mass) {
+  if (body == 0) return;
+  Inertia& inertia = inertias_[static_cast<size_t>(body)];
+  const Inertia sum = inertia + Inertia{mass, at, Matrix3d::Zero()};
+  // Second moments, of which no body has negative ones.
+  const Matrix3d moments = 0.5 * sum.I_com.trace() * Matrix3d::Identity() - sum.I_com;
+  const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>(moments, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  if (!(sum.mass > 0) || least < -1e-9 * std::max(inertia.I_com.trace(), 1e-12))
+    throw InputError(model_.name(), "link '" + getLink(body) + "'",
+                     "it cannot include the mass of the motor that it is said to carry",
+                     "correct the masses of the link and of its motors in the robot's files");
+  inertia = sum;
 }
 
 int RobotDraft::findFrameAt(int body, const SE3& X_BF) const {

@@ -34,6 +34,10 @@ class RobotDraft {
   /// Scales mass and inertia of a link by a positive factor; its centre of mass stays.
   void scaleMass(const std::string& link, double factor);
 
+  /// Adds a point mass to a body, or takes it away if it is negative, at a place in the frame of the body, m; nothing to the ground.
+  /// \throws InputError when that leaves no mass, or an inertia that no body has
+  void addMass(int body, const Vector3d& at, double mass);
+
   /// A motor in place of that with its index.
   void setMotor(int index, const Motor& motor) { motors_[static_cast<size_t>(index)] = motor; }
 

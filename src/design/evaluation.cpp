@@ -154,6 +154,8 @@ bool DesignEvaluator::Data::addMotion(const std::string& name, const Architectur
   }
   if (!failed) addLimitMeasures(*outcome.loaded, trajectory, requested, base.left_out, outcome.measures);
   out.motions.push_back(outcome.measures);
+  if (!failed && !outcome.loaded->serialJoints().empty())
+    out.margin = std::min(out.margin.value_or(outcome.measures.margin), outcome.measures.margin);
   for (const GoalOutcome& goal : outcome.goals) out.goals.push_back({name, goal});
   return !failed;
 }
@@ -261,7 +263,9 @@ Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<Motion
   return out;
 }
 
-Evaluation DesignEvaluator::evaluate(const VectorXd& x) const { return data_->evaluate(x); }
+Evaluation DesignEvaluator::evaluate(const VectorXd& x, std::vector<MotionOutcome>* outcomes) const {
+  return data_->evaluate(x, outcomes);
+}
 
 Evaluation DesignEvaluator::solveUsually(const VectorXd& x) const {
   Evaluation out;

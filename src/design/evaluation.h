@@ -97,6 +97,7 @@ struct Evaluation {
   std::vector<double> constraints;      ///< their measures, likewise
   std::string message;                  ///< reason if infeasible
   std::vector<DesignGoal> goals;        ///< requested and achieved, as the measures
+  std::optional<double> margin = {};    ///< least one from dead points; none of a robot without serial joints
 };
 
 /// An evaluation and the gradients of its terms.
@@ -119,7 +120,8 @@ class DesignEvaluator {
                   const EvaluationOptions& options = {});
   ~DesignEvaluator();
 
-  Evaluation evaluate(const VectorXd& x) const;
+  /// \param outcomes  if given, of the motions, in their order, as far as they were made
+  Evaluation evaluate(const VectorXd& x, std::vector<MotionOutcome>* outcomes = nullptr) const;
   /// The same with gradients (gradient.h, optimum_gradient.h). If they do not exist, as at a dead point, the design counts as one whose
   /// motion fails.
   /// \throws InputError when a measure has no gradient

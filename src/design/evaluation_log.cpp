@@ -85,6 +85,8 @@ std::string formatEvaluation(const LoggedEvaluation& e) {
   if (!e.constraints.empty()) json["constraints"] = e.constraints;
   if (!e.goals.empty()) json["goals"] = formatGoals(e.goals);
   if (!e.message.empty()) json["message"] = e.message;
+  if (e.margin) json["margin"] = *e.margin;
+  if (!e.marks.empty()) json["marks"] = e.marks;
   if (!e.terms.empty()) json["limits"] = formatPieces(e.limits);
   for (const MeasurePieces& term : e.terms) json["terms"].push_back(formatPieces(term));
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -107,6 +109,8 @@ LoggedEvaluation readEvaluation(const std::string& line) {
   if (json.contains("constraints"))
     for (const Json& measure : json.at("constraints")) out.constraints.push_back(readNumber(measure));
   if (json.contains("goals")) out.goals = readGoals(json.at("goals"));
+  if (json.contains("margin")) out.margin = readNumber(json.at("margin"));
+  if (json.contains("marks")) out.marks = json.at("marks").get<std::vector<std::string>>();
   if (!json.contains("terms")) return out;
   for (const Json& term : json.at("terms")) out.terms.push_back(readPieces(term));
   out.limits = readPieces(json.at("limits"));

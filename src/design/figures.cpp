@@ -5,10 +5,7 @@
 #include <limits>
 #include <set>
 
-#include "bielle/dynamics/kinematics.h"
-#include "bielle/motion/motion.h"
 #include "design/motor_change.h"
-#include "formats/fastenings.h"
 
 namespace bielle {
 namespace {
@@ -110,41 +107,6 @@ DesignFigure makeMotionFigure(const DesignEvaluator& evaluator, const std::strin
   return {name, {torque, speed}};
 }
 
-// Rods between the points fastened to the bodies, seen along an axis of the world.
-Curve makeSkeleton(const Model& model, int horizontal, const std::string& title, const char* color) {
-  Curve curve{title, color, CurveStyle::Lines, false, {}};
-  Workspace ws(model);
-  updatePlacements(model, ws, makeStandingPosture(model));
-  const std::vector<std::vector<Vector3d>> fastenings = listFastenings(model);
-  for (int i = 1; i < model.numBodies(); ++i)
-    for (const Vector3d& point : fastenings[i]) {
-      const Vector3d end = ws.X_WB[i].R * point + ws.X_WB[i].p;
-      curve.points.insert(curve.points.end(),
-                          {{ws.X_WB[i].p[horizontal], ws.X_WB[i].p.z()}, {end[horizontal], end.z()}, {kGap, kGap}});
-    }
-  return curve;
-}
-
-// The extent of a view; that of a planar mechanism seen edge-on is zero.
-double calcWidth(const Curve& curve) {
-  double least = 0, most = 0;
-  for (const auto& [x, y] : curve.points) least = std::fmin(least, x), most = std::fmax(most, x);
-  return most - least;
-}
-
-DesignFigure makeMechanismFigure(const DesignEvaluator& evaluator, const DesignRun& run) {
-  const Model best = evaluator.robot().make(run.best);
-  DesignFigure figure{"design_mechanism", {}};
-  for (const auto& [title, axis, horizontal] :
-       {std::tuple{"From the side", "x [m]", 0}, {"From the front", "y [m]", 1}}) {
-    const Curve before = makeSkeleton(evaluator.robot().startModel(), horizontal, "before", kSerialColor);
-    const Curve after = makeSkeleton(best, horizontal, "after", kClosedColor);
-    if (std::max(calcWidth(before), calcWidth(after)) > 1e-6)
-      figure.plots.push_back({title, axis, "z [m]", PlotScale::Equal, {before, after}});
-  }
-  return figure;
-}
-
 }  // namespace
 
 std::string describeMeasure(Measure measure, const std::vector<std::string>& motors) {
@@ -169,7 +131,6 @@ std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, co
     if (!names.insert(name).second) name += "_" + std::to_string(i + 1);
     figures.push_back(makeMotionFigure(evaluator, name, evaluator.start().motions[i], run.evaluation.motions[i]));
   }
-  figures.push_back(makeMechanismFigure(evaluator, run));
   return figures;
 }
 

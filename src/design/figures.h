@@ -18,8 +18,7 @@ std::string describeMeasure(Measure measure, const std::vector<std::string>& mot
 std::string describeTerm(const ObjectiveTerm& term);
 
 // `design`: values over evaluations. `design_front`: where several objectives are kept apart, the first over each of the
-// others. `design_MOTION`: torques and speeds over time, of the start and of the best design. `design_mechanism`: both, from
-// the side and from the front, in their standing posture.
+// others. `design_MOTION`: torques and speeds over time, of the start and of the best design.
 std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, const DesignRun& run);
 
 }  // namespace bielle

@@ -143,7 +143,8 @@ class FrontRunner {
     }
     run_.front.clear();
     for (size_t i : selectFront(objectives, static_cast<size_t>(spec_.front->options.population)))
-      run_.front.push_back({designs[i]->x, designs[i]->measures, designs[i]->goals});
+      run_.front.push_back(
+          {designs[i]->x, designs[i]->measures, designs[i]->goals, designs[i]->constraints, designs[i]->margin});
   }
 
   // From every point of the front: the least sum of all objectives of which none may become larger.

@@ -112,7 +112,7 @@ void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, 
                       const BodyPairs& left_out, MotionMeasures& measures) {
   for (size_t m = 0; m < measures.motors.size(); ++m)
     addShares(measures.trace, static_cast<Eigen::Index>(m), model.motors()[m], measures.motors[m]);
-  if (requested.count(Measure::Margin)) {
+  if (!model.serialJoints().empty()) {
     LinkageConditioning conditioning(model, trajectory.xs.front().head(model.nq()), LinkageSide::Joints);
     for (const VectorXd& x : trajectory.xs)
       measures.margin = std::min(measures.margin, 1 / conditioning.calc(x.head(model.nq())));

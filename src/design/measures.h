@@ -23,10 +23,10 @@ enum class Measure {
   Cost,
   Conditioning,
   Workspace,
-  Mass,      ///< of the robot, kg
-  Envelope,  ///< most of a motor's torque, speed or voltage over what it can give
-  Heat,      ///< most of a motor's root mean square torque over what it bears for ever
-  Margin,    ///< from dead points: least motion of a joint in a unit motion of its linkage
+  Mass,               ///< of the robot, kg
+  Envelope,           ///< most of a motor's torque, speed or voltage over what it can give
+  Heat,               ///< most of a motor's root mean square torque over what it bears for ever
+  Margin,             ///< from dead points: least motion of a joint in a unit motion of its linkage
   DeadPointDistance,  ///< least way of a motor or joint to a dead point (linkage.h), at most kFarthestDeadPoint, rad or m
   Distance            ///< least one of bodies that are not neighbours, m
 };
@@ -80,10 +80,10 @@ MotorTrace makeMotorTrace(const Model& model, const std::vector<double>& dt, con
 std::vector<MotorMeasures> calcMotorMeasures(const MotorTrace& trace, const std::vector<MotorConversion>& drives = {});
 
 struct MotionMeasures {
-  std::vector<MotorMeasures> motors;  ///< in the order of the model
-  double conditioning = 1;            ///< the worst over the nodes (conditioning.h)
-  double cost = 0;                    ///< of a motion that was optimized for the design
-  double margin = 1;                  ///< least inverse of the conditioning by joints, 0 at a dead point
+  std::vector<MotorMeasures> motors;                ///< in the order of the model
+  double conditioning = 1;                          ///< the worst over the nodes (conditioning.h)
+  double cost = 0;                                  ///< of a motion that was optimized for the design
+  double margin = 1;                                ///< least inverse of the conditioning by joints, 0 at a dead point
   double dead_point_distance = kFarthestDeadPoint;  ///< least of the linkages, if it was requested
   double distance = std::numeric_limits<double>::infinity();  ///< least one of shapes, of those listPairsBut() names, m
   std::string nearest;                                        ///< the two bodies of it
@@ -94,7 +94,8 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
                                   const ShootingTrajectory& trajectory,
                                   const std::vector<MotorConversion>& drives = {});
 
-/// Envelope and heat of the limits of the motors, into the motors of a motion; margin and distances if they are among those requested.
+/// Envelope and heat of the limits of the motors, into the motors of a motion; the margin if the robot has serial joints, which it is
+/// about; distances if they are among those requested.
 /// \param trajectory  closed at its nodes   \param left_out  of distances
 void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& requested,
                       const BodyPairs& left_out, MotionMeasures& measures);

@@ -4,17 +4,18 @@
 #include <numeric>
 #include <sstream>
 
-#include "bielle/dynamics/assembly.h"
 #include "bielle/formats/robot_writer.h"
-#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "bielle/results/robot_info.h"
 #include "design/figures.h"
+#include "design/marks.h"
 #include "design/motor_change.h"
 #include "design/run.h"
+#include "design/shown_designs.h"
 #include "formats/text_file.h"
 #include "model/number_text.h"
+#include "results/mechanism_figure.h"
 
 namespace fs = std::filesystem;
 
@@ -36,8 +37,6 @@ void writeRow(std::ostream& out, const std::string& name, double before, double 
       << " |\n";
 }
 
-std::string getFrontName(size_t i) { return (i < 9 ? "0" : "") + std::to_string(i + 1); }
-
 std::string formatBounds(const DesignVariable& v) {
   if (!v.isChoice()) return format(v.lower) + " .. " + format(v.upper);
   std::string text;
@@ -50,26 +49,22 @@ std::string formatValue(const DesignVariable& v, double value) {
   return v.isChoice() ? describeValue(v, value) : format(value, "%.5g");
 }
 
-// Whether a design changes with variable i: parameters of parts that it does not have change nothing.
-bool matters(const Parametrization& robot, const VectorXd& x, size_t i) {
-  const auto format_with = [&](double value) {
-    VectorXd other = x;
-    other[static_cast<Eigen::Index>(i)] = value;
-    const RobotText text = formatRobot(robot.make(other));
-    return text.urdf + text.yaml;
-  };
+// The value of variable i without its unit and whether it is at a bound, or that it means nothing.
+std::string formatOwn(const Parametrization& robot, const VectorXd& x, size_t i) {
+  if (!changesDesign(robot, x, i)) return "–";
   const DesignVariable& variable = robot.variables()[i];
-  try {
-    return variable.isArchitecture() || format_with(variable.lower) != format_with(variable.upper);
-  } catch (const InputError&) {  // one of them defines no robot
-    return true;
-  }
+  const double value = x[static_cast<Eigen::Index>(i)];
+  const std::string bound = findBound(variable, value);
+  return formatValue(variable, value) + (bound.empty() ? "" : " (" + bound + " bound)");
 }
 
-// The value of variable i without its unit, or that it means nothing.
-std::string formatOwn(const Parametrization& robot, const VectorXd& x, size_t i) {
-  return matters(robot, x, i) ? formatValue(robot.variables()[i], x[static_cast<Eigen::Index>(i)]) : "–";
+// Of a constraint that is violated, that it is.
+std::string formatConstraint(const DesignConstraint& constraint, double value) {
+  return format(value) + (calcViolation(constraint, value) > 0 ? ", **violated**" : "");
 }
+
+// The least of the motions; nothing where there is none.
+std::string formatMargin(const std::optional<double>& margin) { return margin ? format(*margin) : "–"; }
 
 void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const DesignRun& run) {
   if (evaluator.constraints().empty()) return;
@@ -78,7 +73,8 @@ void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const
     const DesignConstraint& constraint = evaluator.constraints()[i];
     out << "| " << describeMeasure(constraint.measure, constraint.motors) << " | at "
         << (constraint.at_least ? "least " : "most ") << format(constraint.bound) << " | "
-        << format(evaluator.start().constraints[i]) << " | " << format(run.evaluation.constraints[i]) << " |\n";
+        << formatConstraint(constraint, evaluator.start().constraints[i]) << " | "
+        << formatConstraint(constraint, run.evaluation.constraints[i]) << " |\n";
   }
   const std::vector<std::string> left_out = evaluator.listLeftOut(run.best);
   for (const std::string& pair : left_out)
@@ -125,23 +121,12 @@ void writeUsual(std::ostream& out, const DesignEvaluator& evaluator, const Desig
         << formatAchieved(usual.goals[i].outcome) << " | |\n";
 }
 
-// What the best design has of a variable that is no choice: nearer to a bound than a thousandth of the way between them, the bound
-// may be what decided.
-std::string markBound(const DesignVariable& v, double value) {
-  const double near = 1e-3 * (v.upper - v.lower);
-  if (v.isChoice()) return "";
-  if (value - v.lower < near) return " (lower bound)";
-  return v.upper - value < near ? " (upper bound)" : "";
-}
-
 void writeVariables(std::ostream& out, const Parametrization& robot, const VectorXd& best) {
   out << "| variable | unit | bounds | before | after |\n|---|---|---|---|---|\n";
   for (size_t i = 0; i < robot.variables().size(); ++i) {
     const DesignVariable& v = robot.variables()[i];
-    const Eigen::Index k = static_cast<Eigen::Index>(i);
     out << "| " << v.name << " | " << (v.isChoice() ? "" : v.unit) << " | " << formatBounds(v) << " | "
-        << formatOwn(robot, robot.start(), i) << " | " << formatOwn(robot, best, i)
-        << (matters(robot, best, i) ? markBound(v, best[k]) : "") << " |\n";
+        << formatOwn(robot, robot.start(), i) << " | " << formatOwn(robot, best, i) << " |\n";
   }
 }
 
@@ -155,7 +140,7 @@ void writeFrontGoals(std::ostream& out, const std::vector<FrontDesign>& front) {
   for (size_t i = 0; i < front.front().goals.size(); ++i) out << "|---";
   out << "|\n";
   for (size_t i = 0; i < front.size(); ++i) {
-    out << "| " << getFrontName(i);
+    out << "| " << getNumberName(i);
     for (const DesignGoal& goal : front[i].goals) out << " | " << formatAchieved(goal.outcome);
     out << " |\n";
   }
@@ -172,17 +157,25 @@ void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const Desig
   for (const ObjectiveTerm& term : evaluator.objective()) out << " | " << describeTerm(term);
   for (const DesignVariable& v : robot.variables())
     out << " | " << v.name << (v.isChoice() || v.unit == "1" ? "" : " [" + v.unit + "]");
-  out << " |\n|---";
-  for (size_t i = 0; i < evaluator.objective().size() + robot.variables().size(); ++i) out << "|---";
+  for (const DesignConstraint& constraint : evaluator.constraints())
+    if (constraint.measure != Measure::Margin) out << " | " << describeMeasure(constraint.measure, constraint.motors);
+  out << " | margin |\n|---";
+  size_t columns = evaluator.objective().size() + robot.variables().size() + 1;
+  for (const DesignConstraint& constraint : evaluator.constraints()) columns += constraint.measure != Measure::Margin;
+  for (size_t i = 0; i < columns; ++i) out << "|---";
   out << "|\n";
-  const auto write = [&](const std::string& name, const std::vector<double>& measures, const VectorXd& x) {
+  const auto write = [&](const std::string& name, const FrontDesign& design) {
     out << "| " << name;
-    for (double measure : measures) out << " | " << format(measure);
-    for (size_t i = 0; i < robot.variables().size(); ++i) out << " | " << formatOwn(robot, x, i);
-    out << " |\n";
+    for (double measure : design.measures) out << " | " << format(measure);
+    for (size_t i = 0; i < robot.variables().size(); ++i) out << " | " << formatOwn(robot, design.x, i);
+    for (size_t i = 0; i < evaluator.constraints().size(); ++i)
+      if (evaluator.constraints()[i].measure != Measure::Margin)
+        out << " | " << formatConstraint(evaluator.constraints()[i], design.constraints[i]);
+    out << " | " << formatMargin(design.margin) << " |\n";
   };
-  write("start", evaluator.start().terms, robot.start());
-  for (size_t i = 0; i < run.front.size(); ++i) write(getFrontName(i), run.front[i].measures, run.front[i].x);
+  const Evaluation& start = evaluator.start();
+  write("start", {robot.start(), start.terms, start.goals, start.constraints, start.margin});
+  for (size_t i = 0; i < run.front.size(); ++i) write(getNumberName(i), run.front[i]);
   writeFrontGoals(out, run.front);
 }
 
@@ -220,6 +213,8 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
   for (size_t i = 0; i < evaluator.objective().size() && i < run.evaluation.terms.size(); ++i)
     writeRow(out, describeTerm(evaluator.objective()[i]), evaluator.start().terms[i], run.evaluation.terms[i]);
   writeRow(out, "value", evaluator.start().value, run.value);
+  if (evaluator.start().margin && run.evaluation.margin)
+    writeRow(out, "margin from dead points", *evaluator.start().margin, *run.evaluation.margin);
   writeConstraints(out, evaluator, run);
   writeGoals(out, evaluator.start().goals, run.evaluation.goals);
   if (run.evaluation.status != DesignStatus::Feasible)
@@ -241,22 +236,15 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
   return out.str();
 }
 
-// The robot of a design. Where its lengths do not allow the angles that a reference of the start gives, this gives those that it is
-// assembled with, and the place of its base, which would pull at them.
-Model makeWritten(const Parametrization& robot, const VectorXd& x) {
-  const Model model = robot.make(x);
-  ModelParts parts = takeParts(model);
-  for (Reference& reference : parts.references) {
-    const AssemblyResult result = assembleReference(model, reference.name);
-    const std::vector<ReferenceJoint> joints = listReferenceJoints(model, reference, result.q);
-    const bool moves = std::any_of(joints.begin(), joints.end(),
-                                   [](const ReferenceJoint& joint) { return joint.moved > kReferenceTolerance; });
-    if (!moves || result.status != AssemblyStatus::Closed) continue;
-    for (const ReferenceJoint& joint : joints)
-      reference.joints[model.joints()[joint.joint].name].assign(joint.assembled.begin(), joint.assembled.end());
-    if (model.hasFreeFlyer()) reference.joints[model.joints()[1].name].assign(result.q.begin(), result.q.begin() + 7);
-  }
-  return ModelBuilder::restore(std::move(parts));
+// The mechanism found, with the names and distances of its pivots, over that of the start.
+std::string drawChange(const DesignEvaluator& evaluator, const DesignRun& run) {
+  const Model start = evaluator.robot().startModel(), best = evaluator.robot().make(run.best);
+  const MechanismFigure before = makeMechanismFigure(start, makeDrawnPosture(start)),
+                        after = makeMechanismFigure(best, makeDrawnPosture(best));
+  MechanismPicture picture;
+  picture.title = best.name() + ", grey: the start";
+  picture.behind = &before;
+  return formatMechanism(after, picture);
 }
 
 }  // namespace
@@ -266,7 +254,7 @@ double calcMassInLinks(const Parametrization& robot, const VectorXd& x) {
   double mass = 0;
   for (const Motor& motor : model.motors()) mass += motor.drive.mass;
   for (const DesignVariable& variable : robot.variables())
-    if (!variable.mass.empty())
+    if (!variable.mass.empty() || (robot.isGiven() && !variable.types.empty()))
       for (const int m : findMotors(model, variable.motors)) mass -= model.motors()[static_cast<size_t>(m)].drive.mass;
   return dropNoise(mass);
 }
@@ -277,10 +265,9 @@ std::vector<std::string> writeDesign(const std::string& directory, const DesignE
   writeRobot(makeWritten(evaluator.robot(), run.best), best, "Written by `bielle design`.");
   writeTextFile(page, formatPage(evaluator, spec, run));
   std::vector<std::string> paths = {best, page};
-  for (size_t i = 0; i < run.front.size(); ++i) {
-    paths.push_back(directory + "/front/" + getFrontName(i));
-    writeRobot(makeWritten(evaluator.robot(), run.front[i].x), paths.back(), "Written by `bielle design`.");
-  }
+  const std::string mechanism = directory + "/design_mechanism.svg";
+  writeTextFile(mechanism, drawChange(evaluator, run));
+  paths.push_back(mechanism);
   for (const DesignFigure& figure : makeDesignFigures(evaluator, run)) {
     const std::string path = directory + "/" + figure.name + ".svg";
     if (drawPlots(path, figure.plots)) paths.push_back(path);

@@ -85,14 +85,13 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
   for (size_t i = 0; i < variables_.size(); ++i) {
     const DesignVariable& variable = variables_[i];
     const std::string element = "variable '" + variable.name + "'";
-    if (variable.isChoice())
-      throw InputError(source_, element,
-                       "a given robot has no parts to choose, and its links include the masses of its motors",
-                       "give the `ratio` of its motors, or a generator");
+    if (variable.isChoice() && variable.types.empty())
+      throw InputError(source_, element, "a given robot has no parts to choose",
+                       "give the `motor` or the `ratio` of its motors, or a generator");
     const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.motors.empty();
     if (!variable.parameter.empty() || kinds != 1)
-      throw InputError(source_, element, "it is not a length, a shift or a ratio",
-                       "give `length`, `shift` or `ratio`; `parameter` is for generated robots");
+      throw InputError(source_, element, "it is not a length, a shift, a ratio or a motor",
+                       "give `length`, `shift`, `ratio` or `motor`; `parameter` is for generated robots");
     RobotDraft draft(model_);
     for (const ShiftChange& shift : variable.shifts) draft.getPlace(shift.of);
     for (size_t k = 0; k < variable.lengths.size(); ++k) {
@@ -190,7 +189,14 @@ Model Parametrization::changeMotors(Model model, const VectorXd& x) const {
       }
     }
   RobotDraft draft(model);
-  for (size_t m = 0; m < motors.size(); ++m) draft.setMotor(static_cast<int>(m), motors[m]);
+  for (size_t m = 0; m < motors.size(); ++m) {
+    draft.setMotor(static_cast<int>(m), motors[m]);
+    // A given robot carries its motors on their joints; one of a generator, where and as heavy as its parameters say.
+    const double more = motors[m].drive.mass - model.motors()[m].drive.mass;
+    if (generator_ || more == 0) continue;
+    const Joint& joint = model.joints()[static_cast<size_t>(motors[m].joint)];
+    draft.addMass(joint.parent, joint.X_PJ.p, more);
+  }
   return draft.build();
 }
 
@@ -223,6 +229,12 @@ void Parametrization::readStart() {
       if (named.empty())
         throw InputError(source_, "variable '" + variable.name + "'", "the robot has no such motor",
                          "`bielle info` lists them; * stands for any text");
+      for (const int m : named)
+        if (const Motor& motor = robot.motors()[static_cast<size_t>(m)];
+            choices && !generator_ && !(motor.drive.mass > 0))
+          throw InputError(source_, "variable '" + variable.name + "'",
+                           "the mass of motor '" + motor.name + "', which its link includes, is not known",
+                           "give the motor its `type` or its `mass` in the robot's YAML file");
       const MotorDrive& drive = motors[static_cast<size_t>(named.front())].drive;
       if (!choices) start = drive.ratio;
       for (size_t k = 0; k < variable.choices.size(); ++k)

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
 #include <exception>
 #include <memory>
@@ -13,6 +12,8 @@
 #include "bielle/results/result.h"
 #include "design/evaluation_log.h"
 #include "design/front_run.h"
+#include "design/marks.h"
+#include "model/number_text.h"
 #include "results/json_text.h"
 
 namespace bielle {
@@ -109,10 +110,9 @@ class DesignRunner {
     if (better) best_shown_ = e.value;
     const size_t count = run_.searches[i].size();
     if (!options_.progress || replayed || !(better || count % 20 == 0)) return;
-    char line[160];
-    std::snprintf(line, sizeof line, "search %zu, %s, evaluation %zu: %.4f (%s), best of all %.4f", i + 1,
-                  e.stage.c_str(), count, e.value, getName(e.status), best_shown_);
-    options_.progress(line);
+    options_.progress("search " + std::to_string(i + 1) + ", " + e.stage + ", evaluation " + std::to_string(count) +
+                      ": " + formatNumber(e.value, "%.4f") + " (" + getName(e.status) + "), best of all " +
+                      formatNumber(best_shown_, "%.4f") + formatMarks(e.margin, e.marks));
   }
 
   const DesignEvaluator& evaluator_;
@@ -197,7 +197,9 @@ LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorith
           evaluation.terms,
           listFinite(evaluation.constraints),
           isMeasured(evaluation.status) ? evaluation.goals : std::vector<DesignGoal>(),
-          evaluation.message};
+          evaluation.message,
+          evaluation.margin,
+          listMarks(evaluator, x, evaluation.constraints)};
 }
 
 std::string findFlaw(const LoggedEvaluation& e, size_t variables, size_t objectives, size_t constraints) {

@@ -28,6 +28,8 @@ struct LoggedEvaluation {
   std::vector<double> constraints = {};  ///< likewise, one for each constraint
   std::vector<DesignGoal> goals = {};    ///< likewise; without nodes and places
   std::string message = {};              ///< reason if infeasible
+  std::optional<double> margin = {};     ///< Evaluation::margin
+  std::vector<std::string> marks = {};   ///< listMarks() of marks.h
 };
 
 /// The evaluation of a design as a stage of a search needs it, with its gradients or without.
@@ -64,8 +66,10 @@ struct DesignRunOptions {
 /// One that no design found dominates, among several objectives.
 struct FrontDesign {
   VectorXd x;
-  std::vector<double> measures;  ///< as in LoggedEvaluation
+  std::vector<double> measures;  ///< as in LoggedEvaluation, here and below
   std::vector<DesignGoal> goals;
+  std::vector<double> constraints;
+  std::optional<double> margin;
 };
 
 struct DesignRun {
@@ -88,9 +92,8 @@ DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, co
 /// they count as included, kg.
 double calcMassInLinks(const Parametrization& robot, const VectorXd& x);
 
-/// Writes DIR/best (a robot), DIR/front/01 and so on (those of the front, if there is one), design.md (before and after) and, if gnuplot is installed, design.svg (values over the
-/// evaluations), design_front.svg, design_MOTION.svg (torques and speeds before and after) and design_mechanism.svg (both
-/// mechanisms).
+/// Writes DIR/best (a robot), design.md (before and after), design_mechanism.svg (both mechanisms) and, if gnuplot is installed,
+/// design.svg (values over the evaluations), design_front.svg and design_MOTION.svg (torques and speeds before and after).
 /// The same run, resumed or not, writes the same bytes. Returns the paths. \throws InputError when a file cannot be
 /// written
 std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,

@@ -72,15 +72,28 @@ double readChoiceNumber(const Entry& entry, const std::vector<std::string>& choi
   return static_cast<double>(found - choices.begin());
 }
 
+void requireMasses(const Entry& choices, const std::vector<Motor>& types, const char* remedy) {
+  for (size_t i = 0; i < types.size(); ++i)
+    if (!(types[i].drive.mass > 0)) choices.getList()[i].fail("its mass is not in the catalogue", remedy);
+}
+
 void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& spec, const Entry* catalogues,
                  DesignVariable& variable) {
   variable.choices = choices.getTexts();
   if (std::set<std::string>(variable.choices.begin(), variable.choices.end()).size() < variable.choices.size())
     choices.fail("one of them is listed twice", "remove it");
   if (variable.choices.empty()) choices.fail("there is nothing to choose", "give one or more");
-  if (spec.robot.generator.empty())
-    choices.fail("a given robot has no parts to choose, and its links include the masses of its motors",
-                 "give the `ratio` of its motors, or a generator");
+  if (spec.robot.generator.empty()) {
+    if (!find(fields, "motor"))
+      choices.fail("a given robot has no parts to choose",
+                   "give the `motor` or the `ratio` of its motors, or a generator");
+    if (const Entry* mass = find(fields, "mass"))
+      mass->fail("a given robot has no parameters; the links that carry its motors change their masses by themselves",
+                 "remove it");
+    variable.types = readMotorTypes(choices.getList(), spec.path, catalogues);
+    requireMasses(choices, variable.types, "add it there");
+    return;
+  }
   const OptionSet parameters = findGenerator(spec.robot.generator, spec.robot.settings).parameters;
   const auto getParameter = [&](const Entry& entry) -> const Option& {
     if (const Option* parameter = parameters.find(entry.getText())) return *parameter;
@@ -99,9 +112,7 @@ void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& s
   const Entry* mass = find(fields, "mass");
   if (!mass) return;
   variable.mass = getParameter(*mass).name;
-  for (size_t i = 0; i < variable.types.size(); ++i)
-    if (!(variable.types[i].drive.mass > 0))
-      choices.getList()[i].fail("its mass is not in the catalogue", "add it there, or leave `mass` out");
+  requireMasses(choices, variable.types, "add it there, or leave `mass` out");
 }
 
 DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const Entry* catalogues) {

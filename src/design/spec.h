@@ -15,7 +15,7 @@
 ///     shift: {of: motor_knee_right, along: [1, 0, 0]}
 ///   - {name: foot, parameter: ankle_height, unit: m, bounds: [0.05, 0.08]}    # of a generator
 ///   - {name: gear, ratio: "*knee*", bounds: [6, 20], start: 9}     # turns of the rotor per turn of the joint; * is any text
-///   # Of a generator, choices: of a part, and of a motor of robots/motors.yaml or of motor_catalogue, whose mass is a parameter.
+///   # Choices: of a part of a generator, and of a motor of robots/motors.yaml or of motor_catalogue; `mass` only of a generator.
 ///   - {name: knee, parameter: knee, choices: [belt, four_bar]}
 ///   - {name: knee_motor, motor: "*knee*", choices: [ak80-9, ak10-9], mass: knee_motor_mass, start: ak10-9}
 /// architecture: [four_bar_knee, belt_knee, rsu_ankle, differential_ankle, three_rrs_hip, serial_hip]   # of a generator of

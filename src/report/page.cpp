@@ -1,7 +1,9 @@
 #include "report/page.h"
 
 #include <map>
+#include <vector>
 
+#include "bielle/results/result.h"
 #include "report/assets.h"
 
 namespace bielle {
@@ -41,16 +43,28 @@ std::string fillPage(const std::string& page, const std::map<std::string, std::s
   return out.append(page, at);
 }
 
+std::string joinScripts(const std::vector<const char*>& names) {
+  std::string out;
+  for (const char* name : names) out += "<script>" + guardScript(getAsset(name)) + "</script>\n";
+  return out;
+}
+
 }  // namespace
 
 std::string makePage(const Json& data) {
   std::map<std::string, std::string> texts = {{"style", getAsset("style.css")}, {"data", formatInline(data)}};
-  for (const char* library : {"three.min.js", "OrbitControls.js", "STLLoader.js", "dygraph.min.js"})
-    texts["libraries"] += "<script>" + guardScript(getAsset(library)) + "</script>\n";
-  for (const char* script : {"data.js", "shapes.js", "robot.js", "scene.js", "camera.js", "transport.js", "plot.js",
-                             "plots.js", "tables.js", "film.js", "view.js", "modes.js", "live.js", "main.js"})
-    texts["scripts"] += "<script>" + guardScript(getAsset(script)) + "</script>\n";
+  texts["libraries"] = joinScripts({"three.min.js", "OrbitControls.js", "STLLoader.js", "dygraph.min.js"});
+  texts["scripts"] =
+      joinScripts({"data.js", "shapes.js", "robot.js", "scene.js", "camera.js", "transport.js", "plot.js", "plots.js",
+                   "tables.js", "film.js", "view.js", "modes.js", "live.js", "main.js"});
   return fillPage(getAsset("page.html"), texts);
+}
+
+std::string makeDesignPage(Json data) {
+  data["bielle"] = getBuildInfo().bielle;
+  return fillPage(getAsset("designs.html"), {{"style", getAsset("style.css") + getAsset("designs.css")},
+                                             {"data", formatInline(data)},
+                                             {"scripts", joinScripts({"data.js", "tables.js", "designs.js"})}});
 }
 
 }  // namespace bielle

@@ -6,4 +6,7 @@ namespace bielle {
 
 std::string makePage(const Json& data);
 
+// The page of designs; designs.js says of what the data consist.
+std::string makeDesignPage(Json data);
+
 }  // namespace bielle

@@ -11,6 +11,7 @@
 #include "formats/text_file.h"
 #include "report/pack.h"
 #include "report/page.h"
+#include "report/readouts.h"
 #include "report/run.h"
 
 namespace bielle {
@@ -58,6 +59,7 @@ class GroupGrid {
       : model_(model),
         group_(group),
         count_(kCounts[group.motors.size()]),
+        readouts_(model, group.motors, group.bodies, start),
         weights_(VectorXd::Constant(model.nv(), 1e-4)) {
     size_ = 1;
     int first = 0;
@@ -81,21 +83,21 @@ class GroupGrid {
       motors.push_back({{"motor", group_.motors[i]}, {"low", low_[i]}, {"high", high_[i]}, {"start", start_[i]}});
     Workspace ws(model_);
     RowMatrixXd poses = RowMatrixXd::Zero(size_, 7 * group_.bodies.size());
+    const Json shown = readouts_.describe();
+    RowMatrixXd values = RowMatrixXd::Zero(size_, static_cast<Eigen::Index>(shown.size()));
     for (int node = 0; node < size_; ++node) {
       closed.push_back(nodes_[node].size() > 0);
       if (!closed.back().get<bool>()) continue;
       updatePlacements(model_, ws, nodes_[node]);
+      values.row(node) = readouts_.calc(nodes_[node]);
       for (size_t b = 0; b < group_.bodies.size(); ++b) {
         const int body = group_.bodies[b];
         const SE3& X_WP = ws.X_WB[model_.joints()[body].parent];
         poses.row(node).segment<7>(7 * b) = makePoseRow(X_WP.inverseTimes(ws.X_WB[body]));
       }
     }
-    return {{"motors", motors},
-            {"count", count_},
-            {"bodies", group_.bodies},
-            {"closed", closed},
-            {"poses", packTable(poses)}};
+    return {{"motors", motors},          {"count", count_},   {"bodies", group_.bodies},    {"closed", closed},
+            {"poses", packTable(poses)}, {"readouts", shown}, {"values", packTable(values)}};
   }
 
  private:
@@ -144,7 +146,9 @@ class GroupGrid {
 
   const Model& model_;
   const Group& group_;
-  int count_, size_;
+  int count_;
+  Readouts readouts_;
+  int size_ = 0;
   std::vector<double> low_, high_, start_;
   VectorXd weights_;
   std::vector<VectorXd> nodes_;  // configurations; empty where it does not close

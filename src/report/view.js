@@ -3,11 +3,13 @@
 
 const LIMIT_TEXT = 'the linkage does not close there';
 
-// Closed configurations over the motors of one group: {motors: [{motor, low, high, start}], count, bodies, closed, poses}.
+// Closed configurations over the motors of one group: {motors: [{motor, low, high, start}], count, bodies, closed, poses, readouts:
+// [{name, unit, most}], values: a row of the readouts for each configuration}.
 class Grid {
   constructor(json) {
     Object.assign(this, json);
     this.poses = new Table(json.poses);
+    this.readings = new Table(json.values);
     this.values = this.motors.map(motor => motor.start);
   }
 
@@ -31,6 +33,16 @@ class Grid {
   // Whether the loops close all around the values.
   isClosed(values) {
     return this.listCorners(values).every(({node}) => this.closed[node]);
+  }
+
+  // What is read beside the sliders, averaged over the corners.
+  listReadouts() {
+    const corners = this.listCorners(this.values);
+    return this.readouts.map(({name, unit, most}, r) => {
+      const value = corners.reduce((sum, {node, weight}) => sum + weight * this.readings.get(node, r), 0);
+      const text = most !== undefined && value >= most - 1e-6 ? 'over ' + most : Number.isFinite(value) ? value.toFixed(3) : '–';
+      return {name, value, text: text + (unit ? ' ' + unit : '')};
+    });
   }
 
   // Placement of a body in its parent, averaged over the corners.
@@ -140,10 +152,21 @@ class RobotViewer {
       const sliders = grid.motors.map(
           (entry, i) => this.addSlider(card, robot.motors[entry.motor].name, entry, grid.values[i]));
       const status = addElement(card, 'p', 'status', '');
+      const readouts = addElement(card, 'div', 'readouts');
+      const read = () => {
+        readouts.textContent = '';
+        for (const {name, text} of grid.listReadouts()) {
+          const row = addElement(readouts, 'div');
+          addElement(row, 'span', 'name', name).title = name;
+          addElement(row, 'span', 'value', text);
+        }
+      };
+      read();
       const change = () => {
         const closes = this.setValues(g, sliders.map(slider => Number(slider.value)));
         status.textContent = closes ? '' : LIMIT_TEXT + '; the last closed posture is shown';
         status.className = closes ? 'status' : 'status fail';
+        read();
       };
       sliders.forEach(slider => slider.addEventListener('input', change));
       this.sliders.push({sliders, change});

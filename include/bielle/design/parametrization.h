@@ -51,7 +51,8 @@ std::string describeValue(const DesignVariable& variable, double value);
 /// Makes robots from numbers, fast and without files; names and orders are those of the initial model.
 class Parametrization {
  public:
-  /// A given robot.
+  /// A given robot. Where the type of a motor is chosen, the link that carries it, which includes the present one, becomes heavier or
+  /// lighter by the difference, a point mass at the joint.
   /// \param source  file that defines the variables, named in errors
   /// \throws InputError for unknown names, places on different bodies, bounds that cross or exclude the given robot,
   ///   two variables that set the same thing
@@ -66,6 +67,7 @@ class Parametrization {
   const VectorXd& lower() const { return lower_; }
   const VectorXd& upper() const { return upper_; }
   const Model& startModel() const { return model_; }
+  bool isGiven() const { return !generator_; }  ///< not of a generator
 
   /// Choices of parts of a generator at x: models with the same parts have the same bodies, joints and motors.
   std::vector<int> getArchitecture(const VectorXd& x) const;

@@ -4,7 +4,9 @@
 /// The closed configurations are precomputed on a grid over the motors of each loop cluster (a motor outside all loops
 /// has its own grid) and interpolated by the page. From the start posture (the robot's first reference, else any closed
 /// one) each node of the grid is reached from a closed neighbour, so that the linkage keeps its branch. Where it does
-/// not close, the page says so and keeps the last closed configuration. Motors of clusters with more than three have no
+/// not close, the page says so and keeps the last closed configuration. Beside the sliders stand the angles of joints without a motor,
+/// the ratio of the linkage (ratio.h; of up to two motors, where it has serial joints) and its distance from dead points
+/// (linkage.h), interpolated as well. Motors of clusters with more than three have no
 /// slider.
 #include <optional>
 #include <string>
