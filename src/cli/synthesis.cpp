@@ -1,7 +1,5 @@
 #include "cli/synthesis.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -15,6 +13,7 @@
 #include "design/robot_ratios.h"
 #include "design/spec.h"
 #include "formats/text_file.h"
+#include "formats/yaml_tree.h"
 #include "model/number_text.h"
 #include "robots/generator_entry.h"
 
@@ -44,17 +43,11 @@ void setValue(OptionValues& values, const std::string& name, const OptionValue& 
 
 std::string formatValue(double value) { return formatNumber(value, "%.9g"); }
 
-YAML::Node makeFlow(YAML::NodeType::value type) {
-  YAML::Node node(type);
-  node.SetStyle(YAML::EmitterStyle::Flow);
-  return node;
-}
-
-YAML::Node makeRobot(const SoughtLinkage& sought, const VectorXd& x) {
+YamlTree makeRobot(const SoughtLinkage& sought, const VectorXd& x) {
   OptionValues values = sought.settings;
   for (size_t i = 0; i < sought.variables.size(); ++i)
     setValue(values, sought.variables[i].parameter, x[static_cast<Eigen::Index>(i)]);
-  YAML::Node robot;
+  YamlTree robot;
   robot["generator"] = sought.generator;
   for (const auto& [name, value] : values) {
     const double* number = std::get_if<double>(&value);
@@ -63,18 +56,18 @@ YAML::Node makeRobot(const SoughtLinkage& sought, const VectorXd& x) {
   return robot;
 }
 
-YAML::Node makeVariable(const DesignVariable& variable) {
-  YAML::Node node = makeFlow(YAML::NodeType::Map);
+YamlTree makeVariable(const DesignVariable& variable) {
+  YamlTree node = YamlTree::makeLine();
   node["name"] = variable.name;
   node["parameter"] = variable.parameter;
   node["unit"] = variable.unit;
-  node["bounds"].push_back(formatValue(variable.lower));
-  node["bounds"].push_back(formatValue(variable.upper));
+  node["bounds"].add(formatValue(variable.lower));
+  node["bounds"].add(formatValue(variable.upper));
   return node;
 }
 
-YAML::Node makeMotion(const Json& summary) {
-  YAML::Node node = makeFlow(YAML::NodeType::Map);
+YamlTree makeMotion(const Json& summary) {
+  YamlTree node = YamlTree::makeLine();
   const auto motion = summary.at("motion").get<std::string>();
   node["motion"] = motion;
   const OptionSet usual = findMotion("", motion).request.options;
@@ -87,23 +80,17 @@ YAML::Node makeMotion(const Json& summary) {
   return node;
 }
 
-YAML::Node makeMeasure(const std::string& measure, const std::string& motors) {
-  YAML::Node node = makeFlow(YAML::NodeType::Map);
+YamlTree makeMeasure(const std::string& measure, const std::string& motors) {
+  YamlTree node = YamlTree::makeLine();
   node["measure"] = measure;
-  if (!motors.empty()) node["motors"].push_back(motors);
+  if (!motors.empty()) node["motors"].add(motors);
   return node;
 }
 
-YAML::Node makeStart(const std::vector<DesignVariable>& variables, const VectorXd& x) {
-  YAML::Node node = makeFlow(YAML::NodeType::Map);
+YamlTree makeStart(const std::vector<DesignVariable>& variables, const VectorXd& x) {
+  YamlTree node = YamlTree::makeLine();
   for (size_t i = 0; i < variables.size(); ++i) node[variables[i].name] = formatValue(x[static_cast<Eigen::Index>(i)]);
   return node;
-}
-
-std::string formatFile(const std::string& comment, const YAML::Node& content) {
-  YAML::Emitter out;
-  out << YAML::Comment(comment) << YAML::Newline << content;
-  return std::string(out.c_str()) + "\n";
 }
 
 // Of this side and the other.
@@ -120,35 +107,34 @@ std::string formatDesign(const SoughtLinkage& sought, const std::vector<FoundLin
   const Model best = robot.make(found.front().x);
   const Linkage linkage = makeLinkage(best, findClosedConfiguration(best).q, {joint});
   const std::string motors = coverSides(linkage.motor_names.front());
-  YAML::Node design = makeRobot(sought, found.front().x);
-  for (const DesignVariable& variable : sought.variables) design["variables"].push_back(makeVariable(variable));
-  design["motions"].push_back(makeMotion(motion.summary));
+  YamlTree design = makeRobot(sought, found.front().x);
+  for (const DesignVariable& variable : sought.variables) design["variables"].add(makeVariable(variable));
+  design["motions"].add(makeMotion(motion.summary));
   for (const char* measure : {"electrical_energy", "peak_torque"})
-    design["objective"].push_back(makeMeasure(measure, motors));
-  YAML::Node margin = makeMeasure("margin", "");
+    design["objective"].add(makeMeasure(measure, motors));
+  YamlTree margin = makeMeasure("margin", "");
   double largest = 0;
   for (const FoundLinkage& f : found) largest = std::max(largest, f.largest_ratio);
   margin["at_least"] = formatNumber(kMarginShare / std::hypot(1, largest), "%.3g");
-  design["constraints"].push_back(margin);
+  design["constraints"].add(margin);
   if (!motor.empty()) {
-    YAML::Node type = makeFlow(YAML::NodeType::Map);
+    YamlTree type = YamlTree::makeLine();
     type["name"] = "motor";
-    type["motor"].push_back(motors);
-    type["choices"].push_back(motor);
-    design["variables"].push_back(type);
-    design["constraints"].push_back(makeMeasure("envelope", motors));
+    type["motor"].add(motors);
+    type["choices"].add(motor);
+    design["variables"].add(type);
+    design["constraints"].add(makeMeasure("envelope", motors));
   }
-  YAML::Node search;
-  for (size_t k = 1; k < found.size(); ++k) search["starts"].push_back(makeStart(sought.variables, found[k].x));
-  YAML::Node refinement = makeFlow(YAML::NodeType::Map);
+  YamlTree search;
+  for (size_t k = 1; k < found.size(); ++k) search["starts"].add(makeStart(sought.variables, found[k].x));
+  YamlTree refinement = YamlTree::makeLine();
   refinement["algorithm"] = "slsqp";
-  refinement["evaluations"] = kRefinement;
-  search["pareto"]["population"] = std::max<size_t>(8, (found.size() + 3) / 4 * 4);
-  search["pareto"]["generations"] = 0;
+  refinement["evaluations"] = std::to_string(kRefinement);
+  search["pareto"]["population"] = std::to_string(std::max<size_t>(8, (found.size() + 3) / 4 * 4));
+  search["pareto"]["generations"] = "0";
   search["pareto"]["refine"] = refinement;
   design["search"] = search;
-  return formatFile("Robots found by `" + origin + "`, their motion solved anew; the best refined by gradients.",
-                    design);
+  return design.format("Robots found by `" + origin + "`, their motion solved anew; the best refined by gradients.");
 }
 
 }  // namespace
@@ -195,7 +181,7 @@ SoughtLinkage makeVariedLinkages(const std::string& robot, const std::vector<std
 }
 
 std::string formatRobot(const SoughtLinkage& sought, const FoundLinkage& found, const std::string& origin) {
-  return formatFile("Found by `" + origin + "`.", makeRobot(sought, found.x));
+  return makeRobot(sought, found.x).format("Found by `" + origin + "`.");
 }
 
 std::optional<size_t> writeDesign(const std::string& path, const SoughtLinkage& sought, std::vector<FoundLinkage> found,

@@ -18,28 +18,10 @@ namespace {
 using Entry = YamlEntry;
 using Fields = YamlFields;
 
-// One of the values by its name.
-template <typename Enum>
-Enum readChoice(const Entry& entry, const std::vector<Enum>& choices) {
-  std::string names;
-  for (const Enum choice : choices) {
-    if (entry.getText() == getName(choice)) return choice;
-    names += std::string(names.empty() ? "" : ", ") + getName(choice);
-  }
-  entry.fail("'" + entry.getText() + "' is unknown", "use one of " + names);
-}
-
 Vector3d readDirection(const Entry& entry) {
   const Vector3d direction = entry.getVector3();
   if (direction.norm() < 1e-9) entry.fail("it is not a direction", "give three numbers that are not all zero");
   return direction.normalized();
-}
-
-int readCount(const Entry& entry, int most, int least = 1) {
-  const double value = entry.getNumber();
-  if (value != std::floor(value) || value < least || value > most)
-    entry.fail("it is not a whole number in " + std::to_string(least) + " .. " + std::to_string(most), "give one");
-  return static_cast<int>(value);
 }
 
 // A list, or its only element.
@@ -63,13 +45,6 @@ ShiftChange readShift(const Entry& entry) {
 // Names of motors: a list, or its only element.
 std::vector<std::string> readNames(const Entry& entry) {
   return entry.isList() ? entry.getTexts() : std::vector<std::string>{entry.getText()};
-}
-
-// Number of a choice by its name.
-double readChoiceNumber(const Entry& entry, const std::vector<std::string>& choices) {
-  const auto found = std::find(choices.begin(), choices.end(), entry.getText());
-  if (found == choices.end()) entry.fail("'" + entry.getText() + "' is not one of the choices", "give one of them");
-  return static_cast<double>(found - choices.begin());
 }
 
 void requireMasses(const Entry& choices, const std::vector<Motor>& types, const char* remedy) {
@@ -300,91 +275,6 @@ DesignConstraint readConstraint(const Entry& entry) {
   if (constraint.measure != Measure::Distance && !(constraint.bound > 0))
     (most ? *most : *least).fail("the bound is not positive", "give a positive number");
   return constraint;
-}
-
-// The mode, the objective and the constraints have been read.
-SearchStage readStage(const Entry& item, const std::vector<SearchAlgorithm>& algorithms, const DesignSpec& spec) {
-  const Fields fields = item.getFields({"algorithm", "evaluations", "tolerance"});
-  SearchStage stage;
-  stage.algorithm = readChoice<SearchAlgorithm>(require(fields, "algorithm", item), algorithms);
-  if (needsGradient(stage.algorithm))
-    if (const auto obstacle = findGradientObstacle(spec.mode, spec.objective, spec.constraints))
-      item.fail(obstacle->problem, obstacle->remedy);
-  stage.evaluations = readCount(require(fields, "evaluations", item), 1000000);
-  if (const Entry* tolerance = find(fields, "tolerance")) stage.tolerance = tolerance->getNumber();
-  if (!(stage.tolerance >= 0 && stage.tolerance < 1))
-    item.fail("its tolerance is outside 0 .. 1", "give a share of the bounds, e.g. 1e-3");
-  return stage;
-}
-
-FrontSpec readFront(const Entry& entry, const DesignSpec& spec) {
-  if (!hasFrontSearch())
-    entry.fail("this program was built without pagmo, which searches for fronts",
-               "install libpagmo-dev and build it again, or give `stages`");
-  const Fields fields = entry.getFields({"algorithm", "population", "generations", "refine"});
-  FrontSpec front;
-  FrontOptions& options = front.options;
-  if (const Entry* algorithm = find(fields, "algorithm"))
-    options.algorithm = readChoice<SearchAlgorithm>(*algorithm, {SearchAlgorithm::Nsga2, SearchAlgorithm::Moead});
-  if (const Entry* population = find(fields, "population")) {
-    options.population = readCount(*population, 10000);
-    if (options.population < 8 || options.population % 4 != 0)
-      population->fail("it is not a multiple of 4, or less than 8", "give e.g. 24");
-  }
-  if (const Entry* generations = find(fields, "generations")) options.generations = readCount(*generations, 100000, 0);
-  if (const Entry* refine = find(fields, "refine"))
-    front.refine = readStage(*refine, {SearchAlgorithm::Slsqp, SearchAlgorithm::Mma}, spec);
-  const bool has_choices = std::any_of(spec.variables.begin(), spec.variables.end(),
-                                       [](const DesignVariable& variable) { return variable.isChoice(); });
-  if (has_choices && options.algorithm == SearchAlgorithm::Moead)
-    entry.fail("moead needs continuous variables, but choices have no order", "use nsga2");
-  if (spec.objective.size() < 2) entry.fail("a single objective has no front", "give a second one, or `stages`");
-  return front;
-}
-
-// Values by the names of variables.
-VectorXd readStart(const Entry& entry, const std::vector<DesignVariable>& variables) {
-  VectorXd x = VectorXd::Constant(static_cast<Eigen::Index>(variables.size()), NAN);
-  for (const auto& [name, value] : entry.getMap()) {
-    const auto is_it = [&name = name](const DesignVariable& variable) { return variable.name == name; };
-    const auto variable = std::find_if(variables.begin(), variables.end(), is_it);
-    if (variable == variables.end()) value.fail("there is no variable '" + name + "'", "name one of `variables`");
-    double& number = x[variable - variables.begin()];
-    number = variable->isChoice() ? readChoiceNumber(value, variable->choices) : value.getNumber();
-    if (!variable->isChoice() && !(number >= variable->lower && number <= variable->upper))
-      value.fail("it is outside the bounds of variable '" + name + "'", "correct it, or widen the bounds");
-  }
-  return x;
-}
-
-void readSearch(const Entry& entry, DesignSpec& spec) {
-  const Fields fields = entry.getFields({"seed", "searches", "starts", "stages", "pareto"});
-  if (const Entry* seed = find(fields, "seed")) spec.seed = static_cast<unsigned>(readCount(*seed, 1000000000));
-  if (const Entry* searches = find(fields, "searches")) spec.searches = readCount(*searches, 1000);
-  const Entry *stages = find(fields, "stages"), *starts = find(fields, "starts");
-  if (starts) {
-    if (find(fields, "searches"))
-      starts->fail("it cannot be combined with `searches`", "remove either: there is one search from each start");
-    for (const Entry& item : starts->getList()) spec.starts.push_back(readStart(item, spec.variables));
-    if (spec.starts.empty()) starts->fail("there are none", "give one, or leave the key out");
-  }
-  if (const Entry* pareto = find(fields, "pareto")) {
-    if (stages || find(fields, "searches"))
-      pareto->fail("it cannot be combined with `stages` and `searches`", "remove them, or `pareto`");
-    spec.front = readFront(*pareto, spec);
-    if (static_cast<int>(spec.starts.size()) >= spec.front->options.population)
-      pareto->fail(
-          "its population has no room for the start design and " + std::to_string(spec.starts.size()) + " `starts`",
-          "enlarge `population`");
-  }
-  if (!stages) return;
-  spec.stages.clear();
-  for (const Entry& item : stages->getList())
-    spec.stages.push_back(readStage(item,
-                                    {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa,
-                                     SearchAlgorithm::Sbplx, SearchAlgorithm::Slsqp, SearchAlgorithm::Mma},
-                                    spec));
-  if (spec.stages.empty()) stages->fail("there are no stages", "give one, or leave the key out");
 }
 
 void readRoot(const Entry& root, DesignSpec& spec) {

@@ -1,6 +1,7 @@
 #include "design/spec_parts.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "bielle/model/error.h"
@@ -81,6 +82,19 @@ Model makeRobot(const RobotSpec& spec, const std::string& file) {
   OptionSet parameters = generator.parameters;
   for (const auto& [name, value] : spec.settings) parameters.set(name, value);
   return generator.make(parameters);
+}
+
+int readCount(const YamlEntry& entry, int most, int least) {
+  const double value = entry.getNumber();
+  if (value != std::floor(value) || value < least || value > most)
+    entry.fail("it is not a whole number in " + std::to_string(least) + " .. " + std::to_string(most), "give one");
+  return static_cast<int>(value);
+}
+
+double readChoiceNumber(const YamlEntry& entry, const std::vector<std::string>& choices) {
+  const auto found = std::find(choices.begin(), choices.end(), entry.getText());
+  if (found == choices.end()) entry.fail("'" + entry.getText() + "' is not one of the choices", "give one of them");
+  return static_cast<double>(found - choices.begin());
 }
 
 }  // namespace bielle

@@ -11,6 +11,26 @@ namespace bielle {
 
 OptionValues readSettings(const YamlEntry& entry);
 
+// One of the values by its name.
+template <typename Enum>
+Enum readChoice(const YamlEntry& entry, const std::vector<Enum>& choices) {
+  std::string names;
+  for (const Enum choice : choices) {
+    if (entry.getText() == getName(choice)) return choice;
+    names += std::string(names.empty() ? "" : ", ") + getName(choice);
+  }
+  entry.fail("'" + entry.getText() + "' is unknown", "use one of " + names);
+}
+
+// A whole number.
+int readCount(const YamlEntry& entry, int most, int least = 1);
+
+// Number of a choice by its name.
+double readChoiceNumber(const YamlEntry& entry, const std::vector<std::string>& choices);
+
+// The key `search` of a design, whose other keys have been read.
+void readSearch(const YamlEntry& entry, DesignSpec& spec);
+
 // The keys `robot` or `generator` and `set` of a map.
 RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map);
 

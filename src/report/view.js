@@ -4,12 +4,12 @@
 const LIMIT_TEXT = 'the linkage does not close there';
 
 // Closed configurations over the motors of one group: {motors: [{motor, low, high, start}], count, bodies, closed, poses, readouts:
-// [{name, unit, most}], values: a row of the readouts for each configuration}.
+// [{name, unit, most}], values: a row of the readouts for each configuration}; of modes without readouts.
 class Grid {
   constructor(json) {
     Object.assign(this, json);
     this.poses = new Table(json.poses);
-    this.readings = new Table(json.values);
+    this.readings = json.values && new Table(json.values);
     this.values = this.motors.map(motor => motor.start);
   }
 
