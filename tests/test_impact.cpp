@@ -15,6 +15,26 @@ namespace {
 
 double calcEnergy(const MatrixXd& M, const VectorXd& v) { return 0.5 * v.dot(M * v); }
 
+// After updateImpact(), against differences.
+void checkImpactDerivatives(const Model& model, const ConstraintSet& set, const VectorXd& q, const VectorXd& v,
+                            ImpactWorkspace& iws) {
+  REQUIRE(updateImpactDerivatives(model, iws, set) == DynamicsStatus::Ok);
+  const int nv = model.nv();
+  ImpactWorkspace other(model);
+  const auto solve = [&](const VectorXd& x, const VectorXd& y) {
+    updateImpact(model, other, set, x, y);
+    VectorXd out(nv + set.rows);
+    out << other.v_plus, other.impulse;
+    return out;
+  };
+  MatrixXd numeric = differentiateTangent(model, q, 4e-3, [&](const VectorXd& x) { return solve(x, v); });
+  checkDerivative(iws.dv_dq, numeric.topRows(nv), "v+ by q");
+  checkDerivative(iws.dimpulse_dq, numeric.bottomRows(set.rows), "impulse by q");
+  numeric = differentiate(v, 1, [&](const VectorXd& y) { return solve(q, y); });
+  checkDerivative(iws.dv_dv, numeric.topRows(nv), "v+ by v");
+  checkDerivative(iws.dimpulse_dv, numeric.bottomRows(set.rows), "impulse by v");
+}
+
 }  // namespace
 
 TEST_CASE(
@@ -42,21 +62,7 @@ TEST_CASE(
           CHECK(before - calcEnergy(M, iws.v_plus) == Approx(calcEnergy(M, iws.v_plus - v)).epsilon(1e-9));
           CHECK(calcEnergy(M, iws.v_plus) < before);
 
-          REQUIRE(updateImpactDerivatives(model, iws, set) == DynamicsStatus::Ok);
-          const int nv = model.nv();
-          ImpactWorkspace other(model);
-          const auto solve = [&](const VectorXd& x, const VectorXd& y) {
-            updateImpact(model, other, set, x, y);
-            VectorXd out(nv + set.rows);
-            out << other.v_plus, other.impulse;
-            return out;
-          };
-          MatrixXd numeric = differentiateTangent(model, q, 4e-3, [&](const VectorXd& x) { return solve(x, v); });
-          checkDerivative(iws.dv_dq, numeric.topRows(nv), "v+ by q");
-          checkDerivative(iws.dimpulse_dq, numeric.bottomRows(set.rows), "impulse by q");
-          numeric = differentiate(v, 1, [&](const VectorXd& x) { return solve(q, x); });
-          checkDerivative(iws.dv_dv, numeric.topRows(nv), "v+ by v");
-          checkDerivative(iws.dimpulse_dv, numeric.bottomRows(set.rows), "impulse by v");
+          checkImpactDerivatives(model, set, q, v, iws);
         }
 }
 
@@ -146,23 +152,10 @@ TEST_CASE("impacts of edges on mechanisms: derivatives agree with differences") 
     const Model model = ModelBuilder::restore(std::move(parts));
     const ConstraintSet set = makeConstraintSet(model, {{0, randomPlacement(rng), 0, 0}});
     const VectorXd q = mechanism.q_closed, v = randomVector(rng, model.nv(), 1);
-    const int nv = model.nv();
-    ImpactWorkspace iws(model), other(model);
+    ImpactWorkspace iws(model);
     REQUIRE(updateImpact(model, iws, set, q, v) == DynamicsStatus::Ok);
     CHECK((iws.J * iws.v_plus).norm() < 1e-10);
-    REQUIRE(updateImpactDerivatives(model, iws, set) == DynamicsStatus::Ok);
-    const auto solve = [&](const VectorXd& x, const VectorXd& y) {
-      updateImpact(model, other, set, x, y);
-      VectorXd out(nv + set.rows);
-      out << other.v_plus, other.impulse;
-      return out;
-    };
-    MatrixXd numeric = differentiateTangent(model, q, 4e-3, [&](const VectorXd& x) { return solve(x, v); });
-    checkDerivative(iws.dv_dq, numeric.topRows(nv), "v+ by q");
-    checkDerivative(iws.dimpulse_dq, numeric.bottomRows(set.rows), "impulse by q");
-    numeric = differentiate(v, 1, [&](const VectorXd& y) { return solve(q, y); });
-    checkDerivative(iws.dv_dv, numeric.topRows(nv), "v+ by v");
-    checkDerivative(iws.dimpulse_dv, numeric.bottomRows(set.rows), "impulse by v");
+    checkImpactDerivatives(model, set, q, v, iws);
   }
 }
 

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "bielle/model/error.h"
-#include "bielle/motion/registry.h"
 #include "bielle/report/report.h"
 #include "cli/commands.h"
 #include "cli/table.h"
@@ -204,7 +203,7 @@ void addDesign(CLI::App& app, Action& action) {
       "  drives: {motor_constant: 2, regeneration: 0}     (for electrical_energy; N m/sqrt(W) at the joints)\n"
       "  search:\n"
       "    seed: 1\n"
-      "    searches: 2\n"
+      "    searches: 2              (or starts: [{crank: 0.05}, {crank: 0.055}], one search from each)\n"
       "    stages:                  (crs or isres, then bobyqa or sbplx; except for conditioning and workspace also "
       "slsqp or\n"
       "                              mma: gradients, far fewer evaluations)\n"

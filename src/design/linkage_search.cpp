@@ -1,15 +1,13 @@
 #include "design/linkage_search.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <limits>
 #include <mutex>
 #include <random>
-#include <thread>
 
 #include "bielle/design/search.h"
+#include "design/parallel.h"
 
 namespace bielle {
 namespace {
@@ -54,26 +52,6 @@ FoundLinkage refine(const LinkageFamily& family, const FoundLinkage& start, cons
                      demand);
 }
 
-// work(0) .. work(count - 1), by several threads.
-void doAll(long count, int threads, const std::function<void(long)>& work) {
-  std::atomic<long> next{0};
-  std::mutex mutex;
-  std::exception_ptr error;
-  std::vector<std::thread> team;
-  for (int t = 0; t < std::max(1, threads); ++t)
-    team.emplace_back([&] {
-      try {
-        for (long i = next++; i < count; i = next++) work(i);
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        if (!error) error = std::current_exception();
-        next = count;
-      }
-    });
-  for (std::thread& member : team) member.join();
-  if (error) std::rethrow_exception(error);
-}
-
 }  // namespace
 
 FoundLinkage rateLinkage(const LinkageFamily& family, const VectorXd& x, const JointDemand& demand) {
@@ -106,10 +84,11 @@ std::vector<FoundLinkage> searchLinkages(const LinkageFamily& family, const Join
   std::vector<std::vector<FoundLinkage>> of_chunks(static_cast<size_t>(chunks));
   std::mutex mutex;
   long rated = 0;
-  doAll(chunks, options.threads, [&](long chunk) {
+  doInParallel(of_chunks.size(), options.threads, [&](size_t k) {
+    const auto chunk = static_cast<long>(k);
     const long samples = std::min(kChunk, options.samples - chunk * kChunk);
     const std::uint64_t seed = (static_cast<std::uint64_t>(options.seed) << 32) + static_cast<std::uint64_t>(chunk);
-    of_chunks[static_cast<size_t>(chunk)] = searchChunk(family, demand, samples, seed, most);
+    of_chunks[k] = searchChunk(family, demand, samples, seed, most);
     const std::lock_guard<std::mutex> lock(mutex);
     rated += samples;
     if (options.progress) options.progress(rated);
@@ -117,10 +96,8 @@ std::vector<FoundLinkage> searchLinkages(const LinkageFamily& family, const Join
   for (const std::vector<FoundLinkage>& chunk : of_chunks) best.insert(best.end(), chunk.begin(), chunk.end());
   std::stable_sort(best.begin(), best.end(), isBetter);
   if (best.size() > most) best.resize(most);
-  doAll(static_cast<long>(best.size()), options.threads, [&](long i) {
-    FoundLinkage& found = best[static_cast<size_t>(i)];
-    found = refine(family, found, demand, options.evaluations);
-  });
+  doInParallel(best.size(), options.threads,
+               [&](size_t i) { best[i] = refine(family, best[i], demand, options.evaluations); });
   std::stable_sort(best.begin(), best.end(), isBetter);
   const VectorXd width = (family.upper - family.lower).cwiseMax(1e-12);
   std::vector<FoundLinkage> distinct;

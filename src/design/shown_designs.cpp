@@ -1,18 +1,16 @@
 #include "design/shown_designs.h"
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
 #include <filesystem>
 #include <map>
 #include <mutex>
-#include <thread>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/results/result.h"
 #include "bielle/results/robot_info.h"
+#include "design/parallel.h"
 
 namespace fs = std::filesystem;
 
@@ -98,29 +96,14 @@ std::vector<ShownDesign> writeShownDesigns(const std::string& directory, const D
                                            const DesignRun& run, int jobs,
                                            const std::function<void(const std::string& line)>& progress) {
   std::vector<ShownDesign> designs = chooseDesigns(evaluator, run);
-  std::atomic<size_t> next{0};
   std::mutex mutex;
-  std::exception_ptr error;
   size_t done = 0;
-  std::vector<std::thread> threads;
-  for (size_t t = 0; t < std::min(designs.size(), static_cast<size_t>(std::max(1, jobs))); ++t)
-    threads.emplace_back([&] {
-      for (size_t i = next++; i < designs.size(); i = next++) {
-        try {
-          writeDesignFiles(directory, evaluator, designs[i]);
-        } catch (...) {
-          const std::lock_guard<std::mutex> lock(mutex);
-          if (!error) error = std::current_exception();
-          next = designs.size();
-          continue;
-        }
-        const std::lock_guard<std::mutex> lock(mutex);
-        ++done;
-        if (progress) progress("page, design " + std::to_string(done) + " of " + std::to_string(designs.size()));
-      }
-    });
-  for (std::thread& thread : threads) thread.join();
-  if (error) std::rethrow_exception(error);
+  doInParallel(designs.size(), jobs, [&](size_t i) {
+    writeDesignFiles(directory, evaluator, designs[i]);
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++done;
+    if (progress) progress("page, design " + std::to_string(done) + " of " + std::to_string(designs.size()));
+  });
   return designs;
 }
 

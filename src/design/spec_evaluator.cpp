@@ -4,7 +4,7 @@
 namespace bielle {
 namespace {
 
-DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion) {
+DesignMotion makeRequestedMotion(const std::string& file, const MotionSpec& motion) {
   MotionRequest request = findMotion(file, motion.motion).request;
   MotionRequest usual = request;
   for (const auto& [name, value] : motion.settings) {
@@ -20,7 +20,7 @@ DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion)
 
 DesignEvaluator makeEvaluator(const DesignSpec& spec) {
   std::vector<DesignMotion> motions;
-  for (const MotionSpec& motion : spec.motions) motions.push_back(makeDesignMotion(spec.path, motion));
+  for (const MotionSpec& motion : spec.motions) motions.push_back(makeRequestedMotion(spec.path, motion));
   EvaluationOptions options;
   options.mode = spec.mode;
   options.drives = spec.drives;
