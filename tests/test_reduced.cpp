@@ -70,18 +70,21 @@ State makeClosedState(const Model& model, const VectorXd& q, double distance, do
           projectVelocity(model, ws, makeConstraintSet(model), result.q, randomVector(rng, model.nv(), speed))};
 }
 
-// Sanitizers make differences thirty times as slow and find errors of memory in any mechanism: they see every third one.
+// Sanitizers make differences thirty times as slow and find errors of memory in any mechanism: they see one of several.
 class Selection {
  public:
+  explicit Selection(int several = 3) : several_(several) {}
+
   bool isLeftOut() {
 #ifdef __SANITIZE_ADDRESS__
-    return count_++ % 3 != 0;
+    return count_++ % several_ != 0;
 #else
     return false;
 #endif
   }
 
  private:
+  const int several_;
   int count_ = 0;
 };
 
@@ -206,7 +209,9 @@ TEST_CASE("reduced step: couplers in the loops of other closures") {
 TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(12);
+  Selection selection(2);
   for (const std::string name : {"bipetto", "fourbar", "fivebar", "planar"}) {
+    if (selection.isLeftOut()) continue;
     CAPTURE(getName(rule), name);
     Mechanism mechanism;
     if (name == "planar") {
@@ -246,9 +251,14 @@ std::vector<Model> makeLegBipeds() {
 
 }  // namespace
 
-TEST_CASE("reduced step: every combination of the parts of leg_biped") {
+TEST_CASE("reduced step: combinations of the parts of leg_biped") {
   std::mt19937 rng(19);
-  for (const Model& model : makeLegBipeds()) {
+  const std::vector<Model> models = makeLegBipeds();
+  Selection selection;
+  for (size_t i = 0; i < models.size();
+       i += 7) {  // every hip, knee and ankle has its turns: 7 divides none of their numbers
+    if (selection.isLeftOut()) continue;
+    const Model& model = models[i];
     CAPTURE(model.findMotor("motor_hip1_left"), model.findMotor("motor_knee_left"),
             model.findMotor("motor_ankle1_left"));
     const VectorXd standing = makeStandingPosture(model);
@@ -294,7 +304,9 @@ TEST_CASE("reduced accelerations are those of the full formulation") {
   std::mt19937 rng(13);
   std::vector<Model> models = makeLegBipeds();
   models.push_back(loadRobot("bipetto").model);
+  Selection selection(12);
   for (const Model& model : models) {
+    if (selection.isLeftOut()) continue;
     const State state = makeClosedState(model, makeStandingPosture(model), 0.05, 1, rng);
     const std::vector<ContactTarget> contacts = {{0, {}, 0, 0}, {1, {}, 0, 0}};
     const double h = 1e-5;
