@@ -8,6 +8,13 @@ add_test(NAME install COMMAND ${CMAKE_COMMAND}
   -P ${CMAKE_CURRENT_SOURCE_DIR}/consumer/check_install.cmake)
 set_tests_properties(install PROPERTIES LABELS system)
 
+# Read back by the library that writes them.
+if(TARGET bielle-step)
+  set(area step)
+  bielle_command_test(step SOURCES test_step.cpp LIBS bielle_robots bielle_opencascade)
+  set(area command)
+endif()
+
 # Manual pages and completion follow the help of the command.
 foreach(name man completion)
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_${name}.py

@@ -1,4 +1,5 @@
 // bielle convert: a robot in another format.
+#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -15,7 +16,9 @@
 #include "model/payload.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
+#include "results/process.h"
 #include "results/workshop_sheet.h"
+#include "results/workshop_solids.h"
 
 namespace bielle::cli {
 namespace {
@@ -29,6 +32,23 @@ struct ConvertArguments {
 
 void warn(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) std::cerr << "bielle: warning: " << warning << "\n";
+}
+
+// By a program of its own, which reads the solids.
+void writeStep(const std::string& solids, const std::string& path) {
+  const std::string program = findCompanion("bielle-step");
+  if (program.find('/') == std::string::npos && !isOnPath(program))
+    throw InputError("", "--to step", "bielle-step is neither beside this program nor on the PATH",
+                     "build Bielle where OpenCASCADE is (Debian: libocct-data-exchange-dev, "
+                     "libocct-modeling-algorithms-dev, libocct-ocaf-dev)");
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
+  if (!file || std::fputs(solids.c_str(), file.get()) < 0 || std::fflush(file.get()) != 0)
+    throw InputError("", "--to step", "the solids cannot be written to a temporary file", "make room in /tmp");
+  std::rewind(file.get());
+  ProcessOptions options;
+  options.in = fileno(file.get());
+  if (waitForProcess(startProcess({program, path}, options)) != 0)
+    throw InputError(path, "--to step", "bielle-step could not write it", "see its message above");
 }
 
 int convert(const ConvertArguments& arguments) {
@@ -63,6 +83,10 @@ int convert(const ConvertArguments& arguments) {
     writeTextFile(arguments.output, formatSheet(robot.model));
     writeTextFile(table.string(), formatSheetTable(robot.model));
     std::cout << table.string() << "\n";
+  } else if (arguments.format == "step") {
+    const WorkshopSolids solids = formatSolids(robot.model, findClosedConfiguration(robot.model).q);
+    warn(solids.warnings);
+    writeStep(solids.json, arguments.output);
   } else if (arguments.format == "sdf") {
     const SdfText text = formatSdf(robot.model, findClosedConfiguration(robot.model).q);
     warn(text.warnings);
@@ -89,9 +113,10 @@ void addConvert(CLI::App& app, Action& action) {
       .add_option("--to", arguments->format,
                   "bielle: a directory with URDF and YAML, without losses; drake: a URDF with loops and motors for "
                   "Drake; dxf: plates of the plane links, for a workshop; mjcf: a MuJoCo file; sdf: a Gazebo file with "
-                  "loops; sheet: an SVG drawing with distances, and a CSV file of lengths, masses and motors; urdf: a "
-                  "URDF alone")
-      ->check(CLI::IsMember({"bielle", "drake", "dxf", "mjcf", "sdf", "sheet", "urdf"}))
+                  "loops; sheet: an SVG drawing with distances, and a CSV file of lengths, masses and motors; step: "
+                  "solids for CAD "
+                  "(AP214), an assembly of links; urdf: a URDF alone")
+      ->check(CLI::IsMember({"bielle", "drake", "dxf", "mjcf", "sdf", "sheet", "step", "urdf"}))
       ->capture_default_str();
   command
       .add_option(
@@ -123,12 +148,15 @@ void addConvert(CLI::App& app, Action& action) {
       "A DXF (R12, mm) has a layer for each link whose hinges are parallel: outline and holes; names and distances are "
       "on "
       "NOTES.\n"
+      "A STEP file (mm) has the boxes, cylinders and spheres of the drawing, each link at its place in the closed "
+      "posture.\n"
       "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
       "  bielle convert bipetto --to mjcf --joints hinges -o trained.xml\n"
       "  bielle convert leg_biped --to dxf -o plates.dxf\n"
       "  bielle convert leg_biped --to sheet -o leg.svg\n"
+      "  bielle convert leg_biped --to step -o leg.step\n"
       "  bielle convert bipetto.xml -o my_bipetto\n"
       "  bielle convert bipetto --payload 5 --payload-at 0 0 0.3 -o loaded\n"
       "  bielle convert belt_biped --to urdf -o belt.urdf");
