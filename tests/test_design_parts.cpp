@@ -129,6 +129,13 @@ TEST_CASE("design: architectures and motors are chosen, with what belongs to the
   }
   CHECK(architectures.size() == 4);
 
+  // A type may give its mass to several motors: two at the knees, four at the ankles.
+  const Parametrization both = makeParametrization(readDesignSpec(directory.write(
+      "both.yaml", replaceOnce(kParts, "mass: knee_motor_mass", "mass: [knee_motor_mass, ankle_motor_mass]"))));
+  VectorXd light = both.start();
+  light[4] = 0;
+  CHECK(both.make(both.start()).mass() - both.make(light).mass() == Approx(6 * (1.1 - 0.49)));
+
   const DesignMotion squat = makeSmallSquat();
   EvaluationOptions options;
   options.constraints = spec.constraints;

@@ -254,7 +254,7 @@ double calcMassInLinks(const Parametrization& robot, const VectorXd& x) {
   double mass = 0;
   for (const Motor& motor : model.motors()) mass += motor.drive.mass;
   for (const DesignVariable& variable : robot.variables())
-    if (!variable.mass.empty() || (robot.isGiven() && !variable.types.empty()))
+    if (!variable.masses.empty() || (robot.isGiven() && !variable.types.empty()))
       for (const int m : findMotors(model, variable.motors)) mass -= model.motors()[static_cast<size_t>(m)].drive.mass;
   return dropNoise(mass);
 }

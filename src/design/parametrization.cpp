@@ -54,8 +54,8 @@ std::string describeDirection(const std::string& word, const Vector3d& direction
 // What the variable sets, and no other one may.
 std::vector<std::string> listTargets(const DesignVariable& variable, const Model& robot) {
   std::vector<std::string> out;
-  for (const std::string& parameter : {variable.parameter, variable.mass})
-    if (!parameter.empty()) out.push_back("parameter '" + parameter + "'");
+  if (!variable.parameter.empty()) out.push_back("parameter '" + variable.parameter + "'");
+  for (const std::string& mass : variable.masses) out.push_back("parameter '" + mass + "'");
   for (const int m : findMotors(robot, variable.motors))
     out.push_back((variable.isChoice() ? "the type of motor '" : "the ratio of motor '") +
                   robot.motors()[static_cast<size_t>(m)].name + "'");
@@ -162,7 +162,7 @@ Model Parametrization::generate(const VectorXd& x) const {
     const DesignVariable& variable = variables_[i];
     const double value = x[static_cast<Eigen::Index>(i)];
     const size_t choice = variable.isChoice() ? static_cast<size_t>(getChoice(variable, value)) : 0;
-    if (!variable.mass.empty()) parameters.set(variable.mass, variable.types[choice].drive.mass);
+    for (const std::string& mass : variable.masses) parameters.set(mass, variable.types[choice].drive.mass);
     if (variable.parameter.empty()) continue;
     if (variable.isChoice())
       parameters.set(variable.parameter, variable.choices[choice]);

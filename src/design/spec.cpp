@@ -86,7 +86,7 @@ void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& s
   variable.types = readMotorTypes(choices.getList(), spec.path, catalogues);
   const Entry* mass = find(fields, "mass");
   if (!mass) return;
-  variable.mass = getParameter(*mass).name;
+  for (const Entry& name : getItems(*mass)) variable.masses.push_back(getParameter(name).name);
   requireMasses(choices, variable.types, "add it there, or leave `mass` out");
 }
 

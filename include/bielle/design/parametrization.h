@@ -37,9 +37,9 @@ struct DesignVariable {
   std::vector<std::string> motors;
   /// Names of the values 0, 1, ... of a choice: of the parameter, or of motors.
   std::vector<std::string> choices;
-  std::vector<Motor> types;     ///< of choices of motors, in their order
-  std::string mass;             ///< parameter of the generator that is the mass of one motor of the type, or empty
-  std::optional<double> start;  ///< of ratios and choices, if it differs from the robot's value
+  std::vector<Motor> types;         ///< of choices of motors, in their order
+  std::vector<std::string> masses;  ///< parameters of the generator that are the mass of one motor of the type
+  std::optional<double> start;      ///< of ratios and choices, if it differs from the robot's value
 
   bool isChoice() const { return !choices.empty(); }
   bool isArchitecture() const { return isChoice() && !parameter.empty(); }
