@@ -9,14 +9,15 @@ using Catch::Contains;
 
 TEST_CASE("parts: bipeds of them squat and walk, and have Simbody's dynamics") {
   const RobotDirectory files;
-  const char* const robots[] = {"hip: serial, knee: watt, ankle: biarticular",
-                                "hip: serial, knee: stephenson, ankle: spu",
-                                "hip: three_rrs, knee: parallel_spring, ankle: digit",
-                                "hip: serial, knee: pantograph, ankle: thigh_rods",
-                                "hip: serial, knee: ball_screw, ankle: stacked_rods",
-                                "hip: serial, knee: drawn, ankle: serial",
-                                "hip: serial, knee: leaf, ankle: serial",
-                                "hip: serial, knee: passive, ankle: cable_differential"};
+  const char* const robots[] = {
+      "hip: serial, knee: watt, ankle: biarticular",
+      "hip: serial, knee: stephenson, ankle: spu",
+      "hip: parallel_spring, hip_drive: three_rrs, knee: parallel_spring, knee_drive: four_bar, ankle: digit",
+      "hip: serial, knee: pantograph, ankle: thigh_rods",
+      "hip: serial, knee: ball_screw, ankle: stacked_rods",
+      "hip: serial, knee: drawn, ankle: serial",
+      "hip: serial, knee: leaf, ankle: serial",
+      "hip: serial, knee: passive, ankle: cable_differential"};
   int count = 0;
   for (const char* parts : robots) {
     CAPTURE(parts);

@@ -360,7 +360,7 @@ TEST_CASE("parts: lengths from pivot to pivot are those of the parameters") {
   CHECK(lengths.at("motor_knee_left elbow_knee_left") == Approx(0.05));
   CHECK(lengths.at("elbow_knee_left knee_rod_left") == Approx(kThigh));  // as of a parallelogram
   CHECK(lengths.at("hipy_left knee_left") == Approx(kThigh));
-  CHECK(lengths.at("knee_left knee_rod_left") == Approx(std::hypot(0.05, 0.04)));
+  CHECK(lengths.at("knee_left knee_rod_left") == Approx(std::hypot(0.05, 0.086)));
   CHECK(lengths.count("root_joint hipz_left") == 0);
 }
 
