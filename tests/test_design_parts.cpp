@@ -204,6 +204,16 @@ objective: [{measure: mass}]
     const Motor& motor = model.motors()[model.findMotor(parallel ? "motor_hip3_left" : "hipz_left")];
     CHECK(motor.armature == Approx(4 * 1e-3));
   }
+
+  // What a part chooses for itself, by its full name.
+  const DesignSpec within = readDesignSpec(directory.write("within.yaml", R"(
+generator: leg_biped
+set: {hip: parallel_spring}
+architecture: [three_rrs_hip_drive, serial_hip_drive, belt]
+variables: [{name: gear, ratio: "*hip*", bounds: [1, 3]}]
+objective: [{measure: mass}]
+)"));
+  CHECK(makeParametrization(within).variables()[0].parameter == "hip_drive");
 }
 
 TEST_CASE("design: parameters of parts that a design does not have are no part of its page") {
@@ -248,7 +258,8 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
   check("belt_knee,", "chain_knee,", "there is no part 'chain_knee'");
   check("belt_knee,", "belt_knee, belt_knee,", "listed twice");
   check("belt_knee,", "belt, belt_knee,", "listed twice");
-  check("belt_knee,", "serial,", "there is no part 'serial'; use some of serial_hip");  // of which joint?
+  check("belt_knee,", "serial,",
+        "there is no part 'serial'; use some of parallel_spring_hip, serial_hip");  // of which joint?
   check("leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "cleobot", "does not compose robots from parts");
   check("generator: leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "robot: bipetto", "one architecture");
   check("ankle: differential", "ankle: belt", "not one of its choices");

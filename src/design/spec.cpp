@@ -142,12 +142,18 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
     entry.fail("a given robot has one architecture", "give a generator of parts, e.g. leg_biped");
   const OptionSet parameters = findGenerator(spec.robot.generator, spec.robot.settings).parameters;
   std::map<std::string, DesignVariable> parts;
-  std::map<std::string, int> count;  // of parameters with such a choice
+  // hip_drive is a choice of a part that hip has chosen.
+  const auto is_within_part = [&parameters](const Option& p) {
+    return std::any_of(parameters.begin(), parameters.end(), [&p](const Option& other) {
+      return !other.choices.empty() && p.name.rfind(other.name + "_", 0) == 0;
+    });
+  };
+  std::map<std::string, int> count;  // of parameters with such a choice, but for those within parts
   std::string known;
   for (const Option& p : parameters)
     for (const std::string& choice : p.choices) {
       known += (known.empty() ? "" : ", ") + choice + "_" + p.name;
-      ++count[choice];
+      count[choice] += !is_within_part(p);
     }
   if (known.empty())
     entry.fail("generator '" + spec.robot.generator + "' does not compose robots from parts",
@@ -156,7 +162,8 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
     bool found = false;
     for (const Option& p : parameters)
       for (const std::string& choice : p.choices) {
-        if (choice + "_" + p.name != item.getText() && (choice != item.getText() || count[choice] > 1)) continue;
+        const bool is_short = choice == item.getText() && count[choice] == 1 && !is_within_part(p);
+        if (choice + "_" + p.name != item.getText() && !is_short) continue;
         found = true;
         DesignVariable& part = parts[p.name];
         if (std::find(part.choices.begin(), part.choices.end(), choice) != part.choices.end())
