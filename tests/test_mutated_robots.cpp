@@ -174,7 +174,7 @@ std::string mutate(std::string text, Random& rng) {
 }  // namespace
 
 TEST_CASE("Mutated robot files are models or clear errors") {
-  constexpr int kTrials = 12000;
+  constexpr int kTrials = 6000;
   const std::vector<RobotFiles> robots = collectRobots();
   REQUIRE(robots.size() >= 4);
   const RobotDirectory directory;
@@ -202,7 +202,7 @@ TEST_CASE("Mutated robot files are models or clear errors") {
 }
 
 TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
-  constexpr int kTrials = 4000;
+  constexpr int kTrials = 2000;
   std::vector<std::string> files;
   for (const char* name : {"fourbar", "fivebar_leg", "spring_leg", "belt_biped"}) {
     const Model model = loadRobot(BIELLE_SOURCE_DIR "/robots/" + std::string(name)).model;
@@ -229,7 +229,7 @@ TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
 }
 
 TEST_CASE("Mutated robots of parts are models or clear errors") {
-  constexpr int kTrials = 3000;
+  constexpr int kTrials = 1500;
   const std::string part = R"(mounts: {base: link}
 points: [at]
 parameters:

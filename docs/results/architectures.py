@@ -93,6 +93,10 @@ def run(arguments, directory, specification):
     return {"run": common.describe_run(arguments.commit), "designs": counts[0], "feasible": counts[1], "robots": robots}
 
 
+def shorten(part):
+    return re.sub("_(hip|knee|ankle)$", "", part).replace("_", " ")
+
+
 def calc_total(motions):
     return sum(motion["J"] for motion in motions) if motions else None
 
@@ -110,9 +114,9 @@ def draw(robots, path):
         for i, motion in enumerate(robot["motions"]):
             axes.barh(place, motion["J"], left=left, color=f"C{i}", label=TITLES[i] if place == 0 else None)
             left += motion["J"]
-    axes.set_yticks(range(len(searched)), [", ".join(robot["parts"]).replace("_knee", "").replace("_", " ") for robot in searched])
+    axes.set_yticks(range(len(searched)), [", ".join(map(shorten, robot["parts"])) for robot in searched])
     axes.set_xlabel("electrical energy [J]")
-    axes.legend(fontsize=8, loc="lower right")
+    axes.legend(fontsize=8, loc="upper right")
     figure.tight_layout()
     figure.savefig(path, metadata={"Date": None})
     pyplot.close(figure)
@@ -130,7 +134,7 @@ are feasible; each search had five. Braking energy is not recovered; belts and g
     robots = sorted(data["robots"].values(), key=lambda robot: calc_total(robot["motions"]) or 1e9)
     rows = []
     for robot in robots:
-        cells = [part.replace("_knee", "").replace("_", " ") for part in robot["parts"]]
+        cells = [shorten(part) for part in robot["parts"]]
         if not robot["motions"]:
             cells = [f"*{cell}*" for cell in cells]
         energies = [show(motion["J"], "{:.0f}") for motion in robot["motions"]] or ["–"] * len(TITLES)
@@ -143,6 +147,15 @@ makes the motions, for the best ones, with an asterisk where one misses a goal o
 motor in the four motions, in N m. *Bipetto* has the motors and ratios of [a leg better than it](../../examples/better_leg/README.md),
 its masses as published, and was not searched.""")
     page.table(["hip", "knee", "ankle", "mass [kg]", "sum", *TITLES, "peak torque", "solved"], rows)
+    page.heading("By part")
+    page.add("Mean energy over all legs that have it, in J.")
+    rows = []
+    for i, kind in enumerate(PARTS):
+        for part in dict.fromkeys(robot["parts"][i] for robot in robots if robot["motions"]):
+            having = [robot["motions"] for robot in robots if robot["parts"][i] == part and robot["motions"]]
+            means = [sum(motions[m]["J"] for motions in having) / len(having) for m in range(len(TITLES))]
+            rows.append([kind, shorten(part), f"{sum(means):.0f}", *(f"{mean:.0f}" for mean in means)])
+    page.table(["", "part", "sum", *TITLES], rows)
     return page, robots
 
 
