@@ -77,7 +77,7 @@ def run(arguments, directory, specification):
     subprocess.run([sys.executable, str(common.SOURCE / "examples/better_leg/drive.py"), "ak10-9", "18", "18", "9", "bipetto"],
                    cwd=directory, check=True)
     robots["bipetto"] = {"parts": ["serial", "four-bar", "rods"], "robot": "./bipetto", "motions": [], "solved": []}
-    solved = list(robots)[:arguments.solve] + ["bipetto"]
+    solved = [*list(robots)[:-1][:arguments.solve], "bipetto"]
     lines = ["robots:"] + [f"  {name}: {{robot: {robots[name]['robot']}}}" for name in solved] + ["motions:"]
     lines += [f"  - {{motion: {motion}, set: {json.dumps(settings)}}}" for motion, settings in MOTIONS]
     (directory / "compare.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
