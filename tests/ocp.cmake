@@ -3,7 +3,7 @@ bielle_test(ocp_problem SOURCES test_ocp_problem.cpp LIBS bielle_motion)
 bielle_test(ocp_contract SOURCES test_ocp_contract.cpp LIBS bielle_motion)
 bielle_test(lanes SOURCES test_lanes.cpp LIBS bielle_motion)
 bielle_test(reduced SOURCES test_reduced.cpp LIBS bielle_motion bielle_robots)
-# Under the sanitizers it takes forty times as long, a quarter of an hour on slow machines.
+# Under the sanitizers it takes many times as long, even with a share of the mechanisms.
 set_tests_properties(reduced PROPERTIES TIMEOUT 3600)
 bielle_test(path_constraints SOURCES test_path_constraints.cpp LIBS bielle_motion)
 bielle_test(timings SOURCES test_timings.cpp LIBS bielle_motion)

@@ -128,7 +128,7 @@ def make_page(data):
 same trunk, links and motors (AK10-9 at every joint, behind a stage of up to 2): gears and lengths are searched by gradients for the
 least electrical energy of two walks, stairs of 8 cm and a jump of 0.25 s. Torque, speed and voltage of every motor, its heat, a margin of
 0.2 to dead points, 28 kg and 2 mm between bodies are constraints of all motions. {data['designs']} designs were evaluated, {data['feasible']}
-are feasible; each search had five. Braking energy is not recovered; belts and gears have no losses and no mass of their own.""")
+are feasible; each search had at most five, so that more would find better ones. Braking energy is not recovered; belts and gears have no losses and no mass of their own.""")
     page.lines += ["", "```console", "bielle design examples/architectures/legs.yaml -o legs --jobs 2", "```"]
     page.lines += ["", "![energies of the four motions by robot](../images/architectures.svg)"]
     robots = sorted(data["robots"].values(), key=lambda robot: calc_total(robot["motions"]) or 1e9)

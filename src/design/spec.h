@@ -20,7 +20,7 @@
 ///   - {name: knee_motor, motor: "*knee*", choices: [ak80-9, ak10-9], mass: knee_motor_mass, start: ak10-9}
 /// architecture: [four_bar_knee, belt_knee, rsu_ankle, differential_ankle, three_rrs_hip, serial_hip]   # of a generator of
 ///                                # parts: a variable for each of its parts that several are named of, CHOICE_PARAMETER, or
-///                                # CHOICE where only one part has it (three_rrs); choices within parts by the former
+///                                # CHOICE where only one part has it (three_rrs); a part within a part always needs the former
 /// motor_catalogue: motors.yaml   # or a list of them, relative to this file; searched first
 /// motions:
 ///   - {motion: squat, set: {depth: 0.6}}
