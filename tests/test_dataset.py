@@ -19,6 +19,13 @@ motions:
   - {solve: squat, robot: bipetto, payload: [0, 3], set: {depth: 0.9, """ + SHORT + """}}
   - {solve: squat, robot: bipetto, set: {depth: 0.85, com_weight: 1, """ + SHORT + """}}
 """
+PUSHED = """formats: [mjlab, mcap]
+motions:
+  solve: squat
+  robot: bipetto
+  set: {depth: 0.9, """ + SHORT + """}
+  simulate: {hold: 0.1, push: ["t=0.2,impulse=2,direction=90", "t=0.2,impulse=60"]}
+"""
 
 
 def run(place, text, status=0):
@@ -72,6 +79,22 @@ def check_entries(place):
     assert "3 motions were asked for, 2 are good" in card and "CC0-1.0" in card and SPEC in card
 
 
+def check_pushes(place):
+    """What was carried out is exported as it happened, and good only if the robot stood."""
+    result = run(place, PUSHED)
+    assert "1 of 2 motions are good" in result.stdout and "impulse_60: it fell" in result.stderr, result.stdout + result.stderr
+    stood, fell = read_index(place)
+    assert (stood["outcome"], fell["outcome"]) == ("stood", "fell") and fell["converged"] and fell["check_passed"]
+    assert stood["simulate"] == {"hold": 0.1, "push": "t=0.2,impulse=2,direction=90"} and not fell["files"]
+    summary = json.loads(read(place, "motions", stood["name"], "carried_out", "summary.json"))
+    assert stood["duration_s"] == summary["duration"] and abs(stood["duration_s"] - 0.7) < 1e-6, (stood, summary["duration"])
+    assert read_shape(os.path.join(place, "squats", stood["files"]["mjlab"]), "joint_pos")[0] == 36
+    assert os.path.exists(os.path.join(place, "squats", stood["files"]["mcap"]))
+    for change, problem in ((("[mjlab, mcap]", "[problem]"), "is no problem"), (("hold: 0.1", "live: true"), "cannot be set")):
+        refused = run(place, PUSHED.replace(*change), status=2)
+        assert problem in refused.stderr, (change, refused.stderr)
+
+
 def main():
     if not os.path.exists(os.path.join(os.path.dirname(BIELLE), "bielle-check")):
         print("skipped: no bielle-check")
@@ -103,6 +126,8 @@ def main():
                                 (("robot: bipetto, payload", "robot: no_such_robot, payload"), "no_such_robot")):
             refused = run(place, SPEC.replace(*change), status=2)
             assert problem in refused.stderr, (change, refused.stderr)
+    with tempfile.TemporaryDirectory() as place:
+        check_pushes(place)
     print("data sets are what their index says")
     return 0
 

@@ -22,15 +22,16 @@ IMAGE = common.SOURCE / "docs/images/dataset.svg"
 SPEC = common.SOURCE / "examples/dataset/thousand_motions.yaml"
 ASKED = 1000  # motions of it
 REASONS = {"rejected": "the request was refused", "no end": "the solver did not converge", "check": "the check did not pass",
-           "goal": "a goal was missed"}
+           "goal": "a goal was missed", "fell": "it fell when carried out"}
 SMALL = """licence: CC-BY-4.0
 motions:
   - {solve: squat, robot: bipetto, set: {depth: 0.9, com_weight: [1, 1e5], duration: 0.6, settle: 0, time_step: 0.02}}
 """
 
 
-def judge(result, outcome):
+def judge(case, outcome):
     """(summary, first thing that is not good, of REASONS, and its details); of a good motion (summary, None, "")."""
+    result, execution = case / "motion", case / "carried_out/summary.json"
     if outcome["status"] > 1 or not (result / "summary.json").exists():
         return None, "rejected", outcome["error"]
     summary = json.loads((result / "summary.json").read_text(encoding="utf-8"))
@@ -40,7 +41,14 @@ def judge(result, outcome):
     if not check["pass"]:
         return summary, "check", ", ".join(row["name"] for row in check["rows"] if not row["pass"])
     missed = [f"{goal['name']} {goal['requested']:.4g} → {goal['achieved']:.4g}" for goal in summary["goals"] if not goal["met"]]
-    return summary, "goal" if missed else None, ", ".join(missed)
+    if missed:
+        return summary, "goal", ", ".join(missed)
+    if execution.exists():
+        carried = json.loads(execution.read_text(encoding="utf-8"))
+        summary["duration_s"] = carried["duration"]
+        if carried["outcome"] != "stood":
+            return summary, "fell", carried["outcome_message"]
+    return summary, None, ""
 
 
 def round_off(value):
@@ -59,12 +67,15 @@ def collect(directory):
     lines = []
     for case in sorted((pathlib.Path(directory) / "motions").glob("*/case.json")):
         data = json.loads(case.read_text(encoding="utf-8"))
-        step, outcome = data["request"]["steps"][0], data["outcome"][0]
+        steps, outcome = data["request"]["steps"], data["outcome"][0]
+        step = steps[0]
         robot, _, payload = pathlib.Path(step[step.index("--robot") + 1]).name.partition("_payload_")
         values = dict(step[i + 1].split("=", 1) for i, word in enumerate(step) if word == "--set")
-        summary, reason, why = judge(case.parent / "motion", outcome)
+        summary, reason, why = judge(case.parent, outcome)
         line = {"motion": step[1], "robot": robot, "payload_kg": float(payload or 0),
                 "set": {name: parse(value) for name, value in values.items()}}
+        if len(steps) > 1:
+            line["push"] = steps[1][steps[1].index("--push") + 1]
         if summary:
             line.update(goals={goal["name"]: round_off(goal["achieved"]) for goal in summary["goals"]},
                         duration_s=round_off(summary["duration_s"]), iterations=summary["iterations"])
@@ -88,19 +99,23 @@ def read(data=DATA):
     return head, lines
 
 
+def name_motion(line):
+    return line["motion"] + (", pushed" if "push" in line else "")
+
+
 def draw(lines, path):
     """Good motions by robot and motion, and the iterations of each."""
     import matplotlib
     matplotlib.use("svg")
     matplotlib.rcParams.update({"svg.hashsalt": "dataset", "svg.fonttype": "none", "font.size": 9})
     from matplotlib import pyplot
-    motions = list(dict.fromkeys(line["motion"] for line in lines))
+    motions = list(dict.fromkeys(name_motion(line) for line in lines))
     robots = list(dict.fromkeys(line["robot"] for line in lines))
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.6, 3.6))
     width = 0.8 / len(robots)
     for i, robot in enumerate(robots):
         places = [k + (i - (len(robots) - 1) / 2) * width for k in range(len(motions))]
-        good, asked = ([sum(line["motion"] == motion and line["robot"] == robot and ("failed" not in line or every)
+        good, asked = ([sum(name_motion(line) == motion and line["robot"] == robot and ("failed" not in line or every)
                             for line in lines) for motion in motions] for every in (False, True))
         left.bar(places, asked, width, color="none", edgecolor="#888888", lw=0.6)
         left.bar(places, good, width, color=f"C{i}", label=robot)
@@ -109,7 +124,7 @@ def draw(lines, path):
     left.legend(fontsize=8)
     for i, robot in enumerate(robots):
         chosen = [line for line in lines if line["robot"] == robot and "failed" not in line]
-        right.plot([motions.index(line["motion"]) + (i - (len(robots) - 1) / 2) * width for line in chosen],
+        right.plot([motions.index(name_motion(line)) + (i - (len(robots) - 1) / 2) * width for line in chosen],
                    [line["iterations"] for line in chosen], ".", ms=4, color=f"C{i}", alpha=0.5)
     right.set_xticks(range(len(motions)), motions, rotation=35, ha="right")
     right.set_ylabel("iterations of the solver")
@@ -122,7 +137,7 @@ def draw(lines, path):
 
 def describe_values(line):
     text = ", ".join(f"{name} {value}" for name, value in line["set"].items())
-    return text + (f", {line['payload_kg']:g} kg" if line["payload_kg"] else "")
+    return text + (f", {line['payload_kg']:g} kg" if line["payload_kg"] else "") + (f", {line['push']}" if "push" in line else "")
 
 
 def make_page(head, lines, figure):
@@ -131,17 +146,17 @@ def make_page(head, lines, figure):
     hours = head["cpu_seconds"] / 3600
     made = "" if len(lines) == ASKED else f" {len(lines)} of its {ASKED} motions were made; the run was cut off, before it exported any."
     page.add(f"""`bielle dataset` of `examples/dataset/{SPEC.name}`.{made} Of {len(lines)} motions {len(good)} are
-good, {sum(line['duration_s'] for line in good) / 60:.1f} minutes together. They took {hours:.2f} hours of one core, solves and
-checks: {len(lines) / hours:.0f} motions per core-hour. A motion is good if the solver converged, `bielle check` passes and all
-goals are met ([data sets](../datasets.md)). The index is `docs/results/data/dataset_index.jsonl`, one line per motion behind a line
+good, {sum(line['duration_s'] for line in good) / 60:.1f} minutes together. They took {hours:.2f} hours of one core, solves,
+checks and simulations: {len(lines) / hours:.0f} motions per core-hour. A motion is good if the solver converged, `bielle check`
+passes and all goals are met; a pushed one, carried out under predictive control with real sensors, must also stand ([data sets](../datasets.md)). The index is `docs/results/data/dataset_index.jsonl`, one line per motion behind a line
 about the run; the motions follow from the specification.""")
     page.lines += ["", "```console", f"bielle dataset examples/dataset/{SPEC.name} -o thousand", "```"]
     if figure:
         page.lines += ["", "![motions and iterations by robot](../images/dataset.svg)"]
     robots = list(dict.fromkeys(line["robot"] for line in lines))
     rows = []
-    for motion in dict.fromkeys(line["motion"] for line in lines):
-        ours = [line for line in lines if line["motion"] == motion]
+    for motion in dict.fromkeys(map(name_motion, lines)):
+        ours = [line for line in lines if name_motion(line) == motion]
         cells = []
         for robot in robots:
             asked = [line for line in ours if line["robot"] == robot]
@@ -159,7 +174,7 @@ about the run; the motions follow from the specification.""")
     page.add("; ".join(f"{REASONS[reason]}: {count}" for reason, count in counts.most_common()) + ".")
     page.lines += ["", f"<details><summary>All {len(failed)}</summary>"]
     page.table(["robot", "motion", "values", "", "details"],
-               [[line["robot"], line["motion"], describe_values(line), REASONS[line["failed"]],
+               [[line["robot"], name_motion(line), describe_values(line), REASONS[line["failed"]],
                  re.sub(r"\s+", " ", line["why"]).replace("|", "/")[:200]] for line in failed])
     page.lines += ["", "</details>"]
     return page

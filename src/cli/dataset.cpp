@@ -64,7 +64,8 @@ std::string describeShortfall(const DatasetEntry& entry) {
   if (!entry.error.empty()) return entry.error;
   if (!entry.converged) return "the solver did not converge";
   if (!entry.passed) return "the check did not pass";
-  return "a goal was missed";
+  if (!entry.met) return "a goal was missed";
+  return entry.outcome == "fell" ? "it fell in simulation" : "the simulation failed";
 }
 
 int run(const DatasetArguments& arguments) {
@@ -117,9 +118,11 @@ void addDataset(CLI::App& app, Action& action) {
       "      payload: [0, 5]                (kg, fixed to the trunk)\n"
       "      set: {speed: [0.3, -0.3], steps: 4}\n"
       "      options: {dead-point-margin: 0.3}      (others of `bielle solve`)\n"
-      "A motion is good if the solver converged, `bielle check` passes and all goals are met; only good ones are "
-      "exported,\n"
-      "all are in the index. Finished motions are kept: after Ctrl-C, a crash or with more values in SPEC, the same\n"
+      "      simulate: {push: [\"t=1,impulse=5\"]}    (optional: carry it out, with options of `bielle simulate`)\n"
+      "A motion is good if the solver converged, `bielle check` passes, all goals are met and, carried out, it "
+      "stands;\n"
+      "only good ones are exported, all are in the index. Finished motions are kept: after Ctrl-C, a crash or with "
+      "more values in SPEC, the same\n"
       "command does what is missing.\n"
       "Exit status: 0 done, 1 interrupted or a program crashed, 2 bad input.\n"
       "Example:\n"

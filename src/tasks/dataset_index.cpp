@@ -37,10 +37,12 @@ std::string formatLine(const DatasetEntry& entry) {
                {"motion", motion.motion},
                {"set", listValues(motion.set)},
                {"options", listValues(motion.options)},
+               {"simulate", listValues(motion.simulate)},
                {"good", entry.is_good()},
                {"converged", entry.converged},
                {"check_passed", entry.passed},
                {"goals_met", entry.met},
+               {"outcome", entry.outcome},
                {"goals", entry.goals},
                {"duration_s", entry.duration},
                {"files", listTexts(entry.files)}};
@@ -54,9 +56,12 @@ constexpr const char* kCard = R"(
 - `index.jsonl`: one JSON object per motion: what was asked (`robot`, `payload_kg`, `motion`, `set`, `options`), what was
   achieved (`goals` with requested and achieved values, `converged`, `check_passed`, `goals_met`; `good` if all three hold),
   `duration_s`, and `files` by format. Motions that are not good are listed, too, and have no files but their result.
+  A motion with an `outcome` was carried out in a physics simulation with the options in `simulate`, and its files hold what
+  happened there; it is good only if it `stood`.
 - `mjlab/NAME.npz`, `amp/NAME.npz`: joints and bodies at a uniform rate, with the robots as files of MuJoCo beside them;
   `mcap/NAME.mcap`: frames, forces and events over time. Each holds the motions that are good.
 - `motions/NAME/motion`: the result of the solver, at its own nodes, with its check; `motions/NAME/step1.log` what it printed.
+  `motions/NAME/carried_out`: what happened in simulation.
 
 ## How it was made
 
@@ -92,9 +97,9 @@ DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& ou
     entry.error = "it did not end";
     return entry;
   }
-  const fs::path result = fs::path(directory) / kDatasetMotion;
-  if (outcome.steps.back().status > 1 || !fs::exists(result / "summary.json")) {
-    entry.error = outcome.steps.back().error;
+  const fs::path result = fs::path(directory) / kDatasetMotion, execution = fs::path(directory) / kDatasetExecution;
+  if (outcome.steps.front().status > 1 || !fs::exists(result / "summary.json")) {
+    entry.error = outcome.steps.front().error;
     return entry;
   }
   entry.result = result.string();
@@ -107,10 +112,16 @@ DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& ou
                            {"requested", goal.goal.requested},
                            {"achieved", goal.achieved},
                            {"met", goal.met()}});
-  const VectorXd time = readResultRecord(entry.result).time;
-  entry.duration = time[time.size() - 1];
   if (const fs::path check = result / "check.json"; fs::exists(check))
     readJsonFile(check.string(), "remove it", [&](const Json& json) { entry.passed = json.at("pass"); });
+  if (const fs::path summary_file = execution / "summary.json"; fs::exists(summary_file)) {
+    entry.result = execution.string();
+    readJsonFile(summary_file.string(), "remove it", [&](const Json& json) { entry.outcome = json.at("outcome"); });
+  } else if (motion.carried_out) {
+    entry.error = outcome.steps.back().error;
+  }
+  const VectorXd time = readResultRecord(entry.result).time;
+  entry.duration = time[time.size() - 1];
   return entry;
 }
 

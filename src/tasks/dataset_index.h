@@ -8,12 +8,14 @@ namespace bielle::tasks {
 /// One line of index.jsonl.
 struct DatasetEntry {
   const DatasetMotion* motion = nullptr;
-  std::string result;                                   ///< directory of its result; empty if there is none
-  std::string error;                                    ///< of a motion that was refused
+  std::string
+      result;         ///< directory of its result, or of what it became when it was carried out; empty if there is none
+  std::string error;  ///< of a motion that was refused
   bool converged = false, passed = false, met = false;  ///< the solver; the check; all goals
-  bool is_good() const { return converged && passed && met; }
+  std::string outcome;                                  ///< of a motion that was carried out: stood, fell or failed
+  bool is_good() const { return converged && passed && met && outcome == (motion->carried_out ? "stood" : ""); }
   Json goals = Json::array();
-  double duration = 0;                                     ///< s
+  double duration = 0;                                     ///< s, of the result
   std::vector<std::pair<std::string, std::string>> files;  ///< by format, from the directory of the data set
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <set>
 
@@ -22,7 +23,7 @@ constexpr size_t kMostMotions = 100'000;
 
 // What is varied in one entry of `motions`.
 struct DatasetAxis {
-  enum class Kind { Robot, Payload, Setting, Option } kind;
+  enum class Kind { Robot, Payload, Setting, Option, Simulation } kind;
   std::string name;
   std::vector<std::string> values;
   YamlEntry entry;
@@ -45,6 +46,15 @@ void checkPayloads(const DatasetAxis& axis) {
   }
 }
 
+void addOptionAxes(AxisKind kind, const YamlEntry& options, std::initializer_list<const char*> own,
+                   std::vector<DatasetAxis>& axes) {
+  for (const auto& [name, value] : options.getMap()) {
+    for (const char* other : own)
+      if (name == other) value.fail("it cannot be set here", "remove it");
+    axes.push_back(readAxis(kind, name, value));
+  }
+}
+
 std::vector<DatasetAxis> readAxes(const YamlFields& fields, const YamlEntry& entry, OptionSet known) {
   std::vector<DatasetAxis> axes = {readAxis(AxisKind::Robot, "robot", require(fields, "robot", entry))};
   if (const YamlEntry* payload = find(fields, "payload")) {
@@ -57,11 +67,12 @@ std::vector<DatasetAxis> readAxes(const YamlFields& fields, const YamlEntry& ent
       for (const std::string& text : axes.back().values) known.set(name, parseOption(text));  // checks it
     }
   if (const YamlEntry* options = find(fields, "options"))
-    for (const auto& [name, value] : options->getMap()) {
-      for (const char* other : {"help", "output", "robot", "set", "threads", "no-check", "no-report", "quiet"})
-        if (name == other) value.fail("it cannot be set here", "remove it");
-      axes.push_back(readAxis(AxisKind::Option, name, value));
-    }
+    addOptionAxes(AxisKind::Option, *options,
+                  {"help", "output", "robot", "set", "threads", "no-check", "no-report", "quiet"}, axes);
+  if (const YamlEntry* options = find(fields, "simulate"))
+    addOptionAxes(
+        AxisKind::Simulation, *options,
+        {"help", "output", "robot", "set", "speed", "threads", "no-report", "summary-only", "live", "dry-run"}, axes);
   return axes;
 }
 
@@ -95,7 +106,7 @@ class DatasetNames {
 };
 
 void addMotions(const YamlEntry& entry, DatasetNames& names, DatasetSpec& spec) {
-  const YamlFields fields = entry.getFields({"solve", "robot", "payload", "set", "options"});
+  const YamlFields fields = entry.getFields({"solve", "robot", "payload", "set", "options", "simulate"});
   const std::string solve = require(fields, "solve", entry).getText();
   const std::vector<DatasetAxis> axes = readAxes(fields, entry, findMotion(spec.path, solve).request.options);
   size_t count = 1;
@@ -106,6 +117,7 @@ void addMotions(const YamlEntry& entry, DatasetNames& names, DatasetSpec& spec) 
   for (size_t i = 0; i < count; ++i) {
     DatasetMotion motion;
     motion.motion = solve;
+    motion.carried_out = find(fields, "simulate") != nullptr;
     std::string varied, carried;
     size_t rest = i, block = count;
     for (const DatasetAxis& axis : axes) {
@@ -120,7 +132,10 @@ void addMotions(const YamlEntry& entry, DatasetNames& names, DatasetSpec& spec) 
         motion.payload = std::stod(value);
         if (motion.payload > 0) carried = "_payload_" + value;
       } else {
-        (axis.kind == AxisKind::Setting ? motion.set : motion.options).emplace_back(axis.name, value);
+        auto& values = axis.kind == AxisKind::Setting  ? motion.set
+                       : axis.kind == AxisKind::Option ? motion.options
+                                                       : motion.simulate;
+        values.emplace_back(axis.name, value);
         varied += "_" + axis.name + "_" + value;
       }
     }
@@ -158,6 +173,11 @@ DatasetSpec readDatasetSpec(const std::string& path) {
     for (const YamlEntry& entry : motions.isList() ? motions.getList() : std::vector<YamlEntry>{motions})
       addMotions(entry, names, spec);
     if (spec.motions.empty()) motions.fail("it is empty", "give at least one motion");
+    const bool carries_out = std::any_of(spec.motions.begin(), spec.motions.end(),
+                                         [](const DatasetMotion& motion) { return motion.carried_out; });
+    if (carries_out && std::count(spec.formats.begin(), spec.formats.end(), "problem") > 0)
+      require(fields, "formats", document)
+          .fail("a motion that was carried out is no problem", "remove 'problem', or `simulate` from the motions");
   });
   return spec;
 }
@@ -167,7 +187,11 @@ Case makeDatasetCase(const DatasetMotion& motion, const std::string& robot) {
   for (const auto& [name, value] : motion.set) solve.insert(solve.end(), {"--set", name + "=" + value});
   for (const auto& [name, value] : motion.options) addOption(name, value, solve);
   solve.insert(solve.end(), {"-o", std::string("@") + kDatasetMotion, "--quiet", "--no-report", "--threads", "1"});
-  return {motion.name, {solve}, robot};
+  if (!motion.carried_out) return {motion.name, {solve}, robot};
+  std::vector<std::string> simulate = {"simulate", std::string("@") + kDatasetMotion};
+  for (const auto& [name, value] : motion.simulate) addOption(name, value, simulate);
+  simulate.insert(simulate.end(), {"-o", std::string("@") + kDatasetExecution, "--no-report", "--threads", "1"});
+  return {motion.name, {solve, simulate}, robot};
 }
 
 }  // namespace bielle::tasks

@@ -11,6 +11,7 @@
 ///     payload: [0, 5]            # kg, fixed to the trunk; default: 0
 ///     set: {speed: [0.3, -0.3], steps: 4}
 ///     options: {dead-point-margin: 0.3}      # others of `bielle solve`, by their names
+///     simulate: {push: ["t=1,impulse=5"]}    # carried out, too, with these options of `bielle simulate`
 /// ```
 #include <string>
 #include <utility>
@@ -28,6 +29,8 @@ struct DatasetMotion {
   std::string body;        ///< name of the robot with its payload, e.g. bipetto_payload_5
   double payload = 0;      ///< kg
   std::vector<std::pair<std::string, std::string>> set, options;  ///< by name, as for the command line
+  bool carried_out = false;
+  std::vector<std::pair<std::string, std::string>> simulate;  ///< options of `bielle simulate`, likewise
 };
 
 struct DatasetSpec {
@@ -41,8 +44,9 @@ struct DatasetSpec {
 /// \throws InputError naming the file, the key with its line, and the remedy; `options` are not checked
 DatasetSpec readDatasetSpec(const std::string& path);
 
-constexpr const char* kDatasetMotion = "motion";  ///< directory of the result of a case
-/// `bielle solve` with its check. \param robot  that carries the payload
+constexpr const char* kDatasetMotion = "motion";          ///< directory of the result of a case
+constexpr const char* kDatasetExecution = "carried_out";  ///< that of the motion as it was carried out
+/// `bielle solve` with its check, then `bielle simulate` if asked for. \param robot  that carries the payload
 Case makeDatasetCase(const DatasetMotion& motion, const std::string& robot);
 
 }  // namespace bielle::tasks
