@@ -210,9 +210,11 @@ class FollowedMotors {
     return differ(*to, *from);
   }
   OptimumDerivative differentiate() const {
-    const auto out = differentiateOptimum(
-        here_.solution, ahead_.solution.motion, behind_.solution.motion, step_,
-        [&](const Motion& motion, const ShootingTrajectory& t) { return readMotors(dt_, motion, t); });
+    const auto makeReader = [&](const Motion& motion) {
+      return [&](const ShootingTrajectory& t) { return readMotors(dt_, motion, t); };
+    };
+    FollowedMotion followed(here_.solution, here_.solution.motion, makeReader(here_.solution.motion));
+    const auto out = followed.differentiate(ahead_.solution.motion, step_, makeReader(ahead_.solution.motion));
     REQUIRE(out);
     return *out;
   }

@@ -49,9 +49,18 @@ class StateMeasures {
 // The slopes of one motion, and what is read of its neighbours for them.
 class OptimumSlopes {
  public:
-  OptimumSlopes(const MotionOutcome& outcome, Eigen::Index variables, const std::set<Measure>& requested,
+  // \param here  the motion of the outcome, made as those of robots beside it
+  OptimumSlopes(const MotionOutcome& outcome, Motion here, Eigen::Index variables, const std::set<Measure>& requested,
                 const BodyPairs& left_out)
-      : outcome_(outcome), requested_(requested), left_out_(left_out), envelope_(*outcome.solution) {
+      : requested_(requested),
+        left_out_(left_out),
+        optimum_(*outcome.solution),
+        here_(std::move(here)),
+        envelope_(optimum_),
+        cost_(envelope_.calcLagrangian(here_)),
+        at_(optimum_.motion.problem->model(), optimum_.trajectory.xs.front(), requested, left_out),
+        followed_(optimum_, here_,
+                  [this](const ShootingTrajectory& trajectory) { return read(here_, trajectory, at_); }) {
     const MotorTrace& trace = outcome.measures.trace;
     const auto count = static_cast<size_t>(variables);
     out_.dt = trace.dt, out_.u = trace.torque, out_.v = trace.speed;
@@ -66,15 +75,12 @@ class OptimumSlopes {
     out_.ddistance.assign(count, Eigen::RowVectorXd::Zero(out_.distance.size()));
   }
 
-  // The derivatives by variable i, from motions at `step` on either side; false if there are none.
-  bool add(const Motion& ahead, const Motion& behind, double step, Eigen::Index i) {
-    const double dcost = envelope_.calcDerivative(ahead, behind, step);
-    StateMeasures at_ahead(ahead.problem->model(), ahead.problem->initialState(), requested_, left_out_),
-        at_behind(behind.problem->model(), behind.problem->initialState(), requested_, left_out_);
-    const auto derivative = differentiateOptimum(
-        *outcome_.solution, ahead, behind, step, [&](const Motion& motion, const ShootingTrajectory& trajectory) {
-          return read(motion, trajectory, &motion == &ahead ? at_ahead : at_behind);
-        });
+  // The derivatives by variable i, from the motion of the robot at `step` from this one; false if there are none.
+  bool add(const Motion& changed, double step, Eigen::Index i) {
+    const double dcost = (envelope_.calcLagrangian(changed) - cost_) / step;
+    StateMeasures at(changed.problem->model(), changed.problem->initialState(), requested_, left_out_);
+    const auto derivative = followed_.differentiate(
+        changed, step, [&](const ShootingTrajectory& trajectory) { return read(changed, trajectory, at); });
     if (!std::isfinite(dcost) || !derivative) return false;
     out_.dcost[i] = dcost;
     write(derivative->value, static_cast<size_t>(i));
@@ -85,18 +91,17 @@ class OptimumSlopes {
 
  private:
   void addStates() {
-    const std::vector<VectorXd>& xs = outcome_.solution->trajectory.xs;
+    const std::vector<VectorXd>& xs = optimum_.trajectory.xs;
     const auto nodes = static_cast<Eigen::Index>(xs.size());
-    StateMeasures at(outcome_.solution->motion.problem->model(), xs.front(), requested_, left_out_);
-    if (at.hasMargins()) {
-      out_.margin.resize(at.calcMargins(xs.front()).size(), nodes);
-      for (Eigen::Index k = 0; k < nodes; ++k) out_.margin.col(k) = at.calcMargins(xs[static_cast<size_t>(k)]);
+    if (at_.hasMargins()) {
+      out_.margin.resize(at_.calcMargins(xs.front()).size(), nodes);
+      for (Eigen::Index k = 0; k < nodes; ++k) out_.margin.col(k) = at_.calcMargins(xs[static_cast<size_t>(k)]);
       margins_ = listLeast(out_.margin);
     }
-    if (!at.hasPairs()) return;
+    if (!at_.hasPairs()) return;
     out_.distance.resize(nodes);
     for (Eigen::Index k = 0; k < nodes; ++k) {
-      const NearestPair nearest = at.findNearest(xs[static_cast<size_t>(k)]);
+      const NearestPair nearest = at_.findNearest(xs[static_cast<size_t>(k)]);
       out_.distance[k] = nearest.distance.distance;
       pairs_.push_back(nearest.pair);
     }
@@ -131,10 +136,14 @@ class OptimumSlopes {
     out_.dgoals.col(static_cast<Eigen::Index>(i)) = derivative.tail(out_.dgoals.rows());
   }
 
-  const MotionOutcome& outcome_;
   const std::set<Measure>& requested_;
   const BodyPairs& left_out_;
+  const Solution& optimum_;
+  Motion here_;
   MotionEnvelope envelope_;
+  double cost_;
+  StateMeasures at_;
+  FollowedMotion followed_;
   MotorSlopes out_;
   std::vector<std::pair<Eigen::Index, Eigen::Index>> margins_, distances_;  // where they are read
   std::vector<int> pairs_;                                                  // the nearest at every node
@@ -188,18 +197,18 @@ std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const V
     return out;
   };
   try {
-    std::vector<std::unique_ptr<OptimumSlopes>> slopes;
-    for (const MotionOutcome& outcome : outcomes)
-      slopes.push_back(std::make_unique<OptimumSlopes>(outcome, x.size(), requested, left_out));
     NeighbourMotions neighbours(motions);
+    NeighbourMotions::Robot here(robot.make(x));
+    std::vector<std::unique_ptr<OptimumSlopes>> slopes;
+    for (size_t m = 0; m < motions.size(); ++m)
+      slopes.push_back(
+          std::make_unique<OptimumSlopes>(outcomes[m], neighbours.plan(m, here), x.size(), requested, left_out));
     for (Eigen::Index i : robot.listContinuous()) {
-      const double h = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
+      const double h = kForwardStep * (robot.upper()[i] - robot.lower()[i]);
       const VectorXd dx = h * VectorXd::Unit(x.size(), i);
-      NeighbourMotions::Robot to(robot.make(x + dx)), from(robot.make(x - dx));
+      NeighbourMotions::Robot changed(robot.make(x + dx));
       for (size_t m = 0; m < motions.size(); ++m) {
-        const Motion ahead = neighbours.plan(m, to);
-        const Motion behind = neighbours.plan(m, from);
-        if (slopes[m]->add(ahead, behind, h, i)) continue;
+        if (slopes[m]->add(neighbours.plan(m, changed), h, i)) continue;
         return fail(" along " + robot.variables()[static_cast<size_t>(i)].name + ": " + motions[m].name +
                     " cannot be followed");
       }

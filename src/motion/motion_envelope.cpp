@@ -33,22 +33,30 @@ std::optional<ShootingTrajectory> followOptimum(const Solution& optimum, const M
   return out ? std::optional<ShootingTrajectory>(to->unwrap(*out)) : std::nullopt;
 }
 
-std::optional<OptimumDerivative> differentiateOptimum(
-    const Solution& optimum, const Motion& ahead, const Motion& behind, double step,
-    const std::function<VectorXd(const Motion&, const ShootingTrajectory&)>& read) {
-  const std::unique_ptr<PeakProblem> at = makePeakProblem(optimum.motion), to = makePeakProblem(ahead),
-                                     from = makePeakProblem(behind);
-  if (!at)
-    return differentiateOptimum(*optimum.motion.problem, optimum.trajectory, optimum.multipliers, *ahead.problem,
-                                *behind.problem, step,
-                                [&](const ShootingProblem& changed, const ShootingTrajectory& trajectory) {
-                                  return read(&changed == ahead.problem.get() ? ahead : behind, trajectory);
-                                });
-  return differentiateOptimum(*at, at->wrap(optimum.trajectory), optimum.multipliers, *to, *from, step,
-                              [&](const ShootingProblem& changed, const ShootingTrajectory& trajectory) {
-                                return &changed == to.get() ? read(ahead, to->unwrap(trajectory))
-                                                            : read(behind, from->unwrap(trajectory));
-                              });
+namespace {
+
+const ShootingProblem& getProblem(const Motion& motion, const PeakProblem* peak) {
+  return peak ? static_cast<const ShootingProblem&>(*peak) : *motion.problem;
+}
+
+// A reader of the problem of a peak, if there is one, by that of its motion.
+OptimumReader unwrap(const PeakProblem* peak, const OptimumReader& read) {
+  if (!peak) return read;
+  return [peak, read](const ShootingTrajectory& trajectory) { return read(peak->unwrap(trajectory)); };
+}
+
+}  // namespace
+
+FollowedMotion::FollowedMotion(const Solution& optimum, const Motion& here, const OptimumReader& read)
+    : peak_(makePeakProblem(optimum.motion)),
+      peak_here_(makePeakProblem(here)),
+      followed_(getProblem(optimum.motion, peak_.get()), peak_ ? peak_->wrap(optimum.trajectory) : optimum.trajectory,
+                optimum.multipliers, getProblem(here, peak_here_.get()), unwrap(peak_here_.get(), read)) {}
+
+std::optional<OptimumDerivative> FollowedMotion::differentiate(const Motion& changed, double step,
+                                                               const OptimumReader& read) {
+  const std::unique_ptr<PeakProblem> peak = makePeakProblem(changed);
+  return followed_.differentiate(getProblem(changed, peak.get()), step, unwrap(peak.get(), read));
 }
 
 }  // namespace bielle

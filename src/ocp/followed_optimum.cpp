@@ -64,13 +64,12 @@ class Follower {
   std::vector<VectorXd> dx_, du_;
 };
 
-// About the path of a changed problem; none where it cannot follow.
-std::optional<Follower> startFollower(const ShootingProblem& problem, const ShootingTrajectory& optimum,
-                                      const Multipliers& multipliers, const ShootingProblem& changed) {
+// About the path of a changed problem; null where it cannot follow.
+std::unique_ptr<Follower> startFollower(const ShootingProblem& problem, const ShootingTrajectory& optimum,
+                                        const Multipliers& multipliers, const ShootingProblem& changed) {
   requireSameSizes(problem, changed);
   std::optional<ShootingTrajectory> path = calcPath(problem, optimum, changed);
-  if (!path) return {};
-  return std::optional<Follower>(std::in_place, changed, std::move(*path), multipliers);
+  return path ? std::make_unique<Follower>(changed, std::move(*path), multipliers) : nullptr;
 }
 
 // Eq. (4) of s_0 .. s_n, n > 0, with its residual.
@@ -96,28 +95,57 @@ OptimumDerivative extrapolate(const std::vector<VectorXd>& s) {
 std::optional<ShootingTrajectory> followOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum,
                                                 const Multipliers& multipliers, const ShootingProblem& changed,
                                                 int sweeps) {
-  std::optional<Follower> follower = startFollower(problem, optimum, multipliers, changed);
+  const std::unique_ptr<Follower> follower = startFollower(problem, optimum, multipliers, changed);
   if (!follower) return {};
   for (int i = 0; i < sweeps; ++i)
     if (!follower->step()) return {};
   return follower->get();
 }
 
-std::optional<OptimumDerivative> differentiateOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum,
-                                                      const Multipliers& multipliers, const ShootingProblem& ahead,
-                                                      const ShootingProblem& behind, double step,
-                                                      const OptimumReader& read) {
-  std::optional<Follower> to = startFollower(problem, optimum, multipliers, ahead),
-                          from = startFollower(problem, optimum, multipliers, behind);
-  if (!to || !from) return {};
-  const auto difference = [&]() -> VectorXd {
-    return (read(ahead, to->get()) - read(behind, from->get())) / (2 * step);
+struct FollowedOptimum::Data {
+  const ShootingProblem& problem;
+  ShootingTrajectory optimum;
+  Multipliers multipliers;
+  const ShootingProblem& here;
+  OptimumReader read;
+  std::unique_ptr<Follower> follower;  // of `here`
+  std::vector<VectorXd> numbers;       // after 0, 1, ... sweeps of it
+
+  // After so many sweeps; null where it cannot be followed.
+  const VectorXd* get(size_t sweeps) {
+    if (!follower) {
+      follower = startFollower(problem, optimum, multipliers, here);
+      if (!follower) return nullptr;
+      numbers = {read(follower->get())};
+    }
+    while (numbers.size() <= sweeps) {
+      if (!follower->step()) return nullptr;
+      numbers.push_back(read(follower->get()));
+    }
+    return &numbers[sweeps];
+  }
+};
+
+FollowedOptimum::FollowedOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum,
+                                 const Multipliers& multipliers, const ShootingProblem& here, OptimumReader read)
+    : data_(new Data{problem, optimum, multipliers, here, std::move(read), {}, {}}) {}
+FollowedOptimum::~FollowedOptimum() = default;
+FollowedOptimum::FollowedOptimum(FollowedOptimum&&) noexcept = default;
+
+std::optional<OptimumDerivative> FollowedOptimum::differentiate(const ShootingProblem& changed, double step,
+                                                                const OptimumReader& read) {
+  const std::unique_ptr<Follower> to = startFollower(data_->problem, data_->optimum, data_->multipliers, changed);
+  if (!to) return {};
+  std::vector<VectorXd> s;
+  const auto add = [&] {
+    const VectorXd* from = data_->get(s.size());
+    if (from) s.push_back((read(to->get()) - *from) / step);
+    return from != nullptr;
   };
-  std::vector<VectorXd> s = {difference()};
+  if (!add()) return {};
   OptimumDerivative out;
   do {
-    if (!to->step() || !from->step()) return {};
-    s.push_back(difference());
+    if (!to->step() || !add()) return {};
     out = extrapolate(s);
   } while (out.residual > kFollowTolerance && out.sweeps < kMostSweeps);
   return out;

@@ -19,5 +19,8 @@ VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const
 /// Half the step of a central difference, relative to the width of the bounds: its error grows with the square,
 /// rounding with the inverse.
 inline constexpr double kDesignStep = 2e-5;
+/// The step of a forward difference, likewise: its error grows with the step itself. For derivatives that sweeps leave a thousandth
+/// of anyway (ocp/followed_optimum.h).
+inline constexpr double kForwardStep = 2e-6;
 
 }  // namespace bielle

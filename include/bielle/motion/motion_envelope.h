@@ -34,11 +34,19 @@ class MotionEnvelope {
 /// The optimum of another motion like it to first order, as a trajectory of changed.problem (ocp/followed_optimum.h).
 std::optional<ShootingTrajectory> followOptimum(const Solution& optimum, const Motion& changed, int sweeps = 2);
 
-/// The derivative of numbers computed from the optimum of a motion (ocp/followed_optimum.h). \param ahead, behind
-/// motions like it
-/// \param read  numbers computed from a trajectory of a motion's problem
-std::optional<OptimumDerivative> differentiateOptimum(
-    const Solution& optimum, const Motion& ahead, const Motion& behind, double step,
-    const std::function<VectorXd(const Motion&, const ShootingTrajectory&)>& read);
+/// FollowedOptimum of a motion, whatever it minimizes.
+class FollowedMotion {
+ public:
+  /// \param here  the motion of the optimum, made as changed ones are   \param read  numbers computed from a trajectory of it
+  /// Both must outlive it.
+  FollowedMotion(const Solution& optimum, const Motion& here, const OptimumReader& read);
+
+  /// \param changed  a motion like it   \param read  of a trajectory of its problem
+  std::optional<OptimumDerivative> differentiate(const Motion& changed, double step, const OptimumReader& read);
+
+ private:
+  std::unique_ptr<PeakProblem> peak_, peak_here_;
+  FollowedOptimum followed_;
+};
 
 }  // namespace bielle

@@ -15,8 +15,8 @@
 /// and so on: a full step of the solver each time, without a search. Where rows or bounds become active, or cease to be, the
 /// derivative of an optimum jumps; that of (1) holds them.
 ///
-/// Central differences of (2) across p are derivatives of the optimum, in which the residual of the solve cancels.
-/// Let s_j be that of some smooth function of z_j. With H the exact Hessian of the Lagrangian along the constraints,
+/// Differences between (2) for p and for p = 0 are derivatives of the optimum, in which the residual of
+/// the solve cancels; the sweeps of the latter serve all p. Let s_j be that of some smooth function of z_j. With H the exact Hessian of the Lagrangian along the constraints,
 ///
 ///     s_{j+1} = s_j - K^-1 (H s_j + dgrad L/dp),                                                                   (3)
 ///
@@ -27,6 +27,7 @@
 ///
 ///     s = sum_j g_j s_{j+1},    min_g |sum_j g_j (s_{j+1} - s_j)|,    sum_j g_j = 1.                               (4)
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "bielle/solve/fddp.h"
@@ -43,22 +44,36 @@ std::optional<ShootingTrajectory> followOptimum(const ShootingProblem& problem, 
 
 struct OptimumDerivative {
   VectorXd value;       ///< s of Eq. (4), over the unit of p
-  int sweeps = 0;       ///< done on either side
+  int sweeps = 0;       ///< of the changed problem
   double residual = 0;  ///< the norm that (4) minimizes, over that of s
 };
 
-/// Smooth numbers computed from an optimum of a changed problem; of the same size for all problems.
-using OptimumReader = std::function<VectorXd(const ShootingProblem& changed, const ShootingTrajectory& optimum)>;
+/// Smooth numbers computed from an optimum; of the same size for all problems.
+using OptimumReader = std::function<VectorXd(const ShootingTrajectory& optimum)>;
 
 inline constexpr double kFollowTolerance = 1e-3;  ///< of OptimumDerivative::residual
 inline constexpr int kMostSweeps = 10;            ///< after which it may be larger
 
-/// The derivative of numbers computed from the optimum. Empty if it cannot be followed.
-/// \param ahead, behind  problems at `step` (units of p) on either side of that of the optimum
-/// \throws std::invalid_argument as followOptimum()
-std::optional<OptimumDerivative> differentiateOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum,
-                                                      const Multipliers& multipliers, const ShootingProblem& ahead,
-                                                      const ShootingProblem& behind, double step,
-                                                      const OptimumReader& read);
+/// Derivatives of numbers computed from an optimum, by any number of parameters.
+class FollowedOptimum {
+ public:
+  /// \param problem  of the optimum   \param here  the same, made as changed ones are, so that what their making rounds cancels
+  /// \param read  of the optimum of `here`
+  /// The problems must outlive it.
+  FollowedOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum, const Multipliers& multipliers,
+                  const ShootingProblem& here, OptimumReader read);
+  ~FollowedOptimum();
+  FollowedOptimum(FollowedOptimum&&) noexcept;
+
+  /// Empty if the optimum cannot be followed.
+  /// \param changed  problem at `step` (units of p) from that of the optimum   \param read  of its optimum
+  /// \throws std::invalid_argument as followOptimum()
+  std::optional<OptimumDerivative> differentiate(const ShootingProblem& changed, double step,
+                                                 const OptimumReader& read);
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
 
 }  // namespace bielle
