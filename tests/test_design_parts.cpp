@@ -25,16 +25,32 @@ TEST_CASE("design: a gear scales what is behind it, a type brings what is in it"
   motor.name = "m", motor.joint = 3, motor.dof = 8;
   motor.armature = 0.01, motor.effort_limit = 30, motor.velocity_limit = 10, motor.torque_loss = 0.5;
   motor.drive.ratio = 2;
-  setRatio(6, motor);
+  CHECK(setRatio(6, {}, motor) == 0);  // no winding is known
   CHECK(motor.armature == Approx(0.09));
   CHECK(motor.effort_limit == Approx(90));
   CHECK(motor.velocity_limit == Approx(10.0 / 3));
   CHECK(*motor.torque_loss == Approx(0.5 / 9));
+  CHECK(motor.drive.efficiency == 1);
+  motor.drive.efficiency = 0.98, motor.drive.back_efficiency = 0.97;  // of a belt behind it
   Motor type;
-  type.effort_limit = 22, type.drive.ratio = 9, type.drive.type = "t";
+  type.effort_limit = 22, type.drive.ratio = 9, type.drive.type = "t", type.drive.torque_constant = 0.1;
+  type.drive.efficiency = 0.9;
   setType(type, motor);
   CHECK((motor.name == "m" && motor.joint == 3 && motor.dof == 8));
   CHECK((motor.effort_limit == 22 && motor.drive.type == "t" && motor.armature == 0));
+  CHECK((motor.drive.efficiency == Approx(0.9 * 0.98) && motor.drive.back_efficiency == Approx(0.97)));
+  setType(type, motor);
+  CHECK(motor.drive.efficiency == 0.9);  // in the place of another type
+
+  // Twice the ratio is paid for with 1.5 % of the power and 5.4 g per N m; half of it is not.
+  Motor geared = motor;
+  CHECK(setRatio(18, {}, geared) == Approx(0.0054 * 22));
+  CHECK((geared.drive.efficiency == Approx(0.9 * 0.985) && geared.drive.back_efficiency == Approx(0.985)));
+  CHECK(geared.effort_limit == Approx(2 * 0.985 * 22));
+  geared = motor;
+  CHECK((setRatio(4.5, {}, geared) == 0 && geared.drive.efficiency == 0.9 && geared.effort_limit == 11));
+  geared = motor;
+  CHECK((setRatio(18, {0, 0}, geared) == 0 && geared.effort_limit == 44));
 
   // Of a given robot: both knees, and no other motor; inertias and places stay.
   const Model bipetto = loadBipetto();
@@ -123,6 +139,12 @@ TEST_CASE("design: architectures and motors are chosen, with what belongs to the
     // Of the limits at the gear's shaft and those of current and voltage the smaller: at 6 instead of 9, two thirds of 22 N m.
     CHECK(motor.effort_limit == Approx(strong ? 30 : 22 * 6.0 / 9));
     VectorXd other = x;
+    other[3] = 12;
+    const Model geared = robot.make(other);
+    CHECK(geared.mass() - model.mass() == Approx(2 * 0.0054 * (strong ? 30 : (12.0 / 9 - 1) * 22)));
+    CHECK(geared.motors()[model.findMotor("motor_knee_left")].drive.efficiency ==
+          Approx((belt ? 0.98 : 1) * (1 - 0.03 * (strong ? 0.5 : 0.25))));
+    other[3] = x[3];
     other[4] = 1 - x[4];
     CHECK(calcMassInLinks(robot, x) == 0);  // a variable gives them
     CHECK(model.mass() - robot.make(other).mass() == Approx((strong ? 1 : -1) * 2 * (1.1 - 0.49)));

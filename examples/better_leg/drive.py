@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""drive.py MOTOR HIP KNEE ANKLE DIRECTORY: a copy of Bipetto with motors of robots/motors.yaml behind gears of
-these ratios, its masses as published."""
+"""drive.py MOTOR HIP KNEE ANKLE DIRECTORY: a copy of Bipetto with motors of robots/motors.yaml, whose own gears are of 9, with
+gears of these ratios and their losses (docs/design_reference.md); its masses as published."""
 import pathlib
 import shutil
 import sys
@@ -18,7 +18,8 @@ for line in (source / "bipetto.yaml").read_text().splitlines():
         line, in_motors = "motors:", True
     elif in_motors and line.startswith("  - "):
         ratio = next(value for name, value in ratios.items() if name in line)
-        line = f"  {line[4:]}: {{type: {motor}, ratio: {ratio}}}"
+        efficiency = round(1 - 0.03 * (1 - 9 / float(ratio)), 5)
+        line = f"  {line[4:]}: {{type: {motor}, ratio: {ratio}, efficiency: {efficiency}, back_efficiency: {efficiency}}}"
     else:
         in_motors = False
     lines.append(line)

@@ -51,14 +51,18 @@ void addEnergy(const MotorSlopes& motion, int m, MeasurePieces& out) {
 void addElectricalEnergy(const MotorSlopes& motion, int m, const RobotSlopes& robot, MeasurePieces& out) {
   const MotorConversion drive = robot.drives.empty() ? MotorConversion() : robot.drives[static_cast<size_t>(m)];
   const double heat = 1 / (drive.motor_constant * drive.motor_constant);
-  const auto getChange = [&](size_t i) { return robot.dfactors.empty() ? 0 : robot.dfactors[i](kLoss, m); };
+  const auto getChange = [&](size_t i, MotorFactor factor) {
+    return robot.dfactors.empty() ? 0 : robot.dfactors[i](factor, m);
+  };
   for (int k = 0; k < countNodes(motion); ++k) {
     const double v = motion.v(m, k), c = drive.getEffortFactor(motion.u(m, k) * v), u = c * motion.u(m, k);
+    const MotorFactor gear = motion.u(m, k) * v >= 0 ? kDriving : kDriven;
     const double P = u * v + heat * u * u, weight = motion.dt[k] * (P < 0 ? drive.regeneration : 1);
     out.values[0] += weight * P;
     for (size_t i = 0; i < motion.du.size(); ++i)
       out.gradients(0, i) +=
-          weight * ((v + 2 * heat * u) * c * motion.du[i](m, k) + u * motion.dv[i](m, k) + u * u * getChange(i));
+          weight * ((v + 2 * heat * u) * (c * motion.du[i](m, k) + getChange(i, gear) * motion.u(m, k)) +
+                    u * motion.dv[i](m, k) + u * u * getChange(i, kLoss));
   }
 }
 
@@ -70,7 +74,12 @@ void addHeat(const MotorSlopes& motion, int m, const RobotSlopes& robot, Eigen::
   VectorXd c(countNodes(motion));
   for (int k = 0; k < countNodes(motion); ++k) c[k] = motor.getEffortFactor(motion.u(m, k) * motion.v(m, k));
   scaled.u = motion.u.row(m) * c.asDiagonal();
-  for (const MatrixXd& du : motion.du) scaled.du.emplace_back(du.row(m) * c.asDiagonal());
+  for (size_t i = 0; i < motion.du.size(); ++i) {
+    scaled.du.emplace_back(motion.du[i].row(m) * c.asDiagonal());
+    for (int k = 0; k < countNodes(motion); ++k)
+      scaled.du.back()(0, k) +=
+          robot.dfactors[i](motion.u(m, k) * motion.v(m, k) >= 0 ? kDriving : kDriven, m) * motion.u(m, k);
+  }
   addRms(scaled, 0, piece, out);
   const double rms = out.values[piece], per_effort = robot.factors(kPerContinuous, m);
   out.values[piece] *= per_effort;

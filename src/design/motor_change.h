@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/model/model.h"
+#include "bielle/design/parametrization.h"
 
 namespace bielle {
 
@@ -12,11 +12,12 @@ namespace bielle {
 std::vector<int> findMotors(const Model& model, const std::vector<std::string>& names,
                             std::vector<std::string>* unknown = nullptr);
 
-// The motor `type` in the place of `motor`: everything but name and joint is that of the type.
+// The motor `type` in the place of `motor`: everything but name and joint is that of the type. Efficiencies of a motor without a type
+// are those of what a part puts behind it: they stay.
 void setType(const Motor& type, Motor& motor);
 
 // Another gear, of `ratio` turns of the rotor per turn of the joint: torques change like the ratio, speeds inversely, armature like its
-// square. Losses and mass of the gear stay.
-void setRatio(double ratio, Motor& motor);
+// square. A motor whose winding is known pays for a larger ratio than its own (GearCost). Returns what the gear weighs more, kg.
+double setRatio(double ratio, const GearCost& cost, Motor& motor);
 
 }  // namespace bielle

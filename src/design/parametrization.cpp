@@ -177,6 +177,7 @@ Model Parametrization::changeMotors(Model model, const VectorXd& x) const {
   const auto is_of_motors = [](const DesignVariable& variable) { return !variable.motors.empty(); };
   if (std::none_of(variables_.begin(), variables_.end(), is_of_motors)) return model;
   std::vector<Motor> motors = model.motors();
+  VectorXd gears = VectorXd::Zero(model.nu());  // what they weigh more
   for (const bool types : {true, false})
     for (size_t i = 0; i < variables_.size(); ++i) {
       const DesignVariable& variable = variables_[i];
@@ -184,16 +185,20 @@ Model Parametrization::changeMotors(Model model, const VectorXd& x) const {
       if (variable.motors.empty() || variable.isChoice() != types) continue;
       for (int m : findMotors(model, variable.motors)) {
         Motor& motor = motors[static_cast<size_t>(m)];
-        types ? setType(variable.types[static_cast<size_t>(getChoice(variable, value))], motor)
-              : setRatio(value, motor);
+        if (types)
+          setType(variable.types[static_cast<size_t>(getChoice(variable, value))], motor);
+        else
+          gears[m] += setRatio(value, variable.gear, motor);
       }
     }
   RobotDraft draft(model);
   for (size_t m = 0; m < motors.size(); ++m) {
-    draft.setMotor(static_cast<int>(m), motors[m]);
+    const double gear = gears[static_cast<Eigen::Index>(m)];
     // A given robot carries its motors on their joints; one of a generator, where and as heavy as its parameters say.
-    const double more = motors[m].drive.mass - model.motors()[m].drive.mass;
-    if (generator_ || more == 0) continue;
+    const double more = gear + (generator_ ? 0 : motors[m].drive.mass - model.motors()[m].drive.mass);
+    if (motors[m].drive.mass > 0) motors[m].drive.mass += gear;
+    draft.setMotor(static_cast<int>(m), motors[m]);
+    if (more == 0) continue;
     const Joint& joint = model.joints()[static_cast<size_t>(motors[m].joint)];
     draft.addMass(joint.parent, joint.X_PJ.p, more);
   }

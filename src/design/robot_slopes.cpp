@@ -14,6 +14,8 @@ MotorFactors calcFactors(const Model& model, const std::vector<MotorConversion>&
     out(kPerSpeed, m) = 1 / motor.velocity_limit;
     out(kPerContinuous, m) = 1 / motor.continuous_effort;
     out(kLoss, m) = 1 / (constant * constant);
+    out(kDriving, m) = 1 / motor.drive.efficiency;
+    out(kDriven, m) = motor.drive.back_efficiency;
     if (!motor.hasEnvelope()) continue;
     out(kVoltsPerEffort, m) = motor.getVoltsPerEffort() / motor.drive.voltage;
     out(kVoltsPerSpeed, m) = motor.getVoltsPerSpeed() / motor.drive.voltage;

@@ -6,7 +6,7 @@
 namespace bielle {
 
 /// Numbers of one motor, by which its torque u and its speed v count in measures; 0 of what it has not. `heat` is that of
-/// continuous_effort, without the factor c of MotorDrive Eq. (1).
+/// continuous_effort, without the factor c of MotorDrive Eq. (1), which is kDriving or kDriven.
 enum MotorFactor {
   kPerEffort,       ///< 1 / effort_limit
   kPerSpeed,        ///< 1 / velocity_limit
@@ -14,6 +14,8 @@ enum MotorFactor {
   kVoltsPerSpeed,
   kPerContinuous,  ///< 1 / continuous_effort
   kLoss,           ///< 1 / K_m^2 of MotorConversion
+  kDriving,        ///< 1 / efficiency of the gear
+  kDriven,         ///< its efficiency while it is driven
   kMotorFactors
 };
 using MotorFactors = Eigen::Matrix<double, kMotorFactors, Eigen::Dynamic>;  ///< one column per motor

@@ -90,9 +90,19 @@ void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& s
   requireMasses(choices, variable.types, "add it there, or leave `mass` out");
 }
 
+GearCost readGearCost(const Entry& entry) {
+  const Fields fields = entry.getFields({"loss", "mass"});
+  GearCost cost;
+  if (const Entry* loss = find(fields, "loss")) cost.loss = loss->getNumber();
+  if (const Entry* mass = find(fields, "mass")) cost.mass_per_effort = mass->getNumber();
+  if (!(cost.loss >= 0 && cost.loss < 1 && cost.mass_per_effort >= 0))
+    entry.fail("its loss is no share, or its mass negative", "give e.g. {loss: 0.03, mass: 0.0054}, in kg per N m");
+  return cost;
+}
+
 DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const Entry* catalogues) {
   const Fields fields = entry.getFields(
-      {"name", "unit", "bounds", "length", "shift", "parameter", "ratio", "motor", "choices", "mass", "start"});
+      {"name", "unit", "bounds", "length", "shift", "parameter", "ratio", "gear", "motor", "choices", "mass", "start"});
   DesignVariable variable;
   variable.name = require(fields, "name", entry).getText();
   if (const Entry* lengths = find(fields, "length"))
@@ -102,6 +112,10 @@ DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const En
   if (const Entry* parameter = find(fields, "parameter")) variable.parameter = parameter->getText();
   const Entry *ratio = find(fields, "ratio"), *motor = find(fields, "motor"), *choices = find(fields, "choices");
   if (ratio) variable.motors = readNames(*ratio), variable.unit = "1";
+  if (const Entry* gear = find(fields, "gear")) {
+    if (!ratio) gear->fail("only ratios have a gear", "give `ratio`, or remove it");
+    variable.gear = readGearCost(*gear);
+  }
   if (motor) variable.motors = readNames(*motor);
   const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.parameter.empty() +
                     (ratio != nullptr) + (motor != nullptr);

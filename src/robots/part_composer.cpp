@@ -220,7 +220,8 @@ class PartComposer {
     append(own.warnings, yaml.warnings);
   }
 
-  // Motors by their role, those of the parts in this one: what the file says takes the place of what the parts said.
+  // Motors by their role, those of the parts in this one: what the file says takes the place of what the parts said, but
+  // for losses behind the motor.
   void applyRoles() {
     const YamlEntry* roles = findScoped("roles");
     if (!roles) return;
@@ -233,8 +234,11 @@ class PartComposer {
         if (!motor.role.empty() && !contains(known, motor.role)) known.push_back(motor.role);
         if (motor.role != spec.joint) continue;
         const std::string joint = motor.joint;
+        // Those of a motor without a type are of what the part puts behind it.
+        const MotorDrive behind = motor.drive.type.empty() ? motor.drive : MotorDrive();
         is_found = true;
         motor = spec;
+        motor.drive.efficiency *= behind.efficiency, motor.drive.back_efficiency *= behind.back_efficiency;
         motor.joint = joint, motor.role = spec.joint;
       }
       if (!is_found) roles->fail("no motor has the role '" + spec.joint + "'", "known are " + listItems(known));
