@@ -7,7 +7,7 @@ namespace bielle::testing {
 class ProblemProbe {
  public:
   explicit ProblemProbe(const RobotProblem& problem)
-      : problem_(problem), stage_(problem), point_(problem), next_(problem) {}
+      : problem_(problem), stage_(problem), next_(problem), points_{Point(problem), Point(problem)} {}
 
   const RobotProblem& problem() const { return problem_; }
   const Model& model() const { return problem_.model(); }
@@ -47,19 +47,32 @@ class ProblemProbe {
     if (stage_.evaluate(numStages(), x).status != StepStatus::Ok) return StepStatus::Failed;
     return stage_.linearize(nullptr, out);
   }
-  // Tangent spaces depend on the state alone, so that any node will do.
-  VectorXd integrate(const VectorXd& x, const VectorXd& dx) {
-    point_.evaluate(numStages(), x);
-    return point_.integrate(dx);
-  }
-  VectorXd difference(const VectorXd& x0, const VectorXd& x1) {
-    point_.evaluate(numStages(), x0);
-    return point_.difference(x1);
-  }
+  VectorXd integrate(const VectorXd& x, const VectorXd& dx) { return evaluateAt(x).integrate(dx); }
+  VectorXd difference(const VectorXd& x0, const VectorXd& x1) { return evaluateAt(x0).difference(x1); }
 
  private:
+  struct Point {
+    explicit Point(const RobotProblem& problem) : evaluator(problem) {}
+    RobotEvaluator evaluator;
+    VectorXd x;  // where it was evaluated
+  };
+
+  // Tangent spaces depend on the state alone, so that any node will do. Differences move the same two states again and again:
+  // the one before the step and that of the next node.
+  RobotEvaluator& evaluateAt(const VectorXd& x) {
+    for (Point& point : points_)
+      if (point.x.size() == x.size() && point.x == x) return point.evaluator;
+    turn_ = 1 - turn_;
+    Point& point = points_[turn_];
+    point.x = x;
+    point.evaluator.evaluate(numStages(), x);
+    return point.evaluator;
+  }
+
   const RobotProblem& problem_;
-  RobotEvaluator stage_, point_, next_;
+  RobotEvaluator stage_, next_;
+  Point points_[2];
+  int turn_ = 0;
 };
 
 }  // namespace bielle::testing
