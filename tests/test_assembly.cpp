@@ -7,6 +7,7 @@
 #include "math/constants.h"
 #include "mechanisms.h"
 #include "own_robots.h"
+#include "selection.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -72,7 +73,9 @@ TEST_CASE("assembly: the torso at every height within reach; far outside, what s
   const Model model = loadOwn("bipetto").model;
   Reference reference = model.references().front();
   Workspace ws(model);
+  Selection selection;
   for (double height : {0.45, 0.5, 0.55, 0.6, 0.62}) {
+    if (selection.isLeftOut()) continue;
     reference.height = height;
     const AssemblyResult result = assemble(model, makeReferenceProblem(model, reference));
     CAPTURE(height, result.message);
@@ -81,6 +84,7 @@ TEST_CASE("assembly: the torso at every height within reach; far outside, what s
     CHECK(std::abs(getFrame(model, ws, "torso").p.z() - height) < 1e-12);
   }
   for (double height : {0.9, 2.0}) {
+    if (selection.isLeftOut()) continue;
     reference.height = height;
     const AssemblyResult result = assemble(model, makeReferenceProblem(model, reference));
     CAPTURE(height, result.message);

@@ -9,6 +9,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "check_derivative.h"
 #include "dynamics/saddle_point.h"
+#include "selection.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -110,10 +111,12 @@ TEST_CASE("closures: residual rate, velocity and acceleration are time derivativ
 
 TEST_CASE("constrained dynamics: every joint kind times every closure kind, closed and open, against differences") {
   std::mt19937 rng(4);
+  Selection selection(5);
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds)
       for (bool open : {false, true})
         for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
+          if (selection.isLeftOut()) continue;
           CAPTURE(getName(kind), getName(closure), open, base == MechanismBase::Fixed);
           const double kp = open ? 3 : 0, kd = open ? 2 : 0;
           const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base, kp, kd);

@@ -8,6 +8,7 @@
 #include "check_derivative.h"
 #include "problem_probe.h"
 #include "random_problem.h"
+#include "selection.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -154,6 +155,7 @@ VectorXd makeNextNode(std::mt19937& rng, ProblemProbe& problem, const VectorXd& 
 TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed, small and large") {
   const StepRule step = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(21);
+  Selection selection(2);
   for (JointKind kind : kJointKinds) {
     const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer, 3, 2);
     const Model& model = mechanism.model;
@@ -163,6 +165,7 @@ TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed,
     const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
     const VectorXd x = join(q, randomVector(rng, model.nv())), u = randomVector(rng, model.nu(), 5);
     for (double gap : {0.0, 1e-3, 0.6}) {
+      if (selection.isLeftOut()) continue;
       CAPTURE(getName(step), getName(kind), gap);
       checkProbedStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
     }
@@ -278,7 +281,9 @@ TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities 
   const VectorXd v = projectVelocity(model, ws, problem.spec(0).constraints, q, randomVector(rng, model.nv(), 0.5));
   CHECK(v.norm() > 0.1);
   const VectorXd x = join(q, v), u = motion.guess.us[0] + randomVector(rng, model.nu(), 1);
-  for (double gap : {0.0, 0.2}) {
+  Selection selection(2);
+  for (double gap : {0.2, 0.0}) {
+    if (selection.isLeftOut()) continue;
     CAPTURE(gap);
     checkProbedStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
   }

@@ -12,6 +12,7 @@
 #include "dynamics/reduction.h"
 #include "mechanisms.h"
 #include "problem_probe.h"
+#include "selection.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -69,24 +70,6 @@ State makeClosedState(const Model& model, const VectorXd& q, double distance, do
   return {result.q,
           projectVelocity(model, ws, makeConstraintSet(model), result.q, randomVector(rng, model.nv(), speed))};
 }
-
-// Sanitizers make differences thirty times as slow and find errors of memory in any mechanism: they see one of several.
-class Selection {
- public:
-  explicit Selection(int several = 3) : several_(several) {}
-
-  bool isLeftOut() {
-#ifdef __SANITIZE_ADDRESS__
-    return count_++ % several_ != 0;
-#else
-    return false;
-#endif
-  }
-
- private:
-  const int several_;
-  int count_ = 0;
-};
 
 double calcGap(const Model& model, const VectorXd& x) {
   Workspace ws(model);
@@ -149,7 +132,7 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
 TEST_CASE("reduced step: random mechanisms, every joint kind times every closure kind") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(11);
-  Selection selection;
+  Selection selection(5);
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds)
       for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
@@ -176,8 +159,10 @@ TEST_CASE("reduced step: random mechanisms, every joint kind times every closure
 TEST_CASE("reduced step: springs, dampers and friction on joints in and outside loops, and between points of both") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(17);
+  Selection selection;
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : {ClosureKind::Ball3D, ClosureKind::Coupler}) {
+      if (selection.isLeftOut()) continue;
       CAPTURE(getName(rule), getName(kind), getName(closure));
       const Mechanism mechanism = makeSprungMechanism(rng, kind, closure, MechanismBase::FreeFlyer);
       const Model& model = mechanism.model;
@@ -191,7 +176,7 @@ TEST_CASE("reduced step: springs, dampers and friction on joints in and outside 
 TEST_CASE("reduced step: couplers in the loops of other closures") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(18);
-  Selection selection;
+  Selection selection(5);
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds)
       for (bool repeated : {false, true}) {
@@ -233,32 +218,33 @@ TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar"
 
 namespace {
 
-// Bipeds of every hip, knee and ankle.
-std::vector<Model> makeLegBipeds() {
-  std::vector<Model> models;
-  const Generator& generator = findGenerator("leg_biped");
-  OptionSet parameters = generator.parameters;
-  for (const std::string& hip : generator.parameters.get("hip").choices)
-    for (const std::string& knee : generator.parameters.get("knee").choices)
-      for (const std::string& ankle : generator.parameters.get("ankle").choices) {
+// The parameters of bipeds of every hip, knee and ankle.
+std::vector<OptionSet> listLegBipeds() {
+  std::vector<OptionSet> bipeds;
+  OptionSet parameters = findGenerator("leg_biped").parameters;
+  const OptionSet all = parameters;
+  for (const std::string& hip : all.get("hip").choices)
+    for (const std::string& knee : all.get("knee").choices)
+      for (const std::string& ankle : all.get("ankle").choices) {
         parameters.set("hip", hip);
         parameters.set("knee", knee);
         parameters.set("ankle", ankle);
-        models.push_back(generator.make(parameters));
+        bipeds.push_back(parameters);
       }
-  return models;
+  return bipeds;
 }
 
 }  // namespace
 
 TEST_CASE("reduced step: combinations of the parts of leg_biped") {
   std::mt19937 rng(19);
-  const std::vector<Model> models = makeLegBipeds();
+  const Generator& generator = findGenerator("leg_biped");
+  const std::vector<OptionSet> bipeds = listLegBipeds();
   Selection selection;
-  for (size_t i = 0; i < models.size();
+  for (size_t i = 0; i < bipeds.size();
        i += 7) {  // every hip, knee and ankle has its turns: 7 divides none of their numbers
     if (selection.isLeftOut()) continue;
-    const Model& model = models[i];
+    const Model model = generator.make(bipeds[i]);
     CAPTURE(model.findMotor("motor_hip1_left"), model.findMotor("motor_knee_left"),
             model.findMotor("motor_ankle1_left"));
     const VectorXd standing = makeStandingPosture(model);
@@ -277,8 +263,10 @@ TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, w
   mechanisms.emplace_back();
   mechanisms.back().model = loadRobot("bipetto").model;
   mechanisms.back().q_closed = makeStandingPosture(mechanisms.back().model);
+  Selection selection;
   for (const Mechanism& mechanism : mechanisms)
     for (const Formulation formulation : {Formulation::Full, Formulation::Reduced}) {
+      if (selection.isLeftOut()) continue;
       const Model& model = mechanism.model;
       CAPTURE(model.name(), getName(formulation));
       const std::vector<ContactTarget> contacts = {{1, {}, 0, 10}};
@@ -302,11 +290,12 @@ TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, w
 
 TEST_CASE("reduced accelerations are those of the full formulation") {
   std::mt19937 rng(13);
-  std::vector<Model> models = makeLegBipeds();
-  models.push_back(loadRobot("bipetto").model);
+  const Generator& generator = findGenerator("leg_biped");
+  const std::vector<OptionSet> bipeds = listLegBipeds();
   Selection selection(12);
-  for (const Model& model : models) {
+  for (size_t i = 0; i <= bipeds.size(); ++i) {
     if (selection.isLeftOut()) continue;
+    const Model model = i < bipeds.size() ? generator.make(bipeds[i]) : loadRobot("bipetto").model;
     const State state = makeClosedState(model, makeStandingPosture(model), 0.05, 1, rng);
     const std::vector<ContactTarget> contacts = {{0, {}, 0, 0}, {1, {}, 0, 0}};
     const double h = 1e-5;
