@@ -12,7 +12,7 @@ using namespace bielle;
 using namespace bielle::testing;
 
 TEST_CASE("stairs: Bipetto goes up and down, every foot on its step") {
-  for (double height : {0.06, -0.06, 0.12, -0.12}) {
+  for (double height : {0.12, -0.12}) {  // tests check_stairs, check_stairs_down have lower ones
     CAPTURE(height);
     StairsOptions options;
     options.height = height;

@@ -6,10 +6,11 @@
 #include "bielle/motion/jump.h"
 #include "bielle/motion/walk.h"
 #include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
+#include "own_robots.h"
 #include "solve_in_place.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 namespace fs = std::filesystem;
 
 namespace {
@@ -61,11 +62,17 @@ Motion makeTimedWalk(const Model& model, const TimedSolution* solution = nullptr
   return motion;
 }
 
+// The walk with all durations free, solved once.
+const TimedSolution& getTimedWalk() {
+  static const TimedSolution walk = solveTimed(makeTimedWalk(getBipetto()), 1);
+  return walk;
+}
+
 }  // namespace
 
 TEST_CASE("a walk chooses the best duration of each phase") {
-  const Model model = loadRobot("bipetto").model;
-  const TimedSolution best = solveTimed(makeTimedWalk(model));
+  const Model& model = getBipetto();
+  const TimedSolution& best = getTimedWalk();
   REQUIRE(best.timings.size() == 5);
   int inside = 0;
   for (size_t i = 0; i < best.timings.size(); ++i) {
@@ -91,8 +98,8 @@ TEST_CASE("a walk chooses the best duration of each phase") {
 }
 
 TEST_CASE("a result has the final durations, and a warm start goes on from them") {
-  const Model model = loadRobot("bipetto").model;
-  const TimedSolution walk = solveTimed(makeTimedWalk(model));
+  const Model& model = getBipetto();
+  const TimedSolution& walk = getTimedWalk();
   const MotionResult result = makeResult({"bipetto", "", {}}, {walk.motion, walk.motion.guess, walk.summary});
   REQUIRE(result.timings.size() == 5);
   int node = 0;
@@ -127,8 +134,8 @@ TEST_CASE("a result has the final durations, and a warm start goes on from them"
 }
 
 TEST_CASE("a plan with the final durations makes the same steps") {
-  const Model model = loadRobot("bipetto").model;
-  const TimedSolution walk = solveTimed(makeTimedWalk(model));
+  const Model& model = getBipetto();
+  const TimedSolution& walk = getTimedWalk();
   MotionPlan plan = planWalk(model, makeTwoSteps(), makeStandingRobot(model));
   fixTimings(walk.timings, StepRule::Midpoint, plan.schedule, plan.stages);
   const Motion fixed = makeMotion(model, std::move(plan), {Formulation::Reduced, StepRule::Midpoint});
@@ -144,14 +151,13 @@ TEST_CASE("a plan with the final durations makes the same steps") {
 }
 
 TEST_CASE("the same motion for every number of threads") {
-  const Model model = loadRobot("bipetto").model;
-  const TimedSolution one = solveTimed(makeTimedWalk(model), 1), three = solveTimed(makeTimedWalk(model), 3);
+  const TimedSolution &one = getTimedWalk(), three = solveTimed(makeTimedWalk(getBipetto()), 3);
   CHECK(one.motion.guess.xs == three.motion.guess.xs);
   CHECK(one.motion.guess.us == three.motion.guess.us);
 }
 
 TEST_CASE("which phases are free") {
-  const Model model = loadRobot("bipetto").model;
+  const Model& model = getBipetto();
   const auto list = [&](const TimingOptions& timings) {
     ProblemOptions options;
     options.timings = timings;
