@@ -103,7 +103,7 @@ VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, do
   const MatrixXd N = svd.matrixV().rightCols(H.cols() - rank);
   if (N.cols() == 0) return step;
   const MatrixXd WN = weights.asDiagonal() * N;
-  step += wish_gain * (N * WN.colPivHouseholderQr().solve(weights.cwiseProduct(wish - step)));
+  step += wish_gain * (N * WN.colPivHouseholderQr().solve(VectorXd(weights.cwiseProduct(wish - step))));
   return step;
 }
 
@@ -216,7 +216,7 @@ AssemblyResult refineAssembly(const Model& model, const AssemblyProblem& problem
       const MatrixXd Z = factors.colsPermutation() * factors.matrixZ().transpose();
       const MatrixXd N = Z.rightCols(Z.cols() - factors.rank());
       const MatrixXd WN = weights.asDiagonal() * N;
-      if (N.cols() > 0) step += N * WN.colPivHouseholderQr().solve(weights.cwiseProduct(wish - step));
+      if (N.cols() > 0) step += N * WN.colPivHouseholderQr().solve(VectorXd(weights.cwiseProduct(wish - step)));
     }
     const double size = step.size() ? step.cwiseAbs().maxCoeff() : 0;
     if (!(size < options.step_limit)) break;
@@ -345,7 +345,7 @@ VectorXd projectVelocity(const Model& model, Workspace& ws, const ConstraintSet&
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
   decomposition.setThreshold(1e-8);
   decomposition.compute(J);
-  return v - decomposition.solve(J * v);
+  return v - decomposition.solve(VectorXd(J * v));
 }
 
 double calcLargestGap(const Workspace& ws, const ConstraintSet& constraints, std::string* worst) {

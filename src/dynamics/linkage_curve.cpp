@@ -81,7 +81,8 @@ bool LinkageCurve::advance(const CurvePoint& from, double h, CurvePoint& to) {
   if (!held_.empty()) {
     MatrixXd rows(held_.size(), basis.N.cols());
     for (size_t i = 0; i < held_.size(); ++i) rows.row(i) = basis.N.row(linkage_.joint_dofs[held_[i]]);
-    NH = basis.N * rows.completeOrthogonalDecomposition().pseudoInverse();
+    const MatrixXd inverse = rows.completeOrthogonalDecomposition().pseudoInverse();
+    NH = basis.N * inverse;
   }
   constexpr int kMaxIterations = 30;
   double error = 0;

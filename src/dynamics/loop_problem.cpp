@@ -202,8 +202,8 @@ void LoopProblem::minimise(LoopPoint& z) {
     const double objective = 0.5 * squares.R.squaredNorm();
     if (!std::isfinite(objective) || (rho_ == 0 && squares.R.cwiseAbs().maxCoeff() < kClosed)) return;
     const VectorXd gradient = squares.R_z.transpose() * squares.R;
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(squares.R_z.transpose() * squares.R_z +
-                                                        calcCurvature(z, squares));
+    const MatrixXd hessian = squares.R_z.transpose() * squares.R_z + calcCurvature(z, squares);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(hessian);
     const VectorXd sizes = eigen.eigenvalues().cwiseAbs();
     const double floor = 1e-9 * std::max(sizes.maxCoeff(), 1e-12);
     VectorXd step =

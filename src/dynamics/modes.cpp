@@ -33,7 +33,8 @@ Mode makeMode(const MatrixXd& N, std::complex<double> s, const Eigen::VectorXcd&
 
 // y'' + K y = 0 with a symmetric K: no rounding in real parts.
 std::vector<Mode> listConservativeModes(const MatrixXd& N, const MatrixXd& stiffness) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(0.5 * (stiffness + stiffness.transpose()));
+  const MatrixXd symmetric = 0.5 * (stiffness + stiffness.transpose());
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(symmetric);
   const VectorXd& squares = solver.eigenvalues();
   const double rounding = kRounding * squares.cwiseAbs().maxCoeff();
   std::vector<Mode> modes;
@@ -96,7 +97,7 @@ std::vector<Vector3d> listCorners(const ContactFrame& contact) {
 Eigen::Matrix3Xd spread(const std::vector<Vector3d>& corners, const Vector6d& wrench) {
   MatrixXd sum(6, 3 * corners.size());
   for (size_t i = 0; i < corners.size(); ++i) sum.middleCols<3>(3 * i) << Matrix3d::Identity(), skew(corners[i]);
-  const VectorXd forces = Eigen::CompleteOrthogonalDecomposition<MatrixXd>(sum).solve(wrench);
+  const VectorXd forces = Eigen::CompleteOrthogonalDecomposition<MatrixXd>(sum).solve(VectorXd(wrench));
   return forces.reshaped(3, corners.size());
 }
 

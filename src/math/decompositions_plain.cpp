@@ -1,0 +1,7 @@
+#include "math/decompositions.h"
+
+namespace Eigen {
+
+BIELLE_DENSE_PLAIN()
+
+}  // namespace Eigen
