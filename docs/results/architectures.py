@@ -3,7 +3,7 @@
 
     docs/results/architectures.py                        the page from docs/results/data/architectures.json
     docs/results/architectures.py --run DIR [--bielle build/bin/bielle] [--jobs 2]
-                                                         makes these first, two hours of two cores; goes on where it was cut off
+                                                         makes these first, an hour of two cores; goes on where it was cut off
 
 `--quick` evaluates two of them as they come and prints the page.
 """
@@ -26,7 +26,6 @@ PARTS = {"hip": ["serial", "three_rrs"], "knee": ["serial", "belt", "four_bar", 
 MOTIONS = [("walk", {"speed": 0.5}), ("walk", {"speed": 1.0}), ("stairs", {"height": 0.08, "stairs": 2}), ("jump", {"flight": 0.25})]
 TITLES = ["walk, 0.5 m/s", "walk, 1.0 m/s", "stairs", "jump"]
 SEARCHED = ["walk", "walk_2", "stairs", "jump"]  # their directories
-SPEEDS = [1.2, 1.4, 1.6, 1.8, 2.0]  # of walks, until one fails [m/s]
 
 
 def name_case(motion, settings):
@@ -55,35 +54,6 @@ def list_choices(specification, kinds):
             for kind, choices in kinds.items()}
 
 
-def list_motors(specification):
-    return re.search(r"name: motor, .*choices: \[([^]]*)\]", specification)[1].split(", ")
-
-
-def compare(bielle, directory, name, robots, motions, jobs):
-    """Solves motions of robots by the usual steps: the rows of the table, by robot and motion."""
-    lines = ["robots:"] + [f"  {key}: {{robot: {robot['robot']}}}" for key, robot in robots.items()] + ["motions:"]
-    lines += [f"  - {{motion: {motion}, set: {json.dumps(settings)}}}" for motion, settings in motions]
-    (directory / f"{name}.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    subprocess.run([bielle, "compare", f"{name}.yaml", "-o", name, "--jobs", str(jobs)], cwd=directory)  # cases may fail
-    with open(directory / name / "compare.csv", encoding="utf-8", newline="") as file:
-        return {(row["robot"], row["motion"]): row for row in csv.DictReader(file)}
-
-
-def find_speeds(bielle, directory, robots, jobs):
-    """Adds the fastest walk of each robot before the first that does not pass."""
-    walking = dict(robots)
-    for robot in robots.values():
-        robot["speed"] = 1.0  # of the search
-    for speed in SPEEDS:
-        if not walking:
-            return
-        motion = ("walk", {"speed": speed})
-        rows = compare(bielle, directory, f"speed_{speed:g}", walking, [motion], jobs)
-        walking = {name: robot for name, robot in walking.items() if rows[name, name_case(*motion)]["outcome"] == "passed"}
-        for robot in walking.values():
-            robot["speed"] = speed
-
-
 def read_motion(directory):
     summary = json.loads((directory / "summary.json").read_text(encoding="utf-8"))
     return {"J": summary["electrical_energy"]["total_J"], "peak_torque": max(summary["peak_torques"].values())}
@@ -97,21 +67,23 @@ def run(arguments, directory, specification):
     subprocess.run([bielle, "design", "legs.yaml", "-o", "search", "--jobs", str(arguments.jobs)], cwd=directory, check=True)
     bests, counts = read_search(directory / "search")
     choices = list_choices(specification, PARTS)
-    open_kinds = [kind for kind in PARTS if len(choices[kind]) > 1]  # variables, before all others; next is the motor
-    motors = list_motors(specification)
+    open_kinds = [kind for kind in PARTS if len(choices[kind]) > 1]  # variables, before all others
     robots = {}
     for number, best in enumerate(bests, 1):
         parts = [choices[kind][round(best["x"][open_kinds.index(kind)])] if kind in open_kinds else choices[kind][0] for kind in PARTS]
         place = directory / f"search/ranked/{number:02d}"
-        robots.setdefault("-".join(parts), {  # the better of its motors comes first
-            "parts": parts, "motor": motors[round(best["x"][len(open_kinds)])], "robot": f"search/ranked/{number:02d}",
-            "solved": [], "motions": [read_motion(place / motion) for motion in SEARCHED]})
+        robots["-".join(parts)] = {"parts": parts, "robot": f"search/ranked/{number:02d}", "solved": [],
+                                   "motions": [read_motion(place / motion) for motion in SEARCHED]}
     subprocess.run([sys.executable, str(common.SOURCE / "examples/better_leg/drive.py"), "ak10-9", "18", "18", "9", "bipetto"],
                    cwd=directory, check=True)
-    robots["bipetto"] = {"parts": ["serial", "four-bar", "rods"], "motor": "ak10-9", "robot": "./bipetto", "motions": [], "solved": []}
+    robots["bipetto"] = {"parts": ["serial", "four-bar", "rods"], "robot": "./bipetto", "motions": [], "solved": []}
     solved = [*list(robots)[:-1][:arguments.solve], "bipetto"]
-    rows = compare(bielle, directory, "compare", {name: robots[name] for name in solved}, MOTIONS, arguments.jobs)
-    find_speeds(bielle, directory, robots, arguments.jobs)
+    lines = ["robots:"] + [f"  {name}: {{robot: {robots[name]['robot']}}}" for name in solved] + ["motions:"]
+    lines += [f"  - {{motion: {motion}, set: {json.dumps(settings)}}}" for motion, settings in MOTIONS]
+    (directory / "compare.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    subprocess.run([bielle, "compare", "compare.yaml", "-o", "compare", "--jobs", str(arguments.jobs)], cwd=directory)  # cases may fail
+    with open(directory / "compare/compare.csv", encoding="utf-8", newline="") as file:
+        rows = {(row["robot"], row["motion"]): row for row in csv.DictReader(file)}
     for name, robot in robots.items():
         for motion, settings in MOTIONS if name in solved else []:
             row = rows[name, name_case(motion, settings)]
@@ -153,31 +125,28 @@ def draw(robots, path):
 def make_page(data):
     page = common.Page(__file__, "Twenty-four legs", data["run"])
     page.add(f"""Two hips, six knees and two ankles of [`leg_biped`](../../robots/leg_biped/README.md), in every combination, with the
-same trunk and links, with AK80-9 or AK10-9 at every joint and gears of 9 to 18: gears and lengths are searched by gradients for the
-least electrical energy of two walks, stairs of 8 cm and a jump of 0.25 s, with either motor; the better one is listed. Torque, speed and
-voltage of every motor, its heat, a margin of 0.2 to dead points, 30 kg and 2 mm between bodies are constraints of all motions.
-{data['designs']} designs were evaluated, {data['feasible']} are feasible; each search had at most five, so that more would find better
-ones. Braking energy is not recovered. Gears above 9, belts and differentials have [losses and masses](../design_reference.md#variables).""")
+same trunk, links and motors (AK10-9 at every joint, with gears of 9 to 18 that cost nothing): gears and lengths are searched by gradients for the
+least electrical energy of two walks, stairs of 8 cm and a jump of 0.25 s. Torque, speed and voltage of every motor, its heat, a margin of
+0.2 to dead points, 28 kg and 2 mm between bodies are constraints of all motions. {data['designs']} designs were evaluated, {data['feasible']}
+are feasible; each search had at most five, so that more would find better ones. Braking energy is not recovered; belts and differentials lost nothing at this commit.""")
     page.lines += ["", "```console", "bielle design examples/architectures/legs.yaml -o legs --jobs 2", "```"]
     page.lines += ["", "![energies of the four motions by robot](../images/architectures.svg)"]
     robots = sorted(data["robots"].values(), key=lambda robot: calc_total(robot["motions"]) or 1e9)
     rows = []
     for robot in robots:
-        cells = [*(shorten(part) for part in robot["parts"]), robot["motor"]]
+        cells = [shorten(part) for part in robot["parts"]]
         if not robot["motions"]:
             cells = [f"*{cell}*" for cell in cells]
         energies = [show(motion["J"], "{:.0f}") for motion in robot["motions"]] or ["–"] * len(TITLES)
         failed = "" if all(motion["passed"] for motion in robot["solved"]) else "\\*"
         rows.append(cells + [f"{robot['mass']:.2f}", show(calc_total(robot["motions"]), "{:.0f}"), *energies,
                              show(max((motion["peak_torque"] for motion in robot["motions"]), default=None), "{:.1f}"),
-                             f"{robot['speed']:.1f}",
                              show(calc_total(robot["solved"]), "{:.0f}") + failed])
     page.add("""Energies are in J, by the Euler steps of the search (20 ms, 10 ms in the jump); *solved* is their sum as `bielle solve`
-makes the motions, for the best ones, with an asterisk where one misses a goal or a row of the check. *Speed* is that of the fastest
-walk of 1.0, 1.2, ... 2.0 m/s before the first that does not pass, each from the solver's own guess. Torques are the largest of any
+makes the motions, for the best ones, with an asterisk where one misses a goal or a row of the check. Torques are the largest of any
 motor in the four motions, in N m. *Bipetto* has the motors and ratios of [a leg better than it](../../examples/better_leg/README.md),
 its masses as published, and was not searched.""")
-    page.table(["hip", "knee", "ankle", "motor", "mass [kg]", "sum", *TITLES, "peak torque", "speed [m/s]", "solved"], rows)
+    page.table(["hip", "knee", "ankle", "mass [kg]", "sum", *TITLES, "peak torque", "solved"], rows)
     page.heading("By part")
     page.add("Mean energy over all legs that have it, in J.")
     rows = []
@@ -201,9 +170,8 @@ def main():
         small = re.sub(r"architecture:\s*\[[^]]*\]", "architecture: [belt, parallel_spring_knee]", specification)
         small = small.replace("slsqp, evaluations: 5", "sbplx, evaluations: 1").replace("knee: four_bar", "knee: belt")
         small = re.sub(r"  - \{motion: (walk, set: \{speed: 1|stairs|jump).*\n", "", small)
-        small = small.replace("choices: [ak80-9, ak10-9]", "choices: [ak10-9]").replace("start: ak80-9", "start: ak10-9")
         PARTS.update(hip=["serial"], ankle=["rsu"])
-        MOTIONS[1:], TITLES[1:], SEARCHED[1:], SPEEDS[:] = [], [], [], []
+        MOTIONS[1:], TITLES[1:], SEARCHED[1:] = [], [], []
         with tempfile.TemporaryDirectory() as directory:
             page, _ = make_page(run(arguments, pathlib.Path(directory), small))
         page.write(True)
