@@ -8,6 +8,7 @@
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
+#include "formats/aside_file.h"
 #include "formats/drake.h"
 #include "formats/dxf.h"
 #include "formats/mjcf.h"
@@ -47,8 +48,10 @@ void writeStep(const std::string& solids, const std::string& path) {
   std::rewind(file.get());
   ProcessOptions options;
   options.in = fileno(file.get());
-  if (waitForProcess(startProcess({program, path}, options)) != 0)
+  AsideFile step(path);
+  if (waitForProcess(startProcess({program, step.aside()}, options)) != 0)
     throw InputError(path, "--to step", "bielle-step could not write it", "see its message above");
+  step.commit();
 }
 
 int convert(const ConvertArguments& arguments) {
