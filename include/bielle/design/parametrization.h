@@ -28,10 +28,11 @@ struct ShiftChange {
 /// right legs, which need not be equal to the last digit); all shifts are by the value, relative to the given robot.
 /// What a gear costs whose ratio i is larger than that of the motor as it comes, with i in units of that ratio. It loses the share
 ///     loss (1 - 1/i)                                                                                                   (1)
-/// of the power in both directions: what rolls in a planetary stage of ratio i, the rest of the power turns with the carrier (H. W. Mueller,
-/// "Epicyclic Drive Trains", 1982); makers state losses of up to 3 % a stage (maxon GPX UP: Design World, October 2020). It weighs
-/// mass_per_effort for each N m by which the motor's largest torque grows: two pairs of motors with the same rotors (LK-Tech MG4010-10
-/// and -36, MG6012-8 and -36, data sheets) differ by 190 g and by 35 N m of stall torque. Smaller ratios change neither.
+/// of the power in both directions, that which rolls in a planetary stage of ratio i, while the rest turns with the
+/// carrier (H. W. Mueller, "Epicyclic Drive Trains", 1982); makers state losses of up to 3 % a stage (maxon GPX UP: Design
+/// World, October 2020). It weighs mass_per_effort for each N m by which the motor's largest torque grows: two pairs of
+/// motors with the same rotors (LK-Tech MG4010-10 and -36, MG6012-8 and -36, data sheets) differ by 190 g and by 35 N m
+/// of stall torque together. Smaller ratios change neither.
 struct GearCost {
   double loss = 0.03;
   double mass_per_effort = 0.0054;  ///< kg per N m
