@@ -82,6 +82,7 @@ TEST_CASE("squat: Bipetto goes down or up as requested, loops closed, feet in pl
     CAPTURE(getName(row.formulation), row.depth);
     SquatOptions options;
     options.depth = row.depth;
+    options.time_step = 0.015;
     Motion motion = makeSquat(model, options, row.formulation);
     FddpOptions solver;
     solver.max_iterations = 100;
@@ -126,7 +127,7 @@ TEST_CASE("squat: impossible options are refused, unknown ones are named") {
                                                                                  {"duration", 0},
                                                                                  {"duration", nan},
                                                                                  {"settle", -0.1},
-                                                                                 {"time_step", 0},
+                                                                                 {"time_step", -0.01},
                                                                                  {"time_step", 1},
                                                                                  {"com_weight", -1},
                                                                                  {"force_weight", nan},

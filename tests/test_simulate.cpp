@@ -379,6 +379,26 @@ TEST_CASE("simulate: predictive control survives a push that gains do not") {
   CHECK(solves["regularization"]["median"].get<double>() > 0);
 }
 
+TEST_CASE(
+    "simulate: on leaf springs a walk stands to its end and beyond, pushed under predictive control, with gains as "
+    "well") {
+  const Scratch scratch;
+  const std::string plan = (scratch.path / "springs").string(), output = (scratch.path / "walked").string();
+  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "walk", "--robot", BIELLE_SOURCE_DIR "/robots/spring_biped", "--speed",
+                      "0.3", "--steps", "2", "-o", plan, "--quiet", "--no-report", "--no-check"})
+              .status == 0);
+  for (const std::string control : {"mpc", "gains"}) {
+    CAPTURE(control);
+    std::vector<std::string> arguments = {BIELLE_COMMAND, "simulate", plan,   "--control",
+                                          control,        "-o",       output, "--summary-only"};
+    if (control == "mpc") arguments.insert(arguments.end(), {"--push", "t=0.9,impulse=4,direction=90"});
+    const CommandResult result = runCommand(arguments);
+    CAPTURE(result.out, result.err);
+    CHECK(result.status == 0);
+    CHECK(parseSummary(output)["largest_slip"].get<double>() < 0.01);
+  }
+}
+
 TEST_CASE("simulate: predictive control is the default, and gains where it cannot carry a motion out") {
   const Scratch scratch;
   const std::string output = (scratch.path / "out").string(), full = (scratch.path / "full").string();

@@ -54,6 +54,7 @@ class MotionHorizon : public Horizon {
     for (const ContactPhase& p : motion_.schedule.phases) phases_.insert(phases_.end(), p.nodes, phase++);
     const Model& model = problem_.model();
     VectorXd rest = plan.xs.back();
+    rest.head(model.nq()) = settlePosture(model, motion_.schedule.phases.back().contacts, rest.head(model.nq()));
     rest.tail(model.nv()).setZero();
     const VectorXd u = calcStaticTorques(model, problem_.spec(last_).constraints, rest.head(model.nq())).u;
     plan_.xs.resize(problem_.numStages() + 1, rest);

@@ -36,12 +36,32 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
   return stages;
 }
 
-// Torques that hold the last posture on the contacts of the last phase.
-VectorXd calcHoldTorques(const Motion& motion, const ShootingTrajectory& trajectory) {
+// Holds the last posture on the contacts of the last phase. Where springs do not balance the weight there, a further stage leads
+// to where they do.
+Policy makeHoldingPolicy(const Motion& motion, const ShootingTrajectory& trajectory,
+                         std::vector<Policy::Stage> stages) {
+  constexpr double kSettling = 0.3;  // s
   const Model& model = motion.problem->model();
-  return calcStaticTorques(model, makeConstraintSet(model, motion.schedule.phases.back().contacts),
-                           trajectory.xs.back().head(model.nq()))
-      .u;
+  const std::vector<ContactTarget>& contacts = motion.schedule.phases.back().contacts;
+  const VectorXd& x = trajectory.xs.back();
+  const VectorXd q = settlePosture(model, contacts, x.head(model.nq()));
+  const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), q).u;
+  if (q != x.head(model.nq())) {
+    Policy::Stage rest = stages.back();
+    rest.start += rest.duration;
+    rest.duration = kSettling;
+    rest.q = x.head(model.nq());
+    rest.v = x.segment(model.nq(), model.nv());
+    model.difference(rest.q, q, rest.q_change);
+    rest.v_next.setZero();
+    rest.u = u;
+    const auto of_phase = [&rest](const Policy::Stage& stage) { return stage.phase == rest.phase; };
+    const auto first = std::find_if(stages.begin(), stages.end(), of_phase);
+    rest.K = (first + (stages.end() - first) / 5)->K;  // those of a touchdown itself do not hold for long
+    ++rest.phase;
+    stages.push_back(std::move(rest));
+  }
+  return {model, std::move(stages), u};
 }
 
 }  // namespace
@@ -149,13 +169,13 @@ void Policy::addFeedback(size_t stage, double weight, VectorRef u) const {
 }
 
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory) {
-  return {motion.problem->model(), makeStages(motion, trajectory, {}), calcHoldTorques(motion, trajectory)};
+  return makeHoldingPolicy(motion, trajectory, makeStages(motion, trajectory, {}));
 }
 
 Policy makePolicy(const Solution& solution) {
   const auto& [motion, trajectory, summary, multipliers, gains] = solution;
   if (gains.size() != trajectory.us.size()) throw std::invalid_argument("makePolicy: the solution has no gains");
-  return {motion.problem->model(), makeStages(motion, trajectory, gains), calcHoldTorques(motion, trajectory)};
+  return makeHoldingPolicy(motion, trajectory, makeStages(motion, trajectory, gains));
 }
 
 }  // namespace bielle

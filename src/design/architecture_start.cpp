@@ -19,11 +19,8 @@ double calcPostureGap(const Model& start, const Model& model, const VectorXd& po
   problem.q_ref = posture;
   if (start.hasFreeFlyer()) problem.frames.push_back({start.bodies()[1].name, 1, SE3(), ws.X_WB[1]});
   for (size_t c = 0; c < start.contacts().size(); ++c) {
-    const ContactFrame &from = start.contacts()[c], &foot = model.contacts()[c];
-    FrameTarget target{foot.name, foot.body, foot.X_BF, getPlacement(ws, from.body, from.X_BF)};
-    if (foot.kind == ContactKind::Point3D) target.mask.tail<3>().setConstant(false);
-    if (foot.kind == ContactKind::Edge5D) target.mask[3] = false;
-    problem.frames.push_back(target);
+    const ContactFrame& from = start.contacts()[c];
+    problem.frames.push_back(makeFrameTarget(model.contacts()[c], getPlacement(ws, from.body, from.X_BF)));
   }
   AssemblyOptions options;
   options.step = AssemblyStep::Shortest;

@@ -260,6 +260,13 @@ AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions
   return best;
 }
 
+FrameTarget makeFrameTarget(const ContactFrame& contact, const SE3& X_WT) {
+  FrameTarget target{contact.name, contact.body, contact.X_BF, X_WT};
+  if (contact.kind == ContactKind::Point3D) target.mask.tail<3>().setConstant(false);
+  if (contact.kind == ContactKind::Edge5D) target.mask[3] = false;
+  return target;
+}
+
 AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference) {
   AssemblyProblem problem;
   problem.q_ref = model.makeNeutral();
@@ -284,15 +291,7 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
     if (index < 0)
       throw InputError(model.name(), "reference '" + reference.name + "'", "there is no contact '" + name + "'",
                        "name one of the contacts of the file");
-    const ContactFrame& contact = model.contacts()[index];
-    FrameTarget target;
-    target.name = name;
-    target.body = contact.body;
-    target.X_BF = contact.X_BF;
-    target.X_WT.p = position;
-    if (contact.kind == ContactKind::Point3D) target.mask.tail<3>().setConstant(false);
-    if (contact.kind == ContactKind::Edge5D) target.mask[3] = false;  // it may roll
-    problem.frames.push_back(target);
+    problem.frames.push_back(makeFrameTarget(model.contacts()[index], {Matrix3d::Identity(), position}));
   }
   if (!reference.height_frame.empty()) {
     const int index = model.findFrame(reference.height_frame);

@@ -4,6 +4,7 @@
 
 #include "motion/foot_tasks.h"
 #include "motion/locomotion_stages.h"
+#include "motion/statics.h"
 
 namespace bielle {
 namespace {
@@ -11,10 +12,11 @@ namespace {
 constexpr double kTimeStep = 0.012;  // s
 constexpr int kForeseenSteps = 2;    // beyond that whose stages are made; one more brings the feet together
 
-LocomotionOptions complete(LocomotionOptions options) {
+LocomotionOptions complete(const Model& model, LocomotionOptions options, const StandingRobot& standing) {
   options.timing.flight = options.landing_speed = 0;
   options.rigid_landing = false;
-  if (options.timing.time_step == 0) options.timing.time_step = kTimeStep;
+  if (options.timing.time_step == 0)
+    options.timing.time_step = std::min(kTimeStep, calcSpringStage(model, makeStance(model, options, standing)));
   return options;
 }
 
@@ -44,7 +46,7 @@ struct CommandedWalk::Segment {
 CommandedWalk::CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits,
                              CommandSource command, const StandingRobot& standing)
     : model_(model),
-      options_(complete(options)),
+      options_(complete(model, options, standing)),
       limits_(limits),
       command_(std::move(command)),
       standing_(makeStance(model, options_, standing)),

@@ -208,9 +208,9 @@ SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s) {
   return X;
 }
 
-double chooseTimeStep(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape) {
+double chooseTimeStep(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape, double longest) {
   constexpr double kWalking = 0.012, kRunning = 0.005, kShortest = 0.002, kUnit = 0.001, kSpeed = 4.1;
-  const double longest = timing.flight > 0 ? kRunning : kWalking;
+  const double usual = timing.flight > 0 ? kRunning : kWalking;
   constexpr int kPoints = 100;
   double fastest = 0;
   for (size_t i = 0; i < task.plan.steps.size(); ++i) {
@@ -223,8 +223,8 @@ double chooseTimeStep(const LocomotionTask& task, const GaitTiming& timing, cons
       before = X;
     }
   }
-  if (!(fastest > kSpeed)) return longest;
-  return std::max(kShortest, kUnit * std::floor(longest * std::pow(kSpeed / fastest, 2) / kUnit));
+  if (!(fastest > kSpeed)) return std::min(usual, longest);
+  return std::min(longest, std::max(kShortest, kUnit * std::floor(usual * std::pow(kSpeed / fastest, 2) / kUnit)));
 }
 
 Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape, double stretch,

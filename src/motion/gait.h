@@ -28,7 +28,8 @@ SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s);
 /// square of the speed, in whole milliseconds, at least 2. (What midpoint steps of 12 ms leave, slip and differences of the
 /// velocity, grows with the power 4.5 of the speed in Bipetto's walks from 0.8 to 1.2 m/s, whose feet swing at 3.6 to 5.3
 /// m/s; and with the square of the step.)
-double chooseTimeStep(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape);
+/// \param longest  s, never exceeded
+double chooseTimeStep(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape, double longest);
 
 struct GaitPhase {
   int nodes = 0;

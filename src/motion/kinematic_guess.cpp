@@ -121,10 +121,8 @@ class FeetPlacer {
     problem.q_ref.head<7>() = base;
     problem.frames.push_back({"base", 1, SE3(), getBase(base)});
     for (int i = 0; i < 2; ++i) {
-      const ContactFrame& contact = model_.contacts()[stance_.contacts[i]];
-      problem.frames.push_back({contact.name, contact.body, contact.X_BF, feet[i]});
-      if (!flat[i] || contact.kind == ContactKind::Point3D) problem.frames.back().mask.tail<3>().setConstant(false);
-      if (contact.kind == ContactKind::Edge5D) problem.frames.back().mask[3] = false;
+      problem.frames.push_back(makeFrameTarget(model_.contacts()[stance_.contacts[i]], feet[i]));
+      if (!flat[i]) problem.frames.back().mask.tail<3>().setConstant(false);
     }
     AssemblyResult result = bielle::assemble(model_, problem, options_);
     if (result.status != AssemblyStatus::Closed || !keepsRanges(result.q)) return {};

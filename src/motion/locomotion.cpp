@@ -12,6 +12,7 @@
 #include "motion/kinematic_guess.h"
 #include "motion/locomotion_stages.h"
 #include "motion/neighbour_plans.h"
+#include "motion/statics.h"
 
 namespace bielle {
 namespace {
@@ -177,7 +178,8 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
                           const LocomotionOptions& requested) {
   check(requested);
   LocomotionOptions options = requested;
-  if (options.timing.time_step == 0) options.timing.time_step = chooseTimeStep(task, options.timing, options.swing);
+  if (options.timing.time_step == 0)
+    options.timing.time_step = chooseTimeStep(task, options.timing, options.swing, calcSpringStage(model, stance));
   Scene scene{
       model, stance, task, options, makeStartingGait(model, stance, task, options), makeStageWeights(model, options)};
   check(scene);

@@ -6,12 +6,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
 #include "dynamics/assembly_refinement.h"
-#include "math/decompositions.h"
 #include "motion/motor_scale.h"
 #include "motion/neighbour_plans.h"
+#include "motion/statics.h"
 
 namespace bielle {
 
@@ -50,87 +49,6 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
   return motion;
 }
 
-namespace {
-
-// Torques of these dofs, in their order, that hold the robot still as in motion.h Eq. (1), in the least-squares sense.
-struct StaticHold {
-  VectorXd tau;
-  double residual = 0;
-};
-
-StaticHold calcStaticHold(const Model& model, const ConstraintSet& constraints, ConstVectorRef q,
-                          const std::vector<int>& dofs) {
-  Workspace ws(model);
-  updatePositions(model, ws, q);
-  updateVelocities(model, ws, VectorXd::Zero(model.nv()));
-  updateBias(model, ws);
-  // Unknowns (tau, lambda / scale): forces weigh less than torques of the same number, so that the ground carries the
-  // robot.
-  const double scale = std::max(1.0, model.mass() * model.gravity().norm());
-  const int n = static_cast<int>(dofs.size());
-  MatrixXd A = MatrixXd::Zero(model.nv(), n + constraints.rows);
-  for (int i = 0; i < n; ++i) A(dofs[i], i) = 1;
-  MatrixXd J = MatrixXd::Zero(constraints.rows, model.nv());
-  for (size_t c = 0; c < constraints.closures.size(); ++c)
-    calcClosureJacobian(ws, constraints.closures[c],
-                        J.middleRows(constraints.offsets[c], getRows(constraints.closures[c].kind)));
-  A.rightCols(constraints.rows) = scale * J.transpose();
-  const VectorXd solution = A.completeOrthogonalDecomposition().solve(ws.b);
-  return {solution.head(n), (A * solution - ws.b).cwiseAbs().maxCoeff()};
-}
-
-std::vector<int> listMotorDofs(const Model& model) {
-  std::vector<int> dofs;
-  for (const Motor& motor : model.motors()) dofs.push_back(motor.dof);
-  return dofs;
-}
-
-// The reference, standing on all contacts with its springs bent by the weight that motors cannot take from them. What a spring
-// lacks of the torque that would hold it bends it by that over its stiffness; as stiff springs move little, a few rounds
-// settle it. Where they do not (the robot would fall over), springs stay as the reference has them.
-VectorXd settleSprings(const Model& model, const Reference& reference, const VectorXd& unloaded) {
-  std::vector<const JointForce*> springs;
-  std::vector<int> dofs = listMotorDofs(model);
-  for (const JointForce& force : model.jointForces())
-    if (force.stiffness > 0 && std::find(dofs.begin(), dofs.end(), force.dof) == dofs.end() &&
-        reference.joints.count(model.joints()[force.joint].name) == 0)
-      springs.push_back(&force);
-  if (springs.empty()) return unloaded;
-  const ConstraintSet constraints =
-      makeConstraintSet(model, makeContactTargets(makeStandingRobot(model, unloaded), 0, 0));
-  const double tolerance = 1e-9 * std::max(1.0, model.mass() * model.gravity().norm());  // N m or N
-  if (calcStaticHold(model, constraints, unloaded, dofs).residual < tolerance) return unloaded;
-  for (const JointForce* spring : springs) dofs.push_back(spring->dof);
-  constexpr int kRounds = 50;
-  constexpr double kFirm = 1e3;  // weight of a spring's angle among those of the reference
-  AssemblyProblem problem = makeReferenceProblem(model, reference);
-  VectorXd angles(springs.size());
-  for (size_t i = 0; i < springs.size(); ++i) angles[i] = unloaded[springs[i]->idx_q];
-  VectorXd q = unloaded;
-  for (int round = 0; round < kRounds; ++round) {
-    const StaticHold hold = calcStaticHold(model, constraints, q, dofs);
-    const VectorXd lack = hold.tau.tail(springs.size());
-    if (hold.residual > tolerance) break;
-    if (lack.cwiseAbs().maxCoeff() < tolerance) return q;
-    for (size_t i = 0; i < springs.size(); ++i) {
-      angles[i] -= lack[i] / springs[i]->stiffness;
-      problem.q_ref[springs[i]->idx_q] = angles[i];
-      problem.weights[springs[i]->dof] = kFirm;
-    }
-    const AssemblyResult next = assemble(model, problem);
-    if (next.status != AssemblyStatus::Closed) break;
-    q = next.q;
-  }
-  return unloaded;
-}
-
-}  // namespace
-
-StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q) {
-  const StaticHold hold = calcStaticHold(model, constraints, q, listMotorDofs(model));
-  return {hold.tau, hold.residual};
-}
-
 VectorXd makeStandingPosture(const Model& model) { return makeStandingPosture(model, nullptr); }
 
 VectorXd makeStandingPosture(const Model& model, NeighbourPlans* neighbours) {
@@ -153,7 +71,7 @@ VectorXd makeStandingPosture(const Model& model, NeighbourPlans* neighbours) {
   }
   if (result.status != AssemblyStatus::Closed)
     throw InputError(model.name(), "reference '" + standing->name + "'", result.message, "correct its targets");
-  return settleSprings(model, *standing, result.q);
+  return settleReference(model, *standing, result.q);
 }
 
 StandingRobot makeStandingRobot(const Model& model) { return makeStandingRobot(model, makeStandingPosture(model)); }
@@ -322,10 +240,10 @@ void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd
       stage.costs.push_back({"force " + contact.name, costs.force_weight / (weight * weight),
                              Activation::makeQuadratic(VectorXd::Ones(rows)),
                              makeContactForce(set, c, reference, costs.axes)});
-    if (costs.pressure_weight == 0 || rows != 6 || contact.half_length <= 0 || contact.half_width <= 0) continue;
-    const Eigen::Vector2d half(contact.half_length, contact.half_width);
-    stage.costs.push_back({"pressure " + contact.name, costs.pressure_weight,
-                           Activation::makeQuadratic(half.cwiseAbs2().cwiseInverse()),
+    if (costs.pressure_weight == 0 || rows != 6 || contact.half_length <= 0) continue;
+    const double half_length = contact.half_length, half_width = contact.half_width;  // the latter is none of edges
+    const Eigen::Vector2d weights(1 / (half_length * half_length), half_width > 0 ? 1 / (half_width * half_width) : 0);
+    stage.costs.push_back({"pressure " + contact.name, costs.pressure_weight, Activation::makeQuadratic(weights),
                            makeCenterOfPressure(set, c, costs.axes)});
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "motion/gait.h"
+#include "motion/statics.h"
 
 namespace bielle {
 namespace {
@@ -36,7 +37,8 @@ MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask 
   LocomotionOptions gait = options.gait;
   gait.timing.flight = options.flight;
   gait.timing.single = options.stance;
-  if (gait.timing.time_step == 0) gait.timing.time_step = chooseTimeStep(task, gait.timing, gait.swing);
+  if (gait.timing.time_step == 0)
+    gait.timing.time_step = chooseTimeStep(task, gait.timing, gait.swing, calcSpringStage(model, stance));
   requireOption(options.stance >= 4 * gait.timing.time_step, "stance", "it is shorter than four time steps",
                 "give seconds, e.g. 0.25");
   task.ground.height = stance.middle.p.z();

@@ -1,14 +1,18 @@
 #include "bielle/motion/squat.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bielle/model/error.h"
 #include "math/constants.h"
 #include "motion/foot_tasks.h"
 #include "motion/motor_scale.h"
+#include "motion/statics.h"
 
 namespace bielle {
 namespace {
+
+constexpr double kTimeStep = 0.015;  // s
 
 void check(const Model& model, const SquatOptions& o) {
   listOptions(o).check();
@@ -49,7 +53,7 @@ void describe(OptionFields& f, SquatOptions& o) {
   f.number("depth", o.depth, "1", {0.05, 2}, "lowest height of the centre of mass divided by its initial height");
   f.number("duration", o.duration, "s", kPositive, "time to go down and come back");
   f.number("settle", o.settle, "s", kNotNegative, "time at rest before and after");
-  f.number("time_step", o.time_step, "s", kPositive, "length of a shooting stage");
+  f.number("time_step", o.time_step, "s", kNotNegative, "length of a shooting stage; 0: 15 ms, less with springs");
   f.number("com_weight", o.com_weight, "1/m^2", kNotNegative, "follow the height of the centre of mass");
   describe(f, static_cast<MotionOptions&>(o));
   f.number("closure_kp", o.closure_kp, "1/s^2", kNotNegative, "position gain of the stabilisation of closures");
@@ -62,7 +66,10 @@ double calcSquatHeight(const SquatOptions& o, double t) {
   return 1 - (1 - o.depth) * 0.5 * (1 - std::cos(2 * kPi * s));
 }
 
-MotionPlan planSquat(const Model& model, const SquatOptions& options, const StandingRobot& standing) {
+MotionPlan planSquat(const Model& model, const SquatOptions& requested, const StandingRobot& standing) {
+  SquatOptions options = requested;
+  if (options.time_step == 0)
+    options.time_step = std::min(kTimeStep, calcSpringStage(model, standing.q, makeContactTargets(standing, 0, 0)));
   check(model, options);
   const VectorXd& q0 = standing.q;
   const Vector3d& com0 = standing.com;
@@ -93,7 +100,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Stan
   plan.guess.xs.assign(nodes + 1, x0);
   plan.guess.us.assign(nodes, calcStaticTorques(model, makeConstraintSet(model, contacts), q0).u);
   plan.q_start = plan.q_end = q0;
-  plan.options = listOptions(options).listValues();
+  plan.options = listOptions(requested).listValues();
   Goal depth{GoalKind::Height, "depth", options.depth, calcTolerance(1 - options.depth, 0.01), 0, nodes};
   depth.contacts = getContactNames(model, contacts);
   plan.goals = {depth};

@@ -24,9 +24,7 @@ std::vector<FrameTarget> holdContacts(const Model& model, ConstVectorRef q, cons
   std::vector<FrameTarget> targets;
   for (int c : contacts) {
     const ContactFrame& contact = model.contacts()[c];
-    targets.push_back({contact.name, contact.body, contact.X_BF, getPlacement(ws, contact.body, contact.X_BF)});
-    if (contact.kind == ContactKind::Point3D) targets.back().mask.tail<3>().setConstant(false);
-    if (contact.kind == ContactKind::Edge5D) targets.back().mask[3] = false;
+    targets.push_back(makeFrameTarget(contact, getPlacement(ws, contact.body, contact.X_BF)));
   }
   return targets;
 }

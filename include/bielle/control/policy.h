@@ -12,7 +12,8 @@
 ///
 /// (nu x 2 nv): in the reduced formulation a state that is not closed is thus projected on the closed ones. After its end the
 /// policy holds the last posture with the torques u_hold that carry it at rest, and with the gains of the first stage
-/// of the last phase, because the last stages look ahead too little to correct the robot's position. Where torques act
+/// of the last phase, because the last stages look ahead too little to correct the robot's position. Where springs do not
+/// balance the weight in the last posture, another stage leads to one in which they do (settlePosture). Where torques act
 /// later than the state was measured, u* and K are those of the time when they act, the deviation is that of the time
 /// of the measurement.
 #include <vector>

@@ -23,6 +23,9 @@ struct FrameTarget {
   Eigen::Matrix<bool, 6, 1> mask = Eigen::Matrix<bool, 6, 1>::Constant(true);
 };
 
+/// A contact to be placed, as far as its kind stands firm: a point turns freely, an edge rolls about itself.
+FrameTarget makeFrameTarget(const ContactFrame& contact, const SE3& X_WT);
+
 struct AssemblyProblem {
   VectorXd q_ref;    ///< nq, start and preferred configuration
   VectorXd weights;  ///< nv, of the preference for q_ref; empty: all one

@@ -96,6 +96,10 @@ struct StaticTorques {
 };
 StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q);
 
+/// The posture next to q, with these contacts where they belong, at which springs that no motor moves balance the weight; q
+/// itself where there are no such springs, or nothing balances them.
+VectorXd settlePosture(const Model& model, const std::vector<ContactTarget>& contacts, ConstVectorRef q);
+
 /// The starting posture: the reference `half_sitting`, or the only one; springs that it does not name and that no motor
 /// holds are deflected until the robot stands still, if possible. \throws InputError when there is no reference, or it
 /// cannot be closed

@@ -6,13 +6,13 @@
 namespace bielle {
 
 struct SquatOptions : MotionOptions {
-  double depth = 0.7;        ///< lowest height of the CoM over its initial height, 1
-  double duration = 2.4;     ///< down and back, s
-  double settle = 0.3;       ///< at rest before and after, s
-  double time_step = 0.015;  ///< s
-  double com_weight = 1e5;   ///< of the CoM's height, 1/m^2
-  double closure_kp = 0;     ///< stabilisation of the closures, 1/s^2
-  double closure_kd = 0;     ///< 1/s
+  double depth = 0.7;       ///< lowest height of the CoM over its initial height, 1
+  double duration = 2.4;    ///< down and back, s
+  double settle = 0.3;      ///< at rest before and after, s
+  double time_step = 0;     ///< s; 0: 15 ms, less where springs swing faster
+  double com_weight = 1e5;  ///< of the CoM's height, 1/m^2
+  double closure_kp = 0;    ///< stabilisation of the closures, 1/s^2
+  double closure_kd = 0;    ///< 1/s
 };
 
 void describe(OptionFields& fields, SquatOptions& options);
