@@ -26,6 +26,13 @@ TEST_CASE("files that name a generator: errors give the file, the line, the para
   refuse("generator: leg_biped\nset: {thigh_length: .nan}\n", "key 'thigh_length' (line 2)", "not a number");
   refuse("generator: leg_biped\nset: [knee]\n", "key 'set' (line 2)", "not a map");
   refuse("generator: rsu_biped\nset: {hip_height: 0.8}\n", "key 'generator' (line 1)", "do not reach the ground");
+  const std::string part = files.write("bad/knee.yaml",
+                                       "mounts: {base: link, output: link, joint: joint}\n"
+                                       "parameters:\n  motor_mass: {unit: kg}\n"
+                                       "tree: {}\n"
+                                       "solids:\n  base: [{motor: motor_mas, at: origin, axis: y}]\n");
+  refuse("generator: leg_biped\nset: {knee: knee.yaml}\n", "key 'generator' (line 1): " + part + ": key 'solids'",
+         "(line 6): 'motor_mas' is unknown");
   refuse("set: {knee: belt}\n", "key 'set' (line 1)", "there is no generator");
   refuse("generator: rsu_biped\nmodel: bipetto\n", "key 'generator' (line 1)", "keep one of them");
   refuse("generator: rsu_biped\nparts: 1\n", "key 'parts' (line 2)", "known keys are");

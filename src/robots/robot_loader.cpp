@@ -18,8 +18,12 @@ Model makeModel(const YamlFile& yaml) {
   const GeneratorEntry entry = readGeneratorEntry(*yaml.generator, yaml.settings ? &*yaml.settings : nullptr);
   try {
     return entry.generator.make(entry.parameters);
-  } catch (const InputError& error) {  // parameters that are possible one by one, but not together
-    yaml.generator->fail(error.element() + ": " + error.problem(), error.remedy());
+  } catch (const InputError& error) {
+    // Of a part's file, or of parameters that are possible one by one, but not together.
+    const std::string& file = error.source();
+    yaml.generator->fail((file.empty() || file == yaml.generator->getText() ? "" : file + ": ") + error.element() +
+                             ": " + error.problem(),
+                         error.remedy());
   }
 }
 
