@@ -30,6 +30,7 @@ VARIANTS = {
     "exact loops": [],
     "full formulation": ["--formulation", "full"],
     "Euler steps": ["--step", "euler"],
+    "no multipliers": ["--no-multipliers"],
     "no margin to dead points": ["--dead-point-margin", "0"],
 }
 

@@ -115,6 +115,37 @@ TEST_CASE("constraints: a cart catches its pole within bounds, and the condition
   CHECK(calcConditions(problem, t, multipliers).gradient > 3e-4);
 }
 
+TEST_CASE("constraints: a penalty alone violates them by the multipliers over it, to first order") {
+  auto problem = makeBoundedCartPole();
+  FddpOptions options;
+  const FddpResult exact = solve(problem, makeGuess(problem), options);
+  options.constraints.multipliers = false;
+  options.constraints.tolerance = 0.01;
+  options.constraints.penalty_increase = 1;
+  double last = 0;
+  for (const double penalty : {1e3, 1e4}) {
+    options.constraints.initial_penalty = penalty;
+    const FddpResult result = solve(problem, makeGuess(problem), options);
+    CAPTURE(penalty, result.summary.message, result.summary.violation, exact.summary.multiplier);
+    CHECK(result.summary.termination == FddpTermination::Converged);
+    CHECK(result.summary.penalty == penalty);
+    for (const VectorXd& y : result.multipliers.values) CHECK(y.isZero(0));
+    CHECK(result.summary.violation == Approx(exact.summary.multiplier / penalty).epsilon(0.05));
+    const double deficit = exact.summary.cost - result.summary.cost;  // of a point outside
+    CHECK(deficit > 0);
+    if (last > 0) CHECK(deficit == Approx(last / 10).epsilon(0.05));
+    last = deficit;
+  }
+  // Where the penalty may grow, it does so until the constraints hold.
+  options.constraints = {};
+  options.constraints.multipliers = false;
+  options.constraints.max_penalty = 1e14;
+  const FddpResult result = solve(problem, makeGuess(problem), options);
+  CHECK(result.summary.termination == FddpTermination::Converged);
+  CHECK(result.summary.violation <= 1e-8);
+  CHECK(result.summary.penalty > 1e7);
+}
+
 TEST_CASE("constraints: a quadratic program has the solution of its dense conditions") {
   Constrained<PlantProblem<Linear>> problem(makeLinear());
   const int N = problem.stages, n = 2 * N;

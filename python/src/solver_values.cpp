@@ -10,7 +10,8 @@ void bindOptions(py::module_& module) {
       .field("tolerance", &ConstraintOptions::tolerance, "largest violation of a converged solve")
       .field("initial_penalty", &ConstraintOptions::initial_penalty, "cost over squared violation")
       .field("penalty_increase", &ConstraintOptions::penalty_increase, "factor when the violation falls too slowly")
-      .field("max_penalty", &ConstraintOptions::max_penalty, "largest");
+      .field("max_penalty", &ConstraintOptions::max_penalty, "largest")
+      .field("multipliers", &ConstraintOptions::multipliers, "false: the penalty alone grows, for comparisons");
   Value<FddpOptions>(module, "SolverOptions", "Options of FDDP.")
       .field("max_iterations", &FddpOptions::max_iterations, "the solver stops there")
       .field("gradient_tolerance", &FddpOptions::gradient_tolerance, "(cost per unit of control)^2")

@@ -288,6 +288,13 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
   addLimitOptions(sub, arguments);
   addTimingOptions(sub, arguments->timings);
   addObjectiveOptions(sub, arguments->problem.objective);
+  sub.add_flag_callback(
+      "--no-multipliers",
+      [arguments] {
+        arguments->solver.constraints.multipliers = false;
+        arguments->solver.constraints.max_penalty = 1e14;
+      },
+      "hold constraints by a growing quadratic penalty alone, for comparisons");
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "largest number of iterations")
       ->check(CLI::Range(1, kMostIterations))
       ->capture_default_str();

@@ -129,7 +129,7 @@ bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, doubl
   } else {
     restoring_ = false;
     adoptMultipliers(iterate);
-    if (!falls) {
+    if (!falls || !options_.multipliers) {
       far_penalty_ = std::min(options_.max_penalty, options_.penalty_increase * far_penalty_);
       penalty_ = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
     } else if (at_.violation < kNear) {
@@ -176,6 +176,7 @@ void AugmentedLagrangian::startRestoration(double cost) {
 }
 
 void AugmentedLagrangian::adoptMultipliers(const EvaluationList& iterate) {
+  if (!options_.multipliers) return;
   if (holds_) evaluate(iterate);  // Eq. (12) is of the d of Eq. (10)
   for (Node& node : nodes_) node.multipliers = node.weights.gradient;
 }

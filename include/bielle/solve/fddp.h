@@ -41,6 +41,7 @@ struct ConstraintOptions {
   double initial_penalty = 0.1;  ///< rho, in the unit of the cost over that of c squared
   double penalty_increase = 10;  ///< factor when the violation falls too slowly, or is small
   double max_penalty = 1e8;
+  bool multipliers = true;  ///< false: y_k stays zero and rho grows at every update, to compare with penalties alone
 };
 
 /// y of Eq. (10), node by node, and rho.
