@@ -17,9 +17,8 @@ CheckedMotion makeLifted() {
   CheckedMotion lifted = getSquat().checked;
   const auto stances = lifted.summary.phases[0].stances;
   const double h = lifted.getTimeStep(0);
-  lifted.summary.phases = {{"both", 0, 80, h, stances},
-                           {"one", 80, 40, h, {stances[0]}},
-                           {"both", 120, lifted.numStages() - 120, h, stances}};
+  lifted.summary.phases = {
+      {"both", 0, 40, h, stances}, {"one", 40, 20, h, {stances[0]}}, {"both", 60, lifted.numStages() - 60, h, stances}};
   return lifted;
 }
 
@@ -183,7 +182,7 @@ TEST_CASE("check: an energy a few times what a step may lose is seen, in an inte
       if (std::abs(way) > 1e-9) motion.record.u(k, best) -= energy / way;
     };
     CheckedMotion once = good, always = good;
-    take(once, 60, 4 * (trace.stages[60].energy_scale + mean));
+    take(once, 30, 4 * (trace.stages[30].energy_scale + mean));
     const CheckReport interval = checkMotion(once);
     INFO(print(interval));
     CHECK(fails(interval, "energy, one interval"));
@@ -197,7 +196,7 @@ TEST_CASE("check: an energy a few times what a step may lose is seen, in an inte
 
 TEST_CASE("check: feet that land hard, turn, stand askew or go under the ground fail") {
   CheckedMotion landing = makeLifted();
-  landing.record.v(120, 2) += 0.2;
+  landing.record.v(60, 2) += 0.2;
   CHECK_FALSE(fails(checkMotion(makeLifted()), "landing velocity"));
   CHECK(fails(checkMotion(landing), "landing velocity"));
 
@@ -230,7 +229,7 @@ TEST_CASE("check: feet that land hard, turn, stand askew or go under the ground 
 
 TEST_CASE("check: a centre of mass that was recorded elsewhere") {
   CheckedMotion elsewhere = getSquat().checked;
-  elsewhere.record.com(60, 2) += 1e-6;
+  elsewhere.record.com(30, 2) += 1e-6;
   CHECK(getFailures(checkMotion(elsewhere)) == Names{"centre of mass, as recorded"});
 }
 

@@ -50,7 +50,9 @@ struct SolvedSquat {
     const LoadedRobot robot = loadRobot(findBipetto());
     ProblemOptions options(formulation);
     options.step = step;
-    Motion motion = makeSquat(robot.model, {}, options);
+    SquatOptions squat;
+    squat.time_step = 0.03;  // Simbody takes milliseconds for a node
+    Motion motion = makeSquat(robot.model, squat, options);
     summary = test::solveInPlace(*motion.problem, motion.guess);
     writeResult(directory.path(), makeResult({"bipetto", robot.file, {}}, {motion, motion.guess, summary}));
     checked = readMotion(directory.path());
