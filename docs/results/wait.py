@@ -1,10 +1,13 @@
-"""What a newcomer and a developer wait for: processor time, without a compiler cache, of this commit and of another one in turn.
+"""What a newcomer and a developer wait for: processor time, without a compiler cache, of this commit and of another one.
 
-    python3 docs/results/wait.py --against REVISION [--steps demo edit ...]
+    docs/results/wait.py --against REVISION [--steps demo edit ...] [--measure REVISION ...]
 
-Each step runs in a fresh clone, this commit's and the other's one after the other. All steps of both take two hours of two cores.
+Each step runs in a fresh clone, this commit's and the other's one after the other, and is a line of docs/results/data/wait.csv
+when it has ended; what is there for the same commit and processor is not measured again. All steps of both take three hours of two
+cores.
 """
 import argparse
+import csv
 import os
 import pathlib
 import resource
@@ -15,17 +18,23 @@ import time
 
 import common
 
+DATA = common.HERE / "data/wait.csv"
+COLUMNS = ("commit", "step", "title", "processor", "clock", "run")
 RELEASE = "cmake --preset release -G Ninja >/dev/null && "
+SANITIZED = "source scripts/setup.sh && eval \"$(sed -n '{}' .ci/run)\""
 # What runs once before and is not counted; what is counted, by its title.
 STEPS = {
     "demo": ("", {"`scripts/demo.sh`": "scripts/demo.sh"}),
     "test": ("", {"`scripts/test.sh`, building": "sed -i '/^run_tests/d' scripts/test.sh && scripts/test.sh",
                   "`scripts/test.sh`, testing": "source scripts/setup.sh && run_tests build/test"}),
+    "ci": ("", {"`.ci/run` after it: building with sanitizers": SANITIZED.format("/^bielle_targets=/,/^build/p"),
+                "`.ci/run` after it: testing with sanitizers": SANITIZED.format("/^run_tests build.sanitize/p")}),
     "edit": (RELEASE + "ninja -C build {target}",
              {"one source of `motion` edited, its test built": "echo '// edited' >> src/motion/walk.cpp && ninja -C build {target}"}),
     "pip": ("python3 -m venv --system-site-packages environment",
             {"`pip install .` in a fresh virtual environment": "environment/bin/pip install --no-build-isolation ."}),
 }
+SUMS = {"`scripts/test.sh`": ["test"], "`.ci/run`": ["test", "ci"]}
 
 
 def run(command, directory, log):
@@ -42,7 +51,7 @@ def run(command, directory, log):
 
 
 def measure(step, revision, directory, log):
-    """[(title, (minutes of processor, of clock)), ...] in a fresh clone."""
+    """[(title, minutes of processor, of clock), ...] in a fresh clone."""
     before, commands = STEPS[step]
     clone = pathlib.Path(directory) / revision[:12] / "clone"
     if not clone.exists():
@@ -54,25 +63,62 @@ def measure(step, revision, directory, log):
     target = "test_motion" if "test_${area}" in targets else "test_walk"
     if before:
         run(before.format(target=target), clone, log)
-    return [(title, run(command.format(target=target), clone, log)) for title, command in commands.items()]
+    return [(title, *run(command.format(target=target), clone, log)) for title, command in commands.items()]
+
+
+def read():
+    if not DATA.exists():
+        return []
+    with open(DATA, encoding="utf-8", newline="") as file:
+        return [{**row, "processor": float(row["processor"]), "clock": float(row["clock"])} for row in csv.DictReader(file)]
+
+
+def record(revision, step, measured):
+    is_new = not DATA.exists()
+    with open(DATA, "a", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if is_new:
+            writer.writerow(COLUMNS)
+        for title, processor, clock in measured:
+            writer.writerow((revision[:12], step, title, f"{processor:.2f}", f"{clock:.2f}", common.describe_run(revision[:8])))
+            print(title, f"{processor:.1f}, {clock:.1f} min", file=sys.stderr)
+
+
+def find(revision):
+    """{title: minutes of processor and of clock}, with sums, of what is measured of a revision."""
+    rows = [row for row in read() if row["commit"] == revision[:12]]
+    out = {row["title"]: (row["processor"], row["clock"]) for row in rows}
+    for title, steps in SUMS.items():
+        if set(steps) <= {row["step"] for row in rows}:
+            out[title] = tuple(sum(row[key] for row in rows if row["step"] in steps) for key in ("processor", "clock"))
+    return out
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--against", required=True, metavar="REVISION")
+    parser.add_argument("--commit", default="HEAD", metavar="REVISION", help="instead of HEAD")
+    parser.add_argument("--measure", nargs="*", metavar="REVISION", help="of these only; none: the page alone")
     parser.add_argument("--steps", nargs="+", choices=STEPS, default=list(STEPS))
     arguments = parser.parse_args()
-    revisions = [subprocess.run(["git", "rev-parse", name], cwd=common.SOURCE, text=True, check=True, stdout=subprocess.PIPE).stdout.strip()
-                 for name in ("HEAD", arguments.against)]
-    rows = []
+
+    def parse(name):
+        command = ["git", "rev-parse", name]
+        return subprocess.run(command, cwd=common.SOURCE, text=True, check=True, stdout=subprocess.PIPE).stdout.strip()
+
+    here, there = parse(arguments.commit), parse(arguments.against)
     with tempfile.TemporaryDirectory(prefix="bielle-wait-") as directory, open("wait.log", "w", encoding="utf-8") as log:
         for step in arguments.steps:
-            for (title, here), (_, there) in zip(*[measure(step, revision, directory, log) for revision in revisions]):
-                rows.append((title, *(f"{minutes:.1f}" for minutes in (*there, *here)), f"{here[0] / there[0]:.2f}"))
-                print(rows[-1], file=sys.stderr)
-    page = common.Page(__file__, "The wait", common.describe_run())
+            for revision in (here, there) if arguments.measure is None else map(parse, arguments.measure):
+                if not any(row["commit"] == revision[:12] and row["step"] == step for row in read()):
+                    record(revision, step, measure(step, revision, directory, log))
+    one, other = find(here), find(there)
+    page = common.Page(__file__, "The wait", next(row["run"] for row in reversed(read()) if row["commit"] == here[:12]))
     page.add("Minutes of processor and of clock on all cores, each in a fresh clone and without a compiler cache.")
-    page.table(("", f"{arguments.against}: processor", "clock", "this commit: processor", "clock", "ratio of processor times"), rows)
+    titles = [title for _, commands in STEPS.values() for title in commands] + list(SUMS)
+    page.table(("", f"{arguments.against}: processor", "clock", "this commit: processor", "clock", "ratio of processor times"),
+               [(title, *(f"{minutes:.1f}" for minutes in (*other[title], *one[title])), f"{one[title][0] / other[title][0]:.2f}")
+                for title in titles if title in one and title in other])
     page.write(False)
 
 
