@@ -62,6 +62,24 @@ TEST_CASE("edge feet: a robot on blades walks, passes the check, and is carried 
   }
 }
 
+TEST_CASE("edge feet: a squat keeps its pressure in the middle of its edges") {
+  const testing::RobotDirectory directory;
+  const std::string robot = writeBlades(directory), squat = directory.path() + "/squat";
+  const auto calcFarthest = [&](const std::string& weight) {
+    const CommandResult solved =
+        runOnBlades({"solve", "squat", "--robot", robot, "--set", "time_step=0.03", "--set",
+                     "pressure_weight=" + weight, "-o", squat, "--quiet", "--no-report", "--no-check"});
+    CAPTURE(solved.err);
+    REQUIRE(solved.status == 0);
+    const MatrixXd wrenches = readRecord(squat + "/trajectory.npz").contact_wrenches;
+    return (wrenches.col(4).array() / wrenches.col(2).array()).abs().maxCoeff();  // m
+  };
+  const double middle = calcFarthest("10"), free = calcFarthest("0");
+  CAPTURE(middle, free);
+  CHECK(middle < 0.01);
+  CHECK(free > 3 * middle);
+}
+
 TEST_CASE("edge feet: what does not describe an edge is refused") {
   const testing::RobotDirectory directory;
   const std::string source = readFile(BIELLE_SOURCE_DIR "/robots/bipetto/bipetto.yaml");
