@@ -6,7 +6,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 install_missing "${bielle_packages[@]}" "${bielle_check_packages[@]}" "${bielle_python_packages[@]}" \
   "${bielle_worker_packages[@]}" "${bielle_front_packages[@]}" "${bielle_sdf_packages[@]}" "${bielle_mcap_packages[@]}" \
-  "${bielle_step_packages[@]}" dpkg-dev file
+  "${bielle_step_packages[@]}" "${bielle_mesh_packages[@]}" dpkg-dev file
 cd "$bielle_root"
 build build-package --preset package
 cd build-package

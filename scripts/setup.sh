@@ -20,6 +20,8 @@ bielle_sdf_packages=(libsdformat-dev)
 bielle_mcap_packages=(libprotobuf-dev protobuf-compiler)
 # OpenCASCADE, which writes STEP files (bielle convert). Without it everything else is built.
 bielle_step_packages=(libocct-data-exchange-dev libocct-modeling-algorithms-dev libocct-ocaf-dev)
+# assimp, which reads meshes of further kinds. Without it everything else is built.
+bielle_mesh_packages=(libassimp-dev)
 # Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, what tests the Python
 # package.
 bielle_test_packages=(catch2 python3 chromium pkg-config python3-pytest

@@ -6,6 +6,7 @@
 #include "cli/case_run.h"
 #include "cli/commands.h"
 #include "cli/task_options.h"
+#include "formats/process.h"
 #include "results/output_place.h"
 #include "tasks/campaign_report.h"
 

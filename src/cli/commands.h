@@ -38,8 +38,6 @@ void addDataset(CLI::App& app, Action& action);
 
 // bielle validate, bielle check and bielle simulate: only their help lines; their arguments are those of other programs.
 void addCompanions(CLI::App& app);
-// The path of such a program beside this one, or else the bare name, which is searched on the PATH.
-std::string findCompanion(const std::string& program);
 // Replaces this process by that program; returns only on failure. `arguments` begins with a name and ends with a null
 // pointer.
 int becomeCompanion(const std::string& name, char** arguments);

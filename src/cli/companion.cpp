@@ -5,16 +5,9 @@
 #include <iostream>
 
 #include "cli/commands.h"
-#include "results/process.h"
+#include "formats/process.h"
 
 namespace bielle::cli {
-
-std::string findCompanion(const std::string& program) {
-  std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path beside = self.parent_path() / program;
-  return !error && access(beside.c_str(), X_OK) == 0 ? beside.string() : program;
-}
 
 void addCompanions(CLI::App& app) {
   app.add_subcommand("validate", "Compare the dynamics with Simbody's (see bielle validate --help)");

@@ -17,7 +17,7 @@
 #include "model/payload.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
-#include "results/process.h"
+#include "formats/process.h"
 #include "results/workshop_sheet.h"
 #include "results/workshop_solids.h"
 

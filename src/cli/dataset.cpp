@@ -12,6 +12,7 @@
 #include "cli/case_run.h"
 #include "cli/commands.h"
 #include "cli/export.h"
+#include "formats/process.h"
 #include "model/payload.h"
 #include "tasks/dataset_index.h"
 

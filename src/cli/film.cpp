@@ -9,7 +9,7 @@
 #include "bielle/model/error.h"
 #include "cli/table.h"
 #include "formats/aside_file.h"
-#include "results/process.h"
+#include "formats/process.h"
 
 namespace fs = std::filesystem;
 

@@ -9,6 +9,7 @@
 
 #include "bielle/model/error.h"
 #include "cli/commands.h"
+#include "formats/process.h"
 #include "formats/text_file.h"
 #include "tasks/local_tasks.h"
 #include "tasks/worker_tasks.h"

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "formats/collada.h"
+#include "formats/process.h"
 #include "math/decompositions.h"
 
 namespace fs = std::filesystem;
@@ -68,21 +69,30 @@ std::string getExtension(const std::string& mesh) {
   return extension;
 }
 
-// The whole file, if it is of one of these kinds and not too large.
-std::string readMeshFile(const std::string& mesh, const std::string& directory,
-                         std::initializer_list<const char*> kinds) {
+struct MeshFile {
+  std::string extension, content;
+};
+
+// A file of any kind as STL; "" if assimp cannot read it, or is not there.
+std::string convertToStl(const fs::path& file) {
+  constexpr double kLongest = 60;  // s
+  const ProcessOutput run = runProcess({findCompanion("bielle-mesh"), file.string()}, kLongest);
+  return run.status == 0 ? run.out : "";
+}
+
+// The whole file, those that are not of these kinds as STL; without content if there is none, or it is too large.
+MeshFile readMeshFile(const std::string& mesh, const std::string& directory, std::initializer_list<const char*> kinds) {
   const std::string extension = getExtension(mesh);
   const fs::path place = findMesh(mesh, directory);
   std::error_code error;
-  if (std::find(kinds.begin(), kinds.end(), extension) == kinds.end() || place.empty() ||
-      fs::file_size(place, error) > kLargest || error)
-    return "";
+  if (place.empty() || fs::file_size(place, error) > kLargest || error) return {};
+  if (std::find(kinds.begin(), kinds.end(), extension) == kinds.end()) return {".stl", convertToStl(place)};
   std::ifstream file(place, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  return {extension, {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()}};
 }
 
 Points readMesh(const std::string& mesh, const std::string& directory) {
-  const std::string extension = getExtension(mesh), content = readMeshFile(mesh, directory, {".stl", ".obj", ".dae"});
+  const auto [extension, content] = readMeshFile(mesh, directory, {".stl", ".obj", ".dae"});
   if (extension == ".dae") return readCollada(content);
   if (extension == ".obj") return readVertices(content, "v");
   return isBinaryStl(content) ? readBinaryStl(content) : readVertices(content, "vertex");
@@ -176,9 +186,9 @@ fs::path findMesh(const std::string& mesh, const std::string& directory) {
 }
 
 Eigen::Matrix3Xd readTriangles(const std::string& mesh, const std::string& directory) {
-  const std::string content = readMeshFile(mesh, directory, {".stl", ".obj"});
+  const auto [extension, content] = readMeshFile(mesh, directory, {".stl", ".obj"});
   Points corners;
-  if (getExtension(mesh) == ".obj")
+  if (extension == ".obj")
     corners = readObjFaces(content);
   else
     corners = isBinaryStl(content) ? readBinaryStl(content) : readVertices(content, "vertex");

@@ -12,12 +12,15 @@ namespace bielle {
 // directory above the robot's or in $ROS_PACKAGE_PATH, or for rest beside the robot.
 std::filesystem::path findMesh(const std::string& mesh, const std::string& directory);
 
-// The box or capsule of least volume around the vertices of an STL, OBJ or COLLADA (.dae) file, along the axes of the file or the
-// principal ones of the vertices; none if the file is missing, of another kind, damaged, or larger than 100 MB.
+// STL, OBJ and the vertices of COLLADA files (.dae) are read here, what else assimp reads by `bielle-mesh`, a program of its own:
+// none of the many formats can then harm this process.
+
+// The box or capsule of least volume around the vertices of a file, along the axes of the file or the principal ones of the
+// vertices; none if the file is missing, of an unknown kind, damaged, or larger than 100 MB.
 std::optional<Shape> fitMesh(const std::string& mesh, const std::string& directory, const Vector3d& scale);
 
-// Corners of the triangles of an STL or OBJ file, three columns each, polygons cut into fans; none if the file is missing, of
-// another kind, damaged, or larger than 100 MB.
+// Corners of the triangles of a file, three columns each, polygons cut into fans; none if the file is missing, of an unknown
+// kind, damaged, or larger than 100 MB.
 Eigen::Matrix3Xd readTriangles(const std::string& mesh, const std::string& directory);
 
 }  // namespace bielle

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "formats/aside_file.h"
-#include "results/process.h"
+#include "formats/process.h"
 
 namespace bielle {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "results/process.h"
+#include "formats/process.h"
 #include "tasks/campaign.h"
 #include "tasks/cases.h"
 

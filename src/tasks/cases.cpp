@@ -18,7 +18,7 @@
 #include "formats/aside_file.h"
 #include "formats/text_file.h"
 #include "results/json_text.h"
-#include "results/process.h"
+#include "formats/process.h"
 #include "tasks/case_task.h"
 
 namespace fs = std::filesystem;

@@ -10,7 +10,7 @@
 #include <cstring>
 
 #include "bielle/model/error.h"
-#include "results/process.h"
+#include "formats/process.h"
 
 namespace bielle::tasks {
 namespace {

@@ -9,7 +9,7 @@
 
 namespace bielle::tasks {
 
-// Starts a program apart (results/process.h), with both outputs in the file `log` and no input.
+// Starts a program apart (formats/process.h), with both outputs in the file `log` and no input.
 // \throws InputError when there can be no new process
 pid_t startChild(const std::vector<std::string>& arguments, const std::string& log);
 
@@ -24,7 +24,7 @@ PipedChild startPipedChild(const std::vector<std::string>& arguments);
 
 struct ChildEnd {
   pid_t pid = 0;
-  int status = 0;  // results/process.h
+  int status = 0;  // formats/process.h
 };
 
 // During its lifetime, SIGINT, SIGTERM and SIGCHLD are blocked and awaited. Children get the previous signal mask.

@@ -1,0 +1,121 @@
+// Meshes of kinds that assimp reads, against the same body as STL.
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <sstream>
+
+#include "formats/mesh.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// A wedge.
+const std::vector<std::array<double, 3>> kVertices = {{0, 0, 0},   {0.3, 0, 0}, {0.3, 0.2, 0},
+                                                      {0, 0.2, 0}, {0, 0, 0.1}, {0, 0.2, 0.1}};
+const std::vector<std::array<int, 3>> kFaces = {{0, 2, 1}, {0, 3, 2}, {0, 1, 4}, {3, 5, 2},
+                                                {1, 2, 5}, {1, 5, 4}, {0, 4, 5}, {0, 5, 3}};
+
+std::string write(const std::string& begin, const std::string& face_prefix) {
+  std::ostringstream out;
+  out << begin;
+  for (const auto& [x, y, z] : kVertices) out << x << " " << y << " " << z << "\n";
+  for (const auto& [a, b, c] : kFaces) out << face_prefix << a << " " << b << " " << c << "\n";
+  return out.str();
+}
+
+std::string writeStl() {
+  std::ostringstream out;
+  out << "solid wedge\n";
+  for (const auto& face : kFaces) {
+    out << "facet normal 0 0 0\nouter loop\n";
+    for (const int i : face)
+      out << "vertex " << kVertices[i][0] << " " << kVertices[i][1] << " " << kVertices[i][2] << "\n";
+    out << "endloop\nendfacet\n";
+  }
+  out << "endsolid\n";
+  return out.str();
+}
+
+const std::string kPly =
+    "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nelement face 8\n"
+    "property list uchar int vertex_indices\nend_header\n";
+
+// COLLADA with a node that is moved, and an axis that counts for nothing.
+std::string writeCollada() {
+  std::ostringstream out;
+  out << "<COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\"><asset><unit meter=\"1\"/>"
+         "<up_axis>Y_UP</up_axis></asset><library_geometries><geometry id=\"g\"><mesh><source id=\"p\"><float_array "
+         "id=\"a\" "
+         "count=\"18\">";
+  for (const auto& [x, y, z] : kVertices) out << x - 1 << " " << y << " " << z << " ";
+  out << "</float_array><technique_common><accessor source=\"#a\" count=\"6\" stride=\"3\"><param name=\"X\" "
+         "type=\"float\"/>"
+         "<param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></technique_common></source>"
+         "<vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices><triangles count=\"8\">"
+         "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>";
+  for (const auto& [a, b, c] : kFaces) out << a << " " << b << " " << c << " ";
+  out << "</p></triangles></mesh></geometry></library_geometries><library_visual_scenes><visual_scene id=\"s\"><node "
+         "id=\"n\">"
+         "<matrix>1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_geometry url=\"#g\"/></node></visual_scene>"
+         "</library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>\n";
+  return out.str();
+}
+
+// Corners of the triangles, in an order of their own.
+std::vector<std::array<double, 9>> sortTriangles(const Eigen::Matrix3Xd& corners) {
+  std::vector<std::array<double, 9>> out(static_cast<size_t>(corners.cols() / 3));
+  for (size_t i = 0; i < out.size(); ++i) {
+    Eigen::Matrix3d t = corners.middleCols<3>(static_cast<Eigen::Index>(3 * i));
+    int first = 0;
+    for (int k = 1; k < 3; ++k)
+      if (std::lexicographical_compare(t.col(k).begin(), t.col(k).end(), t.col(first).begin(), t.col(first).end()))
+        first = k;
+    for (int k = 0; k < 9; ++k) out[i][k] = t(k % 3, (first + k / 3) % 3);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("meshes of further kinds have the triangles and the shape of the same body as STL") {
+  const RobotDirectory files;
+  files.write("wedge.stl", writeStl());
+  const auto expected = sortTriangles(readTriangles("wedge.stl", files.path()));
+  REQUIRE(expected.size() == kFaces.size());
+  const Shape shape = fitMesh("wedge.stl", files.path(), Vector3d::Ones()).value();
+  files.write("wedge.ply", write(kPly, "3 "));
+  files.write("wedge.off", write("OFF\n6 8 0\n", "3 "));
+  files.write("wedge.dae", writeCollada());
+  for (const std::string name : {"wedge.ply", "wedge.off", "wedge.dae"}) {
+    CAPTURE(name);
+    const auto triangles = sortTriangles(readTriangles(name, files.path()));
+    REQUIRE(triangles.size() == expected.size());
+    for (size_t i = 0; i < expected.size(); ++i)
+      for (int k = 0; k < 9; ++k) CHECK(triangles[i][k] == Approx(expected[i][k]).margin(1e-6));
+    const std::optional<Shape> fitted = fitMesh(name, files.path(), Vector3d::Ones());
+    REQUIRE(fitted);
+    CHECK((fitted->half - shape.half).norm() < 1e-6);
+    CHECK((fitted->X_BS.p - shape.X_BS.p).norm() < 1e-6);
+    CHECK(fitted->radius == Approx(shape.radius).margin(1e-6));
+  }
+}
+
+TEST_CASE("meshes that are cut off, empty or of no known kind give nothing") {
+  const RobotDirectory files;
+  const std::string ply = write(kPly, "3 ");
+  files.write("cut.ply", ply.substr(0, ply.size() / 2));
+  files.write("empty.ply", "");
+  files.write("header.ply", kPly);
+  files.write("wedge.text", "no mesh at all\n");
+  files.write("-option.ply", ply);
+  for (const std::string name : {"cut.ply", "empty.ply", "header.ply", "wedge.text", "missing.ply"}) {
+    CAPTURE(name);
+    CHECK(readTriangles(name, files.path()).cols() == 0);
+    CHECK_FALSE(fitMesh(name, files.path(), Vector3d::Ones()));
+  }
+  CHECK(readTriangles("-option.ply", files.path()).cols() == 24);
+}
