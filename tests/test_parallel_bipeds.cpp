@@ -180,7 +180,7 @@ TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 
     }
   }
   const RobotDirectory directory;
-  const MotionRecord record = solveByCommand("kangaroo_leg", squat, directory);
+  const MotionRecord record = solveByCommand("kangaroo_leg", {"squat"}, directory);
   CHECK(record.com.col(2).minCoeff() == Approx(0.7 * record.com(0, 2)).margin(0.015));
 }
 
