@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Writes docs/results/architectures.md and docs/images/architectures.svg: 24 legs, each optimized for the same four motions.
+"""Writes docs/results/architectures.md and docs/images/architectures.svg: 24 legs, each optimized for the same four motions with
+either of two motors, and the fastest walk of each.
 
     docs/results/architectures.py                        the page from docs/results/data/architectures.json
     docs/results/architectures.py --run DIR [--bielle build/bin/bielle] [--jobs 2]
-                                                         makes these first, an hour of two cores; goes on where it was cut off
+                                                         makes these first, two hours of one core; goes on where it was cut off
 
 `--quick` evaluates two of them as they come and prints the page.
 """
@@ -25,6 +26,8 @@ PARTS = {"hip": ["serial", "three_rrs"], "knee": ["serial", "belt", "four_bar", 
          "ankle": ["rsu", "differential"]}
 MOTIONS = [("walk", {"speed": 0.5}), ("walk", {"speed": 1.0}), ("stairs", {"height": 0.08, "stairs": 2}), ("jump", {"flight": 0.25})]
 TITLES = ["walk, 0.5 m/s", "walk, 1.0 m/s", "stairs", "jump"]
+MOTORS = ["ak80-9", "ak10-9"]
+SPEEDS = [1.2, 1.4, 1.6]
 SEARCHED = ["walk", "walk_2", "stairs", "jump"]  # their directories
 
 
@@ -59,8 +62,18 @@ def read_motion(directory):
     return {"J": summary["electrical_energy"]["total_J"], "peak_torque": max(summary["peak_torques"].values())}
 
 
+def compare(bielle, directory, name, robots, motions, jobs):
+    """{(robot, motion): row} of `bielle compare`; what it has solved before stays."""
+    lines = ["robots:"] + [f"  {robot}: {{robot: {place}}}" for robot, place in robots.items()] + ["motions:"]
+    lines += [f"  - {{motion: {motion}, set: {json.dumps(settings)}}}" for motion, settings in motions]
+    (directory / f"{name}.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    subprocess.run([bielle, "compare", f"{name}.yaml", "-o", name, "--jobs", str(jobs)], cwd=directory)  # cases may fail
+    with open(directory / name / "compare.csv", encoding="utf-8", newline="") as file:
+        return {(row["robot"], row["motion"]): row for row in csv.DictReader(file)}
+
+
 def run(arguments, directory, specification):
-    """Searches, then solves the motions of the best designs by the usual steps: the content of DATA."""
+    """Searches, then makes motions of the best designs by the usual steps: the content of DATA."""
     bielle = str(pathlib.Path(arguments.bielle).resolve()) if "/" in arguments.bielle else arguments.bielle
     directory.mkdir(parents=True, exist_ok=True)
     (directory / "legs.yaml").write_text(specification, encoding="utf-8")
@@ -72,22 +85,29 @@ def run(arguments, directory, specification):
     for number, best in enumerate(bests, 1):
         parts = [choices[kind][round(best["x"][open_kinds.index(kind)])] if kind in open_kinds else choices[kind][0] for kind in PARTS]
         place = directory / f"search/ranked/{number:02d}"
-        robots["-".join(parts)] = {"parts": parts, "robot": f"search/ranked/{number:02d}", "solved": [],
-                                   "motions": [read_motion(place / motion) for motion in SEARCHED]}
+        if "-".join(parts) not in robots:  # with the better motor
+            robots["-".join(parts)] = {"parts": parts, "robot": f"search/ranked/{number:02d}", "solved": [],
+                                       "motor": MOTORS[round(best["x"][len(open_kinds)])],
+                                       "motions": [read_motion(place / motion) for motion in SEARCHED]}
     subprocess.run([sys.executable, str(common.SOURCE / "examples/better_leg/drive.py"), "ak10-9", "18", "18", "9", "bipetto"],
                    cwd=directory, check=True)
-    robots["bipetto"] = {"parts": ["serial", "four-bar", "rods"], "robot": "./bipetto", "motions": [], "solved": []}
+    robots["bipetto"] = {"parts": ["serial", "four-bar", "rods"], "robot": "./bipetto", "motor": "ak10-9", "motions": [],
+                         "solved": []}
     solved = [*list(robots)[:-1][:arguments.solve], "bipetto"]
-    lines = ["robots:"] + [f"  {name}: {{robot: {robots[name]['robot']}}}" for name in solved] + ["motions:"]
-    lines += [f"  - {{motion: {motion}, set: {json.dumps(settings)}}}" for motion, settings in MOTIONS]
-    (directory / "compare.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    subprocess.run([bielle, "compare", "compare.yaml", "-o", "compare", "--jobs", str(arguments.jobs)], cwd=directory)  # cases may fail
-    with open(directory / "compare/compare.csv", encoding="utf-8", newline="") as file:
-        rows = {(row["robot"], row["motion"]): row for row in csv.DictReader(file)}
-    for name, robot in robots.items():
-        for motion, settings in MOTIONS if name in solved else []:
+    rows = compare(bielle, directory, "compare", {name: robots[name]["robot"] for name in solved}, MOTIONS, arguments.jobs)
+    for name in solved:
+        for motion, settings in MOTIONS:
             row = rows[name, name_case(motion, settings)]
-            robot["solved"].append({"passed": row["outcome"] == "passed", "J": float(row["electrical_energy_J"] or "nan")})
+            robots[name]["solved"].append({"passed": row["outcome"] == "passed", "J": float(row["electrical_energy_J"] or "nan")})
+    walking = list(robots)
+    for speed in SPEEDS:  # whoever fails does not try a higher one
+        settings = {"speed": speed}
+        rows = compare(bielle, directory, f"walks-{speed:g}", {name: robots[name]["robot"] for name in walking},
+                       [("walk", settings)], arguments.jobs) if walking else {}
+        walking = [name for name in walking if rows[name, name_case("walk", settings)]["outcome"] == "passed"]
+        for name in walking:
+            robots[name]["speed"] = speed
+    for name, robot in robots.items():
         info = subprocess.run([bielle, "info", robot["robot"], "--json"], cwd=directory, check=True, capture_output=True, text=True)
         robot["mass"] = json.loads(info.stdout)["mass"]
     return {"run": common.describe_run(arguments.commit), "designs": counts[0], "feasible": counts[1], "robots": robots}
@@ -125,10 +145,11 @@ def draw(robots, path):
 def make_page(data):
     page = common.Page(__file__, "Twenty-four legs", data["run"])
     page.add(f"""Two hips, six knees and two ankles of [`leg_biped`](../../robots/leg_biped/README.md), in every combination, with the
-same trunk, links and motors (AK10-9 at every joint, with gears of 9 to 18 that cost nothing): gears and lengths are searched by gradients for the
-least electrical energy of two walks, stairs of 8 cm and a jump of 0.25 s. Torque, speed and voltage of every motor, its heat, a margin of
-0.2 to dead points, 28 kg and 2 mm between bodies are constraints of all motions. {data['designs']} designs were evaluated, {data['feasible']}
-are feasible; each search had at most five, so that more would find better ones. Braking energy is not recovered; belts and differentials lost nothing at this commit.""")
+same trunk and links and one kind of motor, AK80-9 or AK10-9, at every joint: gears of 9 to 18, which weigh and lose what they add,
+and lengths are searched by gradients for the least electrical energy of two walks, stairs of 8 cm and a jump of 0.25 s. Torque,
+speed and voltage of every motor, its heat, a margin of 0.2 to dead points, 30 kg and 2 mm between bodies are constraints of all
+motions. {data['designs']} designs were evaluated, {data['feasible']} are feasible; each of the 48 searches had at most five, so that
+more would find better ones. Braking energy is not recovered.""")
     page.lines += ["", "```console", "bielle design examples/architectures/legs.yaml -o legs --jobs 2", "```"]
     page.lines += ["", "![energies of the four motions by robot](../images/architectures.svg)"]
     robots = sorted(data["robots"].values(), key=lambda robot: calc_total(robot["motions"]) or 1e9)
@@ -139,14 +160,15 @@ are feasible; each search had at most five, so that more would find better ones.
             cells = [f"*{cell}*" for cell in cells]
         energies = [show(motion["J"], "{:.0f}") for motion in robot["motions"]] or ["–"] * len(TITLES)
         failed = "" if all(motion["passed"] for motion in robot["solved"]) else "\\*"
-        rows.append(cells + [f"{robot['mass']:.2f}", show(calc_total(robot["motions"]), "{:.0f}"), *energies,
+        rows.append(cells + [robot["motor"].upper(), f"{robot['mass']:.2f}", show(calc_total(robot["motions"]), "{:.0f}"), *energies,
                              show(max((motion["peak_torque"] for motion in robot["motions"]), default=None), "{:.1f}"),
-                             show(calc_total(robot["solved"]), "{:.0f}") + failed])
-    page.add("""Energies are in J, by the Euler steps of the search (20 ms, 10 ms in the jump); *solved* is their sum as `bielle solve`
+                             show(calc_total(robot["solved"]), "{:.0f}") + failed, show(robot.get("speed"), "{:.1f}")])
+    page.add(f"""Energies are in J, by the Euler steps of the search (20 ms, 10 ms in the jump); *solved* is their sum as `bielle solve`
 makes the motions, for the best ones, with an asterisk where one misses a goal or a row of the check. Torques are the largest of any
-motor in the four motions, in N m. *Bipetto* has the motors and ratios of [a leg better than it](../../examples/better_leg/README.md),
+motor in the four motions, in N m. The *fastest walk* of {", ".join(f"{speed:g}" for speed in SPEEDS)} m/s is the one before the first that fails the check, motors'
+limits among its rows, by the usual steps. *Bipetto* has the motors and ratios of [a leg better than it](../../examples/better_leg/README.md),
 its masses as published, and was not searched.""")
-    page.table(["hip", "knee", "ankle", "mass [kg]", "sum", *TITLES, "peak torque", "solved"], rows)
+    page.table(["hip", "knee", "ankle", "motor", "mass [kg]", "sum", *TITLES, "peak torque", "solved", "fastest walk [m/s]"], rows)
     page.heading("By part")
     page.add("Mean energy over all legs that have it, in J.")
     rows = []
@@ -171,7 +193,7 @@ def main():
         small = small.replace("slsqp, evaluations: 5", "sbplx, evaluations: 1").replace("knee: four_bar", "knee: belt")
         small = re.sub(r"  - \{motion: (walk, set: \{speed: 1|stairs|jump).*\n", "", small)
         PARTS.update(hip=["serial"], ankle=["rsu"])
-        MOTIONS[1:], TITLES[1:], SEARCHED[1:] = [], [], []
+        MOTIONS[1:], TITLES[1:], SEARCHED[1:], SPEEDS[1:] = [], [], [], []
         with tempfile.TemporaryDirectory() as directory:
             page, _ = make_page(run(arguments, pathlib.Path(directory), small))
         page.write(True)
