@@ -73,10 +73,11 @@ struct MeshFile {
   std::string extension, content;
 };
 
-// A file of any kind as STL; "" if assimp cannot read it, or is not there.
-std::string convertToStl(const fs::path& file) {
-  constexpr double kLongest = 60;  // s
-  const ProcessOutput run = runProcess({findCompanion("bielle-mesh"), file.string()}, kLongest);
+// A file of any kind and so many bytes as STL; "" if assimp cannot read it, or is not there. On some damaged files it never ends.
+std::string convertToStl(const fs::path& file, std::uintmax_t size) {
+  constexpr double kLeast = 4, kPerByte = 2e-6;  // s
+  const double longest = kLeast + kPerByte * static_cast<double>(size);
+  const ProcessOutput run = runProcess({findCompanion("bielle-mesh"), file.string()}, longest);
   return run.status == 0 ? run.out : "";
 }
 
@@ -85,8 +86,9 @@ MeshFile readMeshFile(const std::string& mesh, const std::string& directory, std
   const std::string extension = getExtension(mesh);
   const fs::path place = findMesh(mesh, directory);
   std::error_code error;
-  if (place.empty() || fs::file_size(place, error) > kLargest || error) return {};
-  if (std::find(kinds.begin(), kinds.end(), extension) == kinds.end()) return {".stl", convertToStl(place)};
+  const std::uintmax_t size = place.empty() ? 0 : fs::file_size(place, error);
+  if (place.empty() || error || size > kLargest) return {};
+  if (std::find(kinds.begin(), kinds.end(), extension) == kinds.end()) return {".stl", convertToStl(place, size)};
   std::ifstream file(place, std::ios::binary);
   return {extension, {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()}};
 }
