@@ -14,14 +14,12 @@ using namespace bielle;
 
 namespace {
 
-Model loadOwn(const std::string& name) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model; }
+Model loadOwn(const std::string& place) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/" + place).model; }
 
 // Largest acceleration that motor torques leave on these contacts, by the derivatives' own dynamics.
 double calcAcceleration(const Model& model, const std::vector<ContactTarget>& contacts, const VectorXd& q,
                         const VectorXd& u) {
-  VectorXd tau = VectorXd::Zero(model.nv());
-  for (int m = 0; m < model.nu(); ++m) tau[model.motors()[m].dof] = u[m];
-  const Modes modes = calcModes(model, makeConstraintSet(model, contacts), q, tau);
+  const Modes modes = calcModes(model, makeConstraintSet(model, contacts), q, calcMotorForces(model, u));
   REQUIRE(modes.status == DynamicsStatus::Ok);
   return modes.acceleration;
 }
@@ -29,7 +27,7 @@ double calcAcceleration(const Model& model, const std::vector<ContactTarget>& co
 }  // namespace
 
 TEST_CASE("leaf springs: beside the middle of its feet a robot rests where they balance its weight") {
-  const Model model = loadOwn("spring_biped");
+  const Model model = loadOwn("robots/spring_biped");
   const StandingRobot standing = makeStandingRobot(model);
   const std::vector<ContactTarget> contacts = makeContactTargets(standing, 0, 0);
   AssemblyProblem aside;
@@ -62,13 +60,13 @@ TEST_CASE("leaf springs: beside the middle of its feet a robot rests where they 
   const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), moved.q).u;
   CHECK((u.cwiseAbs().maxCoeff() > 100 || calcAcceleration(model, contacts, moved.q, u) > 0.1));
 
-  const Model stiff = loadOwn("bipetto");
+  const Model stiff = loadOwn("robots/bipetto");
   const StandingRobot other = makeStandingRobot(stiff);
   CHECK(settlePosture(stiff, makeContactTargets(other, 0, 0), other.q) == other.q);
 }
 
 TEST_CASE("leaf springs: stages follow the fastest of their modes") {
-  const Model model = loadOwn("spring_biped");
+  const Model model = loadOwn("robots/spring_biped");
   const StandingRobot standing = makeStandingRobot(model);
   const std::vector<ContactTarget> contacts = makeContactTargets(standing, 0, 0);
   CHECK(calcSpringStage(model, standing.q, contacts) == 0.005);  // 34 Hz
@@ -80,11 +78,9 @@ TEST_CASE("leaf springs: stages follow the fastest of their modes") {
   const double soft = calcSpringStage(ModelBuilder::restore(parts), standing.q, contacts);
   CHECK(soft >= 0.009);
   CHECK(soft <= 0.013);
-  for (const char* name : {"bipetto", "better_leg"}) {
-    CAPTURE(name);
-    const Model other = std::string(name) == "bipetto"
-                            ? loadOwn(name)
-                            : loadRobot(std::string(BIELLE_SOURCE_DIR) + "/examples/better_leg").model;
+  for (const char* place : {"robots/bipetto", "examples/better_leg"}) {  // without springs, and with slow ones
+    CAPTURE(place);
+    const Model other = loadOwn(place);
     CHECK(makeSquat(other).problem->spec(0).dt == 0.015);
     CHECK(makeWalk(other).problem->spec(0).dt == 0.012);
   }

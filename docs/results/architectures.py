@@ -26,7 +26,6 @@ PARTS = {"hip": ["serial", "three_rrs"], "knee": ["serial", "belt", "four_bar", 
          "ankle": ["rsu", "differential"]}
 MOTIONS = [("walk", {"speed": 0.5}), ("walk", {"speed": 1.0}), ("stairs", {"height": 0.08, "stairs": 2}), ("jump", {"flight": 0.25})]
 TITLES = ["walk, 0.5 m/s", "walk, 1.0 m/s", "stairs", "jump"]
-MOTORS = ["ak80-9", "ak10-9"]
 SPEEDS = [1.2, 1.4, 1.6]
 SEARCHED = ["walk", "walk_2", "stairs", "jump"]  # their directories
 
@@ -80,6 +79,7 @@ def run(arguments, directory, specification):
     subprocess.run([bielle, "design", "legs.yaml", "-o", "search", "--jobs", str(arguments.jobs)], cwd=directory, check=True)
     bests, counts = read_search(directory / "search")
     choices = list_choices(specification, PARTS)
+    motors = re.search(r'motor: "\*", choices: \[([^]]*)\]', specification)[1].split(", ")
     open_kinds = [kind for kind in PARTS if len(choices[kind]) > 1]  # variables, before all others
     robots = {}
     for number, best in enumerate(bests, 1):
@@ -87,7 +87,7 @@ def run(arguments, directory, specification):
         place = directory / f"search/ranked/{number:02d}"
         if "-".join(parts) not in robots:  # with the better motor
             robots["-".join(parts)] = {"parts": parts, "robot": f"search/ranked/{number:02d}", "solved": [],
-                                       "motor": MOTORS[round(best["x"][len(open_kinds)])],
+                                       "motor": motors[round(best["x"][len(open_kinds)])],
                                        "motions": [read_motion(place / motion) for motion in SEARCHED]}
     subprocess.run([sys.executable, str(common.SOURCE / "examples/better_leg/drive.py"), "ak10-9", "18", "18", "9", "bipetto"],
                    cwd=directory, check=True)

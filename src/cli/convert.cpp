@@ -12,12 +12,12 @@
 #include "formats/drake.h"
 #include "formats/dxf.h"
 #include "formats/mjcf.h"
+#include "formats/process.h"
 #include "formats/sdf.h"
 #include "formats/text_file.h"
 #include "model/payload.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
-#include "formats/process.h"
 #include "results/workshop_sheet.h"
 #include "results/workshop_solids.h"
 

@@ -12,8 +12,8 @@ namespace bielle {
 // directory above the robot's or in $ROS_PACKAGE_PATH, or for rest beside the robot.
 std::filesystem::path findMesh(const std::string& mesh, const std::string& directory);
 
-// STL, OBJ and the vertices of COLLADA files (.dae) are read here, what else assimp reads by `bielle-mesh`, a program of its own:
-// none of the many formats can then harm this process.
+// STL and OBJ files and the vertices of COLLADA files (.dae) are read here. What else assimp reads is read by `bielle-mesh`, a
+// program of its own, so that a damaged file cannot harm this process.
 
 // The box or capsule of least volume around the vertices of a file, along the axes of the file or the principal ones of the
 // vertices; none if the file is missing, of an unknown kind, damaged, or larger than 100 MB.

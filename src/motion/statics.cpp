@@ -52,7 +52,7 @@ std::vector<int> listMotorDofs(const Model& model) {
   return dofs;
 }
 
-// Those that no motor moves.
+// Those on other joints than the motors' own. (Through a linkage a motor may move them all the same.)
 std::vector<const JointForce*> listFreeSprings(const Model& model) {
   std::vector<const JointForce*> springs;
   const std::vector<int> motors = listMotorDofs(model);
@@ -130,9 +130,7 @@ double calcSpringStage(const Model& model, ConstVectorRef q, const std::vector<C
   double fastest = 0;  // Hz
   if (!listFreeSprings(model).empty()) {
     const ConstraintSet constraints = makeConstraintSet(model, contacts);
-    VectorXd tau = VectorXd::Zero(model.nv());
-    const VectorXd u = calcStaticTorques(model, constraints, q).u;
-    for (int m = 0; m < model.nu(); ++m) tau[model.motors()[m].dof] = u[m];
+    const VectorXd tau = calcMotorForces(model, calcStaticTorques(model, constraints, q).u);
     for (const Mode& mode : calcModes(model, constraints, q, tau).modes) fastest = std::max(fastest, mode.frequency);
   }
   if (fastest == 0) return std::numeric_limits<double>::infinity();

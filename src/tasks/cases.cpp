@@ -16,9 +16,9 @@
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "formats/aside_file.h"
+#include "formats/process.h"
 #include "formats/text_file.h"
 #include "results/json_text.h"
-#include "formats/process.h"
 #include "tasks/case_task.h"
 
 namespace fs = std::filesystem;
