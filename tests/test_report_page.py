@@ -524,6 +524,18 @@ point_springs:
         self.assertEqual(struct.unpack(">II", data[16:24]), (192, 160))
         self.assertGreater(len(data), 8000)
 
+    def test_a_robot_has_a_picture_of_its_page(self):
+        page, sizes = self.root / "shown.html", []
+        for robot in ("bipetto", "fourbar"):
+            picture = self.root / f"{robot}.png"
+            run("view", robot, "-o", page, "--png", picture)
+            data = picture.read_bytes()
+            self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
+            self.assertEqual(struct.unpack(">II", data[16:24]), (1280, 1000))
+            sizes.append(len(data))
+        self.assertGreater(sizes[1], 20000)        # not blank
+        self.assertGreater(sizes[0], 1.3 * sizes[1])  # more bodies, sliders and readouts
+
     def test_stills_need_a_browser(self):
         result = subprocess.run([BIELLE, "report", str(self.squat), "--png", str(self.root / "none.png")],
                                 capture_output=True, text=True, env={**os.environ, "PATH": "/nonexistent"})

@@ -55,12 +55,14 @@ std::string escapeUrl(const std::string& text) {
   return out;
 }
 
+std::string makeAddress(const std::string& page) { return "file://" + escapeUrl(fs::absolute(page).string()); }
+
 std::string makeAddress(const std::string& page, const FilmOptions& options, bool separate) {
   std::string times;
   for (double t : options.times) times += (times.empty() ? "" : ",") + formatNumber(t, "%.4f");
-  std::string address = "file://" + escapeUrl(fs::absolute(page).string()) + "#film=" + times +
-                        "&size=" + std::to_string(options.width) + "x" + std::to_string(options.height) +
-                        "&view=" + escapeUrl(options.view) + "&columns=" + std::to_string(options.columns);
+  std::string address = makeAddress(page) + "#film=" + times + "&size=" + std::to_string(options.width) + "x" +
+                        std::to_string(options.height) + "&view=" + escapeUrl(options.view) +
+                        "&columns=" + std::to_string(options.columns);
   if (separate) address += "&separate=1";
   if (!options.side_by_side) address += "&apart=0";
   if (options.see_through) address += "&through=1";
@@ -86,17 +88,33 @@ std::string decodeBase64(const std::string& text) {
   return bytes;
 }
 
+// Runs the browser on an address, with options of one's own.
+ProcessOutput browse(const ScratchDirectory& scratch, const std::vector<std::string>& options,
+                     const std::string& address, double seconds) {
+  std::vector<std::string> arguments = {findBrowser(),
+                                        "--headless",
+                                        "--no-sandbox",
+                                        "--disable-gpu",
+                                        "--use-gl=angle",
+                                        "--use-angle=swiftshader",
+                                        "--enable-unsafe-swiftshader",
+                                        "--disable-quic",
+                                        "--no-first-run",
+                                        "--disable-background-networking",
+                                        "--disable-component-update",
+                                        "--disable-sync",
+                                        "--user-data-dir=" + (scratch / "profile").string(),
+                                        "--timeout=" + std::to_string(static_cast<int>(1000 * seconds))};
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  arguments.push_back(address);
+  return runProcess(arguments, seconds);
+}
+
 // The images that the page stores in its document (film.js), as bytes of their formats.
 std::vector<std::string> takePictures(const std::string& page, const FilmOptions& options, bool separate) {
   const ScratchDirectory scratch;
   const double seconds = 60 + 4.0 * static_cast<double>(options.times.size());
-  const ProcessOutput result = runProcess(
-      {findBrowser(), "--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader",
-       "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking",
-       "--disable-component-update", "--disable-sync", "--user-data-dir=" + (scratch / "profile").string(),
-       "--timeout=" + std::to_string(static_cast<int>(1000 * seconds)), "--dump-dom",
-       makeAddress(page, options, separate)},
-      seconds);
+  const ProcessOutput result = browse(scratch, {"--dump-dom"}, makeAddress(page, options, separate), seconds);
   std::vector<std::string> pictures;
   const std::string mark = ";base64,", begin = "<img class=\"film\" src=\"data:image/";
   for (size_t at = 0; (at = result.out.find(begin, at)) != std::string::npos;) {
@@ -115,6 +133,23 @@ std::vector<std::string> takePictures(const std::string& page, const FilmOptions
 void writeStrip(const std::string& page, const FilmOptions& options, const std::string& path) {
   AsideFile file(path);
   file.write(takePictures(page, options, false).front());
+  file.commit();
+}
+
+void writeScreenshot(const std::string& page, const std::string& path) {
+  constexpr double kLongest = 60;  // s
+  const ScratchDirectory scratch;
+  const std::string made = (scratch / "page.png").string();
+  browse(scratch,
+         {"--window-size=1280,1000", "--hide-scrollbars", "--virtual-time-budget=3000", "--screenshot=" + made},
+         makeAddress(page), kLongest);
+  std::error_code error;
+  if (fs::file_size(made, error) == 0 || error)
+    throw InputError(path, "picture", "the browser drew none",
+                     "open the page to see whether the browser supports WebGL");
+  std::ifstream picture(made, std::ios::binary);
+  AsideFile file(path);
+  file.write({std::istreambuf_iterator<char>(picture), std::istreambuf_iterator<char>()});
   file.commit();
 }
 

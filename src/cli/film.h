@@ -1,5 +1,5 @@
 #pragma once
-// Pictures and films of a report's page, made by a headless browser.
+// Pictures and films of pages, made by a headless browser.
 #include <string>
 #include <vector>
 
@@ -15,10 +15,13 @@ struct FilmOptions {
   std::string show, hide;  // layers, separated by commas
 };
 
-// One PNG with a picture per time. \throws InputError when there is no browser, or it fails
+// The page as it opens, 1280 by 1000 pixels, as PNG. \throws InputError as writeStrip() does
+void writeScreenshot(const std::string& page, const std::string& path);
+
+// Of a report, one PNG with a picture per time. \throws InputError when there is no browser, or it fails
 void writeStrip(const std::string& page, const FilmOptions& options, const std::string& path);
 
-// H.264, `rate` pictures per second of real time. \throws InputError when there is no browser or no ffmpeg, or one
+// Of a report, H.264, `rate` pictures per second of real time. \throws InputError when there is no browser or no ffmpeg, or one
 // fails
 void writeFilm(const std::string& page, const FilmOptions& options, double rate, const std::string& path);
 

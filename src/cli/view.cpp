@@ -9,6 +9,7 @@
 
 #include "bielle/model/error.h"
 #include "cli/commands.h"
+#include "cli/film.h"
 #include "cli/parameter_range.h"
 #include "results/output_place.h"
 #include "robots/generator_entry.h"
@@ -21,7 +22,7 @@ constexpr int kSamples = 7;  // of a parameter
 struct ViewArguments {
   RobotArgument robot;
   std::vector<std::string> parameters;  // NAME or NAME=LOW:HIGH
-  std::string output;
+  std::string output, png;
 };
 
 // Robots of a parameter from low to high, that of the robot itself among them.
@@ -50,6 +51,7 @@ int view(const ViewArguments& arguments) {
   const std::string path =
       arguments.output.empty() ? std::filesystem::path(robot.file).stem().string() + ".html" : arguments.output;
   requireApart(path, listFiles(robot));
+  if (!arguments.png.empty()) requireApart(arguments.png, listFiles(robot));
   std::vector<ViewParameter> parameters;
   if (!arguments.parameters.empty()) {
     const std::optional<GeneratorEntry> entry = readGeneratorOf(robot.file);
@@ -60,6 +62,10 @@ int view(const ViewArguments& arguments) {
   }
   writeView(path, robot, parameters);
   std::cout << path << "\n";
+  if (!arguments.png.empty()) {
+    writeScreenshot(path, arguments.png);
+    std::cout << arguments.png << "\n";
+  }
   return kOk;
 }
 
@@ -77,6 +83,7 @@ void addView(CLI::App& app, Action& action) {
           "a slider for this parameter of a generated robot, 30 % about its value or over a range; may be repeated")
       ->type_name(kParameterRange);
   command.add_option("-o,--output", arguments->output, "the page; default: NAME.html here");
+  command.add_option("--png", arguments->png, "also a picture of the page as it opens; needs chromium");
   command.footer(
       "The loops close as the sliders move, from precomputed samples; the page reports where they cannot close.\n"
       "Examples:\n"
