@@ -201,10 +201,10 @@ TEST_CASE("check: feet that land hard, turn, stand askew or go under the ground 
   CHECK(fails(checkMotion(landing), "landing velocity"));
 
   CheckedMotion turning = getSquat().checked;
-  for (int k = 0; k <= turning.numStages(); ++k) moveBase(turning, k, 1e-4 * k * Vector6d::Unit(5));
+  for (int k = 0; k <= turning.numStages(); ++k) moveBase(turning, k, 2e-4 * k * Vector6d::Unit(5));
   const CheckReport turned = checkMotion(turning);
   CHECK(fails(turned, "standing feet: slip, angle"));
-  CHECK(getValue(turned, "standing feet: slip, angle") == Approx(1e-4 * turning.numStages()).epsilon(0.1));
+  CHECK(getValue(turned, "standing feet: slip, angle") == Approx(2e-4 * turning.numStages()).epsilon(0.1));
 
   // On the edges of its soles, which touch the ground.
   CheckedMotion askew = getSquat().checked;
