@@ -14,7 +14,7 @@
 #include <iostream>
 
 #include "bielle/motion/jump.h"
-#include "bielle/motion/sequence.h"
+#include "bielle/motion/registry.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
 #include "bielle/results/result.h"

@@ -2,7 +2,7 @@
 // Compares the derivatives of a residual with finite differences, for Catch2 tests.
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "bielle/ocp/residual.h"
+#include "bielle/ocp/cost.h"
 #include "check_derivative.h"
 
 namespace bielle::testing {

@@ -8,7 +8,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "run_bielle.h"
 
 namespace bielle::testing {

@@ -2,7 +2,7 @@
 // The error message of reading a recorded motion.
 #include <string>
 
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "get_error.h"
 
 namespace bielle::testing {

@@ -1,6 +1,6 @@
 #pragma once
 // The biped that is composed of parts.
-#include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace bielle::testing {
 

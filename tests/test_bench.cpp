@@ -78,7 +78,7 @@ TEST_CASE("bench: a window has the bounds of the stages that it shows") {
     stages[k].effort_limits = makeLimits(static_cast<int>(k));
   }
   const VectorXd x0 = makeBenchmarkWalk(model, makeShortBenchmark()).problem->initialState();
-  RobotProblem whole(model, x0.head(model.nq()), x0.tail(model.nv()), std::move(stages));
+  RobotProblem whole(model, x0.head(model.nq()), x0.tail(model.nv()), std::move(stages), Formulation::Full);
   Window window(whole, 12);
   window.move(5, whole.initialState());
   for (int k = 0; k < window.numStages(); ++k) {

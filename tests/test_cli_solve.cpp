@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "bielle/motion/record.h"
-#include "bielle/motion/refinement.h"
 #include "bielle/motion/squat.h"
 #include "bielle/robots/robot_loader.h"
 #include "cli_command.h"
+#include "motion/refinement.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;
@@ -277,7 +277,9 @@ TEST_CASE("a motion that starts near a dead point says so at its start and in it
 }
 
 // Its knees end just before the dead point of their four-bar at 1.3256 rad, and nothing keeps them from it.
-TEST_CASE("a squat that ends just before a dead point: solve, summary, check and report tell how far, and so do info and ratio") {
+TEST_CASE(
+    "a squat that ends just before a dead point: solve, summary, check and report tell how far, and so do info and "
+    "ratio") {
   const OutputDirectory out;
   const CommandResult solved = run({"solve", "squat", "--robot", "bipetto", "--depth", "0.72", "--dead-point-margin",
                                     "0", "--quiet", "-o", out.str()});
@@ -285,7 +287,8 @@ TEST_CASE("a squat that ends just before a dead point: solve, summary, check and
   const json summary = out.readSummary();
   const json* nearest = nullptr;
   for (const json& linkage : summary["dead_points"])
-    if (linkage["distance"].is_number() && (!nearest || linkage["distance"] < (*nearest)["distance"])) nearest = &linkage;
+    if (linkage["distance"].is_number() && (!nearest || linkage["distance"] < (*nearest)["distance"]))
+      nearest = &linkage;
   REQUIRE(nearest);
   const double distance = (*nearest)["distance"];
   const std::string name = (*nearest)["linkage"];
@@ -317,7 +320,8 @@ TEST_CASE("a squat that ends just before a dead point: solve, summary, check and
       }
     CHECK(told);
   }
-  CHECK_THAT(readFile(out.str() + "/report.html"), Catch::Contains("\"linkages\"") && Catch::Contains("\"dead_points\""));
+  CHECK_THAT(readFile(out.str() + "/report.html"),
+             Catch::Contains("\"linkages\"") && Catch::Contains("\"dead_points\""));
 }
 
 TEST_CASE("a leg on a rail squats on one foot, and is told what steps need") {

@@ -7,7 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
 #include "read_table.h"
 #include "robot_directory.h"

@@ -3,7 +3,7 @@
 #include <random>
 
 #include "bielle/robots/robot_loader.h"
-#include "bielle/worlds/contact_law.h"
+#include "worlds/contact_law.h"
 
 namespace bielle::worlds {
 namespace {

@@ -11,7 +11,6 @@
 #include "bielle/dynamics/rnea.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/results/robot_info.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/drake.h"
 #include "formats/mjcf.h"

@@ -12,7 +12,6 @@
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "design/draft.h"
 #include "design/run.h"

@@ -6,7 +6,6 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/ratio.h"
 #include "bielle/model/error.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "design/evaluation.h"
 #include "design/page_data.h"

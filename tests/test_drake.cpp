@@ -7,7 +7,6 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/model/builder.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/drake.h"
 #include "get_error.h"

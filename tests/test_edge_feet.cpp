@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "robot_directory.h"
 #include "run_command.h"
 

@@ -4,7 +4,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/builder.h"
-#include "bielle/motion/objective.h"
+#include "bielle/motion/problem_options.h"
 #include "bielle/ocp/robot_problem.h"
 #include "check_derivative.h"
 #include "mechanisms.h"
@@ -323,7 +323,7 @@ TEST_CASE("energy: what makes no sense is refused") {
     std::vector<StageSpec> stages(2);
     stages[0].constraints = makeConstraintSet(model);
     spoil(stages);
-    RobotProblem(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages));
+    RobotProblem(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages), Formulation::Full);
   };
   const auto add = [](StageSpec& stage, int losses) {
     stage.costs.push_back({"energy", 1, Activation::makeEnergy(VectorXd::Ones(1), VectorXd::Ones(losses), 0, 1),

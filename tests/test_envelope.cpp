@@ -15,6 +15,7 @@
 #include "design/gradient.h"
 #include "design/measures.h"
 #include "design/spec.h"
+#include "motion/motion_envelope.h"
 
 using namespace bielle;
 
@@ -53,7 +54,7 @@ struct Optimum {
 };
 
 VectorXd calcGradient(const Parametrization& robot, const Optimum& optimum, const MakeMotion& make) {
-  return calcCostGradient(robot, robot.start(), MotionEnvelope(optimum.solution), make);
+  return calcCostGradient(robot, robot.start(), optimum.solution, make);
 }
 
 // \param start  of the motions solved again: that of the robot they are of is a few iterations away

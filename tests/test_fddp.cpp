@@ -2,10 +2,10 @@
 #include <catch2/catch.hpp>
 #include <random>
 
-#include "bielle/solve/receding.h"
 #include "count_solver_allocations.h"
 #include "fddp_oracle.h"
 #include "solve/lq_sweep.h"
+#include "solve/receding.h"
 
 using namespace bielle;
 using namespace bielle::test;

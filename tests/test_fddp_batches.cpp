@@ -3,10 +3,10 @@
 #include <catch2/catch.hpp>
 
 #include "batched_problem.h"
-#include "bielle/solve/receding.h"
 #include "count_solver_allocations.h"
 #include "fddp_oracle.h"
 #include "solve/fddp_solve.h"
+#include "solve/receding.h"
 
 using namespace bielle;
 using namespace bielle::test;

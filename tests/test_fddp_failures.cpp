@@ -3,8 +3,8 @@
 #include <limits>
 #include <sstream>
 
-#include "bielle/solve/receding.h"
 #include "fddp_oracle.h"
+#include "solve/receding.h"
 
 using namespace bielle;
 using namespace bielle::test;

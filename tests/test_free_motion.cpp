@@ -7,7 +7,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
 #include "robot_directory.h"
 #include "run_command.h"

@@ -11,7 +11,6 @@
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "bielle/results/robot_info.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "leg_biped.h"
 #include "math/so3.h"

@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "bielle/motion/jump.h"
-#include "bielle/motion/sequence.h"
+#include "bielle/motion/registry.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"

@@ -10,7 +10,7 @@
 #include <fstream>
 
 #include "bielle/model/error.h"
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "formats/text_file.h"
 #include "get_error_of_reading.h"
 #include "robot_directory.h"

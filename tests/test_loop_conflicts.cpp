@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/robots/robot_loader.h"
+#include "dynamics/loop_conflict.h"
 #include "dynamics/loop_problem.h"
 #include "math/so3.h"
 #include "mechanisms.h"

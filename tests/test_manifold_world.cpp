@@ -5,7 +5,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/worlds/manifold_world.h"
+#include "bielle/worlds/bielle_world.h"
 #include "mechanisms.h"
 #include "own_robots.h"
 #include "world_trials.h"

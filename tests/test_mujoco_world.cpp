@@ -8,11 +8,11 @@
 #include "bielle/motion/motion.h"
 #include "bielle/robots/robot_loader.h"
 #include "bielle/worlds/bielle_world.h"
-#include "bielle/worlds/terrain.h"
 #include "count_allocations.h"
 #include "world_trials.h"
 #include "worlds/mujoco_model.h"
 #include "worlds/mujoco_world.h"
+#include "worlds/terrain.h"
 
 namespace bielle::worlds {
 namespace {

@@ -2,10 +2,10 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/model/error.h"
-#include "bielle/motion/footholds.h"
-#include "bielle/motion/obstacles.h"
 #include "change_option.h"
 #include "measure_steps.h"
+#include "motion/footholds.h"
+#include "motion/obstacles.h"
 #include "own_robots.h"
 #include "robot_directory.h"
 #include "solve_in_place.h"

@@ -189,7 +189,7 @@ TEST_CASE("shooting problem: a redundant planar four-bar") {
   std::vector<StageSpec> stages;
   stages.push_back(std::move(stage));
   stages.push_back(std::move(terminal));
-  const RobotProblem whole(model, mechanism.q_closed, VectorXd::Zero(4), std::move(stages));
+  const RobotProblem whole(model, mechanism.q_closed, VectorXd::Zero(4), std::move(stages), Formulation::Full);
   ProblemProbe problem(whole);
   Workspace ws(model);
   // Off the closures too: the four angles keep the loop planar, so the redundant rows never contradict one another.
@@ -259,7 +259,8 @@ TEST_CASE("shooting problem: forces alone, at the midpoint of a step") {
     stage.costs.erase(
         std::remove_if(stage.costs.begin(), stage.costs.end(), [](const Cost& cost) { return cost.name != "force"; }),
         stage.costs.end());
-    const RobotProblem whole(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages));
+    const RobotProblem whole(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages),
+                             Formulation::Full);
     ProblemProbe problem(whole);
     const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
     const VectorXd x = join(q, randomVector(rng, model.nv())), u = randomVector(rng, model.nu(), 5);

@@ -6,7 +6,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/walk.h"
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
 #include "design/conditioning.h"
 #include "formats/text_file.h"

@@ -10,7 +10,6 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/results/robot_info.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 #include "formats/expressions.h"

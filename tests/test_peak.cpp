@@ -2,12 +2,12 @@
 // to rest; bisection over fixed bounds of the controls, each solved for itself.
 #include <catch2/catch.hpp>
 
-#include "bielle/solve/node_evaluator.h"
-#include "bielle/solve/peak_problem.h"
+#include "bielle/solve/shooting_problem.h"
 #include "check_derivative.h"
 #include "constrained_problem.h"
 #include "count_solver_allocations.h"
 #include "fddp_oracle.h"
+#include "solve/peak_problem.h"
 
 using namespace bielle;
 using namespace bielle::test;

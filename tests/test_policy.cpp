@@ -5,7 +5,7 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/motion/squat.h"
 #include "bielle/robots/robot_loader.h"
-#include "bielle/solve/node_evaluator.h"
+#include "bielle/solve/shooting_problem.h"
 #include "count_allocations.h"
 
 namespace bielle {

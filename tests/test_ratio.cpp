@@ -10,7 +10,7 @@
 #include "bielle/dynamics/ratio.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/ocp/residual.h"
+#include "bielle/ocp/cost.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"

@@ -1,9 +1,9 @@
 // Constraints from one solve to the next: multipliers that are kept and moved on, and iterations of receding horizons.
 #include <catch2/catch.hpp>
 
-#include "bielle/solve/receding.h"
 #include "constrained_problem.h"
 #include "fddp_oracle.h"
+#include "solve/receding.h"
 
 using namespace bielle;
 using namespace bielle::test;

@@ -6,7 +6,6 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/robot_problem.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "check_derivative.h"
 #include "dynamics/reduction.h"

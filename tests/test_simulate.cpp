@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "robot_directory.h"
 #include "run_command.h"
 

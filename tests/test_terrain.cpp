@@ -3,7 +3,7 @@
 #include <random>
 
 #include "bielle/model/error.h"
-#include "bielle/worlds/terrain.h"
+#include "worlds/terrain.h"
 
 namespace bielle::worlds {
 namespace {

@@ -342,7 +342,7 @@ TEST_CASE("free timings: what makes no sense is refused") {
       stages[k].timing = {k / 2, 0.5, 2};
     }
     spoil(stages);
-    return RobotProblem(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages));
+    return RobotProblem(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages), Formulation::Full);
   };
   CHECK_NOTHROW(make([](std::vector<StageSpec>&) {}));
   CHECK_THROWS_AS(make([](std::vector<StageSpec>& s) { s[1].timing.lower = 0; }), InputError);

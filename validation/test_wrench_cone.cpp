@@ -6,7 +6,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
-#include "bielle/ocp/residual.h"
+#include "bielle/ocp/cost.h"
 #include "bielle/robots/robot_loader.h"
 #include "wrench_cone.h"
 

@@ -40,12 +40,11 @@ py::array costGradient(const HeldSolution& solved, const HeldParametrization& ro
   VectorXd gradient;
   {
     const py::gil_scoped_release release;
-    const MotionEnvelope envelope(solved.solution);
     const MotionRequest request = held.request->make();
     const auto make = [&](const Model& model, const StandingRobot& standing) {
       return makeMotion(model, request.plan(model, standing), held.options);
     };
-    gradient = calcCostGradient(robot.robot, point, envelope, make);
+    gradient = calcCostGradient(robot.robot, point, solved.solution, make);
   }
   return makeArray(gradient);
 }

@@ -1,10 +1,10 @@
 #include <pybind11/stl.h>
 
-#include "bielle/dynamics/loop_conflict.h"
+#include "bielle/dynamics/assembly.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
-#include "bielle/ocp/residual.h"
+#include "bielle/ocp/cost.h"
 #include "bind.h"
 #include "model_access.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file Residuals as Python sees them: those of the library know how they were made, those written in Python are called
 /// with the interpreter's lock.
-#include "bielle/ocp/residual.h"
+#include "bielle/ocp/cost.h"
 #include "bielle/ocp/robot_problem.h"
 #include "model_access.h"
 

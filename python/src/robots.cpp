@@ -2,9 +2,8 @@
 
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
-#include "bielle/report/view.h"
+#include "bielle/report/report.h"
 #include "bielle/results/robot_info.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "bind.h"
 #include "robot.h"

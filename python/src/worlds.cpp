@@ -5,7 +5,6 @@
 
 #include "bielle/model/error.h"
 #include "bielle/worlds/bielle_world.h"
-#include "bielle/worlds/manifold_world.h"
 #include "bielle/worlds/sensors.h"
 #include "bind.h"
 #include "busy.h"

@@ -30,7 +30,7 @@ struct BenchOptions {
 /// those above it, except for sweep and rollout. (In an iteration the rollout has already computed the dynamics that
 /// the linearization needs.)
 struct NodeTimes {
-  Formulation formulation = Formulation::Full;
+  Formulation formulation = Formulation::Reduced;
   int tangent_size = 0;    ///< of a state
   double dynamics = 0;     ///< one step: accelerations, forces, next state
   double derivatives = 0;  ///< plus its linearization
@@ -41,7 +41,7 @@ struct NodeTimes {
 
 /// Ten FDDP iterations from the standing guess of the walk.
 struct IterationTimes {
-  Formulation formulation = Formulation::Full;
+  Formulation formulation = Formulation::Reduced;
   int threads = 1;
   double seconds = 0;                            ///< one iteration per node
   double rollouts = 0;                           ///< number per iteration
@@ -51,7 +51,7 @@ struct IterationTimes {
 /// From the command to the converged motion: making the problem and the guess, and solving. One run.
 struct SolveTime {
   std::string motion;
-  Formulation formulation = Formulation::Full;
+  Formulation formulation = Formulation::Reduced;
   int threads = 1, iterations = 0;
   double seconds = 0;
   bool converged = false;
@@ -68,7 +68,7 @@ struct ShiftTimes {
 /// by noise of 1e-4 rad and m, 1e-3 rad/s and m/s, on closed loops and with a velocity consistent with loops and stance
 /// feet. With cones their multipliers move on with the plan. When the horizon reaches the end of the walk, it starts again with other noise.
 struct RecedingHorizon {
-  Formulation formulation = Formulation::Full;
+  Formulation formulation = Formulation::Reduced;
   bool cones = false;  ///< soles keep their wrench cones
   int threads = 1;
   ShiftTimes all;          ///< a shift and its iteration, wall clock
@@ -82,7 +82,7 @@ struct RecedingHorizon {
 
 /// Time per node as a function of size.
 struct SizeTime {
-  Formulation formulation = Formulation::Full;
+  Formulation formulation = Formulation::Reduced;
   int size = 0;  ///< four-bars in the chain, or nodes of the horizon
   double seconds = 0;
 };

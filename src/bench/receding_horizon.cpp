@@ -10,7 +10,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/solve/receding.h"
+#include "solve/receding.h"
 #include "solve/window.h"
 
 namespace bielle {

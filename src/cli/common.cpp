@@ -2,10 +2,10 @@
 #include <filesystem>
 #include <iostream>
 
-#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/results/robot_info.h"
 #include "bielle/robots/robot_loader.h"
 #include "cli/commands.h"
+#include "dynamics/loop_conflict.h"
 
 namespace bielle::cli {
 namespace {

@@ -2,7 +2,7 @@
 // Phases of free duration on the command line.
 #include <CLI/CLI.hpp>
 
-#include "bielle/motion/timings.h"
+#include "bielle/motion/problem_options.h"
 
 namespace bielle::cli {
 

@@ -5,7 +5,7 @@
 
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
-#include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "results/setting.h"

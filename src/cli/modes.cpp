@@ -8,9 +8,9 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
-#include "bielle/report/mode_view.h"
 #include "cli/commands.h"
 #include "cli/table.h"
+#include "report/mode_view.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
 

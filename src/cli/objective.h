@@ -2,8 +2,8 @@
 // What a motion minimizes, on the command line.
 #include <CLI/CLI.hpp>
 
-#include "bielle/motion/objective.h"
-#include "bielle/results/electrical_energy.h"
+#include "bielle/motion/problem_options.h"
+#include "bielle/results/result.h"
 
 namespace bielle::cli {
 

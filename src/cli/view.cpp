@@ -1,6 +1,4 @@
 // bielle view ROBOT: the robot as a page, with a slider for each motor.
-#include "bielle/report/view.h"
-
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -8,6 +6,7 @@
 #include <optional>
 
 #include "bielle/model/error.h"
+#include "bielle/report/report.h"
 #include "cli/commands.h"
 #include "cli/film.h"
 #include "cli/parameter_range.h"

@@ -1,7 +1,7 @@
 #pragma once
 /// \file Torques that keep linkages from passing their dead points, at every instant of control.
 ///
-/// Plans keep a margin to dead points (limits.h); a robot that is thrown off its plan may use it up, and past a dead point its
+/// Plans keep a margin to dead points (problem_options.h); a robot that is thrown off its plan may use it up, and past a dead point its
 /// linkage snaps into another configuration. With rho the transmission of a linkage (linkage.h), s = rho where its joints, s =
 /// 1/rho where its motors come to a dead point, and g = ds/dv_M by its motors, the way to the stop at s = s_0 is
 ///     d = (s - s_0) / |g|,    d' = g . v_M / |g|                                                                    (1)

@@ -3,8 +3,8 @@
 #include <memory>
 #include <optional>
 
-#include "bielle/solve/receding.h"
 #include "control/horizon.h"
+#include "solve/receding.h"
 
 namespace bielle {
 

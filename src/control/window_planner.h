@@ -3,8 +3,8 @@
 #include <deque>
 
 #include "bielle/dynamics/impact.h"
-#include "bielle/solve/receding.h"
 #include "control/window_grid.h"
+#include "solve/receding.h"
 #include "solve/window.h"
 
 namespace bielle {

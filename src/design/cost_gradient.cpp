@@ -3,12 +3,14 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "motion/motion_envelope.h"
 #include "motion/neighbour_plans.h"
 
 namespace bielle {
 
-VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
+VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const Solution& optimum,
                           const std::function<Motion(const Model&, const StandingRobot&)>& make) {
+  const MotionEnvelope envelope(optimum);
   VectorXd gradient = VectorXd::Zero(x.size());
   NeighbourPlans plans;
   const auto plan = [&](const Model& model) { return make(model, plans.stand(model)); };

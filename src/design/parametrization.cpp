@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
-#include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/draft.h"
 #include "design/motor_change.h"
 #include "model/number_text.h"

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "bielle/model/error.h"
-#include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 #include "design/spec_parts.h"
 #include "formats/motor_catalogue.h"
 #include "formats/text_file.h"

@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "bielle/model/error.h"
-#include "bielle/robots/generators.h"
 #include "bielle/robots/robot_loader.h"
 #include "robots/generator_entry.h"
 

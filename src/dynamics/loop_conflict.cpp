@@ -1,4 +1,4 @@
-#include "bielle/dynamics/loop_conflict.h"
+#include "dynamics/loop_conflict.h"
 
 #include <algorithm>
 #include <cmath>

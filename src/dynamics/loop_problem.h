@@ -8,8 +8,8 @@
 /// descends, and where the gradient vanishes at a saddle, the step goes along its most negative one. For the least change,
 /// with multipliers y and a penalty rho,
 ///     R = (p, sqrt(rho) (r + y / rho)),    y <- y + rho r                                                          (2)
-#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/dynamics/variation.h"
+#include "dynamics/loop_conflict.h"
 
 namespace bielle {
 

@@ -1,9 +1,8 @@
-#include "bielle/motion/command.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "bielle/motion/commanded_walk.h"
 #include "formats/text_file.h"
 #include "formats/yaml_entry.h"
 #include "math/constants.h"

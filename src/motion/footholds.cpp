@@ -1,4 +1,4 @@
-#include "bielle/motion/footholds.h"
+#include "motion/footholds.h"
 
 #include <algorithm>
 #include <cmath>

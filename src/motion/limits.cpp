@@ -1,10 +1,9 @@
-#include "bielle/motion/limits.h"
-
 #include <cmath>
 #include <limits>
 
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
+#include "bielle/motion/problem_options.h"
 
 namespace bielle {
 namespace {

@@ -1,4 +1,4 @@
-#include "bielle/motion/motion_envelope.h"
+#include "motion/motion_envelope.h"
 
 #include <limits>
 

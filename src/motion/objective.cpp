@@ -1,10 +1,9 @@
-#include "bielle/motion/objective.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "bielle/motion/motion.h"
+#include "bielle/motion/problem_options.h"
 
 namespace bielle {
 

@@ -1,4 +1,4 @@
-#include "bielle/motion/obstacles.h"
+#include "motion/obstacles.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "bielle/motion/refinement.h"
+#include "motion/refinement.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,14 +4,13 @@
 #include <map>
 
 #include "bielle/model/error.h"
-#include "bielle/motion/footholds.h"
 #include "bielle/motion/jump.h"
-#include "bielle/motion/obstacles.h"
 #include "bielle/motion/run.h"
-#include "bielle/motion/sequence.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "motion/footholds.h"
+#include "motion/obstacles.h"
 
 namespace bielle {
 namespace {

@@ -1,9 +1,8 @@
-#include "bielle/motion/sequence.h"
-
 #include <cmath>
 
 #include "bielle/model/error.h"
 #include "bielle/motion/footsteps.h"
+#include "bielle/motion/registry.h"
 #include "math/so3.h"
 #include "motion/join.h"
 

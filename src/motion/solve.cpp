@@ -4,10 +4,10 @@
 #include <utility>
 
 #include "bielle/dynamics/linkage.h"
-#include "bielle/motion/motion_envelope.h"
-#include "bielle/motion/refinement.h"
 #include "model/number_text.h"
 #include "motion/join.h"
+#include "motion/motion_envelope.h"
+#include "motion/refinement.h"
 
 namespace bielle {
 namespace {

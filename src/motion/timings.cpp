@@ -1,10 +1,9 @@
-#include "bielle/motion/timings.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
+#include "bielle/motion/problem_options.h"
 
 namespace bielle {
 namespace {

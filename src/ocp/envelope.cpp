@@ -1,4 +1,4 @@
-#include "bielle/ocp/envelope.h"
+#include "ocp/envelope.h"
 
 #include <limits>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "bielle/ocp/followed_optimum.h"
+#include "ocp/followed_optimum.h"
 
 #include <algorithm>
 #include <stdexcept>

@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "bielle/ocp/residual.h"
+#include "bielle/ocp/cost.h"
 
 namespace bielle {
 

@@ -1,4 +1,4 @@
-#include "bielle/report/mode_view.h"
+#include "report/mode_view.h"
 
 #include <cmath>
 

@@ -7,7 +7,7 @@
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/motion/serial_model.h"
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
 
 namespace fs = std::filesystem;

@@ -1,13 +1,12 @@
-#include "bielle/report/view.h"
-
 #include <algorithm>
 #include <cmath>
 #include <deque>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/model/error.h"
+#include "bielle/report/report.h"
 #include "bielle/results/result.h"
+#include "dynamics/loop_conflict.h"
 #include "formats/text_file.h"
 #include "report/pack.h"
 #include "report/page.h"

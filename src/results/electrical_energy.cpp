@@ -1,6 +1,6 @@
-#include "bielle/results/electrical_energy.h"
-
 #include <limits>
+
+#include "bielle/results/result.h"
 
 namespace bielle {
 

@@ -1,7 +1,7 @@
 // Trajectories as comma-separated values.
 #include <charconv>
 
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "formats/text_file.h"
 #include "motion/record_tables.h"
 

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "bielle/model/error.h"
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "formats/aside_file.h"
 #include "motion/record_tables.h"
 #include "results/npz.h"

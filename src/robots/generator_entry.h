@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 #include "formats/yaml_entry.h"
 
 namespace bielle {

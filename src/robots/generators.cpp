@@ -1,10 +1,9 @@
-#include "bielle/robots/generators.h"
-
 #include <filesystem>
 #include <memory>
 
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"
+#include "bielle/robots/robot_loader.h"
 #include "formats/robot_files.h"
 #include "model/listing.h"
 #include "robots/cleobot.h"

@@ -1,6 +1,6 @@
 #pragma once
 // Checks of a solve's input.
-#include "bielle/solve/receding.h"
+#include "solve/receding.h"
 
 namespace bielle {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <mutex>
 
-#include "bielle/solve/stage_model.h"
+#include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
 

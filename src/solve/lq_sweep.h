@@ -24,8 +24,8 @@
 /// Without gaps and boxes curvature = -slope.
 #include <vector>
 
-#include "bielle/solve/gains.h"
-#include "bielle/solve/stage_model.h"
+#include "bielle/solve/fddp.h"
+#include "bielle/solve/shooting_problem.h"
 #include "solve/box_qp.h"
 
 namespace bielle {

@@ -2,7 +2,7 @@
 // The evaluations of a problem's nodes that a solver keeps, and the scratch memory of the problem's functions.
 #include <algorithm>
 
-#include "bielle/solve/receding.h"
+#include "solve/receding.h"
 #include "solve/team.h"
 
 namespace bielle {

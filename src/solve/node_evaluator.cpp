@@ -1,4 +1,4 @@
-#include "bielle/solve/node_evaluator.h"
+#include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
 

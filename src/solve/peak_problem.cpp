@@ -1,4 +1,4 @@
-#include "bielle/solve/peak_problem.h"
+#include "solve/peak_problem.h"
 
 #include <algorithm>
 #include <limits>

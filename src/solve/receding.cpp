@@ -1,4 +1,4 @@
-#include "bielle/solve/receding.h"
+#include "solve/receding.h"
 
 #include <stdexcept>
 #include <utility>

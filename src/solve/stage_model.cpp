@@ -1,5 +1,4 @@
-#include "bielle/solve/stage_model.h"
-
+#include "bielle/solve/shooting_problem.h"
 #include "math/lane_product.h"
 
 namespace bielle {

@@ -1,4 +1,4 @@
-#include "bielle/worlds/contact_law.h"
+#include "worlds/contact_law.h"
 
 #include <algorithm>
 #include <cmath>

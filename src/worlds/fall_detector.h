@@ -4,8 +4,8 @@
 #include <string>
 
 #include "bielle/control/policy.h"
-#include "bielle/worlds/terrain.h"
 #include "control/passive_joints.h"
+#include "worlds/terrain.h"
 
 namespace bielle::worlds {
 

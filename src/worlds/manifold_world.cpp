@@ -1,5 +1,3 @@
-#include "bielle/worlds/manifold_world.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,6 +5,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/worlds/bielle_world.h"
 #include "dynamics/closed_field.h"
 #include "dynamics/joint_force.h"
 #include "dynamics/point_spring.h"

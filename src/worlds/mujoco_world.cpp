@@ -5,8 +5,8 @@
 
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/model/error.h"
+#include "dynamics/loop_conflict.h"
 #include "worlds/mujoco_ground.h"
 #include "worlds/mujoco_model.h"
 #include "worlds/sole_track.h"

@@ -9,8 +9,8 @@
 /// trapezoidal rule over these steps.
 #include <memory>
 
-#include "bielle/worlds/contact_law.h"
 #include "bielle/worlds/world.h"
+#include "worlds/contact_law.h"
 
 namespace bielle::worlds {
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file What the soles of a robot do on the ground, from the forces on their points.
-#include "bielle/worlds/contact_law.h"
 #include "bielle/worlds/world.h"
+#include "worlds/contact_law.h"
 
 namespace bielle::worlds {
 

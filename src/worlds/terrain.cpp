@@ -1,4 +1,4 @@
-#include "bielle/worlds/terrain.h"
+#include "worlds/terrain.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "scratch.h"
 
 namespace bielle::fuzz {

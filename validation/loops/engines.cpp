@@ -4,7 +4,6 @@
 
 #include "bielle/model/error.h"
 #include "bielle/worlds/bielle_world.h"
-#include "bielle/worlds/manifold_world.h"
 #ifdef BIELLE_WITH_MUJOCO
 #include "worlds/mujoco_world.h"
 #endif

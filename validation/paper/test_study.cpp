@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "bielle/results/record_files.h"
+#include "bielle/results/result.h"
 #include "read_table.h"
 #include "robot_directory.h"
 #include "run_command.h"

@@ -3,24 +3,24 @@
 #include <functional>
 
 #include "bielle/design/parametrization.h"
-#include "bielle/motion/motion_envelope.h"
+#include "bielle/motion/solve.h"
 
 namespace bielle {
 
-/// Derivatives of the optimal cost by all variables, by the envelope theorem (ocp/envelope.h): two models, two motions
+/// Derivatives of the optimal cost by all variables, by the envelope theorem (src/ocp/envelope.h): two models, two motions
 /// and two evaluations of their stages per variable; nothing is solved.
-/// \param x       for which the motion of the envelope is optimal
-/// \param make    the same motion for another robot: same options; posture, footholds and references planned again
+/// \param optimum  a solved motion of the robot at x
+/// \param make     the same motion for another robot: same options; posture, footholds and references planned again
 /// \return (variables), zero for choices
 /// \throws InputError when a neighbour of x has no such motion
-VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
+VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const Solution& optimum,
                           const std::function<Motion(const Model&, const StandingRobot&)>& make);
 
 /// Half the step of a central difference, relative to the width of the bounds: its error grows with the square,
 /// rounding with the inverse.
 inline constexpr double kDesignStep = 2e-5;
 /// The step of a forward difference, likewise: its error grows with the step itself. For derivatives that sweeps leave a thousandth
-/// of anyway (ocp/followed_optimum.h).
+/// of anyway (src/ocp/followed_optimum.h).
 inline constexpr double kForwardStep = 2e-6;
 
 }  // namespace bielle

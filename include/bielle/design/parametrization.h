@@ -7,7 +7,7 @@
 
 #include "bielle/dynamics/variation.h"
 #include "bielle/model/options.h"
-#include "bielle/robots/generators.h"
+#include "bielle/robots/robot_loader.h"
 
 namespace bielle {
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bielle/dynamics/closure.h"
+#include "bielle/model/error.h"
 
 namespace bielle {
 
@@ -93,5 +94,9 @@ VectorXd projectVelocity(const Model& model, Workspace& ws, const ConstraintSet&
 
 /// Largest residual of the loops of the set at the workspace's q; the name of its closure goes to `worst`, if given.
 double calcLargestGap(const Workspace& ws, const ConstraintSet& constraints, std::string* worst = nullptr);
+
+/// The error for a robot without a closed configuration according to findClosedConfiguration().
+/// \param source  file or name of the robot
+InputError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open);
 
 }  // namespace bielle

@@ -7,9 +7,7 @@
 #include "bielle/dynamics/ground.h"
 #include "bielle/model/options.h"
 #include "bielle/motion/goal.h"
-#include "bielle/motion/limits.h"
-#include "bielle/motion/objective.h"
-#include "bielle/motion/timings.h"
+#include "bielle/motion/problem_options.h"
 #include "bielle/ocp/contact_schedule.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/solve/fddp.h"
@@ -38,19 +36,6 @@ struct MotionPlan : MotionOutline {
   VectorXd q_start, q_end;        ///< standing postures, nq
 };
 
-/// Options of a problem besides those of the motion.
-struct ProblemOptions {
-  Formulation formulation = Formulation::Reduced;
-  StepRule step = StepRule::Midpoint;
-  LimitOptions limits;
-  TimingOptions timings;
-  ObjectiveOptions objective;
-
-  ProblemOptions() = default;
-  ProblemOptions(Formulation formulation, const LimitOptions& limits = {}) : formulation(formulation), limits(limits) {}
-  ProblemOptions(Formulation formulation, StepRule step) : formulation(formulation), step(step) {}
-};
-
 struct MotionRequest;
 
 /// A problem ready to be solved (solve.h), with the data that reports need. Solving it changes nothing; copies share the problem.
@@ -77,7 +62,7 @@ FddpOptions makeMotionSolverOptions();
 /// steps move the swing legs so far that dozens of short steps follow. Solves from a solution need no damping.
 constexpr double kGuessRegularization = 1e-5;
 
-/// The scale of an objective by Eq. (2) of objective.h. \param effort, trajectory  the motion of least effort and its
+/// The scale of an objective by Eq. (2) of problem_options.h. \param effort, trajectory  the motion of least effort and its
 /// solution   \param limits  those of the motion
 ObjectiveOptions scaleObjective(const Motion& effort, const ShootingTrajectory& trajectory,
                                 const ObjectiveOptions& options, const LimitOptions& limits = {});
@@ -181,7 +166,7 @@ struct GroundCosts {
   double pressure_weight = 1;           ///< of the centre of pressure, over the half size of the sole squared
   ForceAxes axes = ForceAxes::Contact;  ///< of force reference and centre of pressure
 };
-/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), reduced by `margin` in
+/// Adds a path constraint for every active contact: the wrench cone of its sole (ocp/cost.h), reduced by `margin` in
 /// friction and in size, and by a thousandth of the robot's weight in the normal force. Its pyramids of
 /// friction/sqrt(2) are inscribed in round cones. A violation of 1 is the weight of the robot.
 /// \param friction  coefficient of the ground, positive   \param margin  relative reduction; at least a hundredth,

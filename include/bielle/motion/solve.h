@@ -5,7 +5,7 @@
 /// where that helps:
 /// - A sequence starts from its motions, each solved separately.
 /// - For another objective than effort without a scale, the motion of least effort is solved first; it gives the scale
-///   (objective.h, Eq. 2) and the starting point.
+///   (problem_options.h, Eq. 2) and the starting point.
 /// - Stages that turn out too long are halved (refineStages()); if that does not help, linkages are kept farther from their
 ///   dead points (avoidDeadPoints()). A solution whose stages are still too long ends as Failed.
 /// - How far linkages are from their dead points is told at the start, and added to the message of a failure near one.
@@ -24,7 +24,7 @@ struct Solution {
   ShootingTrajectory trajectory;
   FddpSummary summary;  ///< iterations, times and log of all attempts
   Multipliers multipliers{};
-  std::vector<Gains> gains{};  ///< N, of the solver's last sweep (solve/gains.h); none for the least peak torque
+  std::vector<Gains> gains{};  ///< N, of the solver's last sweep; none for the least peak torque
 
   bool converged() const { return summary.termination == FddpTermination::Converged; }
 };

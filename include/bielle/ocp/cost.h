@@ -1,8 +1,141 @@
 #pragma once
-/// \file Costs: activations of residuals, and diagonal costs of state and control. Path constraints: residuals within bounds.
-#include "bielle/ocp/residual.h"
+/// \file Residuals r(q, v, lambda, u) of costs and path constraints, with analytic derivatives.
+///
+/// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the
+/// constraint forces lambda and to the motor torques u; the stage applies the chain rule through the dynamics. Frame
+/// residuals are in world axes unless stated otherwise. References of velocities are those at the time scale 1 of
+/// robot_problem.h Eq. (5); at s they are divided by s: the same path in another time.
+///
+/// Costs: activations of residuals, and diagonal costs of state and control. Path constraints: residuals within bounds.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/ground.h"
+#include "bielle/dynamics/linkage.h"
 
 namespace bielle {
+
+struct LoopBases;
+class LinkageWorkspaces;
+
+/// Data that a residual may read: one node with up-to-date kinematics (and, at a stage, dynamics).
+struct NodeView {
+  const Model& model;
+  /// In calc(): q, v, X_WB, V and hc, at the stage Bodies; in calcJacobian() also J, dV, h, YJ and Yc, at the stage
+  /// Velocity. Functions of the library that read more throw.
+  const Workspace& ws;
+  const ConstraintSet& constraints;  ///< closures and contacts in force
+  const VectorXd& u;                 ///< nu, empty at the terminal node
+  const VectorXd& lambda;            ///< rows of the constraints, empty at the terminal node
+  double time_scale = 1;
+  /// nu, speeds of the motors at the instant to which the torques belong (robot_problem.h); null where no residual of the
+  /// node needs them.
+  const VectorXd* speeds = nullptr;
+  /// Of the closed configuration of the node, where they are known; else null.
+  const LoopBases* loops = nullptr;
+  /// Memory of the thread for linkages; null: it is allocated.
+  LinkageWorkspaces* linkages = nullptr;
+};
+
+/// Row block of the stacked residual Jacobians of a node. Entries never written stay zero.
+struct ResidualRows {
+  MatrixRef q, v;    ///< n x nv
+  MatrixRef lambda;  ///< n x rows
+  MatrixRef u;       ///< n x nu
+  MatrixRef speeds;  ///< n x nu
+  VectorRef s;       ///< n, by the time scale
+};
+
+class Residual {
+ public:
+  virtual ~Residual() = default;
+  virtual int size() const = 0;
+  virtual bool needsForces() const { return false; }
+  /// Whether it depends on u.
+  virtual bool needsControls() const { return false; }
+  /// Whether it depends on the speeds of the motors; such a residual is for steps alone.
+  virtual bool needsSpeeds() const { return false; }
+  /// False if it depends neither on q nor on v.
+  virtual bool needsMotion() const { return true; }
+  virtual void calc(const NodeView& node, VectorRef r) const = 0;
+  /// Writes all entries that may be non-zero at some state.
+  virtual void calcJacobian(const NodeView& node, ResidualRows rows) const = 0;
+};
+
+/// A frame on a body, for frame residuals.
+struct BodyFrame {
+  int body = 0;
+  SE3 X_BF;
+};
+/// The link, frame or contact of this name. \throws InputError when the robot has none
+BodyFrame getBodyFrame(const Model& model, const std::string& name);
+
+/// Centre of mass minus a reference (3), m.
+std::unique_ptr<Residual> makeComPosition(const Vector3d& reference);
+/// Velocity of the centre of mass minus a reference (3), m/s.
+std::unique_ptr<Residual> makeComVelocity(const Vector3d& reference);
+/// Log6(X_WT^{-1} X_WF) (6), m and rad, in the axes of the target.
+std::unique_ptr<Residual> makeFramePlacement(const BodyFrame& frame, const SE3& X_WT);
+/// Position of the frame's origin minus a reference (3), m.
+std::unique_ptr<Residual> makeFrameTranslation(const BodyFrame& frame, const Vector3d& reference);
+/// Log3(R_WT^T R_WF) (3), rad.
+std::unique_ptr<Residual> makeFrameRotation(const BodyFrame& frame, const Matrix3d& R_WT);
+/// Velocity of the frame's origin and angular velocity, in world axes, minus a reference (6), m/s and rad/s.
+std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector6d& reference = Vector6d::Zero());
+/// Heights of the corners of a sole over the ground (4), of its origin if it has no size (1), m. Around a step the
+/// ground is taken to rise to its top over `ramp` m, so that the residual is continuous, and never exceeds the true
+/// height.
+std::unique_ptr<Residual> makeSoleClearance(const BodyFrame& sole, double half_length, double half_width,
+                                            const Ground& ground, double ramp);
+/// Distance between two shapes (1), m; negative where they overlap (distance.h).
+std::unique_ptr<Residual> makeShapeDistance(const Shape& a, const Shape& b);
+/// The axes in which the force of a contact is expressed: its own, those of the world, or those of the ground, i.e. of the place
+/// where it belongs (ContactTarget::X_WT). Its moment is always about the origin of the contact frame. A sole that rests aslant
+/// on an edge is pushed along the normal of the ground, not along its own: with a friction of 0.3 its own cone holds no force that
+/// carries the robot once it leans by 0.3 rad.
+enum class ForceAxes { Contact, World, Ground };
+/// Entries of the force of a contact: 3 of a point, else those of a wrench.
+int countForces(const ConstraintSet& set, int constraint);
+/// Rows of the force of a contact minus a reference, N and N m (6 or 3). `constraint` is the index in the
+/// ConstraintSet.
+std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
+                                           ForceAxes axes = ForceAxes::Contact);
+/// Centre of pressure of a 6D contact about the origin of its frame (x, y) (2), m.
+std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint,
+                                               ForceAxes axes = ForceAxes::Contact);
+/// Wrench cone of a rectangular sole, whose origin is in the middle of the sole: inside when
+/// all rows are positive (17), N and N m. With f the force, n the moment, X and Y half the length and width, and four corners
+/// that each bear a pyramid of friction mu (Caron, Pham, Nakamura, "Stability of surface contacts for humanoid robots", ICRA
+/// 2015):
+///     f_z,   mu f_z -+ f_x,   mu f_z -+ f_y,   Y f_z -+ n_x,   X f_z -+ n_y,                                        (1)
+///     mu (X + Y) f_z + n_z + s (Y f_x - mu n_x) + t (X f_y - mu n_y)   and
+///     mu (X + Y) f_z - n_z + s (Y f_x + mu n_x) + t (X f_y + mu n_y)   for s, t = -1, 1.                            (2)
+/// A 3D contact has the first five rows: it pushes, within the friction pyramid. A 5D contact, an edge along x, bears no n_x and
+/// has no width: of (1) and (2) remain eleven rows. Both may tilt on the ground: take its axes, or those of the world.
+std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,
+                                         double half_width, double mu, ForceAxes axes = ForceAxes::Contact);
+/// Coordinates of joints with one dof (all those with finite limits if `dofs` is empty) (n), rad or m.
+std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
+/// Velocity coordinates (n), rad/s or m/s.
+std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);
+/// The transmission of a linkage, over that at its reference (1): 0 or infinite at its dead points (linkage.h).
+std::unique_ptr<Residual> makeTransmission(const Linkage& linkage);
+/// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
+std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
+/// Voltages of motors, given by their indices in the model, from their torques and their speeds when the torques act, with the
+/// factors Motor::getVoltsPerEffort() and getVoltsPerSpeed() (n), V. \throws InputError for one without an envelope
+std::unique_ptr<Residual> makeMotorVoltage(const Model& model, const std::vector<int>& motors);
+/// Electrical powers P_m = u_m w_m + loss_m u_m^2 of all motors, w their speeds when the torques act, then their torques
+/// (2 nu), W and N m: what Activation::makeEnergy reads. \param losses  nu, W/(N m)^2
+std::unique_ptr<Residual> makeElectricalPower(const VectorXd& losses);
+/// The same with the losses of the model and those of its gears, P_m = g(p) + loss_m u_m^2 h(p) with p = u_m w_m. With
+/// s = p / sqrt(p^2 + e^2), which stands for the sign of p, and c_1 = 1/efficiency, c_2 = back_efficiency,
+///     g = (c_1 + c_2)/2 p + (c_1 - c_2)/2 (sqrt(p^2 + e^2) - e),    h = (c_1^2 + c_2^2)/2 + (c_1^2 - c_2^2)/2 s:
+/// c p and c^2 of MotorDrive Eq. (1), smoothed over e = kGearSmoothing; g is at most (c_1 - c_2)/2 e less than c p.
+std::unique_ptr<Residual> makeElectricalPower(const Model& model);
+inline constexpr double kGearSmoothing = 1;  ///< W
 
 enum class ActivationKind { Quadratic, Barrier, Energy };
 

@@ -49,7 +49,7 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/ocp/cost.h"
-#include "bielle/solve/node_evaluator.h"
+#include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
 
@@ -138,7 +138,7 @@ class RobotProblem : public ShootingProblem {
   /// \throws InputError on sizes that do not match, a weight that is negative or not finite, or an open
   /// configuration in the reduced formulation
   RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,
-               Formulation formulation = Formulation::Full);
+               Formulation formulation = Formulation::Reduced);
   ~RobotProblem() override;
 
   int numStages() const override { return static_cast<int>(specs_.size()) - 1; }

@@ -1,15 +1,61 @@
 #pragma once
-/// \file The result of a solve, as three files in a directory.
+/// \file The electrical energy of a motion, from its record.
+///
+/// Records of motions (motion/record.h) as files.
+///
+/// The result of a solve, as three files in a directory.
 #include <string>
 #include <vector>
 
 #include "bielle/dynamics/linkage.h"
 #include "bielle/motion/lift.h"
+#include "bielle/motion/record.h"
 #include "bielle/motion/solve.h"
-#include "bielle/results/electrical_energy.h"
-#include "bielle/results/record_files.h"
 
 namespace bielle {
+
+/// Eq. (1) of motion/problem_options.h, without smoothing, as a sum over the steps.
+struct ElectricalEnergy {
+  VectorXd by_motor;             ///< nu, J
+  double total = 0;              ///< J
+  double regeneration = 0;       ///< share of the regenerated energy that is subtracted
+  int num_assumed = 0;           ///< motors without a known loss, for which kDefaultTorqueLoss is assumed
+  double distance = 0;           ///< of the centre of mass on the ground, from start to end, m
+  double cost_of_transport = 0;  ///< total divided by weight and distance; NaN for less than kLeastDistance
+
+  static constexpr double kLeastDistance = 0.2;  ///< m
+};
+
+/// Root mean squares over the time of the motion of the torques c u, c of MotorDrive Eq. (1): what heats the windings (nu), N m
+/// or N.
+VectorXd calcRmsEfforts(const Model& model, const MotionRecord& record);
+
+/// \param regeneration  within 0 .. 1
+ElectricalEnergy calcElectricalEnergy(const Model& model, const MotionRecord& record, double regeneration);
+
+/// One row per node under one header: time, q.<name>, v.<name>, a.<name>, u.<motor>, closure.<name>.<entry>,
+/// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle and, of midpoint steps, q_mid.<name> and
+/// v_mid.<name>. No stage starts at the last node: its cells of a, u, q_mid, v_mid and of the wrenches are empty.
+/// Numbers are the shortest that read back to the same bits. Footholds and multipliers are left out. It is for other
+/// programs; Bielle reads the archive below.
+void writeCsv(const std::string& path, const MotionRecord& record);
+
+/// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6, footholds, if there
+/// are any, N + 1 x contacts x 8. Multipliers, if known, are `multipliers` (node after node), `multiplier_rows` (N + 1, how many
+/// each node has) and `multiplier_penalty` (1).
+void writeNpz(const std::string& path, const MotionRecord& record);
+
+/// Reads an archive that writeNpz() wrote.
+/// \throws InputError naming the file and what is wrong with it, as the writers do when they cannot write
+MotionRecord readRecord(const std::string& path);
+
+/// What the two write.
+std::string formatCsv(const MotionRecord& record);
+std::string formatNpz(const MotionRecord& record);
+
+/// The record in a directory written by writeResult().
+/// \throws InputError naming the file and why it cannot be read
+MotionRecord readResultRecord(const std::string& directory);
 
 /// The request that led to a motion.
 struct RunInfo {
@@ -24,7 +70,7 @@ struct RunInfo {
 struct MotionFacts {
   RunInfo run;
   std::string motion;
-  Formulation formulation = Formulation::Full;
+  Formulation formulation = Formulation::Reduced;
   StepRule step = StepRule::Euler;
   ObjectiveOptions objective;
   OptionValues options;              ///< every option of the motion by name

@@ -1,9 +1,11 @@
 #pragma once
-/// \file Feasibility-driven differential dynamic programming (FDDP) with bounds and constraints: from a guess to an optimum.
+/// \file Feedback of one stage, as a sweep of FDDP finds it.
+///
+/// Feasibility-driven differential dynamic programming (FDDP) with bounds and constraints: from a guess to an optimum.
 ///
 /// Mastalli et al., "Crocoddyl: An Efficient and Versatile Framework for Multi-Contact Optimal Control", ICRA 2020; the
 /// bounds after Tassa, Mansard, Todorov, "Control-Limited Differential Dynamic Programming", ICRA 2014. Derivations, and the
-/// equations that are missing here, are in docs/solver.md; receding.h has the same iterations for a moving horizon.
+/// equations that are missing here, are in docs/solver.md; src/solve/receding.h has the same iterations for a moving horizon.
 ///
 /// One iteration, from node states xs and controls us that need not satisfy the dynamics, linearizes every stage, with
 /// gap_k = difference(xs_{k+1}, f_k(xs_k, us_k)), solves the linear-quadratic problem by a sweep, and rolls the nonlinear
@@ -30,10 +32,17 @@
 #include <iosfwd>
 #include <string>
 
-#include "bielle/solve/gains.h"
+#include "bielle/math/types.h"
 #include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
+
+/// About node state xs_k and control us_k:  u = us_k + k + K dx,  dx = difference(xs_k, x). K is added: where it resists a
+/// deviation, its sign is that of a negative feedback. At an optimum k vanishes. Rows of controls at their bounds are zero.
+struct Gains {
+  VectorXd k;     ///< nu_k, the unit of the control
+  RowMatrixXd K;  ///< nu_k x ndx_k, in the tangent space of the problem at xs_k
+};
 
 /// How constraints are enforced; without effect on problems that have none.
 struct ConstraintOptions {
@@ -50,7 +59,7 @@ struct Multipliers {
   double penalty = 0;
 };
 
-/// What governs the iterations of solve() and of Receding (receding.h).
+/// What governs the iterations of solve() and of Receding (src/solve/receding.h).
 struct IterationOptions {
   /// Converged if Eq. (6) is below this, in (units of cost per unit of control)^2, and the gaps are closed.
   double gradient_tolerance = 1e-9;

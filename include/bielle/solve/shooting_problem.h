@@ -1,5 +1,7 @@
 #pragma once
-/// \file The optimal control problem as a solver sees it (the paper's eq. 1), on manifolds.
+/// \file Quadratic model of one stage of a shooting problem.
+///
+/// The optimal control problem as a solver sees it (the paper's eq. 1), on manifolds.
 ///
 ///     min  sum_k l_k(x_k, u_k) + l_N(x_N)    s.t.  x_0 given,  x_{k+1} = f_k(x_k, u_k),   k = 0 .. N-1,
 ///                                                  lower_k <= c_k(x_k, u_k) <= upper_k,   k = 0 .. N
@@ -12,14 +14,70 @@
 /// Every function takes several tasks at once, which a problem may process together; results must not depend, not even
 /// in the last bit, on batching or order. Different threads may call at the same time, each with its own scratch.
 /// Exceptions are for programming errors: the solver passes them on unchanged.
+///
+/// Evaluates one node of a shooting problem at a time, outside a solver.
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "bielle/solve/stage_model.h"
+#include "bielle/math/types.h"
 
 namespace bielle {
+
+/// A block of a larger matrix, and the transpose of one.
+using MatrixMap = Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>>;
+using ConstMatrixMap = Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>;
+using RowMatrixMap = Eigen::Map<RowMatrixXd, 0, Eigen::OuterStride<>>;
+using ConstRowMatrixMap = Eigen::Map<const RowMatrixXd, 0, Eigen::OuterStride<>>;
+
+/// About (x_k, u_k), in tangent coordinates at x_k and at the node state x_{k+1}:
+///     dx_{k+1} = Fx dx_k + Fu du_k + gap
+///     l = cost + lx.dx + lu.du + 1/2 (dx.lxx.dx + 2 du.lux.dx + du.luu.du)
+/// The terminal node has only cost, lx and lxx: its other sizes are zero.
+///
+/// The matrices are views of two that are stored as the sweep needs them: F^T = [Fu Fx]^T, and the lower triangle of
+/// the Hessian [luu . ; lux^T lxx], both with columns aligned to the processor's vector registers.
+class StageModel {
+ public:
+  VectorXd gap;  ///< ndx_{k+1}: difference(x_{k+1}, f_k(x_k, u_k))
+  double cost = 0;
+  VectorXd lx;  ///< ndx_k
+  VectorXd lu;  ///< nu_k
+
+  /// Sets the sizes, and all entries to zero.
+  void resize(int ndx, int nu, int ndx_next);
+  /// Exchanges the memory of the Hessian, with its content, for another piece of at least its size; while it has none,
+  /// the Hessian must not be used.
+  void swapHessian(VectorXd& memory) { hessian_.swap(memory); }
+  bool hasSizes(int ndx, int nu, int ndx_next) const;
+
+  RowMatrixMap Fx() { return {Ft_.data() + nu_, ndx_next_, ndx_, stride()}; }  ///< ndx_{k+1} x ndx_k
+  RowMatrixMap Fu() { return {Ft_.data(), ndx_next_, nu_, stride()}; }         ///< ndx_{k+1} x nu_k
+  ConstRowMatrixMap Fx() const { return {Ft_.data() + nu_, ndx_next_, ndx_, stride()}; }
+  ConstRowMatrixMap Fu() const { return {Ft_.data(), ndx_next_, nu_, stride()}; }
+
+  /// ndx_k x ndx_k, symmetric: only the lower triangle is written and read
+  MatrixMap lxx() { return {hessian_.data() + nu_ * (1 + stride_), ndx_, ndx_, stride()}; }
+  RowMatrixMap lux() { return {hessian_.data() + nu_, nu_, ndx_, stride()}; }  ///< nu_k x ndx_k
+  MatrixMap luu() { return {hessian_.data(), nu_, nu_, stride()}; }            ///< nu_k x nu_k, likewise
+  ConstMatrixMap lxx() const { return {hessian_.data() + nu_ * (1 + stride_), ndx_, ndx_, stride()}; }
+  ConstRowMatrixMap lux() const { return {hessian_.data() + nu_, nu_, ndx_, stride()}; }
+  ConstMatrixMap luu() const { return {hessian_.data(), nu_, nu_, stride()}; }
+
+  /// (nu_k + ndx_k) x ndx_{k+1} and (nu_k + ndx_k) square
+  MatrixMap Ft() { return {Ft_.data(), nu_ + ndx_, ndx_next_, stride()}; }
+  MatrixMap hessian() { return {hessian_.data(), nu_ + ndx_, nu_ + ndx_, stride()}; }
+  ConstMatrixMap Ft() const { return {Ft_.data(), nu_ + ndx_, ndx_next_, stride()}; }
+  ConstMatrixMap hessian() const { return {hessian_.data(), nu_ + ndx_, nu_ + ndx_, stride()}; }
+
+ private:
+  Eigen::OuterStride<> stride() const { return Eigen::OuterStride<>(stride_); }
+
+  Eigen::Index ndx_ = 0, nu_ = 0, ndx_next_ = 0;
+  Eigen::Index stride_ = 0;  // nu + ndx, rounded up to full registers; the padding is finite
+  VectorXd Ft_, hessian_;
+};
 
 /// A numerical failure is a status, never an exception or a NaN passed on.
 enum class StepStatus { Ok, Failed };
@@ -153,6 +211,30 @@ class NodewiseProblem : public ShootingProblem {
 /// Node states (N + 1) and controls (N) of a shooting problem.
 struct ShootingTrajectory {
   std::vector<VectorXd> xs, us;
+};
+
+/// Owns an evaluation and its scratch. No allocation after the first node of the same sizes.
+class NodeEvaluator {
+ public:
+  /// The problem must outlive it.
+  explicit NodeEvaluator(const ShootingProblem& problem);
+
+  /// Dynamics and cost of a node at (x, u), kept until the next call; u is not read at the terminal node.
+  const NodeEvaluation& evaluate(int node, const VectorXd& x, const VectorXd& u = VectorXd());
+  /// Quadratic model about the last evaluation, which must be Ok.
+  /// \param next  evaluation of the next node; null at the terminal node
+  StepStatus linearize(const NodeEvaluation* next, StageModel& out);
+  /// x (+) dx and x1 (-) x about the state x of the last evaluation.
+  VectorXd integrate(const VectorXd& dx);
+  VectorXd difference(const VectorXd& x1);
+
+  const NodeEvaluation& evaluation() const { return *at_; }
+
+ private:
+  const ShootingProblem& problem_;
+  std::unique_ptr<NodeEvaluation> at_;
+  std::unique_ptr<ProblemScratch> scratch_;
+  int node_ = 0;
 };
 
 }  // namespace bielle

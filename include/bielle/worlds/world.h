@@ -20,7 +20,7 @@ struct WorldOptions {
   double time_step = 0;  ///< of worlds with fixed steps, s; 0: the world's own
   /// Polled after every step, so that a signal handler can set it: ends an advance(), however short the steps.
   const std::atomic<bool>* interrupt = nullptr;
-  /// Error allowed per step of worlds that control it (manifold_world.h); 0: the world's own.
+  /// Error allowed per step of worlds that control it (makeManifoldWorld()); 0: the world's own.
   double tolerance = 0;
   int pushed_body = 1;  ///< at whose centre of mass World::setPush() acts; 1: the trunk, the body of the first joint
 };

@@ -7,13 +7,13 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
-#include "bielle/worlds/terrain.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "results/number_option.h"
 #include "results/setting.h"
 #include "solve/fddp_checks.h"
 #include "worlds/make_world.h"
+#include "worlds/terrain.h"
 
 namespace bielle::worlds {
 namespace {

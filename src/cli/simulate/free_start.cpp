@@ -6,11 +6,11 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "cli/eval_state.h"
 #include "cli/simulate/free.h"
+#include "dynamics/loop_conflict.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 

@@ -18,7 +18,6 @@
 /// stretched linkage J alone does not determine q. All minima are local ones. A change is offered only after the changed
 /// model has been made and closed by assemble() to 1e-9.
 #include "bielle/dynamics/assembly.h"
-#include "bielle/model/error.h"
 
 namespace bielle {
 
@@ -54,9 +53,5 @@ Model applyRemedy(const Model& model, const LoopRemedy& remedy);
 /// One sentence on the conflict, and one on its remedies: empty if there are none.
 std::string describeConflict(const Model& model, const LoopConflict& conflict);
 std::string describeRemedies(const Model& model, const LoopConflict& conflict);
-
-/// The error for a robot without a closed configuration according to findClosedConfiguration().
-/// \param source  file or name of the robot
-InputError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open);
 
 }  // namespace bielle

@@ -26,20 +26,10 @@
 /// slider take |s - f_t|^2 / c_t + (s - f_t) . (f_t - t) / c_t >= 0 in (2), and (3) lowers e.
 #include <vector>
 
-#include "bielle/model/model.h"
-#include "bielle/worlds/terrain.h"
+#include "bielle/worlds/bielle_world.h"
+#include "worlds/terrain.h"
 
 namespace bielle::worlds {
-
-/// Scaled by the weight of the robot, so that one choice suits robots of all sizes: soles of hard rubber. A sole that lands
-/// at v rebounds with e v, where by (1) c v - ln(1 + c v) = -c e v - ln(1 - c e v): e = 0.8 at 0.02 m/s, 0.4 at 0.1 m/s.
-struct ContactOptions {
-  double sinkage = 1e-4;       ///< of one sole under the robot's weight, m; gives k
-  double damping = 20;         ///< c, s/m
-  double shear_ratio = 1;      ///< k_t / k
-  int grid = 5;                ///< points along each side of a sole on ground with steps
-  double shear_damping = 0.3;  ///< c_t over that which damps the robot's mass on one sole's bristles critically
-};
 
 /// One point of a contact, with its coefficients.
 struct ContactPoint {

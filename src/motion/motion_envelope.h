@@ -1,9 +1,9 @@
 #pragma once
 /// \file Derivatives of an optimal motion, of its cost and of itself, with respect to the robot and to the request.
 #include "bielle/motion/solve.h"
-#include "bielle/ocp/envelope.h"
-#include "bielle/ocp/followed_optimum.h"
-#include "bielle/solve/peak_problem.h"
+#include "ocp/envelope.h"
+#include "ocp/followed_optimum.h"
+#include "solve/peak_problem.h"
 
 namespace bielle {
 
