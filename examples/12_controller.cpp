@@ -34,10 +34,10 @@ class MotorFeedback : public Controller {
  public:
   // \param plan  without gains: its torques are u*
   explicit MotorFeedback(Policy plan)
-      : plan_(std::move(plan)), q_(plan_.getModel().nq()), e_(plan_.getModel().nv()), v_(plan_.getModel().nv()) {}
+      : plan_(std::move(plan)), q_(plan_.model().nq()), e_(plan_.model().nv()), v_(plan_.model().nv()) {}
 
   void update(const Measurement& measured, VectorRef u) override {
-    const Model& model = plan_.getModel();
+    const Model& model = plan_.model();
     plan_.update(measured, u);
     plan_.getReference(measured.time, q_, v_);
     model.difference(measured.q, q_, e_);
@@ -58,25 +58,25 @@ class MotorFeedback : public Controller {
 class Robot {
  public:
   Robot(const Model& model, const Policy& plan)
-      : world_(worlds::makeWorld("bielle", model, {})), duration_(plan.getDuration() + 1) {
+      : world_(worlds::makeWorld("bielle", model, {})), duration_(plan.duration() + 1) {
     VectorXd q = model.makeNeutral(), v = VectorXd::Zero(model.nv());
     plan.getReference(0, q, v);
     world_->reset(q, v);
   }
 
   void read(Measurement& measured) const {
-    measured.time = world_->getTime();
-    measured.q = world_->getConfiguration();
-    measured.v = world_->getVelocity();
+    measured.time = world_->time();
+    measured.q = world_->configuration();
+    measured.v = world_->velocity();
   }
   void send(const VectorXd& u) { world_->setTorques(u); }
   void await() {  // the next instant: only a world must be asked to go on
-    const bool is_pushed = world_->getTime() >= kPushStart && world_->getTime() < kPushEnd;
+    const bool is_pushed = world_->time() >= kPushStart && world_->time() < kPushEnd;
     world_->setPush(is_pushed ? kPush : Vector3d::Zero());
     moves_ = world_->advance(std::chrono::duration<double>(kPeriod).count());
   }
-  double getHeight() const { return world_->getConfiguration()[2]; }  // of the trunk over the ground
-  bool isWalking() const { return moves_ && getHeight() > 0.2 && world_->getTime() < duration_; }
+  double height() const { return world_->configuration()[2]; }  // of the trunk over the ground
+  bool isWalking() const { return moves_ && height() > 0.2 && world_->time() < duration_; }
 
  private:
   const std::unique_ptr<worlds::World> world_;
@@ -107,7 +107,7 @@ Outcome run(const Model& model, const Policy& plan, Controller& controller, bool
     out.latencies.push_back(std::chrono::duration<double>(Clock::now() - begin).count());
     robot.await();
   }
-  out.height = robot.getHeight();
+  out.height = robot.height();
   return out;
 }
 
@@ -151,10 +151,10 @@ int main() {
       "trunk at the start %.3f m; after the push with gains %.3f m, with stiff motors %.3f m, "
       "with predictive control %.3f m\n",
       start, with_gains, with_stiff, with_prediction);
-  std::printf("%d solves, %d failed\n", controller.getCounts().solves, controller.getCounts().failed);
+  std::printf("%d solves, %d failed\n", controller.counts().solves, controller.counts().failed);
 
   predictive.own_thread = true;
   PredictiveController beside = makeController();
-  printTimes(beside.getCounts(), run(model, gains, beside, true));  // of this machine: no part of the verdict
+  printTimes(beside.counts(), run(model, gains, beside, true));  // of this machine: no part of the verdict
   return with_gains < 0.9 * start && with_stiff > 0.9 * start && with_prediction > 0.9 * start ? 0 : 1;
 }

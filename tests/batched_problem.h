@@ -28,7 +28,7 @@ class BatchedProblem : public ShootingProblem {
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override {
     inner_.getControlBounds(stage, lower, upper);
   }
-  int getBatchSize() const override { return batch_size_; }
+  int batchSize() const override { return batch_size_; }
 
   std::unique_ptr<NodeEvaluation> makeEvaluation() const override {
     ++num_made;

@@ -66,9 +66,9 @@ TEST_CASE("bielle world: a push of another body than the trunk moves it as steps
     world->reset(q, v);
     world->setPush(Vector3d(3, 0, 1));
     REQUIRE(world->advance(0.1));
-    const Books books = world->getBooks();
+    const Books books = world->books();
     CHECK(books.push_work != 0);
-    return world->getConfiguration();
+    return world->configuration();
   };
   const VectorXd fixed = push(0, 2), controlled = push(1e-9, 2);
   CHECK((fixed - controlled).cwiseAbs().maxCoeff() < 1e-5);
@@ -98,7 +98,7 @@ TEST_CASE("bielle world: accelerations in the air are those of the full system")
   world->setTorques(flight.u);
   constexpr double h = 1e-5;
   REQUIRE(world->advance(h));
-  const VectorXd a = (world->getVelocity() - flight.v) / h;
+  const VectorXd a = (world->velocity() - flight.v) / h;
   CHECK((a - cws.a).norm() < 1e-3 * cws.a.norm());
   // The torque of one motor, a thousandth different, must be noticed as often.
   VectorXd other = flight.u;
@@ -106,7 +106,7 @@ TEST_CASE("bielle world: accelerations in the air are those of the full system")
   world->reset(flight.q, flight.v);
   world->setTorques(other);
   REQUIRE(world->advance(h));
-  CHECK(((world->getVelocity() - flight.v) / h - cws.a).norm() > 1e-3 * cws.a.norm());
+  CHECK(((world->velocity() - flight.v) / h - cws.a).norm() > 1e-3 * cws.a.norm());
 }
 
 TEST_CASE("bielle world: steps are of second order, in the air and on the ground") {
@@ -122,13 +122,13 @@ TEST_CASE("bielle world: steps are of second order, in the air and on the ground
         world->setTorques(flight.u);
         REQUIRE(world->advance(0.1));
       } else {
-        VectorXd q = posture.getPosture();
+        VectorXd q = posture.posture();
         q[2] -= 6e-5;  // all soles stay on the ground
         world->reset(q, VectorXd::Zero(model.nv()));
         world->setTorques(posture.calcTorques(*world));
         REQUIRE(world->advance(0.05));
       }
-      ends.push_back(world->getConfiguration());
+      ends.push_back(world->configuration());
     }
     const double coarse = model.difference(ends[0], ends[1]).norm(), fine = model.difference(ends[1], ends[2]).norm();
     CAPTURE(flies, coarse, fine);
@@ -141,12 +141,12 @@ TEST_CASE("bielle world: torques are cut at the limits of the motors") {
   const auto world = makeTestWorld();
   const Model& model = getBipetto();
   const testing::PostureHold posture(model);
-  world->reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+  world->reset(posture.posture(), VectorXd::Zero(model.nv()));
   const VectorXd u = VectorXd::Constant(model.nu(), -1e9);
   world->setTorques(u);
   for (int m = 0; m < model.nu(); ++m) {
     const double limit = model.motors()[m].effort_limit;
-    CHECK(world->getTorques()[m] == std::max(-limit, -1e9));
+    CHECK(world->torques()[m] == std::max(-limit, -1e9));
   }
 }
 
@@ -154,7 +154,7 @@ TEST_CASE("bielle world: it advances without allocation") {
   const Model& model = getBipetto();
   const testing::PostureHold posture(model);
   const auto world = makeTestWorld();
-  VectorXd q = posture.getPosture();
+  VectorXd q = posture.posture();
   q[2] += 0.001;
   world->reset(q, VectorXd::Zero(model.nv()));
   const VectorXd u = posture.calcTorques(*world);
@@ -178,20 +178,20 @@ TEST_CASE("worlds: an interrupt ends a period of many steps, and the world can g
   for (const std::string& name : listWorlds()) {
     CAPTURE(name);
     const auto world = makeWorld(name, model, {Ground(), name == "simbody" ? 0 : 1e-12, &interrupt});
-    world->reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+    world->reset(posture.posture(), VectorXd::Zero(model.nv()));
     CHECK_FALSE(world->advance(0.1));
-    CHECK(world->getMessage().empty());
-    CHECK(world->getTime() > 0);
-    CHECK(world->getTime() < 0.1);
-    CHECK(world->getConfiguration().allFinite());
+    CHECK(world->message().empty());
+    CHECK(world->time() > 0);
+    CHECK(world->time() < 0.1);
+    CHECK(world->configuration().allFinite());
   }
   const auto world = makeWorld("bielle", model, {Ground(), 1e-4, &interrupt});
-  world->reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+  world->reset(posture.posture(), VectorXd::Zero(model.nv()));
   CHECK_FALSE(world->advance(1e-3));
-  CHECK(world->getTime() == Approx(1e-4));
+  CHECK(world->time() == Approx(1e-4));
   interrupt = false;
   CHECK(world->advance(9e-4));
-  CHECK(world->getTime() == Approx(1e-3));
+  CHECK(world->time() == Approx(1e-3));
 }
 
 TEST_CASE("worlds: an unknown one is refused by name") {

@@ -52,10 +52,10 @@ TEST_CASE("closed field: accelerations and forces of the full system, for every 
         field.accelerate(tau, d_rate, a);
         Workspace ws(model);
         ConstrainedWorkspace cws;
-        REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), field.getConfiguration(),
-                                          field.getVelocity(), tau) == DynamicsStatus::Ok);
+        REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), field.configuration(),
+                                          field.velocity(), tau) == DynamicsStatus::Ok);
         CHECK(calcRelativeError(a, cws.a) < 1e-9);
-        CHECK((d_rate - field.getVelocity()).norm() < 1e-12);
+        CHECK((d_rate - field.velocity()).norm() < 1e-12);
         VectorXd poisoned = tau;
         poisoned[model.nv() - 1] += 1e-3 * (1 + std::abs(poisoned[model.nv() - 1]));
         field.accelerate(poisoned, d_rate, a);
@@ -80,14 +80,14 @@ TEST_CASE("closed field: a step has the order of its method, for every joint") {
       double error = 0, part = 0;
       const VectorXd whole = takeStep(field, mechanism, v, h, &error);
       REQUIRE(field.close(whole.head(model.nv()), whole.tail(model.nv())));
-      const VectorXd q = field.getConfiguration();
+      const VectorXd q = field.configuration();
       const VectorXd half = takeStep(field, mechanism, v, h / 2, &part);
       REQUIRE(field.close(half.head(model.nv()), half.tail(model.nv())));
-      Mechanism middle{model, field.getConfiguration()};
-      const VectorXd middle_v = field.getVelocity();
+      Mechanism middle{model, field.configuration()};
+      const VectorXd middle_v = field.velocity();
       const VectorXd second = takeStep(field, middle, middle_v, h / 2, &part);
       REQUIRE(field.close(second.head(model.nv()), second.tail(model.nv())));
-      (h == 0.2 ? coarse : fine) = model.difference(q, field.getConfiguration()).norm();
+      (h == 0.2 ? coarse : fine) = model.difference(q, field.configuration()).norm();
       if (h == 0.2) estimate = error;
     }
     CAPTURE(coarse, fine, estimate);

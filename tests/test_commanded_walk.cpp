@@ -29,7 +29,7 @@ struct Walked {
 Walked walk(const std::vector<TimedCommand>& commands, double duration) {
   CommandedWalk walk = makeCommandedWalk(commands);
   Walked out;
-  for (double time = 0; time < duration; time += walk.getTimeStep()) {
+  for (double time = 0; time < duration; time += walk.timeStep()) {
     out.stages.push_back(walk.makeNext());
     const std::vector<ContactTarget>& contacts = out.stages.back().contacts;
     if (contacts.size() == 2) out.middles.push_back(calcMiddle(contacts[0].X_WT, contacts[1].X_WT));
@@ -116,7 +116,7 @@ TEST_CASE("commanded walk: from step to step its path has no jumps") {
   // From rest the pendulum of gait.h starts at once; on the way and to rest it changes its velocity steadily.
   const Walked walked = walk({{0, {0.4, 0, 0}}, {2.5, {0.2, 0.1, 0.4}}, {5, {}}}, 8);
   const Model& model = getBipetto();
-  const double h = makeCommandedWalk({}).getTimeStep();
+  const double h = makeCommandedWalk({}).timeStep();
   for (size_t k = 0; k + 1 < walked.stages.size(); ++k) {
     const CommandedWalk::Stage &now = walked.stages[k], &next = walked.stages[k + 1];
     const VectorXd v = model.difference(now.x.head(model.nq()), next.x.head(model.nq())) / h;

@@ -105,20 +105,20 @@ TEST_CASE("contact filter: at rest it learns the offset of the gyro and the tilt
   // The trunk leans by 0.01 rad about x, which only gravity tells.
   const Matrix3d R = exp3(Vector3d(0.01, 0, 0));
   const Vector3d offset(0.01, -0.02, 0.015);
-  const double before = filter.getCovariance()(kPosition, kPosition);
+  const double before = filter.covariance()(kPosition, kPosition);
   for (int i = 0; i < 5000; ++i) {
     filter.predict(offset, -R.transpose() * kGravity, 1e-3, {1, 1});
     for (size_t foot : {0, 1}) filter.correct(foot, feet[foot]);
   }
-  const ContactFilterState& state = filter.getState();
+  const ContactFilterState& state = filter.state();
   CHECK((state.gyro_offset - offset).norm() < 2e-4);
   CHECK((state.R.row(2) - R.row(2)).norm() < 2e-4);
   CHECK(state.v.norm() < 1e-3);
   CHECK((state.p - start.p).norm() < 0.01);
   CHECK(log3(state.R).z() == Approx(0).margin(2e-3));
-  CHECK(filter.getCovariance()(kPosition, kPosition) >= before);
-  CHECK(filter.getCovariance()(kTurn + 2, kTurn + 2) >= 0);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(filter.getCovariance());
+  CHECK(filter.covariance()(kPosition, kPosition) >= before);
+  CHECK(filter.covariance()(kTurn + 2, kTurn + 2) >= 0);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(filter.covariance());
   CHECK(eigen.eigenvalues().minCoeff() > -1e-12);
 }
 

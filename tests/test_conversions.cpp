@@ -361,7 +361,7 @@ TEST_CASE(
             &MotorDrive::back_efficiency, &MotorDrive::mass})
         CHECK(areSame(x.*field, y.*field));
       CHECK(before.torque_loss.has_value() == after.torque_loss.has_value());
-      CHECK(areSame(before.getTorqueLoss(), after.getTorqueLoss()));
+      CHECK(areSame(before.torqueLoss(), after.torqueLoss()));
       CHECK(areSame(before.continuous_effort, after.continuous_effort));
       CHECK(areSame(a.velocityLimits()[before.dof], b.velocityLimits()[after.dof]));
       CHECK(after.armature == before.armature);

@@ -41,11 +41,11 @@ double driveCrank(double torque, double stop, double delay) {
   double least = 1;
   for (int tick = 0; tick < 1000; ++tick) {
     u.setConstant(torque);
-    dead_point_stop.add({world->getTime(), world->getConfiguration(), world->getVelocity(), {}, delay}, u);
+    dead_point_stop.add({world->time(), world->configuration(), world->velocity(), {}, delay}, u);
     sent.push_back(u);
     world->setTorques(sent[tick]);
     REQUIRE(world->advance(kControlPeriod));
-    least = std::min(least, calcTransmission(linkage, model, world->getConfiguration()));
+    least = std::min(least, calcTransmission(linkage, model, world->configuration()));
   }
   return least;
 }

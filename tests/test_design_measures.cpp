@@ -415,7 +415,7 @@ TEST_CASE("design: corners of what a motor can give lie on its limits") {
     const auto& [next_w, next_u] = corners[(i + 1) % corners.size()];
     CAPTURE(w, u);
     area += (w * next_u - next_w * u) / 2;
-    const double volts = motor.getVoltsPerEffort() * u + motor.getVoltsPerSpeed() * w;
+    const double volts = motor.voltsPerEffort() * u + motor.voltsPerSpeed() * w;
     const auto shares = {std::abs(u) / 50, std::abs(w) / 30, std::abs(volts) / 48};
     CHECK(std::max(shares) == Approx(1).epsilon(1e-12));
     CHECK(std::count_if(shares.begin(), shares.end(), [](double share) { return share > 1 - 1e-12; }) == 2);

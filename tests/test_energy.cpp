@@ -256,7 +256,7 @@ TEST_CASE("energy: torques that a motor can give at a speed") {
                    lower = std::clamp(-stall * (1 + w / fastest), -10.0, 10.0);
       CAPTURE(w, u, lower, upper);
       CHECK(given == Approx(std::clamp(u, lower, upper)));
-      if (std::abs(w) < fastest) CHECK(std::abs(motor.getVoltsPerEffort() * given + 0.9 * w) <= 24 + 1e-12);
+      if (std::abs(w) < fastest) CHECK(std::abs(motor.voltsPerEffort() * given + 0.9 * w) <= 24 + 1e-12);
     }
   motor.drive = {};
   CHECK(motor.clampEffort(-200, 60) == -10);

@@ -53,7 +53,7 @@ class Swing {
     if (model_.hasFreeFlyer()) contacts.emplace_back();
     return calcStaticTorques(model_, makeConstraintSet(model_, contacts), q).u;
   }
-  const VectorXd& getStart() const { return start_; }
+  const VectorXd& start() const { return start_; }
 
  private:
   SE3 calcFoot(const VectorXd& q) {
@@ -102,17 +102,17 @@ TEST_CASE("estimator: exact sensors give the state of a robot on one foot") {
     Swing swing(model, 5);
     EstimatorOptions options;
     options.imu = {exp3(Vector3d(0.3, -0.2, 0.5)), {0.05, 0.02, 0.1}};
-    Estimator estimator(model, swing.getStart(), options);
-    estimator.reset(0, swing.getStart(), VectorXd::Zero(model.nv()), {0});
+    Estimator estimator(model, swing.start(), options);
+    estimator.reset(0, swing.start(), VectorXd::Zero(model.nv()), {0});
     for (int i = 1; i <= 150; ++i)
       REQUIRE(estimator.update(read(model, swing, options.imu, i * kReadingPeriod), {0}) == EstimatorStatus::Ok);
     const double time = 150 * kReadingPeriod;
     const VectorXd q = swing.calcConfiguration(time), v = swing.calcVelocity(time);
-    const Measurement& found = estimator.getMeasurement();
+    const Measurement& found = estimator.measurement();
     CHECK(found.time == time);
     CHECK(found.contacts == std::vector<char>{1, 0});
     const VectorXd dq = model.difference(q, found.q), dv = found.v - v;
-    REQUIRE(getLargest(model.difference(swing.getStart(), q).head<6>()) > 5e-3);
+    REQUIRE(getLargest(model.difference(swing.start(), q).head<6>()) > 5e-3);
     REQUIRE(getLargest(v.head<6>()) > 0.02);
     CHECK(getLargest(dq.head<6>()) < 1e-4);
     CHECK(getLargest(dq.tail(model.nv() - 6)) < 1e-9);
@@ -159,7 +159,7 @@ TEST_CASE("estimator: a push on the trunk is no force of the ground on a foot in
     for (int i = 1; i <= 100; ++i) {
       readings.time = i * kReadingPeriod;
       estimator.update(readings, {0});
-      REQUIRE(estimator.getContacts() == std::vector<char>{1, 0});
+      REQUIRE(estimator.contacts() == std::vector<char>{1, 0});
     }
     REQUIRE(f.head<2>().norm() > 0.4 * weight);
     CHECK(estimator.getWrench(0).head<3>().norm() == Approx(f.head<3>().norm()).epsilon(0.03));
@@ -186,12 +186,12 @@ TEST_CASE("estimator: feet that stand are at rest, unless they roll") {
 TEST_CASE("estimator: passive joints of a fixed linkage follow its motors") {
   const LoadedRobot robot = loadOwn("fivebar");
   Swing swing(robot.model, 3);
-  Estimator estimator(robot.model, swing.getStart());
+  Estimator estimator(robot.model, swing.start());
   for (int i = 1; i <= 200; ++i) {
     REQUIRE(estimator.update(read(robot.model, swing, {}, i * kReadingPeriod), {}) == EstimatorStatus::Ok);
-    CHECK(getLargest(estimator.getMeasurement().q - swing.calcConfiguration(i * kReadingPeriod)) < 1e-9);
+    CHECK(getLargest(estimator.measurement().q - swing.calcConfiguration(i * kReadingPeriod)) < 1e-9);
   }
-  CHECK(getLargest(estimator.getMeasurement().v - swing.calcVelocity(200 * kReadingPeriod)) < 0.02);
+  CHECK(getLargest(estimator.measurement().v - swing.calcVelocity(200 * kReadingPeriod)) < 0.02);
 }
 
 TEST_CASE("estimator: near a dead point the status says so") {
@@ -208,16 +208,16 @@ TEST_CASE("estimator: near a dead point the status says so") {
     readings.time = i * kReadingPeriod;
     readings.motor_positions += Eigen::Vector2d(-1e-3, 1e-3);
     status = estimator.update(readings, {});
-    CHECK(estimator.getMeasurement().q.allFinite());
+    CHECK(estimator.measurement().q.allFinite());
     warned = warned || status == EstimatorStatus::NearDeadPoint;
     if (status == EstimatorStatus::Ok) {
       CHECK_FALSE(warned);
-      CHECK(estimator.getMargin() >= 0.02);
-      CHECK(estimator.getMessage().empty());
+      CHECK(estimator.margin() >= 0.02);
+      CHECK(estimator.message().empty());
     }
     if (status == EstimatorStatus::NearDeadPoint) {
-      CHECK(estimator.getMargin() < 0.02);
-      CHECK(estimator.getMessage().find("'pin' is near a dead point") != std::string::npos);
+      CHECK(estimator.margin() < 0.02);
+      CHECK(estimator.message().find("'pin' is near a dead point") != std::string::npos);
     }
   }
   CHECK(warned);
@@ -227,11 +227,11 @@ TEST_CASE("estimator: readings that are not finite change nothing") {
   const LoadedRobot robot = loadOwn("bipetto");
   const Model& model = robot.model;
   Swing swing(model, 1);
-  Estimator estimator(model, swing.getStart());
-  estimator.reset(0, swing.getStart(), VectorXd::Zero(model.nv()), {0});
+  Estimator estimator(model, swing.start());
+  estimator.reset(0, swing.start(), VectorXd::Zero(model.nv()), {0});
   SensorReadings readings = read(model, swing, {}, kReadingPeriod);
   estimator.update(readings, {0});
-  const Measurement before = estimator.getMeasurement();
+  const Measurement before = estimator.measurement();
   for (int part = 0; part < 5; ++part) {
     SensorReadings bad = readings;
     (part == 0   ? bad.time
@@ -240,9 +240,9 @@ TEST_CASE("estimator: readings that are not finite change nothing") {
      : part == 3 ? bad.angular_velocity[1]
                  : bad.specific_force[2]) = std::numeric_limits<double>::quiet_NaN();
     CHECK(estimator.update(bad, {0}) == EstimatorStatus::NotFinite);
-    CHECK_FALSE(estimator.getMessage().empty());
-    CHECK(estimator.getMeasurement().q == before.q);
-    CHECK(estimator.getMeasurement().v == before.v);
+    CHECK_FALSE(estimator.message().empty());
+    CHECK(estimator.measurement().q == before.q);
+    CHECK(estimator.measurement().v == before.v);
   }
   readings.time = 2 * kReadingPeriod;
   CHECK(estimator.update(readings, {0}) == EstimatorStatus::Ok);
@@ -259,8 +259,8 @@ TEST_CASE("estimator: an update does not allocate") {
   const LoadedRobot robot = loadOwn("bipetto");
   const Model& model = robot.model;
   Swing swing(model, 2);
-  Estimator estimator(model, swing.getStart());
-  estimator.reset(0, swing.getStart(), VectorXd::Zero(model.nv()), {0});
+  Estimator estimator(model, swing.start());
+  estimator.reset(0, swing.start(), VectorXd::Zero(model.nv()), {0});
   std::vector<SensorReadings> readings;
   for (int i = 1; i <= 20; ++i) readings.push_back(read(model, swing, {}, i * kReadingPeriod));
   const std::vector<int> planned = {0, 1};

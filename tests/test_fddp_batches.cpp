@@ -187,7 +187,7 @@ TEST_CASE("a horizon that advances evaluates only what is new, with the same byt
   t.us[N / 2][0] += 1e-9;
   const bool anew = GENERATE(false, true);
   if (anew) {  // multipliers that are set are those of nodes that may be others
-    advancing.setMultipliers(advancing.getMultipliers());
+    advancing.setMultipliers(advancing.multipliers());
     CHECK(count(advancing, t) > N);
   } else {
     CHECK_THROWS_WITH(advancing.step(t), Catch::Contains("node 50"));

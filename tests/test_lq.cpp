@@ -139,7 +139,7 @@ TEST_CASE("the sweep solves the dense program, whatever the sizes, gaps and regu
     CHECK(dense.calcResidual(z) < 1e-10);
     CHECK(result.expected_change == Approx(dense.calcValue(z)).epsilon(1e-11));
     CHECK(slope == Approx(dense.g.dot(z)).epsilon(1e-11));
-    for (const LqSweep::Node& node : sweep.getNodes()) CHECK(node.Vxx == node.Vxx.transpose());
+    for (const LqSweep::Node& node : sweep.nodes()) CHECK(node.Vxx == node.Vxx.transpose());
   }
 }
 
@@ -154,7 +154,7 @@ TEST_CASE("the sweep solves the dense program of larger sizes, with every number
     const auto models = makeModels(ndx, nu);
     const DenseProgram dense(models, {});
     CHECK(calcStepError(sweep, models, dense, {}) < 1e-9);
-    for (const LqSweep::Node& node : sweep.getNodes()) CHECK(node.Vxx == node.Vxx.transpose());
+    for (const LqSweep::Node& node : sweep.nodes()) CHECK(node.Vxx == node.Vxx.transpose());
   }
 }
 
@@ -165,7 +165,7 @@ TEST_CASE("without gaps the expected change is half the slope, the sum of Qu.k")
   const LqResult result = sweep.update(models, {});
   std::vector<VectorXd> dx, du;
   double sum = 0;
-  for (size_t k = 0; k < kControls.size(); ++k) sum += sweep.getNodes()[k].Qu.dot(sweep.getNodes()[k].k);
+  for (size_t k = 0; k < kControls.size(); ++k) sum += sweep.nodes()[k].Qu.dot(sweep.nodes()[k].k);
   CHECK(sweep.calcStep(models, dx, du) == Approx(sum).epsilon(1e-11));
   CHECK(result.expected_change == Approx(0.5 * sum).epsilon(1e-11));
 }
@@ -175,7 +175,7 @@ TEST_CASE("the value function is the optimal cost to go from any deviation") {
   LqSweep sweep;
   REQUIRE(sweep.update(models, {}).status == LqStatus::Ok);
   const int k = 2;
-  const LqSweep::Node node = sweep.getNodes()[k];
+  const LqSweep::Node node = sweep.nodes()[k];
   const std::vector<StageModel> tail(models.begin() + k, models.end());
   DenseProgram dense(tail, {});
   const VectorXd d = random(kTangents[k], 1);
@@ -281,10 +281,10 @@ TEST_CASE("box QP: the best of all active sets, with its free factor") {
     CHECK((d - oracle).cwiseAbs().maxCoeff() < 1e-9);
     CHECK((d - lower).minCoeff() >= 0);
     CHECK((upper - d).minCoeff() >= 0);
-    const MatrixXd L = MatrixXd(qp.getFreeFactor()).triangularView<Eigen::Lower>();
+    const MatrixXd L = MatrixXd(qp.freeFactor()).triangularView<Eigen::Lower>();
     std::vector<int> free;
-    for (int i = 0; i < qp.getNumFree(); ++i) free.push_back(qp.getFreeIndex(i));
-    clamped_in_all += n - qp.getNumFree();
+    for (int i = 0; i < qp.numFree(); ++i) free.push_back(qp.getFreeIndex(i));
+    clamped_in_all += n - qp.numFree();
     if (!free.empty()) CHECK((L * L.transpose() - MatrixXd(H(free, free))).cwiseAbs().maxCoeff() < 1e-13 * n);
   }
   CHECK(clamped_in_all > 200);
@@ -306,9 +306,9 @@ TEST_CASE("a sweep with boxes: wide ones change nothing, tight ones clamp k and 
   const LqResult wide = boxed.update(models, {}, boxes);
   CHECK(wide.expected_change == Approx(unbounded.expected_change).epsilon(1e-11));
   for (size_t k = 0; k < boxes.size(); ++k) {
-    CHECK((boxed.getNodes()[k].Vxx - free.getNodes()[k].Vxx).norm() < 1e-10);
-    CHECK((boxed.getNodes()[k].Vx - free.getNodes()[k].Vx).norm() < 1e-10);
-    CHECK((boxed.getNodes()[k].K - free.getNodes()[k].K).norm() < 1e-10);
+    CHECK((boxed.nodes()[k].Vxx - free.nodes()[k].Vxx).norm() < 1e-10);
+    CHECK((boxed.nodes()[k].Vx - free.nodes()[k].Vx).norm() < 1e-10);
+    CHECK((boxed.nodes()[k].K - free.nodes()[k].K).norm() < 1e-10);
   }
 
   // The value function must be that of the policy du = k + K dx, rolled out through the models.
@@ -318,9 +318,9 @@ TEST_CASE("a sweep with boxes: wide ones change nothing, tight ones clamp k and 
   int clamped = 0;
   for (size_t k = 0; k < boxes.size(); ++k) {
     for (int i = 0; i < kControls[k]; ++i) {
-      const bool at_bound = std::abs(boxed.getNodes()[k].k[i]) == 0.2;
+      const bool at_bound = std::abs(boxed.nodes()[k].k[i]) == 0.2;
       clamped += at_bound;
-      if (at_bound) CHECK(boxed.getNodes()[k].K.row(i).isZero(0));
+      if (at_bound) CHECK(boxed.nodes()[k].K.row(i).isZero(0));
     }
   }
   CHECK(clamped > 2);
@@ -349,7 +349,7 @@ TEST_CASE("a sweep with any control clamped: gains and value function of the fre
       const MatrixXd free_Qux = Qux(free, Eigen::all);
       const MatrixXd K = -MatrixXd(Quu(free, free)).ldlt().solve(free_Qux);
       V = m.lxx() + m.Fx().transpose() * V * m.Fx() + free_Qux.transpose() * K;
-      const auto& node = sweep.getNodes()[k];
+      const auto& node = sweep.nodes()[k];
       CHECK((node.Vxx - V).norm() < 1e-10 * V.norm());
       CHECK((MatrixXd(node.K(free, Eigen::all)) - K).norm() < 1e-10 * (1 + K.norm()));
       CHECK(node.K.row(which).isZero(0));

@@ -86,7 +86,7 @@ std::unique_ptr<World> makeTight(const Model& model, double tolerance = 1e-11, d
 
 Vector3d calcPoint(const Model& model, const World& world, int body, const Vector3d& point) {
   Workspace ws(model);
-  updatePositions(model, ws, world.getConfiguration());
+  updatePositions(model, ws, world.configuration());
   return ws.X_WB[body].act(point);
 }
 
@@ -96,7 +96,7 @@ TEST_CASE("manifold world: Bricard's mechanism, with a redundant row, as its clo
   const Model model = makeBricard();
   const auto world = makeTight(model);
   world->reset(model.makeNeutral(), VectorXd::Zero(model.nv()));
-  const double start = world->getBooks().getEnergy();
+  const double start = world->books().energy();
   // The joints turn by (-a, -b, -a, -b, -a) with (1 - sin a)(1 - sin b) = 1; the energy integral by quadrature.
   const double times[] = {0.25, 0.5, 1, 2};
   const Vector3d places[] = {{0.99809250226, -1.05993979848, 0.93826381180},
@@ -104,15 +104,15 @@ TEST_CASE("manifold world: Bricard's mechanism, with a redundant row, as its clo
                              {0.51050146119, -1.64916759940, 0.14012311455},
                              {-0.96934034478, -1.22124689496, 0.75427801078}};
   for (int i = 0; i < 4; ++i) {
-    REQUIRE(world->advance(times[i] - world->getTime()));
+    REQUIRE(world->advance(times[i] - world->time()));
     CHECK((calcPoint(model, *world, 3, Vector3d::UnitZ()) - places[i]).norm() < 2e-11);
-    CHECK(world->getGap() < 1e-12);
+    CHECK(world->gap() < 1e-12);
   }
   // A period later in the same place, and the energy of the start.
   constexpr double kPeriod = 2 * 2.495855756843;
-  REQUIRE(world->advance(2 * kPeriod + 0.5 - world->getTime()));
+  REQUIRE(world->advance(2 * kPeriod + 0.5 - world->time()));
   CHECK((calcPoint(model, *world, 3, Vector3d::UnitZ()) - places[1]).norm() < 1e-9);
-  CHECK(std::abs(world->getBooks().getEnergy() - start) < 1e-9);
+  CHECK(std::abs(world->books().energy() - start) < 1e-9);
 }
 
 TEST_CASE("manifold world: four-bars side by side pass their horizontal posture") {
@@ -125,14 +125,14 @@ TEST_CASE("manifold world: four-bars side by side pass their horizontal posture"
     const Model model = makeFourBars(c.count);
     const auto world = makeTight(model, 1e-12);
     world->reset(model.makeNeutral(), makeFourBarVelocity(model, -1));
-    const double start = world->getBooks().getEnergy();
+    const double start = world->books().energy();
     const bool advances = world->advance(c.time);
-    CAPTURE(c.count, c.time, world->getMessage());
+    CAPTURE(c.count, c.time, world->message());
     REQUIRE(advances);
     const Vector3d top = calcPoint(model, *world, 1, Vector3d::UnitY());
     CHECK(std::hypot(top.x() - c.x, top.y() - c.y) < 1e-9);
-    CHECK(world->getGap() < 1e-12);
-    CHECK(std::abs(world->getBooks().getEnergy() - start) < 1e-8);
+    CHECK(world->gap() < 1e-12);
+    CHECK(std::abs(world->books().energy() - start) < 1e-8);
   }
 }
 
@@ -140,11 +140,11 @@ TEST_CASE("manifold world: many four-bars, whose rows are factorized as a sparse
   const Model model = makeFourBars(60);
   const auto world = makeTight(model, 1e-9);
   world->reset(model.makeNeutral(), makeFourBarVelocity(model, -1));
-  const double start = world->getBooks().getEnergy();
+  const double start = world->books().energy();
   REQUIRE(world->advance(1.5));  // past the horizontal posture
-  CHECK(std::abs(world->getBooks().getEnergy() - start) < 1e-5);
-  CHECK(world->getGap() < 1e-12);
-  const VectorXd& q = world->getConfiguration();
+  CHECK(std::abs(world->books().energy() - start) < 1e-5);
+  CHECK(world->gap() < 1e-12);
+  const VectorXd& q = world->configuration();
   for (size_t j = 1; j < model.joints().size(); ++j)
     CHECK(std::abs(std::abs(q[model.joints()[j].idx_q]) - std::abs(q[0])) < 1e-6);
 }
@@ -157,8 +157,8 @@ TEST_CASE("manifold world: a start where the loops are singular is refused with 
     q[model.joints()[j].idx_q] = model.joints()[j].name.substr(0, 4) == "foot" ? -M_PI / 2 : M_PI / 2;
   world->reset(q, VectorXd::Zero(model.nv()));
   CHECK_FALSE(world->advance(0.1));
-  CAPTURE(world->getMessage());
-  CHECK(world->getMessage().find("singular at the start: they have rank 2") != std::string::npos);
+  CAPTURE(world->message());
+  CHECK(world->message().find("singular at the start: they have rank 2") != std::string::npos);
 }
 
 TEST_CASE("manifold world: mechanisms of every joint and closure keep their energy, and converge") {
@@ -174,13 +174,13 @@ TEST_CASE("manifold world: mechanisms of every joint and closure keep their ener
       for (double tolerance : {1e-6, 1e-9, 1e-12}) {
         const auto world = makeTight(model, tolerance, -100);
         world->reset(mechanism.q_closed, v);
-        const double start = world->getBooks().getEnergy();
+        const double start = world->books().energy();
         const bool advances = world->advance(0.3);
-        CAPTURE(getName(joint), getName(closure), tolerance, world->getMessage());
+        CAPTURE(getName(joint), getName(closure), tolerance, world->message());
         REQUIRE(advances);
-        CHECK(std::abs(world->getBooks().getEnergy() - start) < 1e4 * tolerance * (1 + std::abs(start)));
-        CHECK(world->getGap() < 1e-11);
-        ends.push_back(world->getConfiguration());
+        CHECK(std::abs(world->books().energy() - start) < 1e4 * tolerance * (1 + std::abs(start)));
+        CHECK(world->gap() < 1e-11);
+        ends.push_back(world->configuration());
       }
       const double coarse = model.difference(ends[0], ends[2]).norm(), fine = model.difference(ends[1], ends[2]).norm();
       CAPTURE(getName(joint), getName(closure), coarse, fine);

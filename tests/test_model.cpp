@@ -129,7 +129,7 @@ TEST_CASE("motors and limits by dof, with the tighter of two velocity limits") {
   CHECK(model.velocityLimits()[0] == 3);
   CHECK((model.armature() - Vector3d(0.1, 0.2, 0.2)).norm() == 0);
   CHECK(model.motors()[0].effort_limit == 20);
-  CHECK(model.motors()[0].getTorqueLoss() == 0.5);
+  CHECK(model.motors()[0].torqueLoss() == 0.5);
 }
 
 TEST_CASE("axes are made unit vectors") {

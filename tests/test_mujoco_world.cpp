@@ -68,19 +68,19 @@ TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined, on
   options.world.ground.height = -0.2;
   for (int i = 0; i < 300; ++i) options.world.ground.steps.push_back({{2 + 0.1 * i, 0, 1}, 0.1, 0.1, 0, 0, 0});
   options.world.ground.steps.push_back({{0.02, 0, 0.15}, 1, 1, 0.4, 0.02, -0.01});
-  VectorXd q = posture.getPosture();
+  VectorXd q = posture.posture();
   q[2] += 0.17;
   const auto world = makeMujocoWorld(model, options);
   world->reset(q, VectorXd::Zero(model.nv()));
   REQUIRE(testing::hold(*world, posture, 1));
   double load = 0;
   Workspace ws(model);
-  updatePositions(model, ws, world->getConfiguration());
+  updatePositions(model, ws, world->configuration());
   for (size_t c = 0; c < model.contacts().size(); ++c) {
     const ContactFrame& contact = model.contacts()[c];
     const SE3 X_WF = getPlacement(ws, contact.body, contact.X_BF);
     CHECK(X_WF.p.z() == Approx(options.world.ground.calcHeight(X_WF.p.x(), X_WF.p.y())).margin(2e-3));
-    load += (X_WF.R * world->getFeet()[c].wrench.head<3>()).z();
+    load += (X_WF.R * world->feet()[c].wrench.head<3>()).z();
   }
   CHECK(load == Approx(model.mass() * model.gravity().norm()).epsilon(0.02));
 }
@@ -92,7 +92,7 @@ TEST_CASE("mujoco world: a ground of more boxes under the soles than it can have
   const auto world = makeMujocoWorld(model, options);
   world->reset(makeStandingPosture(model), VectorXd::Zero(model.nv()));
   CHECK(!world->advance(1e-3));
-  CHECK(world->getMessage().find("boxes") != std::string::npos);
+  CHECK(world->message().find("boxes") != std::string::npos);
 }
 
 TEST_CASE("mujoco world: it advances without allocation") {
@@ -101,7 +101,7 @@ TEST_CASE("mujoco world: it advances without allocation") {
   MujocoWorldOptions options;
   options.world.ground = makeTiles({0.001, 0.25, -1, 2, 2, 1});
   const auto world = makeMujocoWorld(model, options);
-  VectorXd q = posture.getPosture();
+  VectorXd q = posture.posture();
   q[2] += 0.002;
   world->reset(q, VectorXd::Zero(model.nv()));
   const VectorXd u = posture.calcTorques(*world);
@@ -114,7 +114,7 @@ TEST_CASE("mujoco world: it advances without allocation") {
   }
   const long allocations = num_allocations - before;
   CHECK(advanced);
-  CHECK(world->getFeet()[0].touches);
+  CHECK(world->feet()[0].touches);
   CHECK(allocations == 0);
 }
 
@@ -124,14 +124,14 @@ TEST_CASE("mujoco world: a four-bar that falls conserves its energy the better, 
   const auto calcErrors = [&](double time_step) {
     const auto world = makeFineWorld(model, time_step);
     world->reset(q, VectorXd::Zero(model.nv()));
-    const Books start = world->getBooks();
+    const Books start = world->books();
     double energy = 0, kinetic = 0, gap = 0;
     for (int i = 0; i < 100; ++i) {
       REQUIRE(world->advance(0.01));
-      const Books books = world->getBooks();
-      energy = std::max(energy, std::abs(books.getEnergy() - start.getEnergy()));
+      const Books books = world->books();
+      energy = std::max(energy, std::abs(books.energy() - start.energy()));
       kinetic = std::max(kinetic, books.kinetic);
-      gap = std::max(gap, world->getGap());
+      gap = std::max(gap, world->gap());
     }
     return Eigen::Array3d(energy / kinetic, kinetic, gap);
   };
@@ -151,8 +151,8 @@ TEST_CASE("mujoco world: linkages without contact move as in the world of Bielle
       world.reset(q, VectorXd::Zero(model.nv()));
       world.setTorques(u);
       REQUIRE(world.advance(0.2));
-      CHECK(world.getGap() < 1e-6);
-      return VectorXd(world.getConfiguration());
+      CHECK(world.gap() < 1e-6);
+      return VectorXd(world.configuration());
     };
     BielleWorldOptions options;
     options.world.time_step = 2e-5;
@@ -182,13 +182,13 @@ TEST_CASE("mujoco world: a stop of a joint takes the energy that runs into it") 
   const Model model = builder.build();
   const auto world = makeMujocoWorld(model);
   world->reset(VectorXd::Zero(1), VectorXd::Constant(1, 2));
-  const Books start = world->getBooks();
+  const Books start = world->books();
   REQUIRE(world->advance(0.09));
-  CHECK(world->getConfiguration()[0] == Approx(0.18));
-  CHECK(world->getBooks().stop_loss == 0);
+  CHECK(world->configuration()[0] == Approx(0.18));
+  CHECK(world->books().stop_loss == 0);
   REQUIRE(world->advance(0.2));
-  const Books end = world->getBooks();
-  CHECK(world->getConfiguration()[0] < 0.2 + 1e-3);
+  const Books end = world->books();
+  CHECK(world->configuration()[0] < 0.2 + 1e-3);
   CHECK(end.kinetic < 0.01 * start.kinetic);
   CHECK(end.stop_loss == Approx(start.kinetic - end.kinetic).epsilon(1e-6));
 }
@@ -199,22 +199,22 @@ TEST_CASE("mujoco world: a push in the air gives the robot its impulse and its w
   q[2] += 5;
   const auto world = makeFineWorld(model, 2e-5);
   world->reset(q, VectorXd::Zero(model.nv()));
-  const Books start = world->getBooks();
+  const Books start = world->books();
   const Vector3d push(100, -60, 30);
   world->setPush(push);
   REQUIRE(world->advance(0.2));
   world->setPush(Vector3d::Zero());
   REQUIRE(world->advance(0.1));
   Workspace ws(model);
-  updatePositions(model, ws, world->getConfiguration());
-  updateVelocities(model, ws, world->getVelocity());
+  updatePositions(model, ws, world->configuration());
+  updateVelocities(model, ws, world->velocity());
   const Vector3d expected = push * 0.2 + model.mass() * model.gravity() * 0.3;
   CHECK((model.mass() * calcComVelocity(model, ws) - expected).norm() < 0.01 * expected.norm());
-  const Books books = world->getBooks();
+  const Books books = world->books();
   CHECK(books.push_work > 1);
   CHECK(books.contact_loss == 0);
   CHECK(testing::calcImbalance(start, books) < 0.01);
-  for (const FootReport& foot : world->getFeet()) {
+  for (const FootReport& foot : world->feet()) {
     CHECK(!foot.touches);
     CHECK(foot.wrench.isZero(0));
   }
@@ -227,11 +227,11 @@ TEST_CASE("mujoco world: reset takes a state as it is, and the same torques make
   VectorXd ends[2];
   for (VectorXd& end : ends) {
     world->reset(q, VectorXd::Zero(model.nv()));
-    CHECK(world->getTime() == 0);
-    CHECK(world->getConfiguration() == q);
-    CHECK(world->getBooks().motor_work == 0);
+    CHECK(world->time() == 0);
+    CHECK(world->configuration() == q);
+    CHECK(world->books().motor_work == 0);
     REQUIRE(testing::hold(*world, testing::PostureHold(model), 0.2));
-    end = world->getConfiguration();
+    end = world->configuration();
   }
   CHECK(ends[0] == ends[1]);
 }
@@ -248,10 +248,10 @@ TEST_CASE("mujoco world: torques are cut at the limits of the motors") {
   const auto world = makeMujocoWorld(model);
   world->reset(VectorXd::Zero(1), VectorXd::Zero(1));
   world->setTorques(VectorXd::Constant(1, -10));
-  CHECK(world->getTorques()[0] == -2);
+  CHECK(world->torques()[0] == -2);
   REQUIRE(world->advance(0.1));
-  CHECK(world->getVelocity()[0] == Approx(-2 * 0.1 / 0.5).epsilon(1e-9));
-  CHECK(world->getBooks().motor_work == Approx(world->getBooks().kinetic).epsilon(1e-9));
+  CHECK(world->velocity()[0] == Approx(-2 * 0.1 / 0.5).epsilon(1e-9));
+  CHECK(world->books().motor_work == Approx(world->books().kinetic).epsilon(1e-9));
 }
 
 TEST_CASE("mujoco world: a world that breaks off says so, keeps its last state and leaves no file behind") {
@@ -261,11 +261,11 @@ TEST_CASE("mujoco world: a world that breaks off says so, keeps its last state a
   world->reset(q, VectorXd::Zero(model.nv()));
   world->setTorques(VectorXd::Constant(model.nu(), std::numeric_limits<double>::quiet_NaN()));
   CHECK(!world->advance(0.01));
-  CHECK(world->getMessage().find("torques") != std::string::npos);
-  CHECK(world->getConfiguration() == q);
+  CHECK(world->message().find("torques") != std::string::npos);
+  CHECK(world->configuration() == q);
   CHECK(!world->advance(0.01));
   world->reset(q, VectorXd::Zero(model.nv()));
-  CHECK(world->getMessage().empty());
+  CHECK(world->message().empty());
   CHECK(world->advance(0.01));
   CHECK_THROWS_AS(mju_error("an error of the engine"), std::runtime_error);
   CHECK(!std::filesystem::exists("MUJOCO_LOG.TXT"));

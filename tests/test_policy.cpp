@@ -39,9 +39,9 @@ TEST_CASE("policy: on the plan it gives the torques of the plan, each in the mid
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
   Policy policy = makePolicy(squat.solution);
-  const auto& stages = policy.getStages();
+  const auto& stages = policy.stages();
   REQUIRE(static_cast<int>(stages.size()) == squat.solution.motion.problem->numStages());
-  CHECK(policy.getDuration() ==
+  CHECK(policy.duration() ==
         Approx(squat.solution.motion.schedule.getTime(squat.solution.motion.problem->numStages())));
   VectorXd u(model.nu());
   for (size_t k : {size_t(0), stages.size() / 3, stages.size() - 1}) {
@@ -83,7 +83,7 @@ TEST_CASE("policy: its gains are those of the solver's last sweep") {
     VectorXd dx(K.cols());
     for (int i = 0; i < dx.size(); ++i) dx[i] = 1e-3 * std::sin(1 + 2.1 * i);
     const VectorXd moved = evaluator.integrate(dx);
-    const double time = policy.getStages()[k].start;
+    const double time = policy.stages()[k].start;
     VectorXd there(model.nu()), here(model.nu());
     policy.update(measure(model, time, moved), there);
     policy.update(measure(model, time, x), here);
@@ -104,7 +104,7 @@ TEST_CASE("policy: its gains on states whose loops are open are those on the dif
   const VectorXd& x = squat.solution.trajectory.xs[kNode];
   evaluator.evaluate(kNode, x, squat.solution.trajectory.us[kNode]);
   const RowMatrixXd& K = squat.solution.gains[kNode].K;
-  RowMatrixXd gains = policy.getStages()[kNode].K, differences(model.nu(), 2 * nv);
+  RowMatrixXd gains = policy.stages()[kNode].K, differences(model.nu(), 2 * nv);
   constexpr double kStep = 0.01;  // along one coordinate the difference is linear
   for (int i = 0; i < 2 * nv; ++i) {
     VectorXd moved = x;
@@ -124,7 +124,7 @@ TEST_CASE("policy: gains that look ahead are those of an earlier stage of their 
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
   Policy policy = makePolicy(squat.solution), far = policy;
-  const auto& stages = policy.getStages();
+  const auto& stages = policy.stages();
   constexpr int kStages = 5;
   const size_t last = stages.size() - 1;  // a squat has one phase
   far.setLookAhead(kStages * stages[last].duration);
@@ -161,7 +161,7 @@ TEST_CASE("policy: after its end the torques hold the last posture, and gains ca
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
   Policy policy = makePolicy(squat.solution);
-  Measurement at{policy.getDuration() + 0.5, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  Measurement at{policy.duration() + 0.5, model.makeNeutral(), VectorXd::Zero(model.nv())};
   policy.getReference(at.time, at.q, at.v);
   VectorXd u(model.nu()), other(model.nu());
   policy.update(at, u);

@@ -85,8 +85,8 @@ TEST_CASE("predictive control: a squat stands to its end and beyond, to the same
   const Execution a = carryOut(getShortSquat(), *one, options), b = carryOut(getShortSquat(), *two, options);
   CHECK(a.outcome == Outcome::Stood);
   CHECK(a.largest_deviation < 5e-3);
-  CHECK(one->getCounts().failed == 0);
-  CHECK(one->getCounts().solves == 60);  // one for every stage
+  CHECK(one->counts().failed == 0);
+  CHECK(one->counts().solves == 60);  // one for every stage
   CHECK(a.record.q == b.record.q);
   CHECK(a.record.u == b.record.u);
 }
@@ -121,7 +121,7 @@ TEST_CASE("predictive control: states that cannot be solved from leave the last 
   at.time = kStage;
   at.v.setConstant(std::numeric_limits<double>::quiet_NaN());
   controller->update(at, u);
-  CHECK(controller->getCounts().failed == 1);
+  CHECK(controller->counts().failed == 1);
   at.v = good.v;
   at.time = kStage + 1e-3;
   controller->update(at, u);
@@ -129,8 +129,8 @@ TEST_CASE("predictive control: states that cannot be solved from leave the last 
   at.time = 2 * kStage;
   controller->update(at, u);
   CHECK(u.allFinite());
-  CHECK(controller->getCounts().failed == 1);
-  CHECK(controller->getCounts().solves == 3);
+  CHECK(controller->counts().failed == 1);
+  CHECK(controller->counts().solves == 3);
 }
 
 TEST_CASE("predictive control: a walk by command is made on the way, to the same bytes for every number of threads") {
@@ -154,8 +154,8 @@ TEST_CASE("predictive control: a walk by command is made on the way, to the same
   const Execution a = carryOut(getShortSquat(), one, options), b = carryOut(getShortSquat(), two, options);
   CHECK(a.outcome == Outcome::Stood);
   CHECK(a.distance > 0.1);
-  CHECK(one.getCounts().failed == 0);
-  CHECK(one.getCounts().solves == 125);
+  CHECK(one.counts().failed == 0);
+  CHECK(one.counts().solves == 125);
   CHECK(a.record.q == b.record.q);
   CHECK(a.record.u == b.record.u);
 }
@@ -176,7 +176,7 @@ class Gate {
     holds_ = false;
   }
   bool holds() const { return holds_; }
-  int getPasses() const { return passes_; }
+  int passes() const { return passes_; }
 
  private:
   std::atomic<bool> closed_{false}, holds_{false};
@@ -221,9 +221,9 @@ TEST_CASE("predictive control: solved in a thread of its own and waited for, pol
     other.update(tick);
     REQUIRE(own.u == other.u);
   }
-  CHECK(own.controller->getCounts().solves == 20);
-  CHECK(own.controller->getCounts().missed == 0);
-  CHECK(own.controller->getCounts().failed == 0);
+  CHECK(own.controller->counts().solves == 20);
+  CHECK(own.controller->counts().missed == 0);
+  CHECK(own.controller->counts().failed == 0);
 }
 
 TEST_CASE(
@@ -233,12 +233,12 @@ TEST_CASE(
   {
     Standing trial(true);
     for (int tick = 0, passes = 0;; ++tick) {
-      passes = trial.gate.getPasses();
+      passes = trial.gate.passes();
       trial.update(tick);
       trial.controller->waitForSolve();
       asking = tick / kStageTicks;
       REQUIRE(asking < 50);
-      if (asking >= 5 && trial.gate.getPasses() > passes) break;
+      if (asking >= 5 && trial.gate.passes() > passes) break;
     }
   }
   Standing standing(true);
@@ -252,7 +252,7 @@ TEST_CASE(
   standing.update(tick++);
   for (int i = 0; !standing.gate.holds() && i < 60000; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   REQUIRE(standing.gate.holds());
-  Policy last = controller.getPolicy();
+  Policy last = controller.policy();
   VectorXd expected(standing.u.size());
   const long allocations = num_allocations_here;
   bool same = true;
@@ -265,15 +265,15 @@ TEST_CASE(
   CHECK(num_allocations_here == allocations);
   CHECK(same);
   CHECK(standing.gate.holds());  // all that time
-  CHECK(controller.getCounts().solves == asking);
-  CHECK(controller.getCounts().missed == 2);  // the third one may still have a solve
-  CHECK(controller.getPolicy().getStages().front().start == last.getStages().front().start);
+  CHECK(controller.counts().solves == asking);
+  CHECK(controller.counts().missed == 2);  // the third one may still have a solve
+  CHECK(controller.policy().stages().front().start == last.stages().front().start);
 
   standing.gate.open();
   controller.waitForSolve();
   standing.update(tick);  // it comes into force late, but does
   const double stage = 1e-3 * kStageTicks;
-  CHECK(controller.getPolicy().getStages().front().start == Approx((asking + 1) * stage));
+  CHECK(controller.policy().stages().front().start == Approx((asking + 1) * stage));
   last.update(standing.at, expected);
   CHECK(standing.u != expected);
   const long before = num_allocations_here;
@@ -282,13 +282,13 @@ TEST_CASE(
     controller.waitForSolve();
   }
   CHECK(num_allocations_here == before);  // to take solutions and ask for the next, none either
-  CHECK(controller.getCounts().missed == 2);
-  CHECK(controller.getCounts().solves == asking + 6);  // the late one, and one for each stage from then on
-  CHECK(controller.getCounts().stages == asking + 8);
-  const std::vector<PredictiveSolve>& solves = controller.getCounts().last;
+  CHECK(controller.counts().missed == 2);
+  CHECK(controller.counts().solves == asking + 6);  // the late one, and one for each stage from then on
+  CHECK(controller.counts().stages == asking + 8);
+  const std::vector<PredictiveSolve>& solves = controller.counts().last;
   for (const PredictiveSolve& solve : solves)
     CHECK((solve.latency > 0) == (&solve != &solves.back()));  // not yet in force
-  CHECK(controller.getCounts().failed == 0);
+  CHECK(controller.counts().failed == 0);
 }
 
 namespace {

@@ -45,7 +45,7 @@ struct Walking {
     at.contacts = contacts;
     for (int i = 0; i < kStageTicks; ++i, ++tick) {
       at.time = 1e-3 * tick;
-      controller->getPolicy().getReference(at.time, at.q, at.v);
+      controller->policy().getReference(at.time, at.q, at.v);
       controller->update(at, u);
     }
   }
@@ -56,7 +56,7 @@ struct Walking {
     return getPlacement(ws, contact.body, contact.X_BF).p.z();
   }
   // How far the motion is behind its plan, in stages.
-  double getLag() const { return (at.time - controller->getPlanTime(at.time)) / (1e-3 * kStageTicks); }
+  double lag() const { return (at.time - controller->getPlanTime(at.time)) / (1e-3 * kStageTicks); }
 
   const Model& model = getBipetto();
   Workspace ws{model};
@@ -76,16 +76,16 @@ TEST_CASE("predictive control: a foot that finds ground early stands from then o
   const int touch = begin + 3 * (landing - begin) / 4;
   for (int stage = 0; stage < touch; ++stage) walk.updateAsPlanned(stage);
   CHECK(walk.getHeight(foot) > 5e-3);
-  CHECK(walk.getLag() == Approx(0).margin(1e-6));
+  CHECK(walk.lag() == Approx(0).margin(1e-6));
   walk.update({1, 1});
-  CHECK(walk.controller->getCounts().early == 1);
-  CHECK(walk.getLag() == Approx(touch + 1 - landing));
+  CHECK(walk.controller->counts().early == 1);
+  CHECK(walk.lag() == Approx(touch + 1 - landing));
   walk.update({1, 1});
   const double height = walk.getHeight(foot);
   for (int i = 0; i < 2; ++i) walk.update({1, 1});
   CHECK(walk.getHeight(foot) == Approx(height).margin(2e-3));  // above the ground of the plan
   CHECK(walk.getHeight(foot) > 3e-3);
-  CHECK(walk.controller->getCounts().failed == 0);
+  CHECK(walk.controller->counts().failed == 0);
 }
 
 TEST_CASE("predictive control: footholds are foreseen where feet come to stand") {
@@ -93,7 +93,7 @@ TEST_CASE("predictive control: footholds are foreseen where feet come to stand")
   const int foot = walk.findChange(0, false) < walk.findChange(1, false) ? 0 : 1;
   const int begin = walk.findChange(foot, false), landing = walk.findChange(foot, true);
   const auto find = [&](int contact) {
-    for (const PredictedFoothold& foothold : walk.controller->getFootholds())
+    for (const PredictedFoothold& foothold : walk.controller->footholds())
       if (foothold.contact == contact) return foothold;
     FAIL("none is foreseen");
     return PredictedFoothold();
@@ -129,12 +129,12 @@ TEST_CASE("predictive control: a foot that touches early has landed where it may
     const int half = begin + 5 * (landing - begin) / 8;
     for (int stage = 0; stage < half; ++stage) walk.updateAsPlanned(stage);
     walk.update({1, 1});  // on an edge, several centimetres from its foothold
-    CHECK(walk.controller->getCounts().early == (room > 0.1 ? 1 : 0));
+    CHECK(walk.controller->counts().early == (room > 0.1 ? 1 : 0));
     for (int stage = half + 1; stage < landing - 3; ++stage) walk.updateAsPlanned(stage);
-    CHECK((walk.getLag() < 0) == (room > 0.1));
+    CHECK((walk.lag() < 0) == (room > 0.1));
     walk.update({1, 1});  // over it
-    CHECK(walk.controller->getCounts().early == 1);
-    CHECK(walk.controller->getCounts().failed == 0);
+    CHECK(walk.controller->counts().early == 1);
+    CHECK(walk.controller->counts().failed == 0);
   }
 }
 
@@ -147,7 +147,7 @@ TEST_CASE("predictive control: gains that look ahead are those of an earlier sol
     std::vector<RowMatrixXd> gains;
     for (int stage = 0; stage <= landing; ++stage) {
       by.updateAsPlanned(stage);
-      gains.push_back(by.controller->getPolicy().getStages().front().K);
+      gains.push_back(by.controller->policy().stages().front().K);
     }
     return gains;
   };
@@ -168,19 +168,19 @@ TEST_CASE("predictive control: a foot that finds no ground is lowered until it d
   std::vector<char> hangs{1, 1};
   hangs[foot] = 0;
   for (int i = 0; i < 6; ++i) walk.update(hangs);
-  CHECK(walk.controller->getCounts().late == 1);
-  CHECK(walk.getLag() > 3);
+  CHECK(walk.controller->counts().late == 1);
+  CHECK(walk.lag() > 3);
   CHECK(walk.getHeight(foot) < -5e-3);
   for (int i = 0; i < 3; ++i) walk.update({1, 1});
-  const double height = walk.getHeight(foot), lag = walk.getLag();
+  const double height = walk.getHeight(foot), lag = walk.lag();
   CHECK(height < -5e-3);
   // It stands there, in the middle of each stage: nothing here takes the speed at which it touched, which steps from middle to
   // middle turn round at every node.
   for (int i = 0; i < 4; ++i) walk.update({1, 1});
   CHECK(walk.getHeight(foot) == Approx(height).margin(1e-4));
-  CHECK(walk.getLag() == Approx(lag));
-  CHECK(walk.controller->getCounts().late == 1);
-  CHECK(walk.controller->getCounts().failed == 0);
+  CHECK(walk.lag() == Approx(lag));
+  CHECK(walk.controller->counts().late == 1);
+  CHECK(walk.controller->counts().failed == 0);
 }
 
 TEST_CASE("predictive control: the motion does not wait for ever for ground that is not there") {
@@ -190,12 +190,12 @@ TEST_CASE("predictive control: the motion does not wait for ever for ground that
   std::vector<char> hangs{1, 1};
   hangs[foot] = 0;
   for (int i = 0; i < 25; ++i) walk.update(hangs);
-  const double lag = walk.getLag();
+  const double lag = walk.lag();
   CHECK(lag > 5);
   for (int i = 0; i < 5; ++i) walk.update(hangs);
-  CHECK(walk.getLag() == Approx(lag));
+  CHECK(walk.lag() == Approx(lag));
   CHECK(walk.getHeight(foot) > -0.1);
-  CHECK(walk.controller->getCounts().late == 1);
+  CHECK(walk.controller->counts().late == 1);
 }
 
 }  // namespace bielle

@@ -142,7 +142,7 @@ TEST_CASE("four-bar: the ratio on paper, over both branches of a full turn") {
   // The crank has turned once.
   CHECK(sweep.samples.back().motors[0] - sweep.samples.front().motors[0] == Approx(2 * kPi).margin(0.05));
 
-  const std::vector<RatioSample> dead = sweep.getDeadPoints();
+  const std::vector<RatioSample> dead = sweep.deadPoints();
   REQUIRE(dead.size() == 2);
   CHECK(dead[0].dead == DeadPointKind::Output);
   CHECK(dead[1].dead == DeadPointKind::Output);
@@ -158,7 +158,7 @@ TEST_CASE("four-bar driven by its rocker: the dead points are the motor's") {
   const Linkage linkage = makeLinkage(chain.model, chain.q_closed, {"crank1"});
   const RatioSweep sweep = sweepRatio(chain.model, linkage, chain.q_closed);
   CHECK(sweep.full_turn);
-  const std::vector<RatioSample> dead = sweep.getDeadPoints();
+  const std::vector<RatioSample> dead = sweep.deadPoints();
   REQUIRE(dead.size() == 2);
   for (const RatioSample& sample : dead) {
     CHECK(sample.dead == DeadPointKind::Motors);
@@ -223,7 +223,7 @@ TEST_CASE("the map of an ankle: the other joint is held, rows end at dead points
   for (const RatioSample& sample : sweep.samples)
     CHECK(std::abs(sample.joints[1] - sweep.samples.front().joints[1]) < 1e-10);
   int motor_dead = 0;
-  for (const RatioSample& sample : sweep.getDeadPoints()) {
+  for (const RatioSample& sample : sweep.deadPoints()) {
     if (sample.dead != DeadPointKind::Motors) continue;
     ++motor_dead;
     CHECK(sample.ratio.condition > 1e8);
@@ -307,7 +307,7 @@ TEST_CASE("belts: a sweep is one turn of the joint, whatever the ratio") {
     const VectorXd q = findClosedConfiguration(model).q;
     const RatioSweep sweep = sweepRatio(model, makeLinkage(model, q, {"knee_left"}), q);
     CHECK(sweep.full_turn);
-    CHECK(sweep.getDeadPoints().empty());
+    CHECK(sweep.deadPoints().empty());
     const double range = sweep.samples.back().joints[0] - sweep.samples.front().joints[0];
     CHECK(range <= 2 * kPi);
     CHECK(range > 2 * kPi - SweepOptions().step);
@@ -421,8 +421,8 @@ TEST_CASE("a posture at a dead point has the distance 0, and is no reference of 
   const FourBarChain chain = makeFourBarChain(FourBarChainOptions());
   const Linkage linkage = makeLinkage(chain.model, chain.q_closed, {"rocker1"});
   const RatioSweep sweep = sweepRatio(chain.model, linkage, chain.q_closed);
-  REQUIRE_FALSE(sweep.getDeadPoints().empty());
-  for (const RatioSample& sample : sweep.getDeadPoints()) {
+  REQUIRE_FALSE(sweep.deadPoints().empty());
+  for (const RatioSample& sample : sweep.deadPoints()) {
     const VectorXd q = carryLinkage(chain.model, linkage, sample, chain.q_closed);
     CHECK(findDeadPoint(linkage, chain.model, q).distance < 1e-6);
   }

@@ -346,7 +346,7 @@ references:
   CHECK(model.motors()[0].velocity_limit == 9);
   CHECK(model.motors()[0].torque_loss == 0.4);
   CHECK_FALSE(model.motors()[1].torque_loss);
-  CHECK(model.motors()[1].getTorqueLoss() == kDefaultTorqueLoss);
+  CHECK(model.motors()[1].torqueLoss() == kDefaultTorqueLoss);
   CHECK(model.velocityLimits()[shoulder] == 9);
   CHECK(model.motors()[1].dof == rod);
   CHECK(model.armature().sum() == 0.5);
@@ -385,12 +385,12 @@ TEST_CASE("winding and gear of a motor: limits, armature, loss and thermal torqu
   CHECK(motor.effort_limit == Approx(std::min(0.8 * 0.9 * 30, loadWith("").motors()[0].effort_limit)));
   CHECK(motor.velocity_limit == Approx(std::min(24 / 0.9, loadWith("").motors()[0].velocity_limit)));
   CHECK(motor.continuous_effort == Approx(9));
-  CHECK(motor.getTorqueLoss() == Approx(0.2 / 0.81));
+  CHECK(motor.torqueLoss() == Approx(0.2 / 0.81));
   CHECK(motor.drive.back_efficiency == 0.7);
   CHECK(motor.drive.mass == 0.5);
   CHECK(motor.hasEnvelope());
-  CHECK(motor.getVoltsPerEffort() == Approx(0.2 / (0.8 * 0.9)));
-  CHECK(motor.getVoltsPerSpeed() == Approx(0.9));
+  CHECK(motor.voltsPerEffort() == Approx(0.2 / (0.8 * 0.9)));
+  CHECK(motor.voltsPerSpeed() == Approx(0.9));
   CHECK(motor.getEffortFactor(1) == 1 / 0.8);
   CHECK(motor.getEffortFactor(-1) == 0.7);
   // What is given holds; of two limits the smaller.
@@ -400,7 +400,7 @@ TEST_CASE("winding and gear of a motor: limits, armature, loss and thermal torqu
   CHECK(loadMotor(", velocity: 50").velocity_limit == Approx(24 / 0.9));
   CHECK(loadMotor(", velocity: 5").velocity_limit == 5);
   CHECK(loadMotor(", armature: 0.3").armature == 0.3);
-  CHECK(loadMotor(", torque_loss: 0.01").getTorqueLoss() == 0.01);
+  CHECK(loadMotor(", torque_loss: 0.01").torqueLoss() == 0.01);
   CHECK(loadMotor(", continuous_effort: 4").continuous_effort == 4);
   CHECK(loadWith("motors: {shoulder: {continuous_effort: 4}}").motors()[0].continuous_effort == 4);
   CHECK(loadWith("motors: {shoulder: {ratio: 2, rotor_inertia: 0.01}}\narmature: 0.25").armature().maxCoeff() == 0.04);
@@ -456,7 +456,7 @@ TEST_CASE("motors of a catalogue") {
     CHECK(motor.armature == Approx(drive.ratio * drive.ratio * drive.rotor_inertia));
     // Stall and no-load speed are those of motors of this size, and what it bears for ever is less than it bears at all.
     CHECK(drive.resistance * drive.continuous_current < drive.voltage);
-    CHECK(motor.continuous_effort < drive.voltage / motor.getVoltsPerEffort());
+    CHECK(motor.continuous_effort < drive.voltage / motor.voltsPerEffort());
     if (std::isfinite(drive.current)) CHECK(drive.continuous_current < drive.current);
   }
   CHECK(loadWith("motors: {shoulder: {type: ak80-6}}").motors()[0].effort_limit <= 12);

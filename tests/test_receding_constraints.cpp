@@ -48,9 +48,9 @@ TEST_CASE("a horizon that advances takes its multipliers along") {
   Receding solver(problem);
   solver.setMultipliers(result.multipliers);
   solver.step(t);
-  const std::vector<VectorXd> before = solver.getMultipliers().values;
+  const std::vector<VectorXd> before = solver.multipliers().values;
   solver.advance(t);
-  const Multipliers after = solver.getMultipliers();
+  const Multipliers after = solver.multipliers();
   const size_t N = t.us.size();
   REQUIRE(after.values.size() == N + 1);
   double largest = 0;
@@ -65,7 +65,7 @@ TEST_CASE("a horizon that advances takes its multipliers along") {
   std::vector<NodeSource> halves(N + 1);
   for (size_t k = 0; k <= N; ++k) halves[k] = {static_cast<int>(k / 2), 0.5};
   solver.move(halves);
-  for (size_t k = 0; k <= N; ++k) CHECK(solver.getMultipliers().values[k] == 0.5 * after.values[k / 2]);
+  for (size_t k = 0; k <= N; ++k) CHECK(solver.multipliers().values[k] == 0.5 * after.values[k / 2]);
 }
 
 TEST_CASE("solves of one iteration, for receding horizons, linearize once each and reach the optimum together") {
@@ -98,7 +98,7 @@ TEST_CASE("solves of one iteration, for receding horizons, linearize once each a
   };
   double first = 0;
   for (int i = 0; i < kSolves; ++i) {
-    if (i > 0) solver.setMultipliers(solver.getMultipliers());
+    if (i > 0) solver.setMultipliers(solver.multipliers());
     solver.step(t);
     CHECK(problem.linearized == (i + 1) * (problem.stages + 1));
     if (i == 0) first = calcError();
@@ -126,7 +126,7 @@ TEST_CASE("in receding horizons a row that binds does not come free and is viola
   options.constraints.penalty_increase = 1;
   Receding solver(problem, options);
   for (int i = 0; i < 6; ++i) {
-    if (i > 0) solver.setMultipliers(solver.getMultipliers());
+    if (i > 0) solver.setMultipliers(solver.multipliers());
     solver.step(t);
     CAPTURE(i, first);
     if (i > 0) CHECK(calcViolation() < 0.05 * first);  // after the first, rows that had no multipliers are violated

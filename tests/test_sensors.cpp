@@ -32,13 +32,13 @@ TEST_CASE("sensors: exact ones read angles, mean angular velocity and no weight 
   Sensors sensors(model, options);
   sensors.reset(*world, 0);
   // The centre of mass falls freely; the trunk's own acceleration follows from velocities.
-  const SE3 before(Eigen::Quaterniond(Eigen::Vector4d(world->getConfiguration().segment<4>(3))).toRotationMatrix(),
-                   world->getConfiguration().head<3>());
-  const Vector3d v_before = before.R * world->getVelocity().head<3>();
+  const SE3 before(Eigen::Quaterniond(Eigen::Vector4d(world->configuration().segment<4>(3))).toRotationMatrix(),
+                   world->configuration().head<3>());
+  const Vector3d v_before = before.R * world->velocity().head<3>();
   world->advance(1e-3);
   const SensorReadings& readings = sensors.read(*world);
-  const VectorXd &q = world->getConfiguration(), &v = world->getVelocity();
-  CHECK(readings.time == world->getTime());
+  const VectorXd &q = world->configuration(), &v = world->velocity();
+  CHECK(readings.time == world->time());
   for (int m = 0; m < model.nu(); ++m)
     CHECK(readings.motor_positions[m] == q[model.joints()[model.motors()[m].joint].idx_q]);
   CHECK((readings.angular_velocity - v.segment<3>(3)).norm() < 0.02);
@@ -95,7 +95,7 @@ TEST_CASE("sensors: encoders round to their resolution") {
   const SensorReadings& readings = sensors.read(*world);
   int rounded = 0;
   for (int m = 0; m < model.nu(); ++m) {
-    const double angle = world->getConfiguration()[model.joints()[model.motors()[m].joint].idx_q];
+    const double angle = world->configuration()[model.joints()[model.motors()[m].joint].idx_q];
     const double steps = readings.motor_positions[m] / resolution;
     CHECK(std::abs(steps - std::round(steps)) < 1e-9);
     CHECK(std::abs(readings.motor_positions[m] - angle) <= resolution / 2 + 1e-12);

@@ -100,10 +100,10 @@ TEST_CASE("serial belief: the plan is one of the closed robot") {
   const SerialReference reference = makeReference(closed, trial.serial, plan, Belief::Serial);
   CHECK(reference.first_missed < 0);
   CHECK(reference.message.empty());
-  CHECK(reference.policy->getDuration() == plan.getDuration());
+  CHECK(reference.policy->duration() == plan.duration());
   VectorXd q = closed.makeNeutral(), v(closed.nv()), q_s = trial.q_s, v_s(trial.serial.model.nv());
   Workspace ws(closed);
-  for (const Policy::Stage& stage : plan.getStages()) {
+  for (const Policy::Stage& stage : plan.stages()) {
     reference.policy->getReference(stage.start, q, v);
     plan.getReference(stage.start, q_s, v_s);
     CHECK((restrictConfiguration(closed, trial.serial.model, q) - q_s).norm() < 1e-9);
@@ -118,9 +118,9 @@ TEST_CASE("serial belief: places where linkages cannot follow are reported") {
   const Policy plan = makeBend(trial.serial, trial.q_s, 3);
   const SerialReference reference = makeReference(trial.robot.model, trial.serial, plan, Belief::Serial);
   CHECK(reference.first_missed > 0);
-  CHECK(reference.first_missed < plan.getDuration());
+  CHECK(reference.first_missed < plan.duration());
   CHECK_THAT(reference.message, Catch::Contains("knee"));
-  for (const Policy::Stage& stage : reference.policy->getStages()) CHECK(stage.q.allFinite());
+  for (const Policy::Stage& stage : reference.policy->stages()) CHECK(stage.q.allFinite());
 }
 
 }  // namespace bielle::worlds

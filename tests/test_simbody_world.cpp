@@ -31,12 +31,12 @@ VectorXd follow(World& world, Policy& policy, const Model& model, double duratio
   world.reset(at.q, at.v);
   VectorXd u(model.nu());
   for (int i = 0; i < static_cast<int>(std::lround(duration / 1e-3)); ++i) {
-    at = {world.getTime(), world.getConfiguration(), world.getVelocity()};
+    at = {world.time(), world.configuration(), world.velocity()};
     policy.update(at, u);
     world.setTorques(u);
     REQUIRE(world.advance(1e-3));
   }
-  return world.getConfiguration();
+  return world.configuration();
 }
 
 }  // namespace
@@ -73,13 +73,13 @@ TEST_CASE("simbody world: where loops are cut does not change the motion") {
   const auto as_modelled = makeSimbodyWorld(model, options);
   // Joints without coordinates in Simbody are read from the placements of their bodies. The state in motion is closed.
   const VectorXd moved = follow(*as_modelled, policy, model, 0.1);
-  fewest->reset(moved, as_modelled->getVelocity());
-  CHECK(model.difference(moved, fewest->getConfiguration()).cwiseAbs().maxCoeff() < 1e-6);
-  CHECK((as_modelled->getVelocity() - fewest->getVelocity()).cwiseAbs().maxCoeff() < 1e-5);
-  CHECK(as_modelled->getVelocity().cwiseAbs().maxCoeff() > 0.1);
+  fewest->reset(moved, as_modelled->velocity());
+  CHECK(model.difference(moved, fewest->configuration()).cwiseAbs().maxCoeff() < 1e-6);
+  CHECK((as_modelled->velocity() - fewest->velocity()).cwiseAbs().maxCoeff() < 1e-5);
+  CHECK(as_modelled->velocity().cwiseAbs().maxCoeff() > 0.1);
   const VectorXd other = follow(*fewest, policy, model, 0.1);
   CHECK(model.difference(moved, other).cwiseAbs().maxCoeff() < 1e-5);
-  CHECK(fewest->getGap() < 1e-7);
+  CHECK(fewest->gap() < 1e-7);
 }
 
 TEST_CASE("simbody world: a walk goes as in Bielle's world, the more so the finer the steps") {

@@ -115,7 +115,7 @@ TEST_CASE("synthesize: the mechanism of a drawing has the ratios of the closed f
     const OptionValues numbers = {{"knee", std::string("drawn")},      {"knee_motor_x", d.motor_x},
                                   {"knee_motor_z", d.motor_z},         {"knee_drawn_crank", d.crank},
                                   {"knee_crank_angle", d.crank_angle}, {"knee_drawn_arm", d.arm},
-                                  {"knee_arm_angle", d.arm_angle},     {"knee_drawn_at", demand.getMiddle()}};
+                                  {"knee_arm_angle", d.arm_angle},     {"knee_drawn_at", demand.middle()}};
     CAPTURE(found.x.transpose());
     const JointRatios ratios = calcJointRatios(makeLegBiped(numbers), "knee_left", demand.angles);
     VectorXd expected(demand.angles.size());
@@ -126,11 +126,11 @@ TEST_CASE("synthesize: the mechanism of a drawing has the ratios of the closed f
     double way = 10;
     for (const double direction : {-1, 1}) {
       const double end = direction < 0 ? demand.angles[0] : demand.angles[8];
-      const FourBarState from = calcFourBar(d, end - demand.getMiddle());
+      const FourBarState from = calcFourBar(d, end - demand.middle());
       FourBarState here = from;
       double angle = end, turned = 0;
       for (double step = 1e-3; step > 1e-9 && std::abs(angle - end) < 3;) {
-        const FourBarState next = calcFourBar(d, angle + direction * step - demand.getMiddle());
+        const FourBarState next = calcFourBar(d, angle + direction * step - demand.middle());
         if (!next.closes || next.ratio * here.ratio < 0) {
           step /= 10;
           continue;

@@ -17,7 +17,7 @@ TEST_CASE("torque delay: without a delay torques act at once") {
   for (int tick = 0; tick < 5; ++tick) {
     delay.send(1e-3 * tick, make(tick));
     CHECK(delay.getTorques(1e-3 * tick)[0] == tick);
-    CHECK(delay.getNextChange() == std::numeric_limits<double>::infinity());
+    CHECK(delay.nextChange() == std::numeric_limits<double>::infinity());
   }
 }
 
@@ -28,7 +28,7 @@ TEST_CASE("torque delay: the first torques act at once, later ones after the del
     delay.send(now, make(tick));
     // The last but two is 3 ms old, the last but one 2 ms.
     CHECK(delay.getTorques(now)[0] == std::max(0, tick - 3));
-    if (tick > 0) CHECK(delay.getNextChange() == Approx(std::max(now - 2e-3, 1e-3) + 2.5e-3));
+    if (tick > 0) CHECK(delay.nextChange() == Approx(std::max(now - 2e-3, 1e-3) + 2.5e-3));
     const double half = now + 0.5e-3;
     CHECK(delay.getTorques(half)[0] == std::max(0, tick - 2));
   }
@@ -53,7 +53,7 @@ TEST_CASE("torque delay: delays lie within the jitter, and torques that are over
         skipped += static_cast<int>(acting - last) - 1;
       }
       last = acting;
-      now = std::max(delay.getNextChange(), now + 1e-6);
+      now = std::max(delay.nextChange(), now + 1e-6);
     }
   }
   CHECK(least >= kDelay - kJitter - 1e-9);

@@ -33,18 +33,18 @@ struct Walk {
     grid->move(first, changed, changed_end);
     check(first);
   }
-  const StageSpec& getSpec(size_t k) const { return horizon->getProblem().spec(grid->getStages()[k]); }
+  const StageSpec& getSpec(size_t k) const { return horizon->getProblem().spec(grid->stages()[k]); }
 
   void check(int first) const {
-    const std::vector<Node>& nodes = grid->getNodes();
+    const std::vector<Node>& nodes = grid->nodes();
     REQUIRE(static_cast<int>(nodes.size()) == options.nodes);
-    REQUIRE(grid->getBegin() == first);
-    CHECK(grid->getEnd() - first <= countMostStages(options));
+    REQUIRE(grid->begin() == first);
+    CHECK(grid->end() - first <= countMostStages(options));
     for (size_t k = 0; k < nodes.size(); ++k) {
       const Node& node = nodes[k];
       const int distance = node.begin - first;
       CAPTURE(first, k, node.begin, node.length);
-      if (k > 0) REQUIRE(node.begin == nodes[k - 1].getEnd());
+      if (k > 0) REQUIRE(node.begin == nodes[k - 1].end());
       REQUIRE(node.length >= 1);
       REQUIRE(node.length <= (distance < options.fine_nodes ? 1 : distance < 3 * options.fine_nodes ? 2 : 4));
       // It is its first stage but for its length, and feet stand or swing through all of it.
@@ -52,7 +52,7 @@ struct Walk {
       CHECK(getSpec(k).dt == Approx(node.length * stage.spec.dt));
       CHECK(getSpec(k).costs.size() == stage.spec.costs.size());
       CHECK(getSpec(k).path_constraints.size() == stage.spec.path_constraints.size());
-      for (int s = node.begin; s < node.getEnd(); ++s) {
+      for (int s = node.begin; s < node.end(); ++s) {
         CHECK(planned[s].spec.constraints.contacts == stage.spec.constraints.contacts);
         CHECK(planned[s].spec.costs.size() == stage.spec.costs.size());
       }
@@ -61,17 +61,17 @@ struct Walk {
   }
   // Each node takes over what it was, or a part of that.
   void checkSources(const std::vector<Node>& before) const {
-    const std::vector<NodeSource>& sources = grid->getSources();
-    REQUIRE(sources.size() == grid->getNodes().size() + 1);
+    const std::vector<NodeSource>& sources = grid->sources();
+    REQUIRE(sources.size() == grid->nodes().size() + 1);
     CHECK_FALSE(sources.front().same);
     CHECK_FALSE(sources.back().same);
     CHECK(sources.back().node == options.nodes);
     for (size_t k = 0; k + 1 < sources.size(); ++k) {
-      const Node& node = grid->getNodes()[k];
+      const Node& node = grid->nodes()[k];
       if (node.origin == Origin::Appended || node.origin == Origin::Earlier) continue;
       const Node& source = before[sources[k].node];
       CHECK(source.begin <= node.begin);
-      CHECK(node.getEnd() <= source.getEnd());
+      CHECK(node.end() <= source.end());
       CHECK((node.origin == Origin::Kept) == (node.begin == source.begin));
       CHECK(sources[k].share == Approx(std::sqrt(static_cast<double>(node.length) / source.length)));
       CHECK(sources[k].same == (k > 0 && node.begin == source.begin && node.length == source.length));
@@ -89,14 +89,14 @@ struct Walk {
 TEST_CASE("window grid: far nodes stand for several stages, and are cut in two as they come nearer") {
   Walk walk(16);
   walk.move(0);
-  CHECK(walk.grid->getEnd() > 80);
+  CHECK(walk.grid->end() > 80);
   int cut = 0, same = 0, moves = 0;
   for (int first = 1; first < 150; ++first, ++moves) {
-    const std::vector<Node> before = walk.grid->getNodes();
+    const std::vector<Node> before = walk.grid->nodes();
     walk.move(first);
     walk.checkSources(before);
-    for (const Node& node : walk.grid->getNodes()) cut += node.origin == Origin::Cut;
-    for (const NodeSource& source : walk.grid->getSources()) same += source.same;
+    for (const Node& node : walk.grid->nodes()) cut += node.origin == Origin::Cut;
+    for (const NodeSource& source : walk.grid->sources()) same += source.same;
   }
   CHECK(cut > moves / 2);
   CHECK(same > 40 * moves);  // of 48
@@ -107,16 +107,16 @@ TEST_CASE("window grid: a window may leap ahead, through the middle of nodes, an
   int first = 0;
   walk.move(first);
   for (int step : {7, -2, 1, 15, -2, 31, 0, 22, 40}) {
-    const std::vector<Node> before = walk.grid->getNodes();
+    const std::vector<Node> before = walk.grid->nodes();
     CAPTURE(step);
     walk.move(first += step);
     walk.checkSources(before);
-    const std::vector<Node>& nodes = walk.grid->getNodes();
+    const std::vector<Node>& nodes = walk.grid->nodes();
     for (int k = 0; k < -step; ++k) CHECK(nodes[k].origin == Origin::Earlier);
     // The state at the end, if that has come nearer.
-    const Node* next = walk.grid->getNext();
-    CHECK((next != nullptr) == (nodes.back().getEnd() < before.back().getEnd()));
-    if (next) CHECK(next->begin == nodes.back().getEnd());
+    const Node* next = walk.grid->next();
+    CHECK((next != nullptr) == (nodes.back().end() < before.back().end()));
+    if (next) CHECK(next->begin == nodes.back().end());
   }
 }
 
@@ -125,7 +125,7 @@ TEST_CASE("window grid: stages have their own length again when nodes no longer 
   walk.move(0);
   for (int first : {3, 40, 90}) walk.move(first);
   walk.grid->clear();
-  CHECK(walk.grid->getNodes().empty());
+  CHECK(walk.grid->nodes().empty());
   const RobotProblem& problem = walk.horizon->getProblem();
   for (int k = 0; k < problem.numStages(); ++k) CHECK(problem.spec(k).dt == walk.planned[0].spec.dt);
 }
@@ -134,7 +134,7 @@ TEST_CASE("window grid: stages that were replaced are not the same") {
   Walk walk(16);
   walk.move(0);
   walk.move(5, 8, 11);
-  const std::vector<NodeSource>& sources = walk.grid->getSources();
+  const std::vector<NodeSource>& sources = walk.grid->sources();
   for (int k = 1; k < 11; ++k) CHECK(sources[k].same == (k + 5 < 8 || k + 5 >= 11));
 }
 
@@ -142,7 +142,7 @@ TEST_CASE("window grid: with as many fine nodes as there are nodes, each is a st
   Walk walk(48);
   for (int first : {0, 1, 2, 30}) {
     walk.move(first);
-    CHECK(walk.grid->getEnd() == first + 48);
+    CHECK(walk.grid->end() == first + 48);
   }
 }
 
@@ -163,9 +163,9 @@ TEST_CASE("window grid: a squat's bottom and a jump's impact are nodes of their 
     WindowGrid grid(*horizon, options);
     for (int first = 0; first <= stages; first += 5) {
       grid.move(first);
-      CHECK(grid.getEnd() <= static_cast<int>(specs.size()));
-      for (const Node& node : grid.getNodes()) {
-        for (int s = node.begin + 1; s < node.getEnd(); ++s) {
+      CHECK(grid.end() <= static_cast<int>(specs.size()));
+      for (const Node& node : grid.nodes()) {
+        for (int s = node.begin + 1; s < node.end(); ++s) {
           CHECK(specs[s].kind == StageKind::Dynamics);
           CHECK(specs[s].costs.size() == specs[node.begin].costs.size());
           CHECK(specs[s].path_constraints.size() == specs[node.begin].path_constraints.size());

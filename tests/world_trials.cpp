@@ -20,13 +20,13 @@ constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad
 
 Vector3d calcTrunkCom(const World& world, const Model& model) {
   Workspace ws(model);
-  updatePlacements<double>(model, ws, world.getConfiguration());
+  updatePlacements<double>(model, ws, world.configuration());
   return ws.X_WB[1].act(model.bodies()[1].inertia.com);
 }
 
 double calcLoad(const World& world) {
   double load = 0;
-  for (const FootReport& foot : world.getFeet()) load += foot.wrench[2];
+  for (const FootReport& foot : world.feet()) load += foot.wrench[2];
   return load;
 }
 
@@ -43,7 +43,7 @@ VectorXd PostureHold::calcTorques(const World& world) const {
   for (int m = 0; m < model_.nu(); ++m) {
     const Motor& motor = model_.motors()[m];
     const int at = model_.joints()[motor.joint].idx_q;
-    u[m] += kStiffness * (q_[at] - world.getConfiguration()[at]) - kDamping * world.getVelocity()[motor.dof];
+    u[m] += kStiffness * (q_[at] - world.configuration()[at]) - kDamping * world.velocity()[motor.dof];
   }
   return u;
 }
@@ -52,14 +52,14 @@ bool hold(World& world, const PostureHold& posture, double duration, const std::
   const int ticks = static_cast<int>(std::lround(duration / 1e-3));
   for (int i = 0; i < ticks; ++i) {
     world.setTorques(posture.calcTorques(world));
-    if (push) world.setPush(push(world.getTime()));
+    if (push) world.setPush(push(world.time()));
     if (!world.advance(1e-3)) return false;
   }
   return true;
 }
 
 double calcImbalance(const Books& start, const Books& end) {
-  const double change = end.getEnergy() - start.getEnergy();
+  const double change = end.energy() - start.energy();
   const double losses = end.contact_loss + end.stop_loss + end.other_loss;
   const double largest = std::max({std::abs(change), std::abs(end.motor_work), std::abs(end.push_work), losses, 1e-12});
   return std::abs(change - end.motor_work - end.push_work + losses) / largest;
@@ -67,46 +67,46 @@ double calcImbalance(const Books& start, const Books& end) {
 
 void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances) {
   const PostureHold posture(model);
-  world.reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+  world.reset(posture.posture(), VectorXd::Zero(model.nv()));
   const auto lean = [](double) { return Vector3d(0, 13, 0); };  // friction has to hold it
   REQUIRE(hold(world, posture, 1.5, lean));
   std::vector<double> slips;
-  for (const FootReport& foot : world.getFeet()) slips.push_back(foot.slip);
+  for (const FootReport& foot : world.feet()) slips.push_back(foot.slip);
   REQUIRE(hold(world, posture, 0.5, lean));
   const double weight = model.mass() * model.gravity().norm();
   CHECK(calcLoad(world) == Approx(weight).epsilon(1e-3));
   for (size_t c = 0; c < slips.size(); ++c) {
-    CHECK(world.getFeet()[c].touches);
-    CHECK(world.getFeet()[c].wrench.head<2>().norm() > 4);
-    CHECK(std::abs(world.getFeet()[c].slip - slips[c]) < tolerances.creep);
+    CHECK(world.feet()[c].touches);
+    CHECK(world.feet()[c].wrench.head<2>().norm() > 4);
+    CHECK(std::abs(world.feet()[c].slip - slips[c]) < tolerances.creep);
   }
-  CHECK((world.getConfiguration().head<3>() - posture.getPosture().head<3>()).norm() < 0.01);
-  CHECK(world.getGap() < tolerances.gap);
-  CHECK(world.getTime() == Approx(2.0));
+  CHECK((world.configuration().head<3>() - posture.posture().head<3>()).norm() < 0.01);
+  CHECK(world.gap() < tolerances.gap);
+  CHECK(world.time() == Approx(2.0));
   // A state that is none is refused, and the world is where it was.
-  const VectorXd stood = world.getConfiguration(), rest = VectorXd::Zero(model.nv());
+  const VectorXd stood = world.configuration(), rest = VectorXd::Zero(model.nv());
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     VectorXd q = stood, v = rest;
     q[9] = v[7] = bad;
     CHECK_THROWS_AS(world.reset(q, rest), std::invalid_argument);
     CHECK_THROWS_AS(world.reset(stood, v), std::invalid_argument);
   }
-  CHECK(world.getConfiguration() == stood);
-  CHECK(world.getTime() == Approx(2.0));
+  CHECK(world.configuration() == stood);
+  CHECK(world.time() == Approx(2.0));
   CHECK(hold(world, posture, 0.01));
 }
 
 void checkDropped(World& world, const Model& model, const TrialTolerances& tolerances) {
   const PostureHold posture(model);
-  VectorXd q = posture.getPosture();
+  VectorXd q = posture.posture();
   constexpr double kHeight = 0.05;
   q[2] += kHeight;
   world.reset(q, VectorXd::Zero(model.nv()));
-  const Books start = world.getBooks();
+  const Books start = world.books();
   REQUIRE(hold(world, posture, 0.03));
   CHECK(calcLoad(world) == 0);
   REQUIRE(hold(world, posture, 0.97));
-  const Books end = world.getBooks();
+  const Books end = world.books();
   CHECK(calcImbalance(start, end) < tolerances.balance);
   CHECK(end.contact_loss > 0);
   CHECK(end.stop_loss >= -1e-9);
@@ -119,14 +119,14 @@ void checkDropped(World& world, const Model& model, const TrialTolerances& toler
 
 void checkPushed(World& world, const Model& model, const TrialTolerances& tolerances) {
   const PostureHold posture(model);
-  world.reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+  world.reset(posture.posture(), VectorXd::Zero(model.nv()));
   REQUIRE(hold(world, posture, 0.5));
-  const Books start = world.getBooks();
+  const Books start = world.books();
   const Vector3d force(30, 20, 0);
   const Vector3d before = calcTrunkCom(world, model);
   REQUIRE(hold(world, posture, 0.1, [&](double) { return force; }));
   const Vector3d after = calcTrunkCom(world, model);
-  Books end = world.getBooks();
+  Books end = world.books();
   const double work = force.dot(after - before);
   CHECK(work > 0.01);
   CHECK(end.push_work == Approx(work).epsilon(0.01));
@@ -139,10 +139,10 @@ void checkPushed(World& world, const Model& model, const TrialTolerances& tolera
 
 void checkStopped(World& world, const Model& model, const TrialTolerances& tolerances) {
   const PostureHold posture(model);
-  VectorXd q = posture.getPosture();
+  VectorXd q = posture.posture();
   q[2] += 5;
   world.reset(q, VectorXd::Zero(model.nv()));
-  const Books start = world.getBooks();
+  const Books start = world.books();
   const Motor& motor = model.motors()[model.findMotor("hipx_right")];
   const int at = model.joints()[motor.joint].idx_q;
   const double upper = model.upperLimits()[motor.dof];
@@ -153,11 +153,11 @@ void checkStopped(World& world, const Model& model, const TrialTolerances& toler
     u[model.findMotor("hipx_right")] = 10;
     world.setTorques(u);
     REQUIRE(world.advance(1e-3));
-    farthest = std::max(farthest, world.getConfiguration()[at]);
+    farthest = std::max(farthest, world.configuration()[at]);
   }
   CHECK(farthest > upper);
   CHECK(farthest < upper + 0.05);
-  const Books end = world.getBooks();
+  const Books end = world.books();
   CHECK(end.stop_loss > 0.01);
   CHECK(end.contact_loss == Approx(0).margin(1e-9));
   CHECK(calcImbalance(start, end) < tolerances.balance);
@@ -209,12 +209,12 @@ double checkSprung(World& world, const Model& model, double balance) {
   constexpr double kDuration = 0.5;
   const VectorXd q = findClosedConfiguration(model).q;
   world.reset(q, VectorXd::Zero(model.nv()));
-  const Books start = world.getBooks();
+  const Books start = world.books();
   REQUIRE(world.advance(kDuration));
-  const Books end = world.getBooks();
+  const Books end = world.books();
   const VectorXd expected = swing(model, q, kDuration, 1e-3);
   REQUIRE((expected - q).cwiseAbs().maxCoeff() > 0.1);
-  const double error = (world.getConfiguration() - expected).cwiseAbs().maxCoeff();
+  const double error = (world.configuration() - expected).cwiseAbs().maxCoeff();
   CHECK(calcImbalance(start, end) < balance);
   // Dampers that are booked by half, or springs that are not, must show.
   Books poisoned = end;
@@ -230,7 +230,7 @@ double checkSprung(World& world, const Model& model, double balance) {
     return calcPotentialEnergy(model, ws) - calcPotentialEnergy(without, other);
   };
   poisoned = end;
-  poisoned.potential -= calcSpringEnergy(world.getConfiguration()) - calcSpringEnergy(q);
+  poisoned.potential -= calcSpringEnergy(world.configuration()) - calcSpringEnergy(q);
   CHECK(calcImbalance(start, poisoned) > 2 * balance);
   return error;
 }

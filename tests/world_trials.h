@@ -12,7 +12,7 @@ namespace bielle::worlds::testing {
 class PostureHold {
  public:
   explicit PostureHold(const Model& model);
-  const VectorXd& getPosture() const { return q_; }
+  const VectorXd& posture() const { return q_; }
   VectorXd calcTorques(const World& world) const;
 
  private:

@@ -19,7 +19,7 @@ class SampleSource {
 
   std::string failure;  ///< why there is no closed configuration, or empty
 
-  const VectorXd& getStart() const { return q_ref_; }  ///< the configuration around which states are drawn (nq)
+  const VectorXd& start() const { return q_ref_; }  ///< the configuration around which states are drawn (nq)
   Sample draw();
 
  private:

@@ -133,7 +133,7 @@ ValidationReport validateAgainstMujoco(const Model& model, const Model& oracle, 
   SampleSource source(model, options);
   report.failure = source.failure;
   if (!report.failure.empty()) return report;
-  MujocoComparison comparison(model, oracle, source.getStart(), options, report);
+  MujocoComparison comparison(model, oracle, source.start(), options, report);
   for (int i = 0; i < options.samples; ++i) comparison.compare(source.draw());
   return report;
 }

@@ -59,7 +59,7 @@ py::object getReference(const HeldController& self, double time) {
 std::vector<PredictedFoothold> getFootholds(HeldController& self) {
   const py::gil_scoped_release release;
   const std::lock_guard<std::mutex> lock(self.mutex);
-  return self.controller->getFootholds();
+  return self.controller->footholds();
 }
 
 }  // namespace
@@ -104,7 +104,7 @@ void bindControllers(py::module_& module) {
           "duration",
           [](const HeldController& self) {
             if (!self.policy) throw std::runtime_error("only the policy of a solved motion has a duration");
-            return self.policy->getDuration();
+            return self.policy->duration();
           },
           "duration of a policy, s")
       .def_property_readonly(
@@ -112,7 +112,7 @@ void bindControllers(py::module_& module) {
           [](const HeldController& self) {
             py::dict out;
             if (!self.predictive) return out;
-            const PredictiveCounts& counts = self.predictive->getCounts();
+            const PredictiveCounts& counts = self.predictive->counts();
             out["stages"] = counts.stages;
             out["solves"] = counts.solves;
             out["failed"] = counts.failed;

@@ -31,11 +31,11 @@ class HeldEstimator {
     return estimator_.update(readings, contacts);
   }
 
-  py::dict getContacts() {
+  py::dict contacts() {
     const BusyGuard guard(is_busy_, "estimator");
     py::dict out;
     for (size_t c = 0; c < model_->contacts().size(); ++c)
-      out[py::str(model_->contacts()[c].name)] = static_cast<bool>(estimator_.getContacts()[c]);
+      out[py::str(model_->contacts()[c].name)] = static_cast<bool>(estimator_.contacts()[c]);
     return out;
   }
 
@@ -116,25 +116,21 @@ void bindEstimator(py::module_& module) {
            "Processes the readings of an instant. planned: names of the contacts in the plan at this time.")
       .def_property_readonly(
           "q",
-          [](HeldEstimator& e) {
-            return e.read([](const Estimator& own) { return makeArray(own.getMeasurement().q); });
-          },
+          [](HeldEstimator& e) { return e.read([](const Estimator& own) { return makeArray(own.measurement().q); }); },
           "(nq,)")
       .def_property_readonly(
           "v",
-          [](HeldEstimator& e) {
-            return e.read([](const Estimator& own) { return makeArray(own.getMeasurement().v); });
-          },
+          [](HeldEstimator& e) { return e.read([](const Estimator& own) { return makeArray(own.measurement().v); }); },
           "(nv,)")
-      .def_property_readonly("contacts", &HeldEstimator::getContacts, "whether each contact stands, by name")
+      .def_property_readonly("contacts", &HeldEstimator::contacts, "whether each contact stands, by name")
       .def_property_readonly("wrenches", &HeldEstimator::getWrenches,
                              "wrenches from the ground on the feet in their contact frames (contacts, 6), N and N m")
       .def_property_readonly(
-          "margin", [](HeldEstimator& e) { return e.read([](const Estimator& own) { return own.getMargin(); }); },
+          "margin", [](HeldEstimator& e) { return e.read([](const Estimator& own) { return own.margin(); }); },
           "the least that motors move in a unit motion of their linkage; 1 without linkages")
       .def_property_readonly(
           "message",
-          [](HeldEstimator& e) { return e.read([](const Estimator& own) { return std::string(own.getMessage()); }); },
+          [](HeldEstimator& e) { return e.read([](const Estimator& own) { return std::string(own.message()); }); },
           "message of the last status; empty if OK");
 }
 

@@ -24,7 +24,7 @@ class MadeResidual : public Residual {
   void calc(const NodeView& node, VectorRef r) const override { made_->calc(node, r); }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override { made_->calcJacobian(node, rows); }
 
-  py::tuple getOrigin() const { return py::make_tuple(function_, arguments_.get()); }
+  py::tuple origin() const { return py::make_tuple(function_, arguments_.get()); }
 
  private:
   std::unique_ptr<Residual> made_;
@@ -35,7 +35,7 @@ class MadeResidual : public Residual {
 // (function, arguments), or None for residuals inside a motion of the library.
 py::object getOrigin(const LibraryResidual& residual) {
   const auto* made = dynamic_cast<const MadeResidual*>(residual.residual.get());
-  return made ? py::object(made->getOrigin()) : py::none();
+  return made ? py::object(made->origin()) : py::none();
 }
 
 // A residual that the library has put into a motion: the index-th of those that are made of a recipe.

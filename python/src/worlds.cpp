@@ -68,16 +68,16 @@ class HeldWorlds {
   }
 
   // Of a single world.
-  py::object getBooks() {
+  py::object books() {
     worlds::Books books;
-    observeOnly([&](const World& world) { books = world.getBooks(); });
+    observeOnly([&](const World& world) { books = world.books(); });
     return py::module_::import("bielle.named")
         .attr("Books")(books.kinetic, books.potential, books.elastic, books.motor_work, books.push_work,
                        books.contact_loss, books.stop_loss, books.other_loss);
   }
-  std::string getMessage() {
+  std::string message() {
     std::string message;
-    observeOnly([&](const World& world) { message = world.getMessage(); });
+    observeOnly([&](const World& world) { message = world.message(); });
     return message;
   }
 
@@ -99,14 +99,14 @@ class HeldWorlds {
     const Eigen::Index contacts = static_cast<Eigen::Index>(model_->contacts().size());
     MatrixXd out(6 * contacts, worlds_.size());
     for (size_t i = 0; i < worlds_.size(); ++i)
-      for (Eigen::Index c = 0; c < contacts; ++c) out.col(i).segment<6>(6 * c) = worlds_[i]->getFeet()[c].wrench;
+      for (Eigen::Index c = 0; c < contacts; ++c) out.col(i).segment<6>(6 * c) = worlds_[i]->feet()[c].wrench;
     Shape shape = {contacts, 6};
     return makeRows(out, shape);
   }
 
-  const std::shared_ptr<Model>& getModel() const { return model_; }
-  const std::optional<int>& getCount() const { return many_; }
-  const std::string& getEngine() const { return engine_; }
+  const std::shared_ptr<Model>& model() const { return model_; }
+  const std::optional<int>& count() const { return many_; }
+  const std::string& engine() const { return engine_; }
 
   void requireSingle() const {
     if (many_) throw py::value_error("world: expected a single world, made without `count`");
@@ -147,9 +147,9 @@ class HeldWorlds {
     MatrixXd time(1, worlds_.size()), q(model_->nq(), worlds_.size()), v(model_->nv(), worlds_.size());
     MatrixXd sound(1, worlds_.size());
     for (size_t i = 0; i < worlds_.size(); ++i) {
-      time(0, i) = worlds_[i]->getTime();
-      q.col(i) = worlds_[i]->getConfiguration();
-      v.col(i) = worlds_[i]->getVelocity();
+      time(0, i) = worlds_[i]->time();
+      q.col(i) = worlds_[i]->configuration();
+      v.col(i) = worlds_[i]->velocity();
       sound(0, i) = ok_[i];
     }
     return makeNamed("WorldState", {makeRows(time, {}), makeRows(q, {model_->nq()}), makeRows(v, {model_->nv()}),
@@ -196,7 +196,7 @@ std::unique_ptr<HeldSensors> makeSensors(const std::shared_ptr<HeldWorlds>& worl
   options.noise = noise;
   options.seed = seed;
   options.imu = imu;
-  held->sensors = std::make_unique<worlds::Sensors>(*world->getModel(), options);
+  held->sensors = std::make_unique<worlds::Sensors>(*world->model(), options);
   return held;
 }
 
@@ -242,10 +242,10 @@ void bindWorlds(py::module_& module) {
            }),
            py::arg("model"), py::arg("count") = py::none(), py::arg("ground") = Ground(), py::arg("time_step") = 0.0,
            py::arg("tolerance") = 0.0, py::arg("engine") = "bielle")
-      .def_property_readonly("model", &HeldWorlds::getModel, "Model")
+      .def_property_readonly("model", &HeldWorlds::model, "Model")
       .def_property_readonly(
-          "count", [](const HeldWorlds& self) { return show(self.getCount(), {}); }, "number of worlds, or None")
-      .def_property_readonly("engine", &HeldWorlds::getEngine, "its name")
+          "count", [](const HeldWorlds& self) { return show(self.count(), {}); }, "number of worlds, or None")
+      .def_property_readonly("engine", &HeldWorlds::engine, "its name")
       .def("reset", &HeldWorlds::reset, py::arg("q"), py::arg("v"), py::arg("where") = py::none(),
            "Sets closed configurations (nq,) and velocities (nv,) that keep them closed; everything else starts "
            "again.\n\n"
@@ -255,9 +255,9 @@ void bindWorlds(py::module_& module) {
            "Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), "
            "N.\n\n"
            "Returns the WorldState; its `ok` is False where the integration failed.")
-      .def_property_readonly("books", &HeldWorlds::getBooks,
+      .def_property_readonly("books", &HeldWorlds::books,
                              "energies now, and work and losses since reset, of a single world (Books), J")
-      .def_property_readonly("message", &HeldWorlds::getMessage,
+      .def_property_readonly("message", &HeldWorlds::message,
                              "why the integration of a single world failed; empty while it is sound")
       .def_property_readonly("wrenches", &HeldWorlds::calcWrenches,
                              "wrenches from the ground on the feet in their contact frames (contacts, 6), N and N m");

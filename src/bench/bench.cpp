@@ -178,7 +178,7 @@ class Bench {
   void tell(const std::string& what, Formulation formulation) const {
     if (options_.progress) options_.progress(what + ", " + getName(formulation) + " formulation");
   }
-  std::vector<int> getThreads() const {
+  std::vector<int> threads() const {
     return options_.threads > 1 ? std::vector<int>{1, options_.threads} : std::vector<int>{1};
   }
 
@@ -227,7 +227,7 @@ class Bench {
     sweep.update(all.models(), regularization);
     times.sweep = calcLeastSeconds(repetitions, [&] { sweep.update(all.models(), regularization); }) / n;
     times.rollout = std::numeric_limits<double>::infinity();
-    for (int threads : getThreads()) measureIterations(motion, threads, times);
+    for (int threads : threads()) measureIterations(motion, threads, times);
     report_.nodes.push_back(times);
   }
 
@@ -258,7 +258,7 @@ class Bench {
   }
 
   void measureSolve(const std::string& name, Formulation formulation, const std::function<Motion()>& make) {
-    for (int threads : getThreads()) {
+    for (int threads : threads()) {
       SolveTime time;
       time.motion = name;
       time.formulation = formulation;
@@ -296,7 +296,7 @@ class Bench {
   }
   void measureReceding(Formulation formulation, bool cones) {
     tell(cones ? "receding horizon with wrench cones" : "receding horizon", formulation);
-    for (int threads : getThreads())
+    for (int threads : threads())
       report_.receding.push_back(runRecedingHorizon(model_, formulation, getReceding(formulation, cones, threads)));
   }
 

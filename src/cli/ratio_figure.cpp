@@ -46,7 +46,7 @@ Plot makeCurvePlot(const RatioReport& report) {
   for (const DeadPointKind kind : {DeadPointKind::Output, DeadPointKind::Motors}) {
     const bool joint = kind == DeadPointKind::Output;
     Curve dead{joint ? "dead (joint)" : "dead (motor)", joint ? "#b02020" : "#2060b0", CurveStyle::Lines, true, {}};
-    for (const RatioSample& sample : report.sweep.getDeadPoints())
+    for (const RatioSample& sample : report.sweep.deadPoints())
       if ((sample.dead == DeadPointKind::Output) == joint)
         dead.points.insert(
             dead.points.end(),

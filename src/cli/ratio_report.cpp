@@ -140,7 +140,7 @@ Json describeReport(const RatioReport& report) {
                {"end", sweep.end},
                {"full_turn", sweep.full_turn},
                {"balance_error", report.balance_error},
-               {"dead_points", describeSamples(sweep.getDeadPoints(), sweep.joint)},
+               {"dead_points", describeSamples(sweep.deadPoints(), sweep.joint)},
                {"samples", describeSamples(sweep.samples, sweep.joint)}};
   if (!report.map) return json;
   Json rows = Json::array();
@@ -173,7 +173,7 @@ void printReport(std::ostream& out, const RatioReport& report) {
                {"range of " + report.linkage.joint_names[sweep.joint],
                 formatNumber(low, "%.6f") + " to " + formatNumber(high, "%.6f") + " (rad, or m), first branch"},
                {"ends", sweep.full_turn ? "none: a full turn" : ends},
-               {"dead points", std::to_string(sweep.getDeadPoints().size())},
+               {"dead points", std::to_string(sweep.deadPoints().size())},
                {"distance from them", start + " at the start; " + first + " and " + last + " at the ends (rad, or m)"},
                {"virtual work", "largest relative error " + formatNumber(report.balance_error, "%.1e")}});
   out << "\nratio R = motor speed / joint speed" << (report.linkage.isDirect() ? ": the motor sits on the joint" : "")

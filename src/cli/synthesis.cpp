@@ -150,7 +150,7 @@ SoughtLinkage makeDrawnKnees(const std::string& robot, const FourBarSpace& space
     if (entry.parameters.find(name)->name.rfind("knee_", 0) != 0 || name == "knee_motor_mass")
       sought.settings.emplace_back(name, value);
   setValue(sought.settings, "knee", std::string("drawn"));
-  setValue(sought.settings, "knee_drawn_at", demand.getMiddle());
+  setValue(sought.settings, "knee_drawn_at", demand.middle());
   const char* names[] = {"motor_x", "motor_z", "drawn_crank", "crank_angle", "drawn_arm", "arm_angle"};
   for (Eigen::Index i = 0; i < space.lower.size(); ++i) {
     DesignVariable variable;

@@ -70,8 +70,8 @@ class ContactFilter {
   /// Learns from a foot that stands. \returns y' S^-1 y, whose mean is the size of the foot
   double correct(size_t foot, const SE3& X_IF);
 
-  const ContactFilterState& getState() const { return state_; }
-  const MatrixXd& getCovariance() const { return P_; }
+  const ContactFilterState& state() const { return state_; }
+  const MatrixXd& covariance() const { return P_; }
 
  private:
   const std::vector<int> sizes_;

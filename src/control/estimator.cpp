@@ -81,10 +81,10 @@ void Estimator::Parts::reset(double time, ConstVectorRef q, ConstVectorRef v, co
   a.setZero();
   feet.update(joints, q, v, a, VectorXd::Zero(model.nu()));
   if (!floats) return;
-  const Workspace& ws = feet.getWorkspace();
+  const Workspace& ws = feet.workspace();
   const SE3 X_WI = ws.X_WB[1] * options.imu;
   const Vector6d twist = options.imu.actInvMotion(v.head<6>());
-  ContactFilterState state = filter.getState();
+  ContactFilterState state = filter.state();
   state.R = X_WI.R;
   state.p = X_WI.p;
   state.v = X_WI.R * twist.head<3>();
@@ -126,14 +126,14 @@ void Estimator::Parts::updateAcceleration(ConstVectorRef u, double h) {
 }
 
 SE3 Estimator::Parts::getSeenFoot(size_t c) const {
-  const Workspace& ws = feet.getWorkspace();
+  const Workspace& ws = feet.workspace();
   const ContactFrame& contact = model.contacts()[c];
   return (ws.X_WB[1] * options.imu).inverseTimes(ws.X_WB[contact.body] * contact.X_BF);
 }
 
 // The trunk from the filter.
 void Estimator::Parts::readTrunk() {
-  const ContactFilterState& state = filter.getState();
+  const ContactFilterState& state = filter.state();
   const SE3 X_IB = options.imu.inverse(), X_WB = SE3(state.R, state.p) * X_IB;
   const Eigen::Quaterniond rotation(X_WB.R);
   measurement.q.head<3>() = X_WB.p;
@@ -197,17 +197,17 @@ void Estimator::reset(double time, ConstVectorRef q, ConstVectorRef v, const std
 EstimatorStatus Estimator::update(const SensorReadings& readings, const std::vector<int>& planned) {
   return parts_->update(readings, planned);
 }
-const Measurement& Estimator::getMeasurement() const { return parts_->measurement; }
-const std::vector<char>& Estimator::getContacts() const { return parts_->measurement.contacts; }
+const Measurement& Estimator::measurement() const { return parts_->measurement; }
+const std::vector<char>& Estimator::contacts() const { return parts_->measurement.contacts; }
 const Vector6d& Estimator::getWrench(size_t contact) const { return parts_->feet.getWrench(contact); }
-double Estimator::getMargin() const { return parts_->joints.getMargin(); }
+double Estimator::margin() const { return parts_->joints.margin(); }
 
-std::string Estimator::getMessage() const {
+std::string Estimator::message() const {
   switch (parts_->status) {
     case EstimatorStatus::Ok:
       return {};
     case EstimatorStatus::NearDeadPoint:
-      return "the linkage of closure '" + parts_->joints.getWeakest() + "' is near a dead point of its motors";
+      return "the linkage of closure '" + parts_->joints.weakest() + "' is near a dead point of its motors";
     case EstimatorStatus::NotClosed:
       return "the loops do not close at the motors' positions";
     case EstimatorStatus::NotFinite:

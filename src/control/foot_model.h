@@ -36,7 +36,7 @@ class FootModel {
   /// Wrench of the ground on a foot in its contact frame, N and N m; of points without a moment.
   const Vector6d& getWrench(size_t contact) const { return wrenches_[contact]; }
   /// Placements of bodies at q.
-  const Workspace& getWorkspace() const { return ws_; }
+  const Workspace& workspace() const { return ws_; }
 
  private:
   void updateRows(const PassiveJoints& joints, size_t contact);

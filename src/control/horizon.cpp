@@ -64,8 +64,8 @@ class MotionHorizon : public Horizon {
   RobotProblem& getProblem() override { return problem_; }
   int getFirst(int stage) const override { return getNode(stage); }  // the window moves no farther than its end
   void prepare(int) override {}
-  int getBegin() const override { return 0; }
-  int getEnd() const override { return last_; }
+  int begin() const override { return 0; }
+  int end() const override { return last_; }
   int getNode(int stage) const override { return std::min(stage, last_); }
   double getStart(int stage) const override {
     return stage <= last_ ? starts_[stage] : starts_[last_] + (stage - last_) * problem_.spec(last_).dt;
@@ -96,7 +96,7 @@ class WalkHorizon : public Horizon {
   WalkHorizon(CommandedWalk walk, const PredictiveOptions& options)
       : stages_(countMostStages(options)), walk_(std::move(walk)) {
     checkNodes(options);
-    const Model& model = walk_.getModel();
+    const Model& model = walk_.model();
     std::vector<StageSpec> specs;
     for (int s = 0; s <= stages_; ++s) specs.push_back(keep(walk_.makeNext()));
     for (StageSpec& spec : walk_.makeExamples()) specs.push_back(std::move(spec));
@@ -120,16 +120,16 @@ class WalkHorizon : public Horizon {
       problem_->replaceStage(node, keep(walk_.makeNext()));
     }
   }
-  int getBegin() const override { return std::max(0, made_ - size_); }
-  int getEnd() const override { return made_ - 1; }
+  int begin() const override { return std::max(0, made_ - size_); }
+  int end() const override { return made_ - 1; }
   int getNode(int stage) const override { return stage % size_; }
-  double getStart(int stage) const override { return stage * walk_.getTimeStep(); }
+  double getStart(int stage) const override { return stage * walk_.timeStep(); }
   int getPhase(int stage) const override { return phases_[getNode(stage)]; }
   const VectorXd& getState(int stage) const override { return states_[getNode(stage)]; }
   // At rest: the feet stand, and with them the velocity would be none that the contacts allow.
   VectorXd makeGuess(int stage) const override {
     VectorXd x = getState(stage);
-    x.tail(walk_.getModel().nv()).setZero();
+    x.tail(walk_.model().nv()).setZero();
     return x;
   }
   const VectorXd& getControl(int stage) const override { return controls_[getNode(stage)]; }

@@ -5,7 +5,7 @@
 namespace bielle {
 
 // Stages are numbered from the start on, without end. The problem holds those of the longest window that begins at getFirst()
-// of the stage given to prepare() last, and those from getBegin() to getEnd().
+// of the stage given to prepare() last, and those from begin() to end().
 class Horizon {
  public:
   virtual ~Horizon() = default;
@@ -13,8 +13,8 @@ class Horizon {
   // Where the window begins whose solution is to be in force from this stage on.
   virtual int getFirst(int stage) const = 0;
   virtual void prepare(int first) = 0;
-  virtual int getBegin() const = 0;
-  virtual int getEnd() const = 0;
+  virtual int begin() const = 0;
+  virtual int end() const = 0;
 
   virtual int getNode(int stage) const = 0;      // of the problem
   virtual double getStart(int stage) const = 0;  // s

@@ -52,8 +52,8 @@ class PassiveJoints {
   /// Whether a joint belongs to a linkage.
   bool isLinked(const Joint& joint) const { return places_[joint.idx_v].cluster >= 0; }
   /// Smallest singular value of N_m of all clusters, 1 if there are none; and the name of a closure of the weakest.
-  double getMargin() const { return margin_; }
-  std::string getWeakest() const { return weakest_ ? *weakest_ : ""; }
+  double margin() const { return margin_; }
+  std::string weakest() const { return weakest_ ? *weakest_ : ""; }
 
  private:
   struct Follower {

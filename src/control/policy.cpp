@@ -126,7 +126,7 @@ void Policy::getReference(double time, VectorRef q, VectorRef v) const {
   const double s = std::clamp((time - stage.start) / stage.duration, &stage == &stages_[0] ? -1.0 : 0.0, 1.0);
   step_ = s * stage.q_change;
   model_.integrate(stage.q, step_, q);
-  if (time > getDuration()) {
+  if (time > duration()) {
     v.setZero();
     return;
   }
@@ -134,9 +134,9 @@ void Policy::getReference(double time, VectorRef q, VectorRef v) const {
 }
 
 void Policy::update(const Measurement& measurement, VectorRef u) {
-  const double time = measurement.getActionTime();
+  const double time = measurement.actionTime();
   if (hasGains()) updateError(measurement);
-  if (time + kClockTolerance >= getDuration()) {
+  if (time + kClockTolerance >= duration()) {
     u = u_hold_;
     addFeedback(last_phase_, 1, u);
     return;

@@ -23,8 +23,8 @@ class PredictiveController::Loop {
   Loop(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options)
       : planner_(std::move(horizon), options),
         solution_(planner_.makeEmpty()),
-        dead_point_stop_(planner_.getModel(), planner_.getStartPosture(), options.dead_point_stop) {
-    const Model& model = planner_.getModel();
+        dead_point_stop_(planner_.model(), planner_.startPosture(), options.dead_point_stop) {
+    const Model& model = planner_.model();
     WindowPlanner::Solution first = planner_.makeFirst();
     policy_ = std::make_unique<Policy>(model, std::move(first.stages), first.u_hold);
     footholds_ = std::move(first.footholds);
@@ -37,11 +37,11 @@ class PredictiveController::Loop {
   }
 
   void update(const Measurement& measurement, VectorRef u) {
-    if (thread_ && thread_->getState() == SolvingThread::State::Done) {
+    if (thread_ && thread_->state() == SolvingThread::State::Done) {
       receive();
       thread_->setIdle();
     }
-    if (ready_ && measurement.getActionTime() + kClockTolerance >= getStart(solution_.target)) {
+    if (ready_ && measurement.actionTime() + kClockTolerance >= getStart(solution_.target)) {
       policy_->exchange(solution_.stages, solution_.u_hold);
       ready_ = false;
       counts_.last[newest_].latency = std::chrono::duration<double>(Clock::now() - measured_).count();
@@ -55,12 +55,12 @@ class PredictiveController::Loop {
       ++counts_.stages;
       waits_ = true;
     }
-    if (waits_ && !(thread_ && thread_->getState() != SolvingThread::State::Idle)) solve(measurement, u);
+    if (waits_ && !(thread_ && thread_->state() != SolvingThread::State::Idle)) solve(measurement, u);
   }
   double getPlanTime(double time) const { return awaited_ >= 0 ? awaited_ : time + advance_; }
-  const PredictiveCounts& getCounts() const { return counts_; }
-  const Policy& getPolicy() const { return *policy_; }
-  const std::vector<PredictedFoothold>& getFootholds() const { return footholds_; }
+  const PredictiveCounts& counts() const { return counts_; }
+  const Policy& policy() const { return *policy_; }
+  const std::vector<PredictedFoothold>& footholds() const { return footholds_; }
   void waitForSolve() const {
     if (thread_) thread_->waitUntilDone();
   }
@@ -134,9 +134,9 @@ PredictiveController::~PredictiveController() = default;
 
 void PredictiveController::update(const Measurement& measurement, VectorRef u) { loop_->update(measurement, u); }
 double PredictiveController::getPlanTime(double time) const { return loop_->getPlanTime(time); }
-const std::vector<PredictedFoothold>& PredictiveController::getFootholds() const { return loop_->getFootholds(); }
-const PredictiveCounts& PredictiveController::getCounts() const { return loop_->getCounts(); }
-const Policy& PredictiveController::getPolicy() const { return loop_->getPolicy(); }
+const std::vector<PredictedFoothold>& PredictiveController::footholds() const { return loop_->footholds(); }
+const PredictiveCounts& PredictiveController::counts() const { return loop_->counts(); }
+const Policy& PredictiveController::policy() const { return loop_->policy(); }
 void PredictiveController::waitForSolve() const { loop_->waitForSolve(); }
 
 }  // namespace bielle

@@ -24,7 +24,7 @@ void SolvingThread::begin() {
 }
 
 void SolvingThread::waitUntilDone() const {
-  while (getState() == State::Busy) std::this_thread::sleep_for(std::chrono::microseconds(100));
+  while (state() == State::Busy) std::this_thread::sleep_for(std::chrono::microseconds(100));
 }
 
 void SolvingThread::run() {

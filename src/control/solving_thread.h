@@ -23,7 +23,7 @@ class SolvingThread {
   // Idle: request and solution are the caller's, who may begin() a solve. Busy: they are the thread's. Done: they are the
   // caller's again, who takes the solution and calls setIdle().
   enum class State { Idle, Busy, Done };
-  State getState() const { return state_.load(std::memory_order_acquire); }
+  State state() const { return state_.load(std::memory_order_acquire); }
   void begin();
   void setIdle() { state_.store(State::Idle, std::memory_order_relaxed); }
   void waitUntilDone() const;

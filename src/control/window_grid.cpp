@@ -50,7 +50,7 @@ void WindowGrid::move(int first, int changed, int changed_end) {
     Node node = before_[i];
     node.source = static_cast<int>(i);
     node.origin = Origin::Kept;
-    const int end = node.getEnd();
+    const int end = node.end();
     if (node.begin < first) {
       restore(node);
       if (end <= first) continue;
@@ -119,7 +119,7 @@ void WindowGrid::add(Node node) {
 
 void WindowGrid::append() {
   Node node;
-  node.begin = nodes_.empty() ? first_ : getEnd();
+  node.begin = nodes_.empty() ? first_ : end();
   node.source = std::max(0, static_cast<int>(before_.size()) - 1);
   const int most = getMostStages(node.begin - first_, options_.fine_nodes);
   while (node.length < most && areAlike(node.begin, node.begin + node.length)) ++node.length;

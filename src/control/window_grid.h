@@ -26,7 +26,7 @@ class WindowGrid {
     std::shared_ptr<const StageSpec> first;  // that of the horizon; null if the node is that stage
     Origin origin = Origin::Appended;
     int source = 0;  // Kept and Cut: this node of the window before
-    int getEnd() const { return begin + length; }
+    int end() const { return begin + length; }
   };
 
   WindowGrid(Horizon& horizon, const PredictiveOptions& options) : horizon_(horizon), options_(options) {}
@@ -37,17 +37,17 @@ class WindowGrid {
   // \param changed, changed_end  stages in this range, each a node of its own, have been replaced
   void move(int first, int changed = 0, int changed_end = 0);
 
-  const std::vector<Node>& getNodes() const { return nodes_; }
+  const std::vector<Node>& nodes() const { return nodes_; }
   // Those before the last move().
-  const std::vector<Node>& getBefore() const { return before_; }
-  int getBegin() const { return nodes_.front().begin; }
-  int getEnd() const { return nodes_.back().getEnd(); }
+  const std::vector<Node>& before() const { return before_; }
+  int begin() const { return nodes_.front().begin; }
+  int end() const { return nodes_.back().end(); }
   // The stages of the problem that the nodes are.
-  const std::vector<int>& getStages() const { return stages_; }
+  const std::vector<int>& stages() const { return stages_; }
   // What the solver needs to move on, terminal node included.
-  const std::vector<NodeSource>& getSources() const { return sources_; }
+  const std::vector<NodeSource>& sources() const { return sources_; }
   // What now follows the window if that ends earlier than before, else null.
-  const Node* getNext() const { return next_ ? &*next_ : nullptr; }
+  const Node* next() const { return next_ ? &*next_ : nullptr; }
 
  private:
   int getStage(int stage) const;

@@ -146,9 +146,9 @@ int WindowPlanner::findLanding(int stage, const Measurement& measurement) {
   for (int contact = 0; contact < contacts_of_model; ++contact) {
     if (!contacts[contact] || stands(stage, contact)) continue;
     int begin = stage, end = stage;  // of the swing
-    while (begin > horizon_->getBegin() && !stands(begin - 1, contact)) --begin;
-    while (end < horizon_->getEnd() && !stands(end, contact)) ++end;
-    if (end < horizon_->getEnd() && stage - begin > (end - begin) / 2 && end - stage >= kEarly &&
+    while (begin > horizon_->begin() && !stands(begin - 1, contact)) --begin;
+    while (end < horizon_->end() && !stands(end, contact)) ++end;
+    if (end < horizon_->end() && stage - begin > (end - begin) / 2 && end - stage >= kEarly &&
         isOverFoothold(end, contact, measurement.q))
       return end;
   }
@@ -158,7 +158,7 @@ int WindowPlanner::findLanding(int stage, const Measurement& measurement) {
 // The foot that should stand with a stage and has not found the ground, while another one carries; or -1.
 int WindowPlanner::findLateFoot(int landing, const std::vector<char>& contacts) const {
   const int begin = landing - kLowering;
-  if (begin < horizon_->getBegin() || isImpact(landing)) return -1;
+  if (begin < horizon_->begin() || isImpact(landing)) return -1;
   const int contacts_of_model = static_cast<int>(contacts.size());
   for (int contact = 0; contact < contacts_of_model; ++contact) {
     if (contacts[contact] || !stands(landing, contact)) continue;
@@ -274,12 +274,12 @@ bool WindowPlanner::solveWindow(Solution& solution) {
 
 // The window begins with this stage, and with the state that was predicted for it; earlier than before if a foot is late.
 bool WindowPlanner::move(int first) {
-  for (const WindowGrid::Node& node : grid_.getNodes()) {
+  for (const WindowGrid::Node& node : grid_.nodes()) {
     if (node.begin >= first) break;
-    past_us_.push_back(trajectory_.us[&node - grid_.getNodes().data()]);
+    past_us_.push_back(trajectory_.us[&node - grid_.nodes().data()]);
     if (past_us_.size() > static_cast<size_t>(kLowering + kLate + 1)) past_us_.pop_front();
   }
-  const int end = grid_.getEnd();
+  const int end = grid_.end();
   if (lowered_)
     grid_.move(first, late_.landing - kLowering, late_.landing + 1);
   else
@@ -288,13 +288,13 @@ bool WindowPlanner::move(int first) {
   std::swap(before_, trajectory_);
   trajectory_.xs.clear();
   trajectory_.us.clear();
-  for (const WindowGrid::Node& node : grid_.getNodes())
+  for (const WindowGrid::Node& node : grid_.nodes())
     if (!continueNode(node)) return false;
-  if (grid_.getEnd() == end) trajectory_.xs.push_back(before_.xs.back());
-  if (const WindowGrid::Node* next = grid_.getNext())
+  if (grid_.end() == end) trajectory_.xs.push_back(before_.xs.back());
+  if (const WindowGrid::Node* next = grid_.next())
     if (!continueNode(*next)) return false;
   trajectory_.us.resize(options_.nodes);
-  solver_.move(grid_.getSources());
+  solver_.move(grid_.sources());
   setWindow();
   return true;
 }
@@ -313,8 +313,8 @@ bool WindowPlanner::continueNode(const WindowGrid::Node& node) {
       if (xs.empty()) {
         xs.push_back(x_);
       } else {
-        const WindowGrid::Node& whole = grid_.getBefore()[node.source];
-        const int stage = grid_.getStages()[us.size() - 1];  // any: their tangent spaces are alike
+        const WindowGrid::Node& whole = grid_.before()[node.source];
+        const int stage = grid_.stages()[us.size() - 1];  // any: their tangent spaces are alike
         const NodeEvaluation* at = solver_.getEvaluation(node.source);
         if (!at) at = &evaluator_.evaluate(stage, before_.xs[node.source], before_.us[node.source]);
         const double share = static_cast<double>(node.begin - whole.begin) / whole.length;
@@ -332,15 +332,15 @@ bool WindowPlanner::continueNode(const WindowGrid::Node& node) {
       if (!has_state) xs.push_back(before_.xs.back());
       us.push_back(us.empty() ? before_.us.back() : us.back());
       xs.push_back(xs.back());
-      horizon_->extend(node.begin, node.getEnd(), xs.back(), us.back());
+      horizon_->extend(node.begin, node.end(), xs.back(), us.back());
       break;
   }
   return true;
 }
 
 void WindowPlanner::setWindow() {
-  window_.move(grid_.getStages(), x_);
-  const VectorXd& end = horizon_->getState(grid_.getEnd());
+  window_.move(grid_.stages(), x_);
+  const VectorXd& end = horizon_->getState(grid_.end());
   problem_.setTerminalReference(end.head(model_.nq()), end.tail(model_.nv()));
 }
 
@@ -352,11 +352,11 @@ void WindowPlanner::startFromGuess(int stage) {
   grid_.move(first);
   trajectory_.xs.clear();
   trajectory_.us.clear();
-  for (const WindowGrid::Node& node : grid_.getNodes()) {
+  for (const WindowGrid::Node& node : grid_.nodes()) {
     trajectory_.xs.push_back(horizon_->makeGuess(node.begin));
     trajectory_.us.push_back(horizon_->getControl(node.begin));
   }
-  trajectory_.xs.push_back(horizon_->makeGuess(grid_.getEnd()));
+  trajectory_.xs.push_back(horizon_->makeGuess(grid_.end()));
   x_ = trajectory_.xs[0];
   setWindow();
 }
@@ -389,7 +389,7 @@ void WindowPlanner::makePolicy(const Receding& solver, int stage, Solution& solu
   const Policy::Stage* before = nullptr;
   for (Policy::Stage& out : solution.stages) {
     while (isImpact(stage)) ++stage, ++node;
-    fillStage(problem_, grid_.getStages()[node], horizon_->getStart(stage) - advance_, trajectory_.xs[node],
+    fillStage(problem_, grid_.stages()[node], horizon_->getStart(stage) - advance_, trajectory_.xs[node],
               trajectory_.us[node], trajectory_.xs[node + 1], out);
     out.phase = horizon_->getPhase(stage);
     const RowMatrixXd* earlier = isNearEnd(stage) ? findEarlierGains(before, out.phase) : nullptr;
@@ -409,14 +409,14 @@ void WindowPlanner::makePolicy(const Receding& solver, int stage, Solution& solu
 const RobotEvaluation& WindowPlanner::getEvaluation(const Receding& solver, int node) {
   if (const NodeEvaluation* evaluation = solver.getEvaluation(node))
     return static_cast<const RobotEvaluation&>(*evaluation);
-  return evaluator_.evaluate(grid_.getStages()[node], trajectory_.xs[node], trajectory_.us[node]);
+  return evaluator_.evaluate(grid_.stages()[node], trajectory_.xs[node], trajectory_.us[node]);
 }
 
 // Where feet that are in the air at some stage of the window, which begins with this one, first stand after it.
 void WindowPlanner::predictFootholds(int stage, Solution& solution) {
   solution.footholds.clear();
-  const int contacts = static_cast<int>(model_.contacts().size()), shift = stage - grid_.getBegin();
-  const std::vector<WindowGrid::Node>& nodes = grid_.getNodes();
+  const int contacts = static_cast<int>(model_.contacts().size()), shift = stage - grid_.begin();
+  const std::vector<WindowGrid::Node>& nodes = grid_.nodes();
   for (int contact = 0; contact < contacts; ++contact) {
     size_t k = 1;
     const auto standsAt = [&](size_t node) { return stands(nodes[node].begin + shift, contact); };

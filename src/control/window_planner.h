@@ -41,8 +41,8 @@ class WindowPlanner {
   // From the state that is predicted for the end of the stage.
   void solve(const Request& request, Solution& solution);
 
-  const Model& getModel() const { return model_; }
-  VectorXd getStartPosture() const { return problem_.initialState().head(model_.nq()); }
+  const Model& model() const { return model_; }
+  VectorXd startPosture() const { return problem_.initialState().head(model_.nq()); }
   // By the plan, s. Any thread may ask.
   double getStart(int stage) const { return horizon_->getStart(stage); }
 

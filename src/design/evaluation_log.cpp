@@ -120,7 +120,7 @@ LoggedEvaluation readEvaluation(const std::string& line) {
 EvaluationLog::EvaluationLog(const std::string& path, const std::string& header, const DesignEvaluator& evaluator)
     : log_(path, header, "the log is of another design problem, robot or version") {
   int line = 1;
-  for (const std::string& text : log_.getLines()) {
+  for (const std::string& text : log_.lines()) {
     ++line;
     try {
       left_.push_back(readEvaluation(text));
@@ -139,7 +139,7 @@ std::optional<LoggedEvaluation> EvaluationLog::replay(const std::string& stage, 
   const LoggedEvaluation evaluation = left_.front();
   left_.pop_front();
   if (evaluation.stage != stage || evaluation.x != x)
-    throw InputError(log_.getPath(), "log", "its evaluations do not belong to this search",
+    throw InputError(log_.path(), "log", "its evaluations do not belong to this search",
                      "remove the file to repeat the search");
   return evaluation;
 }

@@ -45,7 +45,7 @@ FourBarState calcFourBar(const FourBarDrawing& d, double turn) {
 }
 
 LinkageFamily makeFourBars(const FourBarSpace& space, const JointDemand& demand) {
-  const VectorXd turns = demand.angles.array() - demand.getMiddle();
+  const VectorXd turns = demand.angles.array() - demand.middle();
   const auto calc_ratios = [space, turns](const VectorXd& x, VectorXd& ratios, double& margin) {
     const FourBarDrawing drawing = FourBarDrawing::fromVector(x);
     margin = 1;

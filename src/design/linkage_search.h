@@ -20,7 +20,7 @@ struct JointDemand {
   double largest_speed = 0;  ///< of the motor, rad/s; 0: any
 
   /// The middle of the range.
-  double getMiddle() const { return 0.5 * (angles.minCoeff() + angles.maxCoeff()); }
+  double middle() const { return 0.5 * (angles.minCoeff() + angles.maxCoeff()); }
 };
 
 /// Linkages by numbers within bounds. Its functions may be called from several threads at once.

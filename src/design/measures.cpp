@@ -39,8 +39,8 @@ void addShares(const MotorTrace& trace, Eigen::Index m, const Motor& motor, Moto
     const double u = trace.torque(m, stage), v = trace.speed(m, stage);
     out.envelope = std::max({out.envelope, std::abs(u) / motor.effort_limit, std::abs(v) / motor.velocity_limit});
     if (motor.hasEnvelope() && trace.dt[k] > 0)
-      out.envelope = std::max(
-          out.envelope, std::abs(motor.getVoltsPerEffort() * u + motor.getVoltsPerSpeed() * v) / motor.drive.voltage);
+      out.envelope = std::max(out.envelope,
+                              std::abs(motor.voltsPerEffort() * u + motor.voltsPerSpeed() * v) / motor.drive.voltage);
     squares += trace.dt[k] * std::pow(motor.getEffortFactor(u * v) * u, 2);
     duration += trace.dt[k];
   }
@@ -62,7 +62,7 @@ std::vector<MotorConversion> makeDrives(const Model& model, const DriveTable& ta
           "give the share that is given back");
   std::vector<MotorConversion> drives;
   for (const Motor& motor : model.motors())
-    drives.push_back({table.motor_constant.value_or(1 / std::sqrt(motor.getTorqueLoss())), table.regeneration,
+    drives.push_back({table.motor_constant.value_or(1 / std::sqrt(motor.torqueLoss())), table.regeneration,
                       motor.drive.efficiency, motor.drive.back_efficiency});
   for (const auto& [name, constant] : table.motor_constants) {
     const std::vector<int> motors = findMotors(model, {name});

@@ -48,7 +48,7 @@ struct MotorConversion {
 };
 
 /// Drives by motor: constants by name, else one for all, else those of the robot's motors, 1 /
-/// sqrt(Motor::getTorqueLoss()). The gears are always the robot's.
+/// sqrt(Motor::torqueLoss()). The gears are always the robot's.
 struct DriveTable {
   std::optional<double> motor_constant;
   double regeneration = 0;

@@ -120,7 +120,7 @@ std::vector<std::pair<double, double>> listEnvelopeCorners(const Motor& motor, d
   const double u = std::min(motor.effort_limit, most_torque), w = std::min(motor.velocity_limit, most_speed);
   if (!motor.hasEnvelope()) return {{w, -u}, {w, u}, {-w, u}, {-w, -u}};
   // |a u + b w| <= U cuts the corners where the motor drives.
-  const double a = motor.getVoltsPerEffort(), b = motor.getVoltsPerSpeed(), volts = motor.drive.voltage;
+  const double a = motor.voltsPerEffort(), b = motor.voltsPerSpeed(), volts = motor.drive.voltage;
   const double end = std::min(w, volts / b);
   const double at_torque = std::clamp((volts - a * u) / b, -end, end), most = std::min(u, (volts - b * at_torque) / a),
                at_speed = std::min(u, (volts - b * end) / a);

@@ -17,8 +17,8 @@ MotorFactors calcFactors(const Model& model, const std::vector<MotorConversion>&
     out(kDriving, m) = 1 / motor.drive.efficiency;
     out(kDriven, m) = motor.drive.back_efficiency;
     if (!motor.hasEnvelope()) continue;
-    out(kVoltsPerEffort, m) = motor.getVoltsPerEffort() / motor.drive.voltage;
-    out(kVoltsPerSpeed, m) = motor.getVoltsPerSpeed() / motor.drive.voltage;
+    out(kVoltsPerEffort, m) = motor.voltsPerEffort() / motor.drive.voltage;
+    out(kVoltsPerSpeed, m) = motor.voltsPerSpeed() / motor.drive.voltage;
   }
   return out;
 }

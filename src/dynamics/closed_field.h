@@ -39,7 +39,7 @@ namespace bielle {
 /// No function but select() allocates after the constructor, unless more than kDenseRows rows are chosen.
 class ClosedField {
  public:
-  /// Of getIndependence(): below it rows count as dependent.
+  /// Of independence(): below it rows count as dependent.
   static constexpr double kSingular = 1e-12;
   static constexpr int kDenseRows = 96;
 
@@ -52,20 +52,20 @@ class ClosedField {
   /// Begins a chart at a closed configuration, Eq. (1).
   void begin(ConstVectorRef q);
   /// Eqs. (1) and (2): sets state and workspace (velocities, bias). \returns false where the loops do not close or the rows are
-  /// dependent; getFailure() then tells why
+  /// dependent; failure() then tells why
   bool close(ConstVectorRef d, ConstVectorRef u);
   /// Eqs. (3) and (4) after close(), under the generalized forces tau (nv).
   void accelerate(ConstVectorRef tau, VectorRef d_rate, VectorRef u_rate);
 
-  const VectorXd& getConfiguration() const { return ws_.q; }  ///< nq
-  const VectorXd& getVelocity() const { return v_; }          ///< nv
-  const VectorXd& getForces() const { return lambda_; }       ///< of the chosen rows, Eq. (3), after accelerate()
-  const Workspace& getWorkspace() const { return ws_; }
-  const std::string& getFailure() const { return failure_; }
-  int getRank() const { return rows_; }
+  const VectorXd& configuration() const { return ws_.q; }  ///< nq
+  const VectorXd& velocity() const { return v_; }          ///< nv
+  const VectorXd& forces() const { return lambda_; }       ///< of the chosen rows, Eq. (3), after accelerate()
+  const Workspace& workspace() const { return ws_; }
+  const std::string& failure() const { return failure_; }
+  int rank() const { return rows_; }
   /// The least part of a row that is independent of those before it, in the metric of M^{-1}, as a square over the largest square of
   /// any row so far; 1 without loops. It falls where rows turn into others, or vanish.
-  double getIndependence() const { return independence_; }
+  double independence() const { return independence_; }
   /// Largest residual of all rows, the dependent ones included, at the present state, m or rad.
   double calcGap() const;
 

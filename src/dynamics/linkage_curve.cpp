@@ -24,7 +24,7 @@ LinkageCurve::LinkageCurve(const Linkage& linkage, int joint, ConstVectorRef q_c
   for (size_t i = 0; i < held_.size(); ++i) held_angles_[i] = q_start_[linkage.joint_positions[held_[i]]];
 }
 
-MatrixXd LinkageCurve::getHeldRows() const {
+MatrixXd LinkageCurve::heldRows() const {
   const MatrixXd& N = point_.basis().N;
   MatrixXd rows(held_.size(), N.cols());
   for (size_t i = 0; i < held_.size(); ++i) rows.row(i) = N.row(linkage_.joint_dofs[held_[i]]);
@@ -38,7 +38,7 @@ bool LinkageCurve::finishPoint(const VectorXd& direction, CurvePoint& point) {
   MatrixXd H(m, m - 1);
   VectorXd C = VectorXd::Ones(m);
   if (m > 1) {
-    const Eigen::JacobiSVD<MatrixXd> svd(getHeldRows(), Eigen::ComputeThinU | Eigen::ComputeFullV);
+    const Eigen::JacobiSVD<MatrixXd> svd(heldRows(), Eigen::ComputeThinU | Eigen::ComputeFullV);
     if (!(svd.singularValues()[m - 2] > kHeldRank * svd.singularValues()[0])) {
       why_ = "the other joints of the linkage cannot be held: they are at a dead point";
       return false;

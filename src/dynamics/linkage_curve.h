@@ -37,7 +37,7 @@ class LinkageCurve {
 
  private:
   bool finishPoint(const VectorXd& direction, CurvePoint& point);
-  MatrixXd getHeldRows() const;
+  MatrixXd heldRows() const;
   MatrixXd calcJacobian(const VectorXd& q);
   bool hasRank(const VectorXd& q);
 

@@ -215,7 +215,7 @@ RatioSweep sweepDirect(const Model& model, const Linkage& linkage) {
 
 }  // namespace
 
-std::vector<RatioSample> RatioSweep::getDeadPoints() const {
+std::vector<RatioSample> RatioSweep::deadPoints() const {
   std::vector<RatioSample> points;
   for (const RatioSample& sample : samples)
     if (sample.dead != DeadPointKind::None) points.push_back(sample);

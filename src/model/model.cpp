@@ -16,7 +16,7 @@ bool MotorDrive::isGiven() const {
 double Motor::clampEffort(double u, double w) const {
   double lower = -effort_limit, upper = effort_limit;
   if (hasEnvelope() && drive.resistance > 0) {
-    const double induced = getVoltsPerSpeed() * w, per_effort = getVoltsPerEffort();
+    const double induced = voltsPerSpeed() * w, per_effort = voltsPerEffort();
     // Beyond the speed at which the induced voltage is that of the supply the motor brakes, whatever is asked.
     lower = std::clamp((-drive.voltage - induced) / per_effort, -effort_limit, effort_limit);
     upper = std::clamp((drive.voltage - induced) / per_effort, -effort_limit, effort_limit);

@@ -84,7 +84,7 @@ class FeetPlacer {
     }
     return true;
   }
-  double getHeight() const { return height_; }
+  double height() const { return height_; }
 
  private:
   static constexpr double kEasyTransmission = 0.5;  // well before the dead points
@@ -178,9 +178,9 @@ struct LegReach::Data {
 
   Data(const Model& model, const Stance& stance)
       : placer(model, stance),
-        spacing(0.1 * placer.getHeight()),
-        ahead{1, stance.q, placer.getHeight()},
-        behind{-1, stance.q, placer.getHeight()} {}
+        spacing(0.1 * placer.height()),
+        ahead{1, stance.q, placer.height()},
+        behind{-1, stance.q, placer.height()} {}
 
   // Of both directions the first entry is one beside the other's: at the stance, and one spacing behind it.
   void extend(Direction& direction, int count) {

@@ -19,7 +19,7 @@ double ObjectiveOptions::getRegularization() const {
 }
 
 double calcElectricalPower(const Motor& motor, double u, double w, double regeneration) {
-  const double c = motor.getEffortFactor(u * w), power = c * (u * w) + motor.getTorqueLoss() * (c * u) * (c * u);
+  const double c = motor.getEffortFactor(u * w), power = c * (u * w) + motor.torqueLoss() * (c * u) * (c * u);
   return power > 0 ? power : regeneration * power;
 }
 
@@ -44,7 +44,7 @@ void setObjective(const Model& model, const ObjectiveOptions& options, std::vect
   for (int m = 0; m < model.nu(); ++m) {  // c^2 half way between driving and being driven
     const Motor& motor = model.motors()[m];
     const double c_1 = 1 / motor.drive.efficiency, c_2 = motor.drive.back_efficiency;
-    losses[m] = motor.getTorqueLoss() * ((c_1 * c_1 + c_2 * c_2) / 2);
+    losses[m] = motor.torqueLoss() * ((c_1 * c_1 + c_2 * c_2) / 2);
   }
   for (StageSpec& stage : stages) {
     weaken(options.getRegularization(), stage);

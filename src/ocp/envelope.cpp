@@ -47,8 +47,7 @@ void Envelope::Data::updateCostates(double penalty) {
   std::vector<VectorXd> dx, du;
   if (sweepNodes(problem, models, optimum.us, sweep, dx, du) != LqStatus::Ok)
     throw std::invalid_argument("Envelope: the optimum is not a minimum to second order");
-  for (size_t k = 0; k < models.size(); ++k)
-    costates.push_back(sweep.getNodes()[k].Vx + sweep.getNodes()[k].Vxx * dx[k]);
+  for (size_t k = 0; k < models.size(); ++k) costates.push_back(sweep.nodes()[k].Vx + sweep.nodes()[k].Vxx * dx[k]);
 }
 
 // y . (c - b) of Eq. (1).
@@ -102,7 +101,7 @@ double Envelope::calcLagrangian(const ShootingProblem& changed) const {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const Data& data = *data_;
   requireSameSizes(data.problem, changed);
-  const int N = changed.numStages(), size = std::max(1, changed.getBatchSize());
+  const int N = changed.numStages(), size = std::max(1, changed.batchSize());
   const std::optional<ShootingTrajectory> path = calcPath(data.problem, data.optimum, changed);
   if (!path) return kNone;
   const EvaluationList at = makeEvaluations(changed, size);

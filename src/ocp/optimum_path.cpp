@@ -48,7 +48,7 @@ VectorXd calcPathControl(const ShootingProblem& problem, const ShootingProblem& 
 
 std::optional<ShootingTrajectory> calcPath(const ShootingProblem& problem, const ShootingTrajectory& optimum,
                                            const ShootingProblem& changed) {
-  const int N = problem.numStages(), size = std::max(1, changed.getBatchSize());
+  const int N = problem.numStages(), size = std::max(1, changed.batchSize());
   ShootingTrajectory out = optimum;
   for (int k = 0; k < N; ++k) out.us[k] = calcPathControl(problem, changed, k, optimum.us[k]);
   // All states are evaluated as if they were at the last node, the cheapest one, to be closed there.
@@ -87,7 +87,7 @@ ConstraintWeights makeActiveWeights(const ShootingProblem& problem, int node, co
 
 std::vector<StageModel> linearizeNodes(const ShootingProblem& problem, const EvaluationList& at,
                                        const std::vector<ConstraintWeights>& weights, ProblemScratch* scratch) {
-  const int N = problem.numStages(), size = std::max(1, problem.getBatchSize());
+  const int N = problem.numStages(), size = std::max(1, problem.batchSize());
   std::vector<StageModel> models(N + 1);
   std::vector<LinearizeTask> tasks(N + 1);
   for (int k = 0; k <= N; ++k) {

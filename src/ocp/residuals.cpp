@@ -282,8 +282,8 @@ class MotorVoltage : public DescribedResidual {
       if (!motor.hasEnvelope())
         throw InputError(model.name(), "motor '" + motor.name + "'", "it has no winding or no supply voltage",
                          "give its torque_constant and its voltage");
-      per_effort_.push_back(motor.getVoltsPerEffort());
-      per_speed_.push_back(motor.getVoltsPerSpeed());
+      per_effort_.push_back(motor.voltsPerEffort());
+      per_speed_.push_back(motor.voltsPerSpeed());
     }
   }
   int size() const override { return static_cast<int>(motors_.size()); }
@@ -398,7 +398,7 @@ std::unique_ptr<Residual> makeElectricalPower(const VectorXd& losses) {
 std::unique_ptr<Residual> makeElectricalPower(const Model& model) {
   std::vector<ElectricalPower::Law> motors;
   for (const Motor& motor : model.motors())
-    motors.push_back({motor.getTorqueLoss(), 1 / motor.drive.efficiency, motor.drive.back_efficiency});
+    motors.push_back({motor.torqueLoss(), 1 / motor.drive.efficiency, motor.drive.back_efficiency});
   return std::make_unique<ElectricalPower>(std::move(motors));
 }
 

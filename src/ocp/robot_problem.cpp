@@ -230,7 +230,7 @@ int RobotProblem::controlSize(int stage) const { return countControls(model_, pl
 double RobotProblem::getTimeScale(int stage, const VectorXd& x, const VectorXd& u) const {
   return bielle::getTimeScale(places_[stage], x, u);
 }
-int RobotProblem::getBatchSize() const { return transcription_->getBatchSize(); }
+int RobotProblem::batchSize() const { return transcription_->batchSize(); }
 std::unique_ptr<NodeEvaluation> RobotProblem::makeEvaluation() const { return transcription_->makeEvaluation(); }
 std::unique_ptr<ProblemScratch> RobotProblem::makeScratch() const { return transcription_->makeScratch(); }
 
@@ -245,17 +245,17 @@ void visitBatches(Task* tasks, int count, int size, const Work& work) {
 }  // namespace
 
 void RobotProblem::evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const {
-  visitBatches(tasks, count, getBatchSize(),
+  visitBatches(tasks, count, batchSize(),
                [&](EvaluateTask* batch, int size) { transcription_->evaluate(batch, size, scratch); });
 }
 
 void RobotProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const {
-  visitBatches(tasks, count, getBatchSize(),
+  visitBatches(tasks, count, batchSize(),
                [&](LinearizeTask* batch, int size) { transcription_->linearize(batch, size, scratch); });
 }
 
 void RobotProblem::integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const {
-  visitBatches(tasks, count, getBatchSize(),
+  visitBatches(tasks, count, batchSize(),
                [&](const IntegrateTask* batch, int size) { transcription_->integrate(batch, size, scratch); });
   if (!hasFreeTimings()) return;
   const Eigen::Index last = stateSize() - 1;
@@ -264,7 +264,7 @@ void RobotProblem::integrate(const IntegrateTask* tasks, int count, ProblemScrat
 }
 
 void RobotProblem::difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const {
-  visitBatches(tasks, count, getBatchSize(),
+  visitBatches(tasks, count, batchSize(),
                [&](const DifferenceTask* batch, int size) { transcription_->difference(batch, size, scratch); });
   if (!hasFreeTimings()) return;
   const Eigen::Index last = stateSize() - 1;

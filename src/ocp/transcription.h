@@ -23,7 +23,7 @@ class Transcription {
   // After the state cost of a node has changed.
   virtual void updateStateCost(int node) = 0;
   virtual int tangentSize() const = 0;  // without a time scale
-  virtual int getBatchSize() const = 0;
+  virtual int batchSize() const = 0;
   virtual std::unique_ptr<RobotEvaluation> makeEvaluation() const = 0;
   virtual std::unique_ptr<ProblemScratch> makeScratch() const = 0;
   virtual void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const = 0;

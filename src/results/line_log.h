@@ -16,8 +16,8 @@ class LineLog {
   LineLog& operator=(const LineLog&) = delete;
 
   // Those of earlier runs, without the header.
-  const std::vector<std::string>& getLines() const { return lines_; }
-  const std::string& getPath() const { return path_; }
+  const std::vector<std::string>& lines() const { return lines_; }
+  const std::string& path() const { return path_; }
   // Writes a line and its end. \throws InputError when it cannot be written
   void append(const std::string& line);
 

@@ -181,14 +181,14 @@ void AugmentedLagrangian::adoptMultipliers(const EvaluationList& iterate) {
   for (Node& node : nodes_) node.multipliers = node.weights.gradient;
 }
 
-double AugmentedLagrangian::getLargestMultiplier() const {
+double AugmentedLagrangian::largestMultiplier() const {
   double largest = 0;
   for (const Node& node : nodes_)
     if (node.multipliers.size() > 0) largest = std::max(largest, node.multipliers.lpNorm<Eigen::Infinity>());
   return largest;
 }
 
-Multipliers AugmentedLagrangian::getMultipliers() const {
+Multipliers AugmentedLagrangian::multipliers() const {
   Multipliers out;
   for (const Node& node : nodes_) out.values.push_back(node.multipliers);
   out.penalty = far_penalty_;

@@ -20,9 +20,9 @@ class AugmentedLagrangian {
   /// Null if the node has no constraints.
   const ConstraintWeights* getWeights(int node) const { return rows_ > 0 ? nodes_[node].getWeights() : nullptr; }
 
-  double getValue() const { return at_.value; }                      ///< sum of the contributions to Eq. (10)
-  double getViolation() const { return at_.violation; }              ///< the largest
-  double getComplementarity() const { return at_.complementarity; }  ///< Eq. (13), of the multipliers after Eq. (12)
+  double getValue() const { return at_.value; }                   ///< sum of the contributions to Eq. (10)
+  double violation() const { return at_.violation; }              ///< the largest
+  double complementarity() const { return at_.complementarity; }  ///< Eq. (13), of the multipliers after Eq. (12)
   bool isSatisfied() const { return at_.violation <= options_.tolerance; }
   /// Whether constraints are violated, but so little that multipliers under a growing penalty should mend it.
   bool isNear() const;
@@ -46,13 +46,13 @@ class AugmentedLagrangian {
   bool settle(const EvaluationList& iterate, bool full);
   /// Back to the penalty far from the solution.
   void endSettling(const EvaluationList& iterate);
-  int getNumUpdates() const { return num_updates_; }
+  int numUpdates() const { return num_updates_; }
   /// Eq. (12) alone: at a stationary point, the multipliers of the constraints.
   void adoptMultipliers(const EvaluationList& iterate);
 
-  double getPenalty() const { return penalty_; }
-  double getLargestMultiplier() const;
-  Multipliers getMultipliers() const;
+  double penalty() const { return penalty_; }
+  double largestMultiplier() const;
+  Multipliers multipliers() const;
   void setMultipliers(const Multipliers& multipliers);
   /// Multipliers of a window that has moved.
   void move(const std::vector<NodeSource>& sources);

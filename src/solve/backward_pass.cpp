@@ -38,7 +38,7 @@ int BackwardPass::update(const BackwardInput& input) {
   sweep_.start(models_, input.regularization);
   sweep_node_ = N;
   // Batches of nodes, independent of the threads, from the last on.
-  const int size = input.problem.getBatchSize(), num_batches = N / size + 1;
+  const int size = input.problem.batchSize(), num_batches = N / size + 1;
   std::atomic<int> next{num_batches - 1};
   std::atomic_flag sweeping = ATOMIC_FLAG_INIT;
   ParallelErrors errors;
@@ -68,7 +68,7 @@ int BackwardPass::update(const BackwardInput& input) {
 // Stops at the first node that could not be linearized or swept.
 void BackwardPass::sweepReadyNodes(const BackwardInput& input) {
   const int N = input.problem.numStages();
-  while (sweep_node_ >= 0 && sweep_.getResult().status == LqStatus::Ok &&
+  while (sweep_node_ >= 0 && sweep_.result().status == LqStatus::Ok &&
          linearized_[sweep_node_].load(std::memory_order_acquire)) {
     StageModel& model = models_[sweep_node_];
     sweep_.updateNode(sweep_node_, model,

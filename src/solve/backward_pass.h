@@ -32,11 +32,11 @@ class BackwardPass {
   const std::string& getFailure(int node) const { return failures_[node]; }
 
   /// N + 1, without their second derivatives, which the sweep overwrites.
-  const std::vector<StageModel>& getModels() const { return models_; }
-  const LqSweep& getSweep() const { return sweep_; }
+  const std::vector<StageModel>& models() const { return models_; }
+  const LqSweep& sweep() const { return sweep_; }
   /// Times of all updates since resize(), summed over the threads.
-  double getLinearizeSeconds() const { return linearize_seconds_; }
-  double getSweepSeconds() const { return sweep_seconds_; }
+  double linearizeSeconds() const { return linearize_seconds_; }
+  double sweepSeconds() const { return sweep_seconds_; }
 
  private:
   void linearize(const BackwardInput& input, int thread, int begin, int end);

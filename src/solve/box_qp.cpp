@@ -86,7 +86,7 @@ bool BoxQp::factorize(ConstMatrixRef H) {
 void BoxQp::calcNewtonStep(ConstVectorRef r, VectorRef step) {
   auto s = free_step_.head(num_free_);
   for (int i = 0; i < num_free_; ++i) s[i] = -r[free_[i]];
-  const auto L = getFreeFactor();
+  const auto L = freeFactor();
   L.triangularView<Eigen::Lower>().solveInPlace(s);
   L.triangularView<Eigen::Lower>().transpose().solveInPlace(s);
   step.setZero();

@@ -30,10 +30,10 @@ class BoxQp {
   BoxQpStatus solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lower, ConstVectorRef upper, VectorRef d);
 
   /// Number of free components, and their indices in increasing order in its first entries.
-  int getNumFree() const { return num_free_; }
+  int numFree() const { return num_free_; }
   int getFreeIndex(int i) const { return free_[i]; }
   /// Lower Cholesky factor of H_ff in its lower triangle (num_free x num_free).
-  auto getFreeFactor() const { return factor_.topLeftCorner(num_free_, num_free_); }
+  auto freeFactor() const { return factor_.topLeftCorner(num_free_, num_free_); }
 
  private:
   bool updateFreeSet(ConstVectorRef r, ConstVectorRef d, ConstVectorRef lower, ConstVectorRef upper);

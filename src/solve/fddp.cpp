@@ -23,8 +23,8 @@ FddpResult solve(const ShootingProblem& problem, ShootingTrajectory guess, const
   FddpResult out;
   out.trajectory = std::move(guess);
   out.summary = FddpSolve(options, problem, out.trajectory, observer, memory).run();
-  out.multipliers = memory.lagrangian.getMultipliers();
-  const std::vector<LqSweep::Node>& nodes = memory.backward.getSweep().getNodes();
+  out.multipliers = memory.lagrangian.multipliers();
+  const std::vector<LqSweep::Node>& nodes = memory.backward.sweep().nodes();
   for (size_t k = 0; k + 1 < nodes.size(); ++k) out.gains.push_back(nodes[k]);
   return out;
 }

@@ -16,7 +16,7 @@ constexpr const char* kStalled = "the cost no longer decreases";
 }  // namespace
 
 void FddpMemory::resize(const ShootingProblem& problem, const IterationOptions& options, int threads) {
-  const int num_trials = std::min(problem.getBatchSize(), options.num_step_lengths);
+  const int num_trials = std::min(problem.batchSize(), options.num_step_lengths);
   evaluations.resize(problem, num_trials > 1 ? 2 * num_trials : 0, threads);
   lagrangian.resize(problem, options.constraints);
   backward.resize(problem);
@@ -38,7 +38,7 @@ void FddpIterations::start() {
   N_ = problem_.numStages();
   checkSizes(problem_, trajectory_);
   // Each has memory of its own, and no more than one a batch of nodes has work.
-  const int batches = N_ / problem_.getBatchSize() + 1;
+  const int batches = N_ / problem_.batchSize() + 1;
   threads_ = std::min(options_.threads > 0 ? options_.threads : getDefaultThreads(), batches);
   shift_.emplace(memory_.team, threads_);
   memory_.resize(problem_, options_, threads_);
@@ -79,7 +79,7 @@ FddpIterations::End FddpIterations::evaluate() {
 FddpIterations::End FddpIterations::updateModels() {
   if (const End end = linearizeAndSweep()) return end;
   updateGaps();
-  line_.violation = memory_.lagrangian.getViolation();
+  line_.violation = memory_.lagrangian.violation();
   summary_.cost = line_.cost;
   summary_.gap = line_.gap;
   return {};
@@ -96,7 +96,7 @@ FddpIterations::End FddpIterations::linearizeAndSweep() {
 }
 
 void FddpIterations::updateGaps() {
-  const std::vector<StageModel>& models = memory_.backward.getModels();
+  const std::vector<StageModel>& models = memory_.backward.models();
   gap_sum_ = 0;
   for (int k = 0; k <= N_; ++k) {
     if (models[k].gap.size() == 0) continue;
@@ -117,15 +117,15 @@ FddpIterations::End FddpIterations::updateStep() {
       if (const End end = linearizeAndSweep()) return end;
     swept_ = false;
     const Clock::time_point start = Clock::now();
-    const LqSweep& sweep = memory_.backward.getSweep();
-    const LqResult result = sweep.getResult();
+    const LqSweep& sweep = memory_.backward.sweep();
+    const LqResult result = sweep.result();
     if (result.status == LqStatus::NotFinite) {
       summary_.message = "node " + std::to_string(result.node) + ": the quadratic models are not finite";
       return FddpTermination::Failed;
     }
     line_.regularization = regularization_;
     if (result.status == LqStatus::Ok) {
-      slope_ = sweep.calcStep(memory_.backward.getModels(), memory_.dx, memory_.du);
+      slope_ = sweep.calcStep(memory_.backward.models(), memory_.dx, memory_.du);
       summary_.sweep_seconds += calcSecondsSince(start);
       curvature_ = 2 * (result.expected_change - slope_);  // Eq. (8) of the sweep
       line_.gradient = calcGradient();
@@ -139,7 +139,7 @@ FddpIterations::End FddpIterations::updateStep() {
 double FddpIterations::calcGradient() const {
   double gradient = 0;
   for (int k = 0; k < N_; ++k) {
-    const VectorXd& Qu = memory_.backward.getSweep().getNodes()[k].Qu;
+    const VectorXd& Qu = memory_.backward.sweep().nodes()[k].Qu;
     if (memory_.boxes.empty()) {
       gradient += Qu.squaredNorm();
     } else {
@@ -256,16 +256,16 @@ FddpSummary FddpIterations::finish(FddpTermination termination) {
   summary_.termination = termination;
   if (!memory_.lagrangian.isEmpty()) {
     if (termination == FddpTermination::Converged) memory_.lagrangian.adoptMultipliers(getIterate());
-    summary_.violation = memory_.lagrangian.getViolation();
-    summary_.complementarity = memory_.lagrangian.getComplementarity();
-    summary_.multiplier = memory_.lagrangian.getLargestMultiplier();
-    summary_.penalty = memory_.lagrangian.getPenalty();
-    summary_.multiplier_updates = memory_.lagrangian.getNumUpdates();
+    summary_.violation = memory_.lagrangian.violation();
+    summary_.complementarity = memory_.lagrangian.complementarity();
+    summary_.multiplier = memory_.lagrangian.largestMultiplier();
+    summary_.penalty = memory_.lagrangian.penalty();
+    summary_.multiplier_updates = memory_.lagrangian.numUpdates();
   }
   summary_.seconds = calcSecondsSince(start_);
   summary_.evaluate_seconds = memory_.evaluations.getSeconds();
-  summary_.linearize_seconds = memory_.backward.getLinearizeSeconds();
-  summary_.sweep_seconds += memory_.backward.getSweepSeconds();
+  summary_.linearize_seconds = memory_.backward.linearizeSeconds();
+  summary_.sweep_seconds += memory_.backward.sweepSeconds();
   summary_.rollout_seconds = memory_.rollout.getSeconds();
   const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax ||
                       termination == FddpTermination::Infeasible;
@@ -281,7 +281,7 @@ FddpSummary FddpIterations::finish(FddpTermination termination) {
       break;
     case FddpTermination::MaxIterations:
       summary_.message = "the iteration limit was reached";
-      if (memory_.lagrangian.getViolation() > options_.constraints.tolerance)
+      if (memory_.lagrangian.violation() > options_.constraints.tolerance)
         summary_.message += "; " + memory_.lagrangian.describeWorst(problem_);
       break;
     case FddpTermination::Interrupted:

@@ -41,8 +41,8 @@ RolloutInput FddpIterations::startSearch() {
   return {problem_,
           trajectory_,
           memory_.evaluations,
-          memory_.backward.getModels(),
-          memory_.backward.getSweep(),
+          memory_.backward.models(),
+          memory_.backward.sweep(),
           memory_.lagrangian,
           memory_.dx,
           memory_.bounds,
@@ -54,7 +54,7 @@ RolloutInput FddpIterations::startSearch() {
 // Steps of all lengths, each in one piece.
 bool FddpIterations::searchInOnePiece(const RolloutInput& input) {
   Rollout& rollout = memory_.rollout;
-  const int num_trials = rollout.getNumTrials();
+  const int num_trials = rollout.numTrials();
   double alpha = first_step_;
   for (int i = 0; i < options_.num_step_lengths; i += num_trials) {
     if (isInterrupted()) return false;

@@ -124,7 +124,7 @@ LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, MatrixMap Q, Nod
   result_.expected_change += node.Qu.dot(node.k) + 0.5 * node.k.dot(Quu_k);
 
   // The free rows and columns move to the front, in place: a free index is never smaller than its rank.
-  const int num_free = box_qp_.getNumFree();
+  const int num_free = box_qp_.numFree();
   for (int j = 0; j < num_free; ++j) {
     if (const int free = box_qp_.getFreeIndex(j); free != j) Q.col(j) = Q.col(free);
     for (int i = j; i < num_free; ++i) Q(i, j) = Q(box_qp_.getFreeIndex(i), j);

@@ -72,9 +72,9 @@ class LqSweep {
   void start(const std::vector<StageModel>& models, const LqRegularization& regularization);
   LqStatus updateNode(int k, StageModel& model, const ControlBox* box = nullptr);
   /// Result of the nodes updated so far.
-  const LqResult& getResult() const { return result_; }
+  const LqResult& result() const { return result_; }
 
-  const std::vector<Node>& getNodes() const { return nodes_; }
+  const std::vector<Node>& nodes() const { return nodes_; }
 
   /// The solution of (1) of the last update() on the same models: dx_k (N + 1) and du_k (N), resized if necessary.
   /// Returns slope of Eq. (8).

@@ -49,7 +49,7 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
     }
   }
   std::fill(fresh_.begin(), fresh_.end(), true);
-  const int num_tasks = static_cast<int>(tasks_.size()), size = problem.getBatchSize();
+  const int num_tasks = static_cast<int>(tasks_.size()), size = problem.batchSize();
   const int num_batches = (num_tasks + size - 1) / size;
   ParallelErrors errors;
   std::atomic<int> next{0};

@@ -31,10 +31,10 @@ class NodeEvaluations {
   const NodeEvaluation* getFresh(size_t node) const {
     return node < fresh_.size() && fresh_[node] ? iterate_[node].get() : nullptr;
   }
-  const EvaluationList& getTrial() const { return trial_; }
+  const EvaluationList& trial() const { return trial_; }
   void swapTrial();
   /// For trials whose evaluations are not kept.
-  const EvaluationList& getRolling() const { return rolling_; }
+  const EvaluationList& rolling() const { return rolling_; }
   /// Scratch of a thread of the team.
   ProblemScratch* getScratch(int thread) const { return scratch_[thread].get(); }
 

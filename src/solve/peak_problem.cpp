@@ -91,7 +91,7 @@ std::unique_ptr<NodeEvaluation> PeakProblem::makeEvaluation() const {
 std::unique_ptr<ProblemScratch> PeakProblem::makeScratch() const {
   auto out = std::make_unique<PeakScratch>();
   out->inner = inner_.makeScratch();
-  const int size = getBatchSize();
+  const int size = batchSize();
   out->evaluations.reserve(size);
   out->linearizations.reserve(size);
   out->integrations.reserve(size);

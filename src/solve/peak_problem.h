@@ -46,7 +46,7 @@ class PeakProblem : public ShootingProblem {
   void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override;
   void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override;
   void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override;
-  int getBatchSize() const override { return inner_.getBatchSize(); }
+  int batchSize() const override { return inner_.batchSize(); }
 
   /// The largest |u_i| / L_i of a trajectory of the inner problem.
   double calcPeak(const ShootingTrajectory& inner) const;

@@ -129,13 +129,13 @@ void Receding::move(const std::vector<NodeSource>& sources) {
   memory_->lagrangian.move(sources);
 }
 
-Multipliers Receding::getMultipliers() const { return memory_->lagrangian.getMultipliers(); }
+Multipliers Receding::multipliers() const { return memory_->lagrangian.multipliers(); }
 void Receding::setMultipliers(const Multipliers& multipliers) {
   memory_->lagrangian.setMultipliers(multipliers);
   memory_->evaluations.outdate();
 }
 
-const Gains& Receding::getGains(int stage) const { return memory_->backward.getSweep().getNodes()[stage]; }
+const Gains& Receding::getGains(int stage) const { return memory_->backward.sweep().nodes()[stage]; }
 const NodeEvaluation* Receding::getEvaluation(int node) const {
   return memory_->evaluations.getFresh(static_cast<size_t>(node));
 }

@@ -60,7 +60,7 @@ class Receding {
 
   /// Those at the end of the last step(), moved on by advance() or move(); and those from which the next one starts, with all its nodes
   /// evaluated again. \throws std::invalid_argument when the penalty is not positive
-  Multipliers getMultipliers() const;
+  Multipliers multipliers() const;
   void setMultipliers(const Multipliers& multipliers);
 
   /// Of a stage of the last sweep, about the iterate linearized last; valid until the next step().

@@ -34,7 +34,7 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments, int num_t
       if (k < N_) trial.nodes.us[k].resize(problem.controlSize(k));
     }
   }
-  const int num_tracks = std::max(max_segments, num_trials), size = problem.getBatchSize();
+  const int num_tracks = std::max(max_segments, num_trials), size = problem.batchSize();
   tracks_.resize(num_tracks);
   for (Track& track : tracks_) {
     track.start.setZero(largest);
@@ -79,7 +79,7 @@ void Rollout::close(const RolloutInput& input) {
       const StageModel& model = input.models[k];
       auto shift = shift_.head(model.lx.size()), next = joint_gap_.head(model.gap.size());
       auto control = control_.head(model.lu.size());
-      control.noalias() = input.sweep.getNodes()[k].K * shift;
+      control.noalias() = input.sweep.nodes()[k].K * shift;
       next.noalias() = model.Fx() * shift;
       next.noalias() += model.Fu() * control;
       shift_.head(next.size()) = next;
@@ -107,7 +107,7 @@ void Rollout::search(const RolloutInput& input, double alpha, int num) {
 }
 
 void Rollout::rollOut(const RolloutInput& input, int num_tracks) {
-  const int size = input.problem.getBatchSize(), num_groups = (num_tracks + size - 1) / size;
+  const int size = input.problem.batchSize(), num_groups = (num_tracks + size - 1) / size;
   ParallelErrors errors;
   std::atomic<int> next{0};
   std::atomic<double> seconds{seconds_};
@@ -208,7 +208,7 @@ void Rollout::evaluateNodes(const RolloutInput& input, int step, Group& group) {
 
 // Eq. (2).
 void Rollout::updateControl(const RolloutInput& input, int k, Trial& trial) const {
-  const LqSweep::Node& gains = input.sweep.getNodes()[k];
+  const LqSweep::Node& gains = input.sweep.nodes()[k];
   VectorXd& u = trial.nodes.us[k];
   u = input.nodes.us[k] + trial.alpha * gains.k;
   u.noalias() += gains.K * trial.deviations[k];
@@ -264,8 +264,8 @@ void Rollout::integrate(const RolloutInput& input, Group& group) {
 }
 
 NodeEvaluation* Rollout::getEvaluation(const RolloutInput& input, const Track& track, int node) const {
-  if (track.rolling < 0) return input.evaluations.getTrial()[node].get();
-  return input.evaluations.getRolling()[track.rolling + node % 2].get();
+  if (track.rolling < 0) return input.evaluations.trial()[node].get();
+  return input.evaluations.rolling()[track.rolling + node % 2].get();
 }
 
 // Updates the remainders of the old gaps, the gaps where segments join, and Eq. (8).
@@ -291,7 +291,7 @@ void Rollout::updateGaps(const RolloutInput& input, int num_tracks, Trial& trial
 void Rollout::addJointGap(const RolloutInput& input, double rest, const Track& before, const Track& after,
                           Trial& trial) {
   if (after.start.size() == 0) return;
-  const LqSweep::Node& value = input.sweep.getNodes()[after.begin];
+  const LqSweep::Node& value = input.sweep.nodes()[after.begin];
   auto gap = joint_gap_.head(after.start.size()), slope = joint_slope_.head(after.start.size());
   gap = before.arrival - after.start;
   trial.gap_sum += gap.lpNorm<1>();

@@ -40,7 +40,7 @@ class Rollout {
  public:
   /// num_trials: number of step lengths tried side by side.
   void resize(const ShootingProblem& problem, int max_segments, int num_trials);
-  int getNumTrials() const { return static_cast<int>(trials_.size()); }
+  int numTrials() const { return static_cast<int>(trials_.size()); }
 
   /// Rolls out a step of length alpha in several segments: getTrial(0).
   void cut(const RolloutInput& input, double alpha, int segments);

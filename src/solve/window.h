@@ -65,7 +65,7 @@ class Window : public ShootingProblem {
     for (DifferenceTask& task : own.differences) task.node = getNode(task.node);
     whole_.difference(own.differences.data(), count, own.whole.get());
   }
-  int getBatchSize() const override { return whole_.getBatchSize(); }
+  int batchSize() const override { return whole_.batchSize(); }
 
  private:
   struct Scratch : ProblemScratch {

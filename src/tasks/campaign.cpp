@@ -133,13 +133,13 @@ class CampaignRunner {
  private:
   void readLog() {
     int number = 1;  // of the line; the first one is the header
-    for (const std::string& line : log_.getLines()) {
+    for (const std::string& line : log_.lines()) {
       ++number;
       try {
         const Json json = parseJson(line);
         results_[{json.at("motion"), json.at("run")}] = pickCampaignResult(json.at("result"));
       } catch (const std::exception& error) {
-        throw InputError(log_.getPath(), "line " + std::to_string(number),
+        throw InputError(log_.path(), "line " + std::to_string(number),
                          "it was changed or damaged: " + describeJsonError(error),
                          "remove the line to repeat that run");
       }

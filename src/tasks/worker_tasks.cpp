@@ -114,10 +114,10 @@ void WorkerTasks::stop() {
 
 bool WorkerTasks::hasRoom() const {
   const int waiting = std::max(kLeastWaiting, static_cast<int>(std::ceil(kWaitingShare * cores_)));
-  return static_cast<int>(running_.size()) < (cores_ + waiting) * getBundleSize();
+  return static_cast<int>(running_.size()) < (cores_ + waiting) * bundleSize();
 }
 
-int WorkerTasks::getBundleSize() const {
+int WorkerTasks::bundleSize() const {
   return mean_ > 0 ? static_cast<int>(std::clamp(kBundleSeconds / mean_, 1.0, 1.0 * kLargestBundle)) : 1;
 }
 
@@ -130,7 +130,7 @@ int WorkerTasks::submit(const Task& task) {
 // As large as there are enough for all workers, in the order in which tasks came.
 void WorkerTasks::sendBundles() {
   const size_t share = running_.size() / static_cast<size_t>(std::max(1, cores_));
-  const size_t size = std::clamp(share, size_t{1}, static_cast<size_t>(getBundleSize()));
+  const size_t size = std::clamp(share, size_t{1}, static_cast<size_t>(bundleSize()));
   for (size_t begin = 0, end = 0; begin < held_.size(); begin = end) {
     std::vector<const Task*> tasks;
     std::vector<int> ids;

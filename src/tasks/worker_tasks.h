@@ -48,7 +48,7 @@ class WorkerTasks : public TaskEngine {
     Task task;
   };
 
-  int getBundleSize() const;
+  int bundleSize() const;
   void sendBundles();
   void send(const std::string& line);
   bool receive(std::string& line);  // false if the user asks for the end

@@ -42,14 +42,14 @@ class BielleWorld : public World {
   void setTorques(ConstVectorRef u) override;
   void setPush(const Vector3d& force) override { push_ = force; }
   bool advance(double duration) override;
-  const std::string& getMessage() const override { return message_; }
-  double getTime() const override { return time_; }
-  const VectorXd& getConfiguration() const override { return tree_.getConfiguration(); }
-  const VectorXd& getVelocity() const override { return tree_.getVelocity(); }
-  const VectorXd& getTorques() const override { return u_; }
-  const std::vector<FootReport>& getFeet() const override { return soles_.getReports(); }
-  Books getBooks() const override;
-  double getGap() const override;
+  const std::string& message() const override { return message_; }
+  double time() const override { return time_; }
+  const VectorXd& configuration() const override { return tree_.configuration(); }
+  const VectorXd& velocity() const override { return tree_.velocity(); }
+  const VectorXd& torques() const override { return u_; }
+  const std::vector<FootReport>& feet() const override { return soles_.reports(); }
+  Books books() const override;
+  double gap() const override;
 
  private:
   // Forces at a velocity: their loads in reduced coordinates, and their damping if a matrix is given.
@@ -85,7 +85,7 @@ class BielleWorld : public World {
   double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0, joint_work_ = 0;  // on the robot, J
   double elastic_start_ = 0, stops_start_ = 0;
   std::string message_;
-  mutable Workspace ws_;  // of getBooks() and getGap()
+  mutable Workspace ws_;  // of books() and gap()
 };
 
 BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
@@ -113,7 +113,7 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
 void BielleWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   requireFinite(q, v);
   message_.clear();
-  if (!tree_.set(q, v)) message_ = tree_.getFailure();
+  if (!tree_.set(q, v)) message_ = tree_.failure();
   time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = joint_work_ = 0;
   u_.setZero();
   tau_.setZero();
@@ -131,7 +131,7 @@ void BielleWorld::reset(ConstVectorRef q, ConstVectorRef v) {
 void BielleWorld::setTorques(ConstVectorRef u) {
   for (int m = 0; m < model_.nu(); ++m) {
     const Motor& motor = model_.motors()[m];
-    u_[m] = motor.clampEffort(u[m], tree_.getVelocity()[motor.dof]);
+    u_[m] = motor.clampEffort(u[m], tree_.velocity()[motor.dof]);
   }
   calcMotorForces(model_, u_, tau_);
 }
@@ -148,13 +148,13 @@ bool BielleWorld::advance(double duration) {
   const double h = duration / steps;
   double taken = 0;
   while (taken < steps && !(taken > 0 && interrupt_ && *interrupt_)) {
-    if (!tree_.drift(taken == 0 ? h / 2 : h)) return fail(tree_.getFailure());
+    if (!tree_.drift(taken == 0 ? h / 2 : h)) return fail(tree_.failure());
     if (!kick(h)) return fail("the velocities are no longer finite");
     ++taken;
   }
   const bool is_done = taken == steps;
   time_ += is_done ? duration : taken * h;
-  if (!tree_.drift(h / 2)) return fail(tree_.getFailure());
+  if (!tree_.drift(h / 2)) return fail(tree_.failure());
   soles_.update([this](int body) { return tree_.getPlacement(body); });
   return is_done;
 }
@@ -167,11 +167,11 @@ bool BielleWorld::kick(double h) {
   com_ = tree_.getPlacement(pushed_body_).act(model_.bodies()[pushed_body_].inertia.com);
   dw_.setZero();
   for (int i = 0; i < kMaxNewton; ++i) {
-    w_mean_ = tree_.getReducedVelocity() + 0.5 * dw_;
-    loads_ = tree_.getLoads();
+    w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
+    loads_ = tree_.loads();
     damping_.setZero();
     addForces(w_mean_, loads_, &damping_);
-    system_ = tree_.getMassMatrix();
+    system_ = tree_.massMatrix();
     correction_ = h * loads_;
     correction_.noalias() -= system_ * dw_;
     system_ += 0.5 * h * damping_;
@@ -182,7 +182,7 @@ bool BielleWorld::kick(double h) {
     if (correction_.cwiseAbs().maxCoeff() < kNewtonTolerance * (1 + dw_.cwiseAbs().maxCoeff())) break;
   }
   if (!dw_.allFinite()) return false;
-  w_mean_ = tree_.getReducedVelocity() + 0.5 * dw_;
+  w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
   loads_.setZero();
   addForces(w_mean_, loads_, nullptr);
   book(h);
@@ -252,7 +252,7 @@ void BielleWorld::addContacts(const VectorXd& w, VectorXd& loads, MatrixXd* damp
 void BielleWorld::addStops(const VectorXd& w, VectorXd& loads, MatrixXd* damping) {
   for (size_t i = 0; i < stops_.size(); ++i) {
     const JointStop& stop = stops_[i];
-    const double q = tree_.getConfiguration()[stop.coordinate];
+    const double q = tree_.configuration()[stop.coordinate];
     stop_forces_[i] = 0;
     if (q <= stop.upper && q >= stop.lower) continue;
     double v = 0;
@@ -310,15 +310,14 @@ double BielleWorld::calcElasticEnergy(double* of_stops) const {
   for (const ContactPoint& point : points_)
     contacts +=
         calcContactForce(terrain_, point, tree_.getPlacement(point.body).act(point.p), Vector3d::Zero()).elastic;
-  for (const JointStop& stop : stops_)
-    stops += calcStopForce(stop, tree_.getConfiguration()[stop.coordinate], 0).elastic;
+  for (const JointStop& stop : stops_) stops += calcStopForce(stop, tree_.configuration()[stop.coordinate], 0).elastic;
   if (of_stops) *of_stops = stops;
   return contacts + stops;
 }
 
-Books BielleWorld::getBooks() const {
-  updatePositions(model_, ws_, getConfiguration());
-  updateVelocities<double>(model_, ws_, getVelocity());
+Books BielleWorld::books() const {
+  updatePositions(model_, ws_, configuration());
+  updateVelocities<double>(model_, ws_, velocity());
   Books books;
   books.kinetic = calcKineticEnergy(model_, ws_);
   books.potential = calcPotentialEnergy(model_, ws_);
@@ -332,8 +331,8 @@ Books BielleWorld::getBooks() const {
   return books;
 }
 
-double BielleWorld::getGap() const {
-  updatePlacements<double>(model_, ws_, getConfiguration());
+double BielleWorld::gap() const {
+  updatePlacements<double>(model_, ws_, configuration());
   double gap = 0;
   for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureGap(ws_, closure).position);
   return gap;

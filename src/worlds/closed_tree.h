@@ -27,7 +27,7 @@ class ClosedTree {
   ClosedTree& operator=(const ClosedTree&) = delete;
 
   /// Sets a closed configuration, and the velocity nearest to v that keeps it closed.
-  /// \returns false where the linkages are singular; getFailure() then names a closure, also below
+  /// \returns false where the linkages are singular; failure() then names a closure, also below
   bool set(ConstVectorRef q, ConstVectorRef v);
   /// Moves with the present velocity for a duration h, not zero.
   bool drift(double h);
@@ -39,11 +39,11 @@ class ClosedTree {
   void kick(const VectorXd& dw);
 
   int size() const { return reduction_.size; }
-  const MatrixXd& getMassMatrix() const { return M_; }
-  const VectorXd& getLoads() const { return loads_; }
-  const VectorXd& getReducedVelocity() const { return w_; }  ///< w
-  const VectorXd& getConfiguration() const { return q_; }    ///< nq
-  const VectorXd& getVelocity() const { return v_; }         ///< nv
+  const MatrixXd& massMatrix() const { return M_; }
+  const VectorXd& loads() const { return loads_; }
+  const VectorXd& reducedVelocity() const { return w_; }  ///< w
+  const VectorXd& configuration() const { return q_; }    ///< nq
+  const VectorXd& velocity() const { return v_; }         ///< nv
   const SE3& getPlacement(int body) const { return ws_.X_WB[body]; }
   /// Columns J_b N of a tip, about the origin of the world; `outer` are their indices into w.
   const ReducedTree::Columns& getTip(int index) const { return tree_.getTip(index); }
@@ -59,7 +59,7 @@ class ClosedTree {
     for (int c = 0; c < cluster.size; ++c)
       visit(cluster.offset + c, clusters_[place.cluster].state.basis.N(place.index, c));
   }
-  const std::string& getFailure() const { return failure_; }
+  const std::string& failure() const { return failure_; }
 
  private:
   struct Cluster {

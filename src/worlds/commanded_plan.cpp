@@ -26,7 +26,7 @@ Policy::Stage makeStage(const Model& model, double start, double duration, const
 
 // Sets reference and contacts of the plan, from the walk as it is foreseen.
 void foresee(CommandedWalk walk, double duration, Plan& plan) {
-  const double h = walk.getTimeStep();
+  const double h = walk.timeStep();
   const int count = std::max(1, static_cast<int>(std::ceil(duration / h)));
   std::vector<Policy::Stage> stages;
   CommandedWalk::Stage now = walk.makeNext();

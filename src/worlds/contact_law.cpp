@@ -61,7 +61,7 @@ ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point,
   const Vector3d& n = touch.normal;
   const double approach = -n.dot(velocity);
   const NormalForce normal = calcNormalForce(point.stiffness, point.damping, touch.depth, approach);
-  const double limit = terrain.getGround().friction * normal.force;
+  const double limit = terrain.ground().friction * normal.force;
   const Vector3d anchor = point.touches ? point.anchor : x;
   const Vector3d shift = x - anchor, sliding = velocity + approach * n;
   out.spring = shorten(-point.shear_stiffness * (shift - n.dot(shift) * n), limit);

@@ -18,7 +18,7 @@ namespace {
 class Pace {
  public:
   // s since the start
-  double getElapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+  double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
   // Keeps the world from running ahead. \returns how far it is behind, s
   double await(double time) const {
     const Clock::time_point due =
@@ -37,7 +37,7 @@ bool advance(World& world, TorqueDelay& delay, double time, double period) {
   double elapsed = 0;
   for (;;) {
     world.setTorques(delay.getTorques(time + elapsed));
-    const double next = delay.getNextChange() - time;
+    const double next = delay.nextChange() - time;
     const bool ends = next >= period - kClockTolerance;
     if (!world.advance((ends ? period : next) - elapsed)) return false;
     if (ends) return true;
@@ -83,30 +83,30 @@ const char* getName(Outcome outcome) {
 
 Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
                   const ExecutionOptions& o, const ExecutionObserver& observer) {
-  const double duration = o.duration > 0 ? o.duration : plan.getDuration() + o.hold;
+  const double duration = o.duration > 0 ? o.duration : plan.duration() + o.hold;
   const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
   const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
   MotionRecorder recorder(model, (ticks + ticks_per_row - 1) / ticks_per_row);
 
   Execution out;
-  Perception perception(plan.getModel(), o.perception);
+  Perception perception(plan.model(), o.perception);
   TorqueDelay delay(model.nu(), o.control_period, o.delay);
   VectorXd u = VectorXd::Zero(model.nu());
   Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
   plan.getReference(0, measurement.q, measurement.v);
-  if (model.isCopyOf(plan.getModel())) {
+  if (model.isCopyOf(plan.model())) {
     world.reset(measurement.q, measurement.v);
   } else {
-    const VectorXd q = assembleMachine(plan.getModel(), model, measurement.q);
+    const VectorXd q = assembleMachine(plan.model(), model, measurement.q);
     Workspace ws(model);
     world.reset(q, projectVelocity(model, ws, makeConstraintSet(model), q, measurement.v));
   }
-  FallDetector detector(model, plan, world.getConfiguration(), o.fall, o.ground, o.planned_ground);
+  FallDetector detector(model, plan, world.configuration(), o.fall, o.ground, o.planned_ground);
   perception.reset(world, measurement.q, measurement.v);
-  out.start = out.end = world.getBooks();
+  out.start = out.end = world.books();
   out.update_seconds.reserve(static_cast<size_t>(ticks));
-  recorder.addNode(world, controller.getFootholds());
-  const Vector3d com_start = recorder.getCom();
+  recorder.addNode(world, controller.footholds());
+  const Vector3d com_start = recorder.com();
   int cut = 0, tick = 0;
   double exchanged = 0;
   bool advances = true, is_stopped = false;
@@ -115,53 +115,53 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   const auto describe = [&](double since) {
     Execution so_far = out;
     so_far.outcome = Outcome::Running;
-    so_far.duration = world.getTime();
-    so_far.distance = (recorder.getCom() - com_start).head<2>().norm();
+    so_far.duration = world.time();
+    so_far.distance = (recorder.com() - com_start).head<2>().norm();
     so_far.imbalance = calcImbalance(so_far.start, so_far.end);
     so_far.energy_balance = exchanged > 0 ? so_far.imbalance / exchanged : 0;
     so_far.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
-    so_far.whole_seconds = pace.getElapsed();
-    so_far.estimation = perception.getErrors();
+    so_far.whole_seconds = pace.elapsed();
+    so_far.estimation = perception.errors();
     so_far.record = recorder.getRecord(since);
     return so_far;
   };
   for (; tick < ticks && !is_stopped && fall.empty(); ++tick) {
-    if (o.real_time) out.largest_lag = std::max(out.largest_lag, pace.await(world.getTime()));
-    const double start = pace.getElapsed();
-    measurement = perception.update(world, controller.getPlanTime(world.getTime()));
+    if (o.real_time) out.largest_lag = std::max(out.largest_lag, pace.await(world.time()));
+    const double start = pace.elapsed();
+    measurement = perception.update(world, controller.getPlanTime(world.time()));
     measurement.delay = o.delay.delay;
-    const double perceived = pace.getElapsed();
+    const double perceived = pace.elapsed();
     controller.update(measurement, u);
-    out.update_seconds.push_back(pace.getElapsed() - perceived);
+    out.update_seconds.push_back(pace.elapsed() - perceived);
     delay.send(measurement.time, u);
     world.setPush(calcPush(o.pushes, measurement.time));
-    const double controlled = pace.getElapsed();
+    const double controlled = pace.elapsed();
     advances = advance(world, delay, measurement.time, o.control_period);
     out.control_seconds += controlled - start;
-    out.world_seconds += pace.getElapsed() - controlled;
+    out.world_seconds += pace.elapsed() - controlled;
     is_stopped = o.interrupt && *o.interrupt;
-    for (int m = 0; m < model.nu(); ++m) cut += delay.getActing()[m] != world.getTorques()[m];
-    for (const FootReport& foot : world.getFeet()) out.largest_slip = std::max(out.largest_slip, foot.slip);
-    out.largest_gap = std::max(out.largest_gap, world.getGap());
-    if (!world.getMessage().empty()) break;
+    for (int m = 0; m < model.nu(); ++m) cut += delay.acting()[m] != world.torques()[m];
+    for (const FootReport& foot : world.feet()) out.largest_slip = std::max(out.largest_slip, foot.slip);
+    out.largest_gap = std::max(out.largest_gap, world.gap());
+    if (!world.message().empty()) break;
     if (tick % ticks_per_row == 0) recorder.addStage(world);
-    fall = detector.find(world.getTime(), controller.getPlanTime(world.getTime()), world.getConfiguration());
-    out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
-    out.largest_joint_deviation = std::max(out.largest_joint_deviation, detector.getJointDeviation());
+    fall = detector.find(world.time(), controller.getPlanTime(world.time()), world.configuration());
+    out.largest_deviation = std::max(out.largest_deviation, detector.deviation());
+    out.largest_joint_deviation = std::max(out.largest_joint_deviation, detector.jointDeviation());
     if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && !is_stopped && fall.empty()) continue;
-    recorder.addNode(world, controller.getFootholds());
-    const Books books = world.getBooks();
+    recorder.addNode(world, controller.footholds());
+    const Books books = world.books();
     exchanged += calcExchange(out.end, books);
     out.end = books;
-    if (observer && !is_stopped && fall.empty() && tick + 1 < ticks) observer(world.getTime(), duration, describe);
+    if (observer && !is_stopped && fall.empty() && tick + 1 < ticks) observer(world.time(), duration, describe);
   }
   out = describe(0);
-  const bool breaks = !world.getMessage().empty();
+  const bool breaks = !world.message().empty();
   out.outcome = breaks                      ? Outcome::BrokeOff
                 : !fall.empty()             ? Outcome::Fell
                 : advances && tick == ticks ? Outcome::Stood
                                             : Outcome::Stopped;
-  out.message = breaks ? world.getMessage() : fall;
+  out.message = breaks ? world.message() : fall;
   return out;
 }
 

@@ -62,9 +62,9 @@ struct Execution {
   Books start, end;
   MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means
 
-  double getMeanSpeed() const { return duration > 0 ? distance / duration : 0; }  ///< m/s
+  double meanSpeed() const { return duration > 0 ? distance / duration : 0; }  ///< m/s
   /// Simulated time over time on the clock.
-  double getRealTimeFactor() const { return whole_seconds > 0 ? duration / whole_seconds : 0; }
+  double realTimeFactor() const { return whole_seconds > 0 ? duration / whole_seconds : 0; }
 };
 
 /// What has happened up to now, with the rows of its record from an instant [s] on.

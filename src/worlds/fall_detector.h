@@ -33,8 +33,8 @@ class FallDetector {
 
   /// Why the robot counts as fallen, or nothing. \param plan_time  the instant of the plan at which it should be
   std::string find(double time, double plan_time, const VectorXd& q);
-  double getDeviation() const { return deviation_; }  ///< of the trunk from its planned place, at the last find(), m
-  double getJointDeviation() const { return joint_deviation_; }  ///< of a revolute joint, the largest then, rad
+  double deviation() const { return deviation_; }  ///< of the trunk from its planned place, at the last find(), m
+  double jointDeviation() const { return joint_deviation_; }  ///< of a revolute joint, the largest then, rad
 
  private:
   const Joint* findStrayJoint(const VectorXd& q);

@@ -47,7 +47,7 @@ FreeMotion moveFreely(const Model& model, World& world, ConstVectorRef q, ConstV
   Execution& e = out.execution;
   const Clock::time_point start = Clock::now();
   world.reset(q, v);
-  e.start = e.end = world.getBooks();
+  e.start = e.end = world.books();
   out.books.push_back(e.start);
   recorder.addNode(world);
   int row = 0;
@@ -56,17 +56,17 @@ FreeMotion moveFreely(const Model& model, World& world, ConstVectorRef q, ConstV
   const auto describe = [&](double since) {
     Execution so_far = e;
     so_far.outcome = Outcome::Running;
-    so_far.duration = world.getTime();
+    so_far.duration = world.time();
     so_far.imbalance = calcImbalance(e.start, e.end);
     so_far.energy_balance = exchanged > 0 ? so_far.imbalance / exchanged : 0;
     so_far.whole_seconds = std::chrono::duration<double>(Clock::now() - start).count();
     so_far.record = recorder.getRecord(since);
     return so_far;
   };
-  bool advances = world.getMessage().empty();
+  bool advances = world.message().empty();
   const auto addRow = [&] {
     recorder.addNode(world);
-    const Books books = world.getBooks();
+    const Books books = world.books();
     exchanged += calcExchange(e.end, books);
     e.end = books;
     out.books.push_back(books);
@@ -75,31 +75,31 @@ FreeMotion moveFreely(const Model& model, World& world, ConstVectorRef q, ConstV
   };
   for (double instant : listInstants(options, rows)) {
     if (!advances) break;
-    world.setTorques(findTorques(options.torques, world.getTime(), model.nu()));
-    world.setPush(calcPush(options.pushes, world.getTime() + kClockTolerance));
+    world.setTorques(findTorques(options.torques, world.time(), model.nu()));
+    world.setPush(calcPush(options.pushes, world.time() + kClockTolerance));
     if (!has_stage) {
       recorder.addStage(world);
       recorder.addClosureForces(world);
       has_stage = true;
     }
     const Clock::time_point before = Clock::now();
-    advances = world.advance(instant - world.getTime());
+    advances = world.advance(instant - world.time());
     e.world_seconds += std::chrono::duration<double>(Clock::now() - before).count();
-    e.largest_gap = std::max(e.largest_gap, world.getGap());
-    for (const FootReport& foot : world.getFeet()) e.largest_slip = std::max(e.largest_slip, foot.slip);
+    e.largest_gap = std::max(e.largest_gap, world.gap());
+    for (const FootReport& foot : world.feet()) e.largest_slip = std::max(e.largest_slip, foot.slip);
     const bool is_end = instant >= options.duration - kClockTolerance;
     if (instant < next_row - kClockTolerance && !is_end && advances) continue;
     next_row += options.record_period;
     addRow();
-    if (observer && advances && !is_end) observer(world.getTime(), options.duration, describe);
+    if (observer && advances && !is_end) observer(world.time(), options.duration, describe);
   }
   if (row == 0) {  // a record has a stage at least
     recorder.addStage(world);
     addRow();
   }
   e = describe(0);
-  e.outcome = !world.getMessage().empty() ? Outcome::BrokeOff : advances ? Outcome::Ended : Outcome::Stopped;
-  e.message = world.getMessage();
+  e.outcome = !world.message().empty() ? Outcome::BrokeOff : advances ? Outcome::Ended : Outcome::Stopped;
+  e.message = world.message();
   return out;
 }
 

@@ -38,14 +38,14 @@ class ManifoldWorld : public World {
   void setTorques(ConstVectorRef u) override;
   void setPush(const Vector3d& force) override { push_ = force; }
   bool advance(double duration) override;
-  const std::string& getMessage() const override { return message_; }
-  double getTime() const override { return time_; }
-  const VectorXd& getConfiguration() const override { return q_; }
-  const VectorXd& getVelocity() const override { return v_; }
-  const VectorXd& getTorques() const override { return u_; }
-  const std::vector<FootReport>& getFeet() const override { return soles_.getReports(); }
-  Books getBooks() const override;
-  double getGap() const override { return gap_; }
+  const std::string& message() const override { return message_; }
+  double time() const override { return time_; }
+  const VectorXd& configuration() const override { return q_; }
+  const VectorXd& velocity() const override { return v_; }
+  const VectorXd& torques() const override { return u_; }
+  const std::vector<FootReport>& feet() const override { return soles_.reports(); }
+  Books books() const override;
+  double gap() const override { return gap_; }
 
  private:
   void checkStart(int rank);
@@ -118,11 +118,11 @@ void ManifoldWorld::reset(ConstVectorRef q, ConstVectorRef v) {
     if (rank <= ClosedField::kDenseRows) checkStart(rank);
     if (!message_.empty()) return;
   }
-  if (!settle(VectorXd::Zero(model_.nv()), v_)) fail(field_.getFailure());
-  best_independence_ = field_.getIndependence();
+  if (!settle(VectorXd::Zero(model_.nv()), v_)) fail(field_.failure());
+  best_independence_ = field_.independence();
   for (ContactPoint& point : points_) {
     point.touches = false;
-    updateAnchor(terrain_, field_.getWorkspace().X_WB[point.body].act(point.p), ContactForce(), point);
+    updateAnchor(terrain_, field_.workspace().X_WB[point.body].act(point.p), ContactForce(), point);
   }
   elastic_start_ = calcElasticEnergy(&stops_start_);
 }
@@ -157,9 +157,9 @@ bool ManifoldWorld::settle(ConstVectorRef d, ConstVectorRef u) {
   if (!field_.close(d, u)) return false;
   gap_ = field_.calcGap();
   if (gap_ > kOpen) return fail("the rank of its loops changes there: a posture where they lock");
-  q_ = field_.getConfiguration();
+  q_ = field_.configuration();
   model_.normalize(q_);
-  v_ = field_.getVelocity();
+  v_ = field_.velocity();
   return true;
 }
 
@@ -189,14 +189,14 @@ bool ManifoldWorld::step(double& h) {
   field_.begin(q_);
   x_.setZero();
   x_.segment(nv, nv) = v_;
-  if (!evaluate(x_, rate_)) return fail(field_.getFailure());
-  const double independence = field_.getIndependence();
+  if (!evaluate(x_, rate_)) return fail(field_.failure());
+  const double independence = field_.independence();
   if (independence < kLessIndependent * best_independence_ && independence > kNearest * best_independence_) {
     field_.select(q_);
     field_.begin(q_);
-    if (!evaluate(x_, rate_)) return fail(field_.getFailure());
+    if (!evaluate(x_, rate_)) return fail(field_.failure());
   }
-  best_independence_ = std::max(best_independence_, field_.getIndependence());
+  best_independence_ = std::max(best_independence_, field_.independence());
   scale_.head(nv).setConstant(tolerance_);
   scale_.tail(nv) = tolerance_ * (1 + v_.array().abs());
   const double wanted = h;
@@ -210,9 +210,9 @@ bool ManifoldWorld::step(double& h) {
     if (error <= 1 || takes_best) {
       const VectorXd& end = method_.end();
       if (field_.close(end.head(nv), end.segment(nv, nv)) && (gap_ = field_.calcGap()) <= kOpen) {
-        q_ = field_.getConfiguration();
+        q_ = field_.configuration();
         model_.normalize(q_);
-        v_ = field_.getVelocity();
+        v_ = field_.velocity();
         for (int w = 0; w < kWorks; ++w) work_[w] += end[2 * nv + w];
         // A step that had to be short says nothing about the next one.
         next_step_ = std::max(h < next_step_ && h == wanted ? next_step_ : 0.0, h * factor);
@@ -237,7 +237,7 @@ bool ManifoldWorld::step(double& h) {
     if (!(h > kShortestStep)) return fail(describeStop());
   }
   for (ContactPoint& point : points_) {
-    const Workspace& ws = field_.getWorkspace();
+    const Workspace& ws = field_.workspace();
     const Vector3d x = ws.X_WB[point.body].act(point.p);
     const Vector6d& V = ws.V[point.body];
     const Vector3d velocity = V.head<3>() + V.tail<3>().cross(x);
@@ -249,7 +249,7 @@ bool ManifoldWorld::step(double& h) {
 bool ManifoldWorld::evaluate(const VectorXd& x, VectorXd& rate) {
   const int nv = model_.nv();
   if (!field_.close(x.head(nv), x.segment(nv, nv))) return false;
-  least_independence_ = std::min(least_independence_, field_.getIndependence());
+  least_independence_ = std::min(least_independence_, field_.independence());
   std::array<double, kWorks> power{};
   calcForces(tau_, power);
   field_.accelerate(tau_, rate.head(nv), rate.segment(nv, nv));
@@ -261,12 +261,12 @@ bool ManifoldWorld::evaluate(const VectorXd& x, VectorXd& rate) {
 void ManifoldWorld::addForce(int body, const Vector3d& at, const Vector3d& force, VectorXd& tau) const {
   Vector6d wrench;
   wrench << force, at.cross(force);
-  for (int k : model_.supportDofs(body)) tau[k] += field_.getWorkspace().J.col(k).dot(wrench);
+  for (int k : model_.supportDofs(body)) tau[k] += field_.workspace().J.col(k).dot(wrench);
 }
 
 void ManifoldWorld::calcForces(VectorXd& tau, std::array<double, kWorks>& power) {
-  const Workspace& ws = field_.getWorkspace();
-  const VectorXd& v = field_.getVelocity();
+  const Workspace& ws = field_.workspace();
+  const VectorXd& v = field_.velocity();
   tau = tau_motors_;
   power[kMotors] = tau.dot(v);
   const auto calcVelocityAt = [&ws](int body, const Vector3d& x) -> Vector3d {
@@ -300,7 +300,7 @@ void ManifoldWorld::calcForces(VectorXd& tau, std::array<double, kWorks>& power)
 }
 
 void ManifoldWorld::updateFeet() {
-  const Workspace& ws = field_.getWorkspace();
+  const Workspace& ws = field_.workspace();
   soles_.clearForces();
   for (const ContactPoint& point : points_) {
     const Vector3d x = ws.X_WB[point.body].act(point.p);
@@ -321,7 +321,7 @@ double ManifoldWorld::calcElasticEnergy(double* of_stops) const {
   return contacts + stops;
 }
 
-Books ManifoldWorld::getBooks() const {
+Books ManifoldWorld::books() const {
   updatePositions(model_, ws_, q_);
   updateVelocities<double>(model_, ws_, v_);
   Books books;
@@ -342,7 +342,7 @@ std::string ManifoldWorld::describeStop() const {
   v_.cwiseAbs().maxCoeff(&fastest);
   std::string text = "the motion cannot go on after " + formatNumber(time_) + " s: its steps become shorter than " +
                      formatNumber(kShortestStep) + " s. ";
-  if (!field_.getFailure().empty()) text += "Last reason: " + field_.getFailure() + ". ";
+  if (!field_.failure().empty()) text += "Last reason: " + field_.failure() + ". ";
   return text + "Fastest is joint '" + model_.joints()[model_.dofs()[fastest].joint].name + "', at " +
          formatNumber(v_[fastest]);
 }

@@ -34,8 +34,8 @@ MotionRecorder::MotionRecorder(const Model& model, int stages)
 }
 
 void MotionRecorder::addNode(const World& world, const std::vector<PredictedFoothold>& footholds) {
-  const VectorXd &q = world.getConfiguration(), &v = world.getVelocity();
-  record_.time[node_] = world.getTime();
+  const VectorXd &q = world.configuration(), &v = world.velocity();
+  record_.time[node_] = world.time();
   record_.q.row(node_) = q;
   record_.v.row(node_) = v;
   updatePositions(model_, ws_, q);
@@ -55,19 +55,19 @@ void MotionRecorder::addNode(const World& world, const std::vector<PredictedFoot
 
 void MotionRecorder::addStage(const World& world) {
   const int stage = node_ - 1;
-  record_.u.row(stage) = world.getTorques();
+  record_.u.row(stage) = world.torques();
   record_.closure_wrenches.row(stage).setConstant(kUnknown);
-  for (size_t c = 0; c < world.getFeet().size(); ++c)
-    record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world.getFeet()[c].wrench;
+  for (size_t c = 0; c < world.feet().size(); ++c)
+    record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world.feet()[c].wrench;
 }
 
 void MotionRecorder::addClosureForces(const World& world) {
   const int stage = node_ - 1;
   if (loops_.rows == 0 || !record_.contact_wrenches.row(stage).isZero(0) ||
-      !isWithinStops(model_, world.getConfiguration()))
+      !isWithinStops(model_, world.configuration()))
     return;
-  if (updateConstrainedDynamics(model_, ws_, cws_, loops_, world.getConfiguration(), world.getVelocity(),
-                                calcMotorForces(model_, world.getTorques())) != DynamicsStatus::Ok)
+  if (updateConstrainedDynamics(model_, ws_, cws_, loops_, world.configuration(), world.velocity(),
+                                calcMotorForces(model_, world.torques())) != DynamicsStatus::Ok)
     return;
   for (size_t c = 0; c < loops_.closures.size(); ++c) {
     const Closure& closure = loops_.closures[c];
@@ -99,7 +99,7 @@ void MotionRecorder::addFootholds(const std::vector<PredictedFoothold>& foothold
 }
 
 double calcImbalance(const Books& start, const Books& end) {
-  return end.getEnergy() - start.getEnergy() - end.motor_work - end.push_work + end.contact_loss + end.stop_loss +
+  return end.energy() - start.energy() - end.motor_work - end.push_work + end.contact_loss + end.stop_loss +
          end.other_loss;
 }
 

@@ -19,7 +19,7 @@ class MotionRecorder {
   /// After addStage(): forces of the closures at the state of the last node, by the full system, where neither ground nor stops
   /// touch the robot; where rows are redundant, those of least norm.
   void addClosureForces(const World& world);
-  Vector3d getCom() const { return record_.com.row(node_ - 1); }  ///< at the last node, m
+  Vector3d com() const { return record_.com.row(node_ - 1); }  ///< at the last node, m
   /// What was recorded from an instant on [s], a stage at least; accelerations are means.
   MotionRecord getRecord(double since = 0) const;
 

@@ -64,14 +64,14 @@ class MujocoWorld : public World {
   void setTorques(ConstVectorRef u) override;
   void setPush(const Vector3d& force) override;
   bool advance(double duration) override;
-  const std::string& getMessage() const override { return message_; }
-  double getTime() const override { return time_; }
-  const VectorXd& getConfiguration() const override { return q_; }
-  const VectorXd& getVelocity() const override { return v_; }
-  const VectorXd& getTorques() const override { return u_; }
-  const std::vector<FootReport>& getFeet() const override { return soles_.getReports(); }
-  Books getBooks() const override;
-  double getGap() const override;
+  const std::string& message() const override { return message_; }
+  double time() const override { return time_; }
+  const VectorXd& configuration() const override { return q_; }
+  const VectorXd& velocity() const override { return v_; }
+  const VectorXd& torques() const override { return u_; }
+  const std::vector<FootReport>& feet() const override { return soles_.reports(); }
+  Books books() const override;
+  double gap() const override;
 
  private:
   bool step();
@@ -212,7 +212,7 @@ void MujocoWorld::addSoleForces(double share) {
   }
 }
 
-Books MujocoWorld::getBooks() const {
+Books MujocoWorld::books() const {
   updatePositions(model_, ws_, q_);
   updateVelocities(model_, ws_, v_);
   Books books;
@@ -226,7 +226,7 @@ Books MujocoWorld::getBooks() const {
   return books;
 }
 
-double MujocoWorld::getGap() const {
+double MujocoWorld::gap() const {
   updatePositions(model_, ws_, q_);
   double gap = 0;
   for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureGap(ws_, closure).position);

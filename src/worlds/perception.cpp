@@ -54,32 +54,32 @@ void Perception::reset(const World& world, ConstVectorRef q, ConstVectorRef v) {
   errors_ = {};
   instants_ = 0;
   if (!sensors_) return;
-  start_ = world.getConfiguration().head<3>();
-  const std::vector<int>& contacts = getPlanned(world.getTime());
+  start_ = world.configuration().head<3>();
+  const std::vector<int>& contacts = getPlanned(world.time());
   const VectorXd u = calcRestTorques(q, contacts);
-  const double start = world.getTime() - kRestReadings * kRestPeriod;
+  const double start = world.time() - kRestReadings * kRestPeriod;
   sensors_->reset(world, start);
   estimator_->reset(start, q, v, contacts);
   for (int i = kRestReadings - 1; i >= 0; --i)
-    estimator_->update(sensors_->readAtRest(world.getTime() - i * kRestPeriod, u), contacts);
+    estimator_->update(sensors_->readAtRest(world.time() - i * kRestPeriod, u), contacts);
 }
 
 const Measurement& Perception::update(const World& world, double plan_time) {
   if (!sensors_) {
-    measurement_.time = world.getTime();
-    measurement_.q = world.getConfiguration();
-    measurement_.v = world.getVelocity();
-    for (size_t c = 0; c < measurement_.contacts.size(); ++c) measurement_.contacts[c] = world.getFeet()[c].touches;
+    measurement_.time = world.time();
+    measurement_.q = world.configuration();
+    measurement_.v = world.velocity();
+    for (size_t c = 0; c < measurement_.contacts.size(); ++c) measurement_.contacts[c] = world.feet()[c].touches;
     return measurement_;
   }
   estimator_->update(sensors_->read(world), getPlanned(plan_time));
   addErrors(world);
-  return estimator_->getMeasurement();
+  return estimator_->measurement();
 }
 
 void Perception::addErrors(const World& world) {
-  const Measurement& m = estimator_->getMeasurement();
-  const VectorXd &q = world.getConfiguration(), &v = world.getVelocity();
+  const Measurement& m = estimator_->measurement();
+  const VectorXd &q = world.configuration(), &v = world.velocity();
   const Matrix3d R = getAttitude(m.q), truth = getAttitude(q);
   const double position = (m.q.head<3>() - q.head<3>()).norm();
   const double velocity = (R * m.v.head<3>() - truth * v.head<3>()).norm();
@@ -94,13 +94,13 @@ void Perception::addErrors(const World& world) {
   errors_.drift = (m.q - q).head<2>().norm();
   errors_.way = (q.head<3>() - start_).head<2>().norm();
   int wrong = 0;
-  const auto& feet = world.getFeet();
-  for (size_t c = 0; c < feet.size(); ++c) wrong += feet[c].touches != (estimator_->getContacts()[c] != 0);
+  const auto& feet = world.feet();
+  for (size_t c = 0; c < feet.size(); ++c) wrong += feet[c].touches != (estimator_->contacts()[c] != 0);
   errors_.contact_errors += feet.empty() ? 0 : static_cast<double>(wrong) / static_cast<double>(feet.size());
   ++instants_;
 }
 
-EstimationErrors Perception::getErrors() const {
+EstimationErrors Perception::errors() const {
   EstimationErrors out = errors_;
   const double n = static_cast<double>(std::max(1L, instants_));
   for (double* sum : {&out.position_rms, &out.velocity_rms, &out.tilt_rms}) *sum = std::sqrt(*sum / n);

@@ -34,7 +34,7 @@ class Perception {
   /// At the time of the world. No allocation. \param plan_time  at which the controller is in its plan, s
   const Measurement& update(const World& world, double plan_time);
   bool isReal() const { return sensors_.has_value(); }
-  EstimationErrors getErrors() const;  ///< zero where the truth is told
+  EstimationErrors errors() const;  ///< zero where the truth is told
 
  private:
   VectorXd calcRestTorques(ConstVectorRef q, const std::vector<int>& contacts) const;
@@ -51,7 +51,7 @@ class Perception {
   std::optional<Estimator> estimator_;
   Measurement measurement_;
   Vector3d start_ = Vector3d::Zero();
-  EstimationErrors errors_;  // sums until getErrors()
+  EstimationErrors errors_;  // sums until errors()
   long instants_ = 0;
 };
 

@@ -97,7 +97,7 @@ MotionRequest fixDurations(const MotionSummary& summary, MotionRequest request) 
 void finishPlan(const MotionRequest& request, const std::string& guess, PlanControl control,
                 const PredictiveOptions& predictive, Plan& plan) {
   const MotionSummary& summary = plan.summary;
-  const Model& model = plan.getModel();
+  const Model& model = plan.model();
   ProblemOptions problem(summary.formulation, summary.step);
   problem.limits = readLimits(summary);
   problem.objective = summary.objective;

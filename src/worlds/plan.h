@@ -35,11 +35,11 @@ struct Plan {
   int iterations = 0;  ///< that the solver took for the gains; 0: the motion in the files was its solution
 
   /// Of the model that is believed in.
-  const Model& getModel() const { return serial ? serial->model : robot.model; }
+  const Model& model() const { return serial ? serial->model : robot.model; }
   /// When a node of the plan comes, s.
   double getTime(int node) const {
     const size_t k = static_cast<size_t>(node);
-    return k < policy->getStages().size() ? policy->getStages()[k].start : policy->getDuration();
+    return k < policy->stages().size() ? policy->stages()[k].start : policy->duration();
   }
   /// The plan in states of the closed robot.
   const Policy& getReference() const { return reference.policy ? *reference.policy : *policy; }

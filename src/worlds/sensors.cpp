@@ -43,20 +43,20 @@ Vector3d Sensors::drawNoise(const Vector3d& deviations) {
 void Sensors::readEncoders(const World& world) {
   for (int m = 0; m < model_.nu(); ++m) {
     const Joint& joint = model_.joints()[model_.motors()[m].joint];
-    const double position = world.getConfiguration()[joint.idx_q];
+    const double position = world.configuration()[joint.idx_q];
     const double resolution = options_.noise * (joint.kind == JointKind::Prismatic ? options_.parts.encoder_length
                                                                                    : options_.parts.encoder_angle);
     readings_.motor_positions[m] = resolution > 0 ? resolution * std::round(position / resolution) : position;
   }
-  readings_.motor_torques = world.getTorques();
+  readings_.motor_torques = world.torques();
 }
 
 void Sensors::reset(const World& world, double time) {
   readings_.time = time;
   readEncoders(world);
   if (!model_.hasFreeFlyer()) return;
-  X_WI_ = getTrunk(world.getConfiguration()) * options_.imu;
-  const Vector6d twist = options_.imu.actInvMotion(world.getVelocity().head<6>());
+  X_WI_ = getTrunk(world.configuration()) * options_.imu;
+  const Vector6d twist = options_.imu.actInvMotion(world.velocity().head<6>());
   v_ = X_WI_.R * twist.head<3>();
   readings_.angular_velocity = twist.tail<3>() + gyro_offset_;
   readings_.specific_force = -(X_WI_.R.transpose() * model_.gravity()) + accelerometer_offset_;
@@ -73,13 +73,13 @@ const SensorReadings& Sensors::readAtRest(double time, ConstVectorRef torques) {
 }
 
 const SensorReadings& Sensors::read(const World& world) {
-  const double period = world.getTime() - readings_.time;
+  const double period = world.time() - readings_.time;
   if (!(period > 0)) return readings_;
-  readings_.time = world.getTime();
+  readings_.time = world.time();
   readEncoders(world);
   if (!model_.hasFreeFlyer()) return readings_;
-  const SE3 X_WI = getTrunk(world.getConfiguration()) * options_.imu;
-  const Vector3d v = X_WI.R * options_.imu.actInvMotion(world.getVelocity().head<6>()).head<3>();
+  const SE3 X_WI = getTrunk(world.configuration()) * options_.imu;
+  const Vector3d v = X_WI.R * options_.imu.actInvMotion(world.velocity().head<6>()).head<3>();
   const Vector3d turn = log3(Matrix3d(X_WI_.R.transpose() * X_WI.R));
   const Matrix3d middle = X_WI_.R * exp3(Vector3d(0.5 * turn));
   const double bandwidth = std::sqrt(0.5 / period);

@@ -79,7 +79,7 @@ SerialReference makeReference(const Model& closed, const SerialModel& serial, co
   std::vector<Policy::Stage> stages;
   VectorXd q, v, q_next;
   setState(0, q, v);
-  for (const Policy::Stage& from : plan.getStages()) {
+  for (const Policy::Stage& from : plan.stages()) {
     Policy::Stage stage;
     stage.start = from.start;
     stage.duration = from.duration;

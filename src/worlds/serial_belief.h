@@ -35,7 +35,7 @@ class SerialController : public Controller {
   /// Allocates. At a dead point, where Eq. (1) has no solution, R is that of the last posture away from one.
   void update(const Measurement& measurement, VectorRef u) override;
   double getPlanTime(double time) const override { return inner_.getPlanTime(time); }
-  const std::vector<PredictedFoothold>& getFootholds() const override { return inner_.getFootholds(); }
+  const std::vector<PredictedFoothold>& footholds() const override { return inner_.footholds(); }
 
  private:
   const Model &closed_, &serial_;

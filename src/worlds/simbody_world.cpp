@@ -44,7 +44,7 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
       if (force != 0) mobility_forces[tree_.u_index[stop.dof]] += force;
     }
     for (int m = 0; m < tree_.model.nu(); ++m) mobility_forces[tree_.u_index[tree_.model.motors()[m].dof]] += u[m];
-    tree_.bodies[pushed_body].applyForceToBodyPoint(state, toSimTK(getPushPoint()), toSimTK(push), body_forces);
+    tree_.bodies[pushed_body].applyForceToBodyPoint(state, toSimTK(pushPoint()), toSimTK(push), body_forces);
   }
   double calcPotentialEnergy(const State&) const override { return 0; }  // Books keeps it apart
 
@@ -85,8 +85,7 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
                                                      findVelocity(state, spring.body1, spring.point1));
       powers.joint -= spring.damping * rate * rate;
     }
-    powers.push =
-        push.dot(toEigen(tree_.bodies[pushed_body].findStationVelocityInGround(state, toSimTK(getPushPoint()))));
+    powers.push = push.dot(toEigen(tree_.bodies[pushed_body].findStationVelocityInGround(state, toSimTK(pushPoint()))));
     return powers;
   }
   double calcElasticEnergy(const State& state, double& of_stops) const {
@@ -100,7 +99,7 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
 
  private:
   double getRate(const State& state, int dof) const { return state.getU()[tree_.u_index[dof]]; }
-  Vector3d getPushPoint() const { return tree_.model.bodies()[pushed_body].inertia.com; }
+  Vector3d pushPoint() const { return tree_.model.bodies()[pushed_body].inertia.com; }
 
   const SimbodyTree& tree_;
 
@@ -167,14 +166,14 @@ class SimbodyWorld : public World {
   void setTorques(ConstVectorRef u) override;
   void setPush(const Vector3d& force) override;
   bool advance(double duration) override;
-  const std::string& getMessage() const override { return message_; }
-  double getTime() const override { return time_; }
-  const VectorXd& getConfiguration() const override { return q_; }
-  const VectorXd& getVelocity() const override { return v_; }
-  const VectorXd& getTorques() const override { return forces_->u; }
-  const std::vector<FootReport>& getFeet() const override { return soles_.getReports(); }
-  Books getBooks() const override;
-  double getGap() const override;
+  const std::string& message() const override { return message_; }
+  double time() const override { return time_; }
+  const VectorXd& configuration() const override { return q_; }
+  const VectorXd& velocity() const override { return v_; }
+  const VectorXd& torques() const override { return forces_->u; }
+  const std::vector<FootReport>& feet() const override { return soles_.reports(); }
+  Books books() const override;
+  double gap() const override;
 
  private:
   void addRotors();
@@ -345,7 +344,7 @@ void SimbodyWorld::readState() {
   });
 }
 
-Books SimbodyWorld::getBooks() const {
+Books SimbodyWorld::books() const {
   const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Dynamics);
   Books books;
@@ -361,7 +360,7 @@ Books SimbodyWorld::getBooks() const {
   return books;
 }
 
-double SimbodyWorld::getGap() const {
+double SimbodyWorld::gap() const {
   const SimTK::State& state = integrator_->getState();
   double gap = 0;
   const auto locate = [&](int body, const Vector3d& point) {

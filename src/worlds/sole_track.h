@@ -20,7 +20,7 @@ class SoleTrack {
     for (size_t c = 0; c < reports_.size(); ++c)
       updateFoot(c, getPlacement(model_.contacts()[c].body) * model_.contacts()[c].X_BF);
   }
-  const std::vector<FootReport>& getReports() const { return reports_; }
+  const std::vector<FootReport>& reports() const { return reports_; }
 
  private:
   void updateFoot(size_t contact, const SE3& X_WF);

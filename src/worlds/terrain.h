@@ -26,7 +26,7 @@ class Terrain {
   /// How deep a point is in the ground, along the normal of the surface through which the way out is shortest: the top of a
   /// box, or one of its sides unless there is ground beyond it.
   Touch touch(const Vector3d& point) const;
-  const Ground& getGround() const { return ground_; }
+  const Ground& ground() const { return ground_; }
 
  private:
   // A box seen from above, with the plane of its top: z = height + slope . (x, y).

@@ -49,10 +49,10 @@ const VectorXd& TorqueDelay::getTorques(double time) {
     under_way_ -= age;
     break;
   }
-  return getActing();
+  return acting();
 }
 
-double TorqueDelay::getNextChange() const {
+double TorqueDelay::nextChange() const {
   double next = std::numeric_limits<double>::infinity();
   for (size_t age = 1; age <= under_way_; ++age) next = std::min(next, get(age).time);
   return next;

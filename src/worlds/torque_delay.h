@@ -24,9 +24,9 @@ class TorqueDelay {
   void send(double time, ConstVectorRef u);
   /// Those that act at `time`, which must not fall from call to call.
   const VectorXd& getTorques(double time);
-  const VectorXd& getActing() const { return get(0).u; }  ///< as of the last call of getTorques()
+  const VectorXd& acting() const { return get(0).u; }  ///< as of the last call of torques()
   /// When other torques act next, s; infinity if none are under way.
-  double getNextChange() const;
+  double nextChange() const;
 
  private:
   struct Torques {

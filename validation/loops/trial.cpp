@@ -48,15 +48,15 @@ void run(const Problem& problem, const Engine& engine, const TrialOptions& optio
   const double at_start = problem.calcInvariant(problem.start.q, problem.start.v);
   for (const double time : listLooks(problem, duration)) {
     const double before = readClock();
-    const bool is_good = world->advance(time - world->getTime());
+    const bool is_good = world->advance(time - world->time());
     trial.cpu += readClock() - before;
-    trial.until = world->getTime();
+    trial.until = world->time();
     if (!is_good) {
-      trial.end = world->getMessage();
+      trial.end = world->message();
       break;
     }
-    const VectorXd &q = world->getConfiguration(), &v = world->getVelocity();
-    trial.gap = std::max(trial.gap, world->getGap());
+    const VectorXd &q = world->configuration(), &v = world->velocity();
+    trial.gap = std::max(trial.gap, world->gap());
     trial.drift = std::max(trial.drift, std::abs(problem.calcInvariant(q, v) - at_start) / problem.invariant_scale);
     if (std::any_of(problem.times.begin(), problem.times.end(),
                     [&](double t) { return std::abs(t - time) < 1e-9 * duration; }))

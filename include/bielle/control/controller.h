@@ -12,7 +12,7 @@ struct Measurement {
   std::vector<char> contacts{};
   double delay = 0;  ///< from `time` until the torques computed from this act, s
 
-  double getActionTime() const { return time + delay; }  ///< when they act, s
+  double actionTime() const { return time + delay; }  ///< when they act, s
 };
 
 /// The predicted next foothold of a foot.
@@ -32,7 +32,7 @@ class Controller {
   /// The current time in the controller's plan, s. Early landings advance it, late ones hold it back.
   virtual double getPlanTime(double time) const { return time; }
   /// For the feet that land within the controller's horizon; empty if it does not plan.
-  virtual const std::vector<PredictedFoothold>& getFootholds() const {
+  virtual const std::vector<PredictedFoothold>& footholds() const {
     static const std::vector<PredictedFoothold> none;
     return none;
   }

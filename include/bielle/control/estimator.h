@@ -55,7 +55,7 @@ struct EstimatorOptions {
 
 enum class EstimatorStatus {
   Ok,
-  NearDeadPoint,  ///< a linkage hardly follows its motors: getMessage() names it
+  NearDeadPoint,  ///< a linkage hardly follows its motors: message() names it
   NotClosed,      ///< no closed configuration fits the motors: the last one is kept
   NotFinite       ///< readings were not finite and are ignored
 };
@@ -74,12 +74,12 @@ class Estimator {
   /// \param planned  contacts in the plan at this time; empty if there is no plan
   EstimatorStatus update(const SensorReadings& readings, const std::vector<int>& planned);
 
-  const Measurement& getMeasurement() const;        ///< as of the last update()
-  const std::vector<char>& getContacts() const;     ///< per contact of the model, whether it stands
+  const Measurement& measurement() const;           ///< as of the last update()
+  const std::vector<char>& contacts() const;        ///< per contact of the model, whether it stands
   const Vector6d& getWrench(size_t contact) const;  ///< of the ground on a foot in its contact frame, N and N m
   /// The least that motors move in a unit motion of their linkage; 1 without linkages.
-  double getMargin() const;
-  std::string getMessage() const;  ///< of the last status; empty if it is Ok
+  double margin() const;
+  std::string message() const;  ///< of the last status; empty if it is Ok
 
  private:
   struct Parts;

@@ -50,9 +50,9 @@ class Policy : public Controller {
   void exchange(std::vector<Stage>& stages, VectorXd& u_hold);
   /// q* and v* of Eq. (1).
   void getReference(double time, VectorRef q, VectorRef v) const;
-  double getDuration() const { return stages_.back().start + stages_.back().duration; }  ///< s
-  const Model& getModel() const { return model_; }
-  const std::vector<Stage>& getStages() const { return stages_; }
+  double duration() const { return stages_.back().start + stages_.back().duration; }  ///< s
+  const Model& model() const { return model_; }
+  const std::vector<Stage>& stages() const { return stages_; }
 
  private:
   void findLastPhase();

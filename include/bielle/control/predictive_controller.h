@@ -105,9 +105,9 @@ class PredictiveController : public Controller {
   void update(const Measurement& measurement, VectorRef u) override;
   double getPlanTime(double time) const override;
   /// Of the last solution: the first landing of each contact in its window.
-  const std::vector<PredictedFoothold>& getFootholds() const override;
-  const PredictiveCounts& getCounts() const;
-  const Policy& getPolicy() const;  ///< in force
+  const std::vector<PredictedFoothold>& footholds() const override;
+  const PredictiveCounts& counts() const;
+  const Policy& policy() const;  ///< in force
   /// Until the solve under way in a thread of its own, if any, has ended; its policy comes into force by update().
   void waitForSolve() const;
 

@@ -66,7 +66,7 @@ struct RatioSweep {
   std::string begin, end;            ///< why the curve ends there
   bool full_turn = false;            ///< both ends are the same configuration
 
-  std::vector<RatioSample> getDeadPoints() const;
+  std::vector<RatioSample> deadPoints() const;
 };
 
 /// \param q  closed configuration of the whole model to start from

@@ -149,24 +149,22 @@ struct Motor {
   double continuous_effort = std::numeric_limits<double>::infinity();
   MotorDrive drive{};
 
-  double getTorqueLoss() const;
+  double torqueLoss() const;
   /// c of MotorDrive Eq. (1). \param power  u w, W; c is 1/e at 0
   double getEffortFactor(double power) const { return power >= 0 ? 1 / drive.efficiency : drive.back_efficiency; }
   /// Whether torque and speed limit each other.
   bool hasEnvelope() const { return drive.hasWinding() && std::isfinite(drive.voltage); }
   /// Factors of u and w in the voltage of MotorDrive Eq. (1) with c = 1/e. That is exact while the motor drives. While it is
   /// driven, the true one is within the supply if this one and n k_t w alone are, which the limit of speed ensures.
-  double getVoltsPerEffort() const {
-    return drive.resistance / (drive.efficiency * drive.ratio * drive.torque_constant);
-  }
-  double getVoltsPerSpeed() const { return drive.ratio * drive.torque_constant; }
+  double voltsPerEffort() const { return drive.resistance / (drive.efficiency * drive.ratio * drive.torque_constant); }
+  double voltsPerSpeed() const { return drive.ratio * drive.torque_constant; }
   /// The torque next to u that the motor can give at the speed w: within its limit and the row above.
   double clampEffort(double u, double w) const;
 };
 
 /// Assumed value, typical of geared motors of 0.8 kg that hold about 15 N m with 50 W of heat, W/(N m)^2.
 inline constexpr double kDefaultTorqueLoss = 0.25;
-inline double Motor::getTorqueLoss() const { return torque_loss.value_or(kDefaultTorqueLoss); }
+inline double Motor::torqueLoss() const { return torque_loss.value_or(kDefaultTorqueLoss); }
 
 /// A point; a blade, which stands on an edge along x and may roll about it; a rectangular sole.
 enum class ContactKind { Point3D, Edge5D, Surface6D };

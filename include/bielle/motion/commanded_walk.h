@@ -81,10 +81,10 @@ class CommandedWalk {
   CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits, CommandSource command,
                 const StandingRobot& standing);
 
-  const Model& getModel() const { return model_; }
+  const Model& model() const { return model_; }
   /// The next stage.
   Stage makeNext();
-  double getTimeStep() const { return options_.timing.time_step; }  ///< s
+  double timeStep() const { return options_.timing.time_step; }  ///< s
   /// The stages of a step on the spot, which are as large as any stage of the walk; for allocating memory.
   std::vector<StageSpec> makeExamples() const;
 

@@ -125,7 +125,7 @@ std::unique_ptr<Residual> makeTransmission(const Linkage& linkage);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
 /// Voltages of motors, given by their indices in the model, from their torques and their speeds when the torques act, with the
-/// factors Motor::getVoltsPerEffort() and getVoltsPerSpeed() (n), V. \throws InputError for one without an envelope
+/// factors Motor::voltsPerEffort() and voltsPerSpeed() (n), V. \throws InputError for one without an envelope
 std::unique_ptr<Residual> makeMotorVoltage(const Model& model, const std::vector<int>& motors);
 /// Electrical powers P_m = u_m w_m + loss_m u_m^2 of all motors, w their speeds when the torques act, then their torques
 /// (2 nu), W and N m: what Activation::makeEnergy reads. \param losses  nu, W/(N m)^2

@@ -161,7 +161,7 @@ class RobotProblem : public ShootingProblem {
   void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override;
   void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override;
   void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override;
-  int getBatchSize() const override;
+  int batchSize() const override;
   /// Gains on deviations of a robot whose loops need not be closed, from gains K on the tangent space at the state x_k of an
   /// evaluation,
   ///     K d(x (-) x_k)/d(dq, dv) at x = x_k,                                                                        (7)

@@ -182,7 +182,7 @@ class ShootingProblem {
   virtual void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const = 0;
   virtual void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const = 0;
   /// Number of tasks per call for best speed.
-  virtual int getBatchSize() const { return 1; }
+  virtual int batchSize() const { return 1; }
 
  private:
   struct Id {

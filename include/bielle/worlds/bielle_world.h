@@ -58,7 +58,7 @@ struct ManifoldWorldOptions {
   double tolerance = 1e-9;
 };
 
-/// advance() fails where the mechanism cannot go on: getMessage() names joint or closure and the time. The robot needs no
+/// advance() fails where the mechanism cannot go on: message() names joint or closure and the time. The robot needs no
 /// standing posture and no free joint.
 /// \throws InputError when the robot has no closed configuration
 std::unique_ptr<World> makeManifoldWorld(const Model& model, const ManifoldWorldOptions& options = {});

@@ -37,7 +37,7 @@ struct Books {
   double contact_loss = 0, stop_loss = 0;  ///< dissipated by friction and damping; not negative
   double other_loss = 0;                   ///< dampers and friction of joints, damping of closures
 
-  double getEnergy() const { return kinetic + potential + elastic; }
+  double energy() const { return kinetic + potential + elastic; }
 };
 
 /// What the ground does to a contact of the model.
@@ -60,18 +60,18 @@ class World {
   /// A force at the centre of mass of the pushed body (WorldOptions), N (world), held until the next call.
   virtual void setPush(const Vector3d& force) = 0;
   /// Advances by a duration, s.
-  /// \returns false if the integration broke off; the state is then the last one that is finite, and getMessage() says
+  /// \returns false if the integration broke off; the state is then the last one that is finite, and message() says
   ///   why. Exceptions of an engine do not pass. Also false if it was interrupted, without a message; it can go on.
   virtual bool advance(double duration) = 0;
-  virtual const std::string& getMessage() const = 0;  ///< empty unless the integration broke off
+  virtual const std::string& message() const = 0;  ///< empty unless the integration broke off
 
-  virtual double getTime() const = 0;                          ///< since reset(), s
-  virtual const VectorXd& getConfiguration() const = 0;        ///< nq, coordinates of the model
-  virtual const VectorXd& getVelocity() const = 0;             ///< nv
-  virtual const VectorXd& getTorques() const = 0;              ///< nu, as they were cut
-  virtual const std::vector<FootReport>& getFeet() const = 0;  ///< per contact of the model
-  virtual Books getBooks() const = 0;
-  virtual double getGap() const = 0;  ///< opening of the closures at present: the largest distance of their points, m
+  virtual double time() const = 0;                          ///< since reset(), s
+  virtual const VectorXd& configuration() const = 0;        ///< nq, coordinates of the model
+  virtual const VectorXd& velocity() const = 0;             ///< nv
+  virtual const VectorXd& torques() const = 0;              ///< nu, as they were cut
+  virtual const std::vector<FootReport>& feet() const = 0;  ///< per contact of the model
+  virtual Books books() const = 0;
+  virtual double gap() const = 0;  ///< opening of the closures at present: the largest distance of their points, m
 
  protected:
   static void requireFinite(ConstVectorRef q, ConstVectorRef v) {

@@ -181,7 +181,7 @@ std::vector<std::string> writeRun(const SimulateArguments& arguments, const Load
   summary["largest_gap"] = e.largest_gap;
   summary["energy_balance"] = e.energy_balance;
   summary["books"] = listBooks(e);
-  summary["real_time_factor"] = e.getRealTimeFactor();
+  summary["real_time_factor"] = e.realTimeFactor();
   summary["seconds"] = {{"whole", e.whole_seconds}, {"world", e.world_seconds}};
   if (arguments.summary_only) {
     writeSummary(run.directory, summary);
@@ -202,7 +202,7 @@ void printRun(const FreeRun& run) {
                 "  energy              %.6g J at the start, %.6g J at the end; motors %.3g J, losses %.3g J\n"
                 "  energy balance      %.1e J\n"
                 "  computing time      %.3f s, %.3g times real time\n",
-                e.duration, e.largest_gap, e.start.getEnergy(), e.end.getEnergy(), e.end.motor_work,
+                e.duration, e.largest_gap, e.start.energy(), e.end.energy(), e.end.motor_work,
                 e.end.contact_loss + e.end.stop_loss + e.end.other_loss, e.imbalance, e.world_seconds,
                 e.world_seconds > 0 ? e.duration / e.world_seconds : 0);
   std::cout << "free motion in world " << run.world << ": it " << getName(e.outcome);

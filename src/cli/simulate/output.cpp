@@ -155,7 +155,7 @@ Json makeSummary(const MotionResult& result, const SimulateArguments& arguments,
   summary["believed_model"] = getName(plan.belief);
   if (plan.belief != Belief::Closed)
     summary["plan_reachable_until"] = plan.reference.first_missed < 0 ? nullptr : Json(plan.reference.first_missed);
-  if (plan.predictive) summary["solves"] = listSolves(plan.predictive->getCounts());
+  if (plan.predictive) summary["solves"] = listSolves(plan.predictive->counts());
   for (const auto& [name, value] : plan.summary.options)
     if (const double* speed = std::get_if<double>(&value); name == "speed" && speed)
       summary["commanded_speed"] = *speed;
@@ -180,7 +180,7 @@ Json makeSummary(const MotionResult& result, const SimulateArguments& arguments,
   summary["fall_time"] = e.outcome == Outcome::Fell ? Json(e.duration) : nullptr;
   summary["duration"] = e.duration;
   summary["distance"] = e.distance;
-  summary["mean_speed"] = e.getMeanSpeed();
+  summary["mean_speed"] = e.meanSpeed();
   const std::optional<double> steady = calcSteadySpeed(plan, e);
   summary["steady_speed"] = steady ? Json(*steady) : Json();
   summary["largest_deviation"] = e.largest_deviation;
@@ -190,9 +190,9 @@ Json makeSummary(const MotionResult& result, const SimulateArguments& arguments,
   summary["energy_balance"] = e.energy_balance;
   summary["books"] = listBooks(e);
   summary["saturated_share"] = e.saturated_share;
-  summary["real_time_factor"] = e.getRealTimeFactor();
+  summary["real_time_factor"] = e.realTimeFactor();
   summary["seconds"] = {{"whole", e.whole_seconds}, {"world", e.world_seconds}, {"control", e.control_seconds}};
-  if (arguments.execution.real_time) summary["real_time"] = listTimes(plan.predictive->getCounts(), e);
+  if (arguments.execution.real_time) summary["real_time"] = listTimes(plan.predictive->counts(), e);
   return summary;
 }
 
@@ -256,10 +256,10 @@ Json makeHappenedSummary(const MotionResult& result) {
 }
 
 Json listBooks(const Execution& e) {
-  return {{"energy_start_J", e.start.getEnergy()}, {"energy_end_J", e.end.getEnergy()},
-          {"motor_work_J", e.end.motor_work},      {"push_work_J", e.end.push_work},
-          {"contact_loss_J", e.end.contact_loss},  {"stop_loss_J", e.end.stop_loss},
-          {"other_loss_J", e.end.other_loss},      {"imbalance_J", e.imbalance}};
+  return {{"energy_start_J", e.start.energy()},   {"energy_end_J", e.end.energy()},
+          {"motor_work_J", e.end.motor_work},     {"push_work_J", e.end.push_work},
+          {"contact_loss_J", e.end.contact_loss}, {"stop_loss_J", e.end.stop_loss},
+          {"other_loss_J", e.end.other_loss},     {"imbalance_J", e.imbalance}};
 }
 
 Json listPushes(const std::vector<Push>& pushes) {
@@ -290,9 +290,9 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
                 "  energy balance      %.1e J, %.1e of the energy exchanged\n"
                 "  torques             %.2f %% saturated\n"
                 "  computing time      %.2f s, %.2g times real time; world %.2f s, control %.2f s\n",
-                e.duration, e.distance, e.getMeanSpeed(), describeSteadySpeed(plan, e).c_str(), e.largest_deviation,
+                e.duration, e.distance, e.meanSpeed(), describeSteadySpeed(plan, e).c_str(), e.largest_deviation,
                 e.largest_gap, e.largest_slip, e.imbalance, e.energy_balance, 100 * e.saturated_share, e.whole_seconds,
-                e.getRealTimeFactor(), e.world_seconds, e.control_seconds);
+                e.realTimeFactor(), e.world_seconds, e.control_seconds);
   std::cout << text;
   for (const Push& push : arguments.execution.pushes)
     std::cout << "  push                " << formatNumber(push.impulse) << " N s at " << formatNumber(push.time)
@@ -302,7 +302,7 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
     std::cout << "  the linkages cannot follow the plan from " << plan.reference.first_missed
               << " s on: " << plan.reference.message << "\n";
   if (plan.predictive) {
-    const PredictiveCounts& c = plan.predictive->getCounts();
+    const PredictiveCounts& c = plan.predictive->counts();
     std::snprintf(text, sizeof text,
                   "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
                   "                      %d of %d stages %s\n",

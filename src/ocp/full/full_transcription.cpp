@@ -37,7 +37,7 @@ class FullTranscription : public Transcription {
   void updateStateCost(int) override {}
 
   int tangentSize() const override { return 2 * model_.nv(); }
-  int getBatchSize() const override { return 1; }
+  int batchSize() const override { return 1; }
 
   std::unique_ptr<RobotEvaluation> makeEvaluation() const override { return std::make_unique<FullEvaluation>(model_); }
 

@@ -25,7 +25,7 @@ class NodeAssembly {
                     StageModel& out);
   // The part of the gradient of the last setResiduals() that is not due to squares, by (u, s, dy, dy_v); zero where s is not
   // free.
-  const VectorXd& getGradientOfNoSquares() const { return no_squares_; }
+  const VectorXd& gradientOfNoSquares() const { return no_squares_; }
   // Memory of residuals.
   LinkageWorkspaces& linkages() { return linkages_; }
 

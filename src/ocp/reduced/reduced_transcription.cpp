@@ -54,7 +54,7 @@ class ReducedTranscription : public Transcription {
   void updateStateCost(int node) override { layout_.updateStateCost(node, specs_); }
 
   int tangentSize() const override { return 2 * reduction_.size; }
-  int getBatchSize() const override { return static_cast<int>(kLane); }
+  int batchSize() const override { return static_cast<int>(kLane); }
   std::unique_ptr<RobotEvaluation> makeEvaluation() const override {
     return std::make_unique<ReducedEvaluation>(model_, reduction_);
   }
@@ -202,7 +202,7 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
   if (specs_[node].state.weight != 0)
     addStateCostModel(model_, reduction_, view.state_cost, costs_[node].getScale(at), out);
   if (isRunning(node)) costs_[node].addControlCost(at, out);
-  if (place.isFree()) addTimeScaleCost(at.leading, at, assembly.getGradientOfNoSquares(), out);
+  if (place.isFree()) addTimeScaleCost(at.leading, at, assembly.gradientOfNoSquares(), out);
   if (isFinite(out)) task.status = StepStatus::Ok;
 }
 
