@@ -1,6 +1,6 @@
 bielle_test(model SOURCES test_model.cpp LIBS bielle_model)
 bielle_test(options SOURCES test_options.cpp LIBS bielle_model)
-bielle_test(reader SOURCES test_reader.cpp test_reader_shapes.cpp LIBS bielle_dynamics)
+bielle_test(reader SOURCES test_reader.cpp test_reader_motors.cpp test_reader_shapes.cpp LIBS bielle_dynamics)
 if(TARGET bielle-mesh)
   bielle_test(mesh_kinds SOURCES test_mesh_kinds.cpp LIBS bielle_dynamics)
   add_dependencies(test_${area} bielle-mesh)

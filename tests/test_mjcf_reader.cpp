@@ -1,310 +1,219 @@
-// Files of MuJoCo as people write them: free bases made of several joints, included files, masses of meshes, and everything else
-// around a mechanism.
+// Files of MuJoCo, ours and those of its users: what is read, what is left out with a warning, what is refused.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <fstream>
+#include <string>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/robots/robot_loader.h"
-#include "formats/mesh_inertia.h"
+#include "formats/drake.h"
+#include "formats/mjcf.h"
+#include "formats/mjcf_coordinates.h"
+#include "formats/sdf.h"
 #include "get_error.h"
+#include "mechanisms.h"
+#include "published_robots.h"
+#include "robot_difference.h"
 #include "robot_directory.h"
 
 using namespace bielle;
 using namespace bielle::testing;
+namespace fs = std::filesystem;
 
 namespace {
 
-const std::string kInertial = "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\".1 .1 .1\"/>";
-
-// A trunk with these joints, and a leg.
-std::string makeTrunk(const std::string& joints, const std::string& in_root = "", const std::string& in_world = "") {
-  return "<mujoco model=\"trunk\">" + in_root + "<worldbody>" + in_world +
-         "<body name=\"trunk\" pos=\"0.1 0.2 1\" euler=\"0 0 90\">" + kInertial + joints +
-         "<body name=\"leg\"><joint name=\"hip\" axis=\"0 1 0\"/>" + kInertial +
-         "</body></body></worldbody></mujoco>\n";
-}
-
-LoadedRobot load(const std::string& text) {
+Model readMujoco(const std::string& text) {
   const RobotDirectory directory;
-  return loadRobot(directory.write("robot.xml", text));
+  return loadRobot(directory.write("robot.xml", text)).model;
 }
 
-bool warns(const LoadedRobot& robot, const std::string& text) {
-  for (const std::string& warning : robot.warnings)
-    if (warning.find(text) != std::string::npos) return true;
-  return false;
-}
+std::string formatAssembled(const Model& model) { return formatMjcf(model, findClosedConfiguration(model).q).xml; }
 
-// Of a body at a reference, in the world.
-SE3 getPlace(const Model& model, const std::string& reference, const std::string& frame) {
-  Workspace ws(model);
-  updatePositions(model, ws, assembleReference(model, reference).q);
-  const Frame& f = model.frames()[model.findFrame(frame)];
-  return getPlacement(ws, f.body, f.X_BF);
+// A swing with a body, into which elements are put.
+std::string makeSwing(const std::string& in_body, const std::string& in_root = "", const std::string& in_world = "") {
+  return "<mujoco model=\"swing\">" + in_root + "<worldbody>" + in_world + "<body name=\"bob\" pos=\"0 0 1\">" +
+         "<joint name=\"swing\" axis=\"0 1 0\"/><inertial pos=\"0 0 -1\" mass=\"2\" diaginertia=\".1 .1 .1\"/>" +
+         "<body name=\"tip\"><joint name=\"turn\"/><inertial pos=\"0 0 0\" mass=\"1\" fullinertia=\"3 4 5 .1 .2 "
+         ".3\"/>" +
+         in_body + "</body></body></worldbody></mujoco>\n";
 }
-
-Matrix3d makeTurn(double angle, const Vector3d& axis) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
 
 }  // namespace
 
-TEST_CASE("a site between two points stands half way, with z along them") {
-  const LoadedRobot robot =
-      load(makeTrunk("<freejoint/><site name=\"range\" type=\"cylinder\" size=\"0.01 0.1\" fromto=\"1 0 0 1 2 0\" "
-                     "rgba=\"1 0 0 1\"/>"));
-  CHECK(robot.warnings.empty());
-  const Frame& frame = robot.model.frames()[robot.model.findFrame("range")];
-  CHECK((frame.X_BF.p - Vector3d(1, 1, 0)).norm() < 1e-15);
-  CHECK((frame.X_BF.R.col(2) - Vector3d(0, -1, 0)).norm() < 1e-12);
-}
-
-TEST_CASE("three slides and a ball are a free base, which stands where the keyframes put it") {
-  const std::string slides =
-      "<joint type=\"slide\" axis=\"0 0 2\" ref=\"1\" range=\"-3 3\"/>\n<joint type=\"slide\" axis=\"1 0 0\"/>"
-      "<joint type=\"slide\" axis=\"0 1 0\"/><joint type=\"ball\" pos=\"0 0 0.5\"/>";
-  const std::string key =
-      "<keyframe><key name=\"up\" qpos=\"3 0.5 0.25 0.70710678118654757 0.70710678118654757 0 0 0.3\"/></keyframe>";
-  const LoadedRobot robot = load(makeTrunk(slides, key));
-  const Model& model = robot.model;
-  REQUIRE(model.hasFreeFlyer());
-  CHECK(model.joints()[1].name == "root_joint");
-  CHECK(model.nv() == 7);
-  REQUIRE(robot.warnings.size() == 2);
-  CHECK(warns(robot, "<body> (line 1): its slides and ball are read as one free joint, 'root_joint'"));
-  CHECK(warns(robot, "<joint> (line 1): its range is left out, because the base is free"));
-  // The body is turned by a quarter about z; then by a quarter about its x, around a point half a metre above it.
-  const Matrix3d Z = makeTurn(EIGEN_PI / 2, Vector3d::UnitZ()), X = makeTurn(EIGEN_PI / 2, Vector3d::UnitX());
-  const Vector3d above(0, 0, 0.5), p = Vector3d(0.1, 0.2, 1) + Z * (Vector3d(0.5, 0.25, 2) + above - X * above);
-  const SE3 place = getPlace(model, "up", "trunk");
-  CHECK((place.p - p).norm() < 1e-12);
-  CHECK((place.R - Z * X).norm() < 1e-12);
-  const Reference& up = model.references()[0];
-  CHECK(up.joints.at("hip") == std::vector<double>{0.3});
-}
-
-TEST_CASE("three slides and three hinges on something that stands still are a free base") {
-  const std::string joints =
-      "<joint type=\"slide\" axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 1 0\"/><joint type=\"slide\" axis=\"0 0 "
-      "1\"/>"
-      "<joint axis=\"0 0 1\"/><joint axis=\"0 1 0\" ref=\"10\"/><joint axis=\"1 0 0\"/>";
-  const LoadedRobot robot =
-      load("<mujoco><compiler angle=\"degree\"/><worldbody><body pos=\"0 0 2\"><body name=\"trunk\" pos=\"1 0 0\">" +
-           kInertial + joints +
-           "</body></body></worldbody><keyframe><key name=\"k\" qpos=\"1 2 3 0.1 0.2 0.3\"/></keyframe></mujoco>");
-  REQUIRE(robot.model.hasFreeFlyer());
-  CHECK(robot.model.nv() == 6);
-  const SE3 place = getPlace(robot.model, "k", "trunk");
-  const Matrix3d R = makeTurn(0.1, Vector3d::UnitZ()) * makeTurn(0.2 - EIGEN_PI / 18, Vector3d::UnitY()) *
-                     makeTurn(0.3, Vector3d::UnitX());
-  CHECK((place.p - Vector3d(2, 2, 5)).norm() < 1e-12);
-  CHECK((place.R - R).norm() < 1e-12);
-}
-
-TEST_CASE("joints of a base that say more than where it is stay what they are") {
-  const std::string slides = "<joint name=\"x\" type=\"slide\" axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 1 0\"/>";
-  const std::string rest = "<joint type=\"slide\" axis=\"0 0 1\"/><joint type=\"ball\"/>";
-  const auto isFree = [](const std::string& joints, const std::string& in_root = "") {
-    const Model model = load(makeTrunk(joints, in_root)).model;
-    CHECK(model.nv() == 7);
-    return model.hasFreeFlyer();
-  };
-  CHECK(isFree(slides + rest));
-  CHECK(isFree(slides + rest, "<default><joint armature=\"0.1\"/></default>"));
-  CHECK_FALSE(isFree(slides + "<joint type=\"slide\" damping=\"3\"/><joint type=\"ball\"/>"));
-  CHECK_FALSE(isFree(slides + "<joint type=\"slide\" armature=\"3\"/><joint type=\"ball\"/>"));
-  CHECK_FALSE(isFree(slides + "<joint type=\"slide\" axis=\"1 0 1\"/><joint type=\"ball\"/>"));
-  CHECK_FALSE(isFree(slides + rest, "<actuator><motor joint=\"x\"/></actuator>"));
-  CHECK_FALSE(isFree(slides + rest, "<equality><joint joint1=\"hip\" joint2=\"x\"/></equality>"));
-  CHECK_FALSE(isFree(slides + rest, "<tendon><fixed name=\"t\"><joint joint=\"x\" coef=\"1\"/></fixed></tendon>"));
-}
-
-TEST_CASE("what is in other files is read where it is included, and errors name these files") {
+TEST_CASE("what the reader of MJCF leaves out is reported with its line, and what it cannot leave out is refused") {
   const RobotDirectory directory;
-  const std::string path = directory.write("scene.xml",
-                                           "<mujoco model=\"scene\"><include file=\"parts/settings.xml\"/><worldbody>\n"
-                                           "<include file=\"parts/trunk.xml\"/></worldbody></mujoco>");
-  directory.write("parts/settings.xml",
-                  "<mujocoinclude><compiler angle=\"radian\"/><default><include file=\"joint.xml\"/></default>"
-                  "<option gravity=\"0 0 -3\"/></mujocoinclude>");
-  directory.write("parts/joint.xml",
-                  "<x>\n<joint range=\"-1 2\" margin=\"1\"/></x>");  // beside the file that includes it
-  const auto writeTrunk = [&](const std::string& more) {
-    directory.write("parts/trunk.xml", "<mujoco>\n<light/><body name=\"trunk\">" + kInertial +
-                                           "<freejoint/><body name=\"leg\"><joint name=\"hip\"/>" + kInertial + more +
-                                           "</body></body></mujoco>");
-  };
-  writeTrunk("");
-  const LoadedRobot robot = loadRobot(path);
-  CHECK(robot.model.name() == "scene");
-  CHECK(robot.model.upperLimits()[6] == 2);
-  CHECK(robot.model.gravity().z() == -3);
-  CHECK(warns(robot, directory.path() + "/parts/trunk.xml: <light> (line 2): left out"));
-  CHECK(warns(robot, directory.path() + "/parts/joint.xml: <joint> (line 2): left out: 'margin'"));
+  const auto load = [&](const std::string& text) { return loadRobot(directory.write("swing.xml", text)); };
+  const LoadedRobot plain = load(makeSwing(""));
+  CHECK(plain.warnings.empty());
+  const Matrix3d full = (Matrix3d() << 3, .1, .2, .1, 4, .3, .2, .3, 5).finished();
+  CHECK(plain.model.bodies()[2].inertia.I_com == full);
 
-  const auto checkError = [&](const std::string& more, const std::string& error) {
-    writeTrunk(more);
-    CHECK_THAT(getError([&] { loadRobot(path); }), Catch::Contains("/parts/trunk.xml: " + error));
+  const auto checkWarning = [&](const std::string& text, const std::string& warning) {
+    CAPTURE(warning);
+    const std::vector<std::string> found = load(text).warnings;
+    REQUIRE(found.size() == 1);
+    CHECK(found[0] == directory.path() + "/swing.xml: " + warning);
   };
-  checkError("\n<joint name=\"hip\"/>", "joint 'hip' (line 3): two joints have this name; rename one of them");
-  checkError("\n<geom size=\"nan\"/>", "geom (line 3): its attribute 'size' is not made of 1 to 3 finite number(s)");
-  checkError("\n<include/>", "<include> (line 3): it names no file; give its attribute 'file'");
-  checkError("\n<include file=\"none.xml\"/>", "<include> (line 3): there is no file 'none.xml'; correct the name");
-  checkError("\n<include file=\"parts/settings.xml\"/>",
-             "<include> (line 3): the file '" + directory.path() + "/parts/settings.xml' is included twice");
-  checkError("\n<include file=\"scene.xml\"/>",
-             "<include> (line 3): the files include each other: " + directory.path() + "/scene.xml -> " +
-                 directory.path() + "/parts/trunk.xml -> " + directory.path() +
-                 "/scene.xml; remove one of these <include>");
-  directory.write("parts/trunk.xml", "<mujoco>\n<body>");
-  CHECK_THAT(getError([&] { loadRobot(path); }),
-             Catch::Contains("/parts/trunk.xml: line 2: it is not well-formed XML"));
+  checkWarning(makeSwing("\n<camera name=\"eye\"/>\n<camera name=\"other\"/>"), "<camera> (lines 2, 3): left out");
+  checkWarning(makeSwing("\n<geom type=\"plane\" size=\"1 1 1\"/>"),
+               "<geom> (line 2): a geom of type 'plane' is left out");
+  checkWarning(makeSwing("", "\n<sensor>\n<gyro site=\"a\"/></sensor>"), "<sensor> <gyro> (line 3): left out");
+  checkWarning(makeSwing("", "\n<tendon><spatial/></tendon>"),
+               "<spatial> (line 2): it does not run between two sites, and is left out");
+  checkWarning(makeSwing("", "\n<actuator><muscle joint=\"swing\"/></actuator>"),
+               "<muscle> (line 2): the actuator is left out: motors can only drive joints");
+  checkWarning(makeSwing("", "\n<actuator><position name=\"swing\" joint=\"swing\" forcerange=\"-2 2\"/></actuator>"),
+               "<position> (line 2): its servo is left out: it becomes an ideal torque motor");
+  checkWarning(makeSwing("", "\n<equality><weld active=\"false\" body1=\"bob\"/></equality>"),
+               "<weld> (line 2): it is not active, and left out");
+  checkWarning(makeSwing("", "\n<option wind=\"1 0 0\" density=\"1.2\"/>"),
+               "<option> (line 2): left out: 'density', 'wind'");
+
+  const auto checkError = [&](const std::string& text, const std::string& element, const std::string& problem) {
+    CAPTURE(problem);
+    const std::string error = getError([&] { load(text); });
+    CHECK_THAT(error, Catch::StartsWith(directory.path() + "/swing.xml: " + element + ": " + problem));
+    CHECK(error.find("; ") != std::string::npos);
+  };
+  checkError("<mujoco>", "line 1", "it is not well-formed XML");
+  checkError("<robot/>", "document", "its outermost element is not <mujoco>");
+  checkError(makeSwing("", "<include file=\"a.xml\"/>"), "<include> (line 1)", "there is no file 'a.xml'");
+  checkError(makeSwing("<replicate/>"), "<replicate> (line 1)", "such elements are not supported");
+  checkError(makeSwing("\n<joint name=\"swing\"/>"), "joint 'swing' (line 2)", "two joints have this name");
+  checkError(makeSwing("\n<joint name=\"x\" type=\"free\"/>"), "body 'tip' (line 1)", "it has a free joint");
+  checkError(makeSwing("\n<joint name=\"x\" axis=\"0 0 0\"/>"), "joint 'x' (line 2)", "its axis is not a direction");
+  checkError(makeSwing("\n<joint name=\"x\" range=\"1\"/>"), "joint 'x' (line 2)",
+             "its attribute 'range' is not made of 2");
+  checkError(makeSwing("\n<joint name=\"x\" damping=\"nan\"/>"), "joint 'x' (line 2)",
+             "its attribute 'damping' is not");
+  checkError(makeSwing("\n<joint name=\"x\" limited=\"true\"/>"), "joint 'x' (line 2)",
+             "it is limited but has no range");
+  checkError(makeSwing("\n<site name=\"a\" quat=\"1 0 0 0\" zaxis=\"0 0 1\"/>"), "site 'a' (line 2)", "it has several");
+  checkError(makeSwing("\n<geom class=\"none\"/>"), "geom (line 2)", "there is no default class 'none'");
+  checkError(makeSwing("\n<body><geom type=\"mesh\" mesh=\"a\"/></body>"), "geom (line 2)",
+             "the mass of the body comes from the mesh 'a', which is not there");
+  checkError(makeSwing("", "<equality>\n<flex/></equality>"), "flex (line 2)", "such equalities are not supported");
+  checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\" joint2=\"turn\" polycoef=\"0 1 2 0 0\"/></equality>"),
+             "joint (line 2)", "its polycoef is of degree 2 or more");
+  checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\"/></equality>"), "joint (line 2)",
+             "it constrains a single joint");
+  checkError(makeSwing("", "<equality>\n<connect body1=\"none\" anchor=\"0 0 0\"/></equality>"), "connect (line 2)",
+             "there is no body 'none'");
+  checkError(makeSwing("", "<actuator>\n<motor joint=\"none\"/></actuator>"), "motor (line 2)",
+             "there is no joint 'none'");
+  checkError(makeSwing("", "<keyframe>\n<key qpos=\"1 2 3\"/></keyframe>"), "key (line 2)",
+             "its attribute 'qpos' is not");
+  checkError(makeSwing("", "<compiler coordinate=\"global\"/>"), "compiler (line 1)", "its coordinates are global");
 }
 
-TEST_CASE("two sites are welded together wherever their bodies stand") {
-  const Model model =
-      load(
-          "<mujoco><worldbody><site name=\"wall\" pos=\"1 2 3\" euler=\"0 0 90\"/><body name=\"arm\"><joint "
-          "name=\"turn\"/>" +
-          kInertial +
-          "<site name=\"end\" pos=\"0 1 0\"/></body></worldbody><equality><weld name=\"w\" "
-          "site1=\"wall\" site2=\"end\"/></equality></mujoco>")
-          .model;
-  REQUIRE(model.closures().size() == 1);
-  const Closure& weld = model.closures()[0];
-  CHECK(weld.kind == ClosureKind::Weld6D);
-  CHECK((weld.X_B1.p - Vector3d(1, 2, 3)).norm() < 1e-15);
-  CHECK((weld.X_B2.p - Vector3d(0, 1, 0)).norm() < 1e-15);
+TEST_CASE("files of today's MuJoCo: frames, sites in equalities, inertia by shapes, classes of defaults") {
+  // The same arm twice: by hand, and by frames, defaults and shapes.
+  const Model a = readMujoco(R"(<mujoco><compiler angle="radian"/><worldbody>
+    <body name="arm" pos="1 2 4"><joint name="lift" axis="0 0 -1" pos="0 0.1 0" armature="0.2" range="-1 2"/>
+      <inertial pos="0 0 0" mass="6" diaginertia="0.5 0.26 0.4"/><geom type="box" size="0.2 0.4 0.3"/>
+      <body name="rod" pos="0 0 1"><joint name="ball" type="ball"/>
+        <inertial pos="0 0 1" mass="1" diaginertia="0.1 0.1 0.01"/><site name="end" pos="0 0 2"/></body></body>
+    <site name="wall" pos="0.5 2 7"/></worldbody>
+    <equality><connect name="tie" site1="wall" site2="end"/></equality></mujoco>)");
+  const Model b = readMujoco(R"(<mujoco><compiler angle="radian"/>
+    <default><default class="strong"><joint armature="0.2" range="-1 2" axis="0 1 0"/></default></default><worldbody>
+    <frame pos="1 0 0"><frame pos="0 2 4"><body name="arm"><frame euler="-1.5707963267948966 0 0" childclass="strong">
+      <joint name="lift" pos="0 0 0.1"/></frame>
+      <geom type="box" size="0.2 0.4 0.3" mass="6"/>
+      <body name="rod" pos="0 0 1"><joint name="ball" type="ball"/>
+        <inertial pos="0 0 1" mass="1" fullinertia="0.1 0.1 0.01 0 0 0"/><site name="end" pos="0 0 2"/></body>
+    </body></frame></frame><site name="wall" pos="0.5 2 7"/></worldbody>
+    <equality><connect name="tie" site1="wall" site2="end"/></equality></mujoco>)");
+  const Difference d = compare(a, b, a.makeNeutral());
+  CHECK(d.missing == "");
+  CHECK(d.mass_matrix < kTolerance);
+  CHECK(d.bias < kTolerance);
+  CHECK(d.closures < kTolerance);
 }
 
-TEST_CASE("the compiler of MuJoCo bounds, balances and scales masses, and takes them from some groups of geoms") {
-  const auto getInertia = [](const std::string& compiler, const std::string& in_body) {
-    return load("<mujoco><compiler " + compiler + "/><worldbody><body name=\"a\"><joint/>" + in_body +
-                "</body></worldbody></mujoco>")
-        .model.bodies()[1]
-        .inertia;
-  };
-  const std::string given = "<inertial pos=\"1 2 3\" mass=\"2\" diaginertia=\"1 2 4\"/>";
-  const std::string fine = "<inertial pos=\"1 2 3\" mass=\"2\" diaginertia=\"3 2 4\"/>";
-  const Inertia balanced = getInertia("balanceinertia=\"true\"", given);
-  CHECK((balanced.I_com - 7. / 3 * Matrix3d::Identity()).norm() < 1e-14);
-  const Inertia bounded = getInertia("boundmass=\"5\" boundinertia=\"2.5\"", fine);
-  CHECK(bounded.mass == 5);
-  CHECK((bounded.I_com - Matrix3d(Vector3d(3, 2.5, 4).asDiagonal())).norm() < 1e-14);
-  const Inertia scaled = getInertia("settotalmass=\"10\"", fine);
-  CHECK(scaled.mass == 10);
-  CHECK(scaled.I_com(2, 2) == 20);
-  CHECK(scaled.com == Vector3d(1, 2, 3));
-  const std::string geoms = "<geom size=\"1\" mass=\"1\" group=\"1\"/><geom size=\"1\" mass=\"4\" group=\"3\"/>";
-  CHECK(getInertia("", geoms).mass == 5);
-  CHECK(getInertia("inertiagrouprange=\"2 4\"", geoms).mass == 4);
-}
-
-namespace {
-
-// A box of 2 x 4 x 6 with one corner at the origin, seen from outside.
-const char* const kBoxObj = R"(v 0 0 0
-v 2 0 0
-v 2 4 0
-v 0 4 0
-v 0 0 6
-v 2 0 6
-v 2 4 6
-v 0 4 6
-f 4 3 2 1
-f 5/1 6/2/3 7 8
-f 1 2 6 5
-f -7 -6 -2 -3
-f 3 4 8 7
-f 4 1 5 8
-)";
-
-}  // namespace
-
-TEST_CASE("a mesh gives its body the mass that it encloses") {
+TEST_CASE("a robot of MuJoCo becomes one of ours and stays the same") {
   const RobotDirectory directory;
-  directory.write("meshes/box.obj", kBoxObj);
-  const auto load = [&](const std::string& mesh, const std::string& geom) {
-    return loadRobot(directory.write(
-        "robot.xml", "<mujoco><compiler meshdir=\"meshes\"/><asset><mesh " + mesh +
-                         "/></asset><worldbody><body name=\"a\"><joint/>\n<geom type=\"mesh\" mesh=\"box\" " + geom +
-                         "/></body></worldbody></mujoco>"));
-  };
-  const auto getInertia = [&](const std::string& mesh, const std::string& geom) {
-    return load(mesh, geom).model.bodies()[1].inertia;
-  };
-  // m / 12 (a^2 + b^2)
-  const Matrix3d expected = Vector3d(16 + 36, 4 + 36, 4 + 16).asDiagonal();
-  const Inertia plain = getInertia("file=\"box.obj\"", "density=\"10\"");
-  CHECK(plain.mass == Approx(480));
-  CHECK((plain.com - Vector3d(1, 2, 3)).norm() < 1e-12);
-  CHECK((plain.I_com - 40 * expected).norm() < 1e-9);
-  const Inertia moved = getInertia("file=\"box.obj\" refpos=\"1 2 0\" scale=\"0.1 0.1 -0.1\" inertia=\"exact\"",
-                                   "mass=\"12\" pos=\"0 0 1\"");
-  CHECK(moved.mass == 12);
-  CHECK((moved.com - Vector3d(0, 0, 0.7)).norm() < 1e-12);
-  CHECK((moved.I_com - 0.01 * expected).norm() < 1e-12);
-  // Its walls: pairs of 4 x 6, 2 x 6 and 2 x 4. About x, a pair across x has A (b^2 + c^2) / 12 each, the others also their
-  // distance.
-  const Inertia shell = getInertia("file=\"box.obj\" inertia=\"shell\"", "density=\"1\"");
-  CHECK(shell.mass == Approx(2 * (24 + 12 + 8)));
-  CHECK(shell.I_com(0, 0) == Approx(2 * (24 * 52. / 12 + 12 * (36. / 12 + 4) + 8 * (16. / 12 + 9))));
-
-  const auto checkError = [&](const std::string& mesh, const std::string& problem) {
-    const std::string error = getError([&] { load(mesh, ""); });
-    CHECK_THAT(error, Catch::Contains("geom (line 2): the mass of the body comes from the mesh 'box'" + problem));
-    CHECK_THAT(error, Catch::Contains("give the body an <inertial>"));
-  };
-  checkError("file=\"none.obj\" name=\"box\"", ", but meshes/none.obj is missing");
-  checkError("file=\"other.obj\"", ", which is not there");
-  checkError("file=\"box.obj\" inertia=\"convex\"", " by its convex hull");
-  directory.write("meshes/box.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  checkError("file=\"box.obj\"", ", but meshes/box.obj is missing, damaged, of another kind, or encloses nothing");
-  directory.write("meshes/box.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
-  checkError("file=\"box.obj\"", ", but meshes/box.obj is missing, damaged");
-  // Found by fuzzing: a huge triangle, whose volume is rounding.
-  Eigen::Matrix3Xd huge(3, 3);
-  huge << 1.3563156426940112e-19, 4.3368084314480763e-19, 1.3563178398925133e-19,  //
-      -2.1284328186216697e+38, 1.3563156426940112e-19, 1.3563156426940112e-19,     //
-      -2.1293607388610368e+38, 1.4918429822062306e-19, 1.3563156426940112e-19;
-  for (MeshSolid solid : {MeshSolid::Enclosed, MeshSolid::Overlapping, MeshSolid::Surface})
-    if (const std::optional<Inertia> inertia = calcMeshInertia(huge, solid)) CHECK(inertia->mass > 0);
-}
-
-TEST_CASE("what does not change the mechanism is left out by name and line, what bends is refused") {
-  const LoadedRobot robot = load(makeTrunk("<freejoint/>", R"(
-    <asset><texture type="skybox" builtin="flat" width="8" height="8"/><material name="m"/></asset>
-    <extension><plugin plugin="mujoco.elasticity.cable"/></extension>
-    <contact><exclude body1="trunk" body2="leg"/></contact>
-    <deformable><skin/></deformable>
-    <sensor><rangefinder site="a"/></sensor><statistic extent="1"/><visual><map znear="1"/></visual><size njmax="3"/>
-    <tendon><spatial name="t"><site site="a"/><geom geom="g"/><site site="b"/></spatial></tendon>)"));
-  for (const char* left_out :
-       {"<texture> (line 2): left out", "<material> (line 2): left out", "<extension> <plugin> (line 3): left out",
-        "<contact> <exclude> (line 4): left out", "<deformable> <skin> (line 5): left out",
-        "<sensor> <rangefinder> (line 6): left out", "<statistic> (line 6): left out",
-        "<visual> <map> (line 6): left out", "<size> (line 6): left out",
-        "<spatial> (line 7): it bends about a <geom>, and is left out"})
-    CHECK(warns(robot, left_out));
-  CHECK(robot.warnings.size() == 10);
-  CHECK_THAT(getError([] { load(makeTrunk("", "<deformable>\n<flex/></deformable>")); }),
-             Catch::Contains("<flex> (line 2): bodies that bend are not supported; remove it"));
-  CHECK_THAT(getError([] { load(makeTrunk("<freejoint/>\n<composite/>")); }),
-             Catch::Contains("<composite> (line 2): such elements are not supported; save the model with MuJoCo"));
-  const LoadedRobot idle =
-      load(makeTrunk("<freejoint/>", R"(<option><flag gravity="disable" equality="disable"/></option>
-    <equality><connect body1="leg" anchor="0 0 0"/></equality>)"));
-  CHECK(idle.model.gravity().norm() == 0);
-  CHECK(idle.model.closures().empty());
-  CHECK(warns(idle, "<connect> (line 2): it is left out, because <flag> disables equalities"));
-}
-
-TEST_CASE("a file of MuJoCo that ends early is an error at one of its lines") {
-  const std::string text = makeTrunk("<freejoint/>\n<site name=\"s\" fromto=\"0 0 0 0 0 1\"/>\n",
-                                     "<keyframe>\n<key qpos=\"0 0 1 1 0 0 0 0\"/></keyframe>\n");
-  for (size_t length = 0; length + 12 < text.size(); length += 7) {
-    const std::string error = getError([&] { load(text.substr(0, length)); });
-    CAPTURE(length, error);
-    CHECK(error.find("robot.xml: ") != std::string::npos);
-    CHECK((error.find(": line ") != std::string::npos || length == 0));
+  for (const char* name : {"bipetto", "cleobot", "belt_biped", "spring_leg", "delta"}) {
+    CAPTURE(name);
+    const Model a = readMujoco(formatAssembled(loadRobot(name).model));
+    const RobotText text = formatRobot(a);
+    const Model b = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
+    const Difference d = compare(a, b, a.makeNeutral());
+    CHECK(d.missing == "");
+    CHECK(d.mass_matrix < kTolerance);
+    CHECK(d.bias < kTolerance);
+    CHECK(d.closures < kTolerance);
   }
+}
+
+TEST_CASE(
+    "windings, gears and speeds of motors go out and come in again, and other formats tell that energies change") {
+  ModelParts parts = takeParts(loadRobot("bipetto").model);
+  Motor &first = parts.motors[0], &second = parts.motors[3];
+  first.drive = {"rotor \"a\" & <b>", 9, 5.79e-5, 0.095, 0.16, 48, 28, 12, 0.9, 0.8, 0.49};
+  first.torque_loss = 0.123456789012;
+  first.continuous_effort = 7;
+  second.drive.efficiency = 0.7;
+  parts.velocity_limits[first.dof] = first.velocity_limit = 4.25;
+  const Model a = ModelBuilder::restore(parts);
+  const RobotDirectory directory;
+  const RobotText text = formatRobot(a);
+  const Model ours = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
+  for (const Model& b : {ours, readMujoco(formatAssembled(a))})
+    for (int m : {0, 3, 4}) {
+      const Motor &before = a.motors()[m], &after = b.motors()[m];
+      const MotorDrive &x = before.drive, &y = after.drive;
+      CAPTURE(before.name);
+      CHECK(x.isGiven() == y.isGiven());
+      CHECK(x.type == y.type);
+      for (auto field :
+           {&MotorDrive::ratio, &MotorDrive::rotor_inertia, &MotorDrive::torque_constant, &MotorDrive::resistance,
+            &MotorDrive::voltage, &MotorDrive::current, &MotorDrive::continuous_current, &MotorDrive::efficiency,
+            &MotorDrive::back_efficiency, &MotorDrive::mass})
+        CHECK(areSame(x.*field, y.*field));
+      CHECK(before.torque_loss.has_value() == after.torque_loss.has_value());
+      CHECK(areSame(before.torqueLoss(), after.torqueLoss()));
+      CHECK(areSame(before.continuous_effort, after.continuous_effort));
+      CHECK(areSame(a.velocityLimits()[before.dof], b.velocityLimits()[after.dof]));
+      CHECK(after.armature == before.armature);
+    }
+  // Written again it is the same file: what follows from the drive is now given.
+  CHECK(formatRobot(ours).yaml ==
+        formatRobot(loadRobot(directory.writeRobot(text.urdf, formatRobot(ours).yaml)).model).yaml);
+  using Catch::Contains;
+  const auto join = [](const std::vector<std::string>& warnings) {
+    std::string all;
+    for (const std::string& warning : warnings) all += warning + "\n";
+    return all;
+  };
+  CHECK_THAT(join(formatMjcf(a, findClosedConfiguration(a).q).warnings), !Contains("motor '"));
+  for (const std::string& warnings :
+       {join(formatSdf(a, findClosedConfiguration(a).q).warnings), join(formatDrake(a).warnings)})
+    CHECK_THAT(warnings, Contains("motor '" + first.name + "': its winding") &&
+                             Contains("so electrical energies change") &&
+                             Contains("motor '" + second.name + "': its winding"));
+}
+
+TEST_CASE("what a file of MuJoCo says of our motors in its own texts is checked as in a YAML file, with its line") {
+  ModelParts parts = takeParts(loadRobot("belt_biped").model);
+  parts.motors.front().torque_loss = 0.3;
+  const std::string xml = formatAssembled(ModelBuilder::restore(parts)), name = parts.motors.front().name;
+  const size_t end = xml.find("  </custom>");
+  const RobotDirectory directory;
+  const auto load = [&](const std::string& text) { return loadRobot(directory.write("robot.xml", text)); };
+  REQUIRE(end != std::string::npos);
+  const auto insert = [&](const std::string& text) { return std::string(xml).insert(end, text); };
+  const auto line = std::to_string(1 + std::count(xml.begin(), xml.begin() + static_cast<std::ptrdiff_t>(end), '\n'));
+  CHECK_THAT(getError([&] { load(insert("<text name='bielle:motor:" + name + "' data='resistance: much'/>")); }),
+             Catch::Contains("'resistance' (line " + line + "): it is not a number"));
+  const auto warns = [&](const std::string& text) {
+    std::string all;
+    for (const std::string& warning : load(insert(text)).warnings) all += warning + "\n";
+    return all;
+  };
+  CHECK_THAT(warns("<text name='bielle:motor:no' data='mass: 1'/>"), Catch::Contains("<custom> <text>"));
+  CHECK_THAT(warns("<numeric name='n' data='1'/>"), Catch::Contains("<custom> <numeric>"));
 }

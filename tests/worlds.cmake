@@ -21,6 +21,7 @@ if(BIELLE_BUILD_SIMULATION)
   # What runs `bielle simulate` belongs to the command.
   set(area command)
   bielle_command_test(simulate SOURCES test_simulate.cpp LIBS bielle_results)
+  bielle_command_test(simulate_predictive SOURCES test_simulate_predictive.cpp LIBS bielle_results)
   bielle_command_test(edge_feet SOURCES test_edge_feet.cpp LIBS bielle_results)
   bielle_command_test(free_motion SOURCES test_free_motion.cpp LIBS bielle_results)
   bielle_command_test(campaign SOURCES test_campaign.cpp LIBS bielle_tasks)
