@@ -1,5 +1,5 @@
 #pragma once
-/// \file Commands of a walk: a velocity over time.
+/// \file A walk that follows commands, velocities over time, without an end.
 ///
 /// A file of commands is YAML. Each velocity holds from its time on, until the next one; before the first the robot stands.
 ///
@@ -10,9 +10,7 @@
 ///
 /// time is in s; forward and sideways (to the left) are in m/s, turning (to the left) in rad/s; all three are 0 unless given.
 ///
-/// A walk without an end, whose stages are made one by one from a commanded velocity.
-///
-/// Costs and constraints are those of locomotion.h, on level ground, for steps by footsteps.h Eq. (1) with
+/// Its stages are made one by one. Costs and constraints are those of locomotion.h, on level ground, for steps by footsteps.h Eq. (1) with
 ///     D_i = T (forward, sideways, turning),    T the duration of a step,                                         (1)
 /// of the command at the beginning of step i. At zero command the robot takes a last step that brings its feet
 /// together, then stands.

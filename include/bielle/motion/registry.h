@@ -1,11 +1,9 @@
 #pragma once
-/// \file Motions one after the other, as one optimal control problem.
+/// \file The motions that `bielle solve` knows, by name, and sequences of them as one optimal control problem.
 ///
-/// Each motion starts from the standing posture in which the previous one ends. Only the last motion keeps its terminal
+/// Each motion of a sequence starts from the standing posture in which the previous one ends. Only the last motion keeps its terminal
 /// costs, so that the others need not come to rest. The ground has the steps of all motions and the lowest of their
 /// planes; higher soles stand on platforms.
-///
-/// The motions that `bielle solve` knows, by name: one entry each.
 #include <functional>
 #include <string>
 #include <vector>

@@ -1,12 +1,11 @@
 #pragma once
-/// \file Residuals r(q, v, lambda, u) of costs and path constraints, with analytic derivatives.
+/// \file Costs, path constraints, and the residuals r(q, v, lambda, u) of which both are made, with analytic derivatives.
 ///
 /// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the
 /// constraint forces lambda and to the motor torques u; the stage applies the chain rule through the dynamics. Frame
 /// residuals are in world axes unless stated otherwise. References of velocities are those at the time scale 1 of
 /// robot_problem.h Eq. (5); at s they are divided by s: the same path in another time.
-///
-/// Costs: activations of residuals, and diagonal costs of state and control. Path constraints: residuals within bounds.
+/// Costs are activations of residuals, or diagonal in state and control; path constraints keep residuals within bounds.
 #include <memory>
 #include <string>
 #include <vector>

@@ -1,21 +1,18 @@
 #pragma once
-/// \file A report: solved motions as one HTML page that needs only a browser, without a network.
+/// \file Pages that need only a browser, without a network: reports on solved motions, and views of robots.
 ///
-/// It replays the robot in three dimensions and plots its quantities over time, from the files in a result's directory
+/// A report replays the robot in three dimensions and plots its quantities over time, from the files in a result's directory
 /// (result.h): trajectory.npz, summary.json, check.json if it is there. Keys of
 /// summary.json beyond those of a bare run are used if present: `robot_file`, `phases`, `ground`. Of a motion that `bielle simulate`
 /// carried out, its outcome, its pushes and, from plan.npz, its plan are shown as well. Several directories are compared on
 /// one page. Names from the files are escaped and shown as text.
 ///
-/// A robot as a page with a slider for each motor, and for parameters; its loops close as the sliders move.
-///
-/// The closed configurations are precomputed on a grid over the motors of each loop cluster (a motor outside all loops
+/// A view is a robot with a slider for each motor, and for parameters; its loops close as the sliders move. The closed configurations are precomputed on a grid over the motors of each loop cluster (a motor outside all loops
 /// has its own grid) and interpolated by the page. From the start posture (the robot's first reference, else any closed
 /// one) each node of the grid is reached from a closed neighbour, so that the linkage keeps its branch. Where it does
 /// not close, the page says so and keeps the last closed configuration. Beside the sliders stand the angles of joints without a motor,
 /// the ratio of the linkage (ratio.h; of up to two motors, where it has serial joints) and its distance from dead points
-/// (linkage.h), interpolated as well. Motors of clusters with more than three have no
-/// slider.
+/// (linkage.h), interpolated as well. Motors of clusters with more than three have no slider.
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,9 +1,5 @@
 #pragma once
-/// \file The electrical energy of a motion, from its record.
-///
-/// Records of motions (motion/record.h) as files.
-///
-/// The result of a solve, as three files in a directory.
+/// \file The result of a solve as three files in a directory, its record (motion/record.h) as a file, and its electrical energy.
 #include <string>
 #include <vector>
 

@@ -1,7 +1,5 @@
 #pragma once
-/// \file Robots by name or from files, given or generated. formats/reader.h describes the files.
-///
-/// Generators of robots by name, and their parameters.
+/// \file Robots by name or from files, given or generated; generators and their parameters. formats/reader.h describes the files.
 #include <functional>
 #include <string>
 #include <vector>

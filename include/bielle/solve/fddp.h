@@ -1,7 +1,5 @@
 #pragma once
-/// \file Feedback of one stage, as a sweep of FDDP finds it.
-///
-/// Feasibility-driven differential dynamic programming (FDDP) with bounds and constraints: from a guess to an optimum.
+/// \file Feasibility-driven differential dynamic programming (FDDP) with bounds and constraints: from a guess to an optimum.
 ///
 /// Mastalli et al., "Crocoddyl: An Efficient and Versatile Framework for Multi-Contact Optimal Control", ICRA 2020; the
 /// bounds after Tassa, Mansard, Todorov, "Control-Limited Differential Dynamic Programming", ICRA 2014. Derivations, and the
@@ -37,7 +35,7 @@
 
 namespace bielle {
 
-/// About node state xs_k and control us_k:  u = us_k + k + K dx,  dx = difference(xs_k, x). K is added: where it resists a
+/// Feedback of one stage, as a sweep finds it, about node state xs_k and control us_k:  u = us_k + k + K dx,  dx = difference(xs_k, x). K is added: where it resists a
 /// deviation, its sign is that of a negative feedback. At an optimum k vanishes. Rows of controls at their bounds are zero.
 struct Gains {
   VectorXd k;     ///< nu_k, the unit of the control

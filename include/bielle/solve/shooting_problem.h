@@ -1,7 +1,5 @@
 #pragma once
-/// \file Quadratic model of one stage of a shooting problem.
-///
-/// The optimal control problem as a solver sees it (the paper's eq. 1), on manifolds.
+/// \file The optimal control problem as a solver sees it (the paper's eq. 1), on manifolds.
 ///
 ///     min  sum_k l_k(x_k, u_k) + l_N(x_N)    s.t.  x_0 given,  x_{k+1} = f_k(x_k, u_k),   k = 0 .. N-1,
 ///                                                  lower_k <= c_k(x_k, u_k) <= upper_k,   k = 0 .. N
@@ -14,8 +12,6 @@
 /// Every function takes several tasks at once, which a problem may process together; results must not depend, not even
 /// in the last bit, on batching or order. Different threads may call at the same time, each with its own scratch.
 /// Exceptions are for programming errors: the solver passes them on unchanged.
-///
-/// Evaluates one node of a shooting problem at a time, outside a solver.
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -31,7 +27,7 @@ using ConstMatrixMap = Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>;
 using RowMatrixMap = Eigen::Map<RowMatrixXd, 0, Eigen::OuterStride<>>;
 using ConstRowMatrixMap = Eigen::Map<const RowMatrixXd, 0, Eigen::OuterStride<>>;
 
-/// About (x_k, u_k), in tangent coordinates at x_k and at the node state x_{k+1}:
+/// Quadratic model of one stage about (x_k, u_k), in tangent coordinates at x_k and at the node state x_{k+1}:
 ///     dx_{k+1} = Fx dx_k + Fu du_k + gap
 ///     l = cost + lx.dx + lu.du + 1/2 (dx.lxx.dx + 2 du.lux.dx + du.luu.du)
 /// The terminal node has only cost, lx and lxx: its other sizes are zero.
@@ -213,7 +209,7 @@ struct ShootingTrajectory {
   std::vector<VectorXd> xs, us;
 };
 
-/// Owns an evaluation and its scratch. No allocation after the first node of the same sizes.
+/// Evaluates one node at a time, outside a solver. Owns an evaluation and its scratch. No allocation after the first node of the same sizes.
 class NodeEvaluator {
  public:
   /// The problem must outlive it.
