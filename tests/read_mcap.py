@@ -238,6 +238,13 @@ def decode(types, name, data):
     return out
 
 
+def decode_text(data):
+    """A text of ROS 2: encapsulation, length with the zero at its end."""
+    text = data[8:-1]
+    assert data == struct.pack("<BBBBI", 0, 1, 0, 0, len(text) + 1) + text + b"\0"
+    return text.decode()
+
+
 def read(path):
     with open(path, "rb") as file:
         data = file.read()
@@ -251,12 +258,16 @@ def read(path):
     assert [m[2] for m in messages] == sorted(m[2] for m in messages), "messages are not in the order of time"
     check_summary(data, start, footer, known, messages, chunks, metadata)
     assert next(split_records(data, offsets, footer))[0] == 14
-    types = {ident: read_types(schema[3]) for ident, schema in known[3].items()}
+    types = {ident: read_types(schema[3]) for ident, schema in known[3].items() if schema[2] == "protobuf"}
     topics, sequences = {}, {}
     for channel, sequence, time, content in messages:
         assert sequence == sequences.get(channel, 0)
         sequences[channel] = sequence + 1
         _, schema, topic, encoding, _ = known[4][channel]
+        if encoding == "cdr":
+            assert known[3][schema][1:] == ("std_msgs/msg/String", "ros2msg", b"string data"), topic
+            topics.setdefault(topic, []).append((time, decode_text(content)))
+            continue
         assert encoding == "protobuf" and known[3][schema][2] == "protobuf"
         topics.setdefault(topic, []).append((time, decode(types[schema], "." + known[3][schema][1], content)))
     return {"topics": topics, "schemas": {topic: known[3][schema][1] for _, schema, topic, _, _ in known[4].values()},

@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import xml.etree.ElementTree
 
 import read_mcap
 
@@ -108,7 +109,8 @@ def check_types(file):
         ours = {number: field[0] for number, field in file["types"][".foxglove." + name].items()}
         assert ours == dict(enumerate(fields.split(), 1)), name
     for topic, schema in file["schemas"].items():
-        assert schema.startswith("foxglove.") or topic.startswith(("/wrenches", "/footholds", "/plan/footholds")), topic
+        assert (schema.startswith("foxglove.") or topic.startswith(("/wrenches", "/footholds", "/plan/footholds"))
+                or topic == "/robot_description"), topic
 
 
 def check_nodes(file, table, info):
@@ -183,6 +185,25 @@ def check_scene(file, info, topic="/scene/robot", prefix=""):
     return entities
 
 
+def check_description(file):
+    """The URDF draws every body, with the shapes of the scene but its meshes."""
+    (time, urdf), = file["topics"]["/robot_description"]
+    assert time == 0
+    links = {link.get("name"): link for link in xml.etree.ElementTree.fromstring(urdf).iter("link")}
+    for entity in file["topics"]["/scene/robot"][0][1]["entities"]:
+        if not entity["id"].startswith("body/") or entity["frame_id"] == "world":
+            continue
+        shapes = [shape for visual in links[entity["frame_id"]].iter("visual") for shape in visual.find("geometry")]
+        assert shapes and not [shape for shape in shapes if shape.tag == "mesh"], entity["id"]
+        if entity["triangles"]:
+            continue
+        for tag, kind in (("box", "cubes"), ("cylinder", "cylinders"), ("sphere", "spheres")):
+            assert sum(shape.tag == tag for shape in shapes) == len(entity[kind]), entity["id"]
+        edges = [vector(cube["size"]) for cube in entity["cubes"]]
+        boxes = [[float(x) for x in shape.get("size").split()] for shape in shapes if shape.tag == "box"]
+        assert all(distance(a, b) < 1e-12 for a, b in zip(boxes, edges)), entity["id"]
+
+
 def is_refused(path, data):
     with open(path, "wb") as file:
         file.write(data)
@@ -234,6 +255,7 @@ def check_solved(squat, info):
         slip = 1e-6 + json.load(summary)["contact_slip"]["position_m"]
     check_forces(file, table, info, slip)
     check_scene(file, info)
+    check_description(file)
     soles = [message["footholds"][0] for _, message in file["topics"]["/footholds"]]
     assert sorted(sole["name"] for sole in soles) == sorted(contact["name"] for contact in info["contacts"])
     assert [log["message"] for _, log in file["topics"]["/events"]][0].startswith("phase ")
@@ -313,6 +335,7 @@ def check_mesh(place_of_files):
     run("export", output, "--format", "mcap", "-o", path)
     file = read_mcap.read(path)
     entities = {entity["id"]: entity for entity in file["topics"]["/scene/robot"][0][1]["entities"]}
+    check_description(file)
     mesh, = entities["body/bob"]["triangles"]
     assert vector(mesh["pose"]["position"]) == [0, 0, -1]
     points = [tuple(vector(point)) for point in mesh["points"]]

@@ -8,11 +8,14 @@
 #include <set>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/formats/robot_writer.h"
+#include "bielle/model/builder.h"
 #include "bielle/results/result.h"
 #include "model/number_text.h"
 #include "motion.pb.h"
 #include "results/foxglove_scene.h"
 #include "results/mcap_file.h"
+#include "results/skeleton.h"
 
 namespace bielle {
 namespace {
@@ -42,6 +45,7 @@ class MotionMcap {
 
   std::string write(const std::optional<MotionRecord>& plan) {
     writeScene(plan.has_value());
+    writeDescription();
     writeNodes(record_, "");
     if (plan) writeNodes(*plan, kPlanPrefix);
     writeStages();
@@ -57,9 +61,10 @@ class MotionMcap {
   void send(const std::string& topic, double time, const google::protobuf::Message& message) {
     const auto [it, is_new] = channels_.emplace(topic, static_cast<int>(file_.channels.size()));
     if (is_new) file_.channels.push_back({topic, "protobuf", findSchema(*message.GetDescriptor())});
-    file_.messages.push_back(
-        {it->second, static_cast<std::uint64_t>(std::llround(time * 1e9)), message.SerializeAsString()});
+    file_.messages.push_back({it->second, getNanoseconds(time), message.SerializeAsString()});
   }
+
+  static std::uint64_t getNanoseconds(double time) { return static_cast<std::uint64_t>(std::llround(time * 1e9)); }
 
   int findSchema(const google::protobuf::Descriptor& type) {
     for (size_t i = 0; i < file_.schemas.size(); ++i)
@@ -76,6 +81,31 @@ class MotionMcap {
     addGround(scene);
     send("/scene/robot", record_.time[0], scene);
     if (has_plan) send("/scene/plan", record_.time[0], makeRobotScene(robot_, kPlanPrefix, kPlanOpacity));
+  }
+
+  // The robot as a URDF in a message of ROS 2, whose shapes Rerun draws at the frames of /tf. It does not find the files of
+  // meshes: bodies that have nothing else get rods.
+  void writeDescription() {
+    ModelParts parts = takeParts(model_);
+    std::vector<Visual>& visuals = parts.visuals;
+    const auto is_mesh = [](const Visual& visual) { return visual.shape == Visual::Shape::Mesh; };
+    visuals.erase(std::remove_if(visuals.begin(), visuals.end(), is_mesh), visuals.end());
+    std::vector<bool> is_drawn(model_.numBodies(), false);
+    for (const Visual& visual : visuals) is_drawn[visual.body] = true;
+    for (const Visual& rod : listSkeleton(model_, is_drawn)) visuals.push_back(rod);
+    std::string urdf;
+    try {
+      urdf = formatRobot(ModelBuilder::restore(std::move(parts))).urdf;
+    } catch (const InputError&) {
+      return;  // a URDF does not have such joints
+    }
+    const auto size = static_cast<std::uint32_t>(urdf.size() + 1);  // with the zero at its end
+    std::string message("\0\1\0\0", 4);                             // CDR, little-endian
+    for (int shift = 0; shift < 32; shift += 8) message += static_cast<char>(size >> shift & 0xff);
+    file_.messages.push_back(
+        {static_cast<int>(file_.channels.size()), getNanoseconds(record_.time[0]), message + urdf + '\0'});
+    file_.channels.push_back({"/robot_description", "cdr", static_cast<int>(file_.schemas.size())});
+    file_.schemas.push_back({"std_msgs/msg/String", "ros2msg", "string data"});
   }
 
   // The steps of the ground as plates; viewers have a grid of their own for the plane.

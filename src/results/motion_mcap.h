@@ -10,12 +10,13 @@
 /// | /scene/footholds              | foxglove.SceneUpdate     | touchdowns: the sole on the ground; predicted ones, if any |
 /// | /joints, /plan/joints         | foxglove.JointStates     | nodes: coordinates with one rate each; efforts of motors |
 /// | /motors, /plan/motors         | foxglove.JointStates     | nodes: motors alone                                     |
+/// | /robot_description            | std_msgs/msg/String      | the start: a URDF of the shapes, meshes as rods         |
 /// | /com, /plan/com               | foxglove.PoseInFrame     | nodes: centre of mass                                   |
 /// | /wrenches/contacts, /closures | bielle.msg.Wrenches      | stages                                                  |
 /// | /footholds, /plan/footholds   | bielle.msg.Footholds     | touchdowns; nodes: predicted ones                       |
 /// | /events                       | foxglove.Log             | phases, touchdowns, pushes, a fall, how it ended        |
 ///
-/// A stage is told at its node, an impact, which has no forces, not at all.
+/// A stage is written at the time of its node; an impact, which has no forces, is left out.
 #include <optional>
 #include <string>
 
