@@ -108,6 +108,7 @@ def main():
 
     here, there = parse(arguments.commit), parse(arguments.against)
     with tempfile.TemporaryDirectory(prefix="bielle-wait-") as directory, open("wait.log", "w", encoding="utf-8") as log:
+        os.chmod(directory, 0o755)  # a test runs the program as another user
         for step in arguments.steps:
             for revision in (here, there) if arguments.measure is None else map(parse, arguments.measure):
                 if not any(row["commit"] == revision[:12] and row["step"] == step for row in read()):
