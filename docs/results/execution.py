@@ -280,7 +280,7 @@ plan assumes 0.4. {share("unknown")}. A run takes 15 to 20 s of one core."""),
     ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
 two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls."""),
     ("Pushes in real time", "pushes_real_time", lambda: f"""Pushes of 10 N s from eight directions at ten instants of one
-step, with `--real-time`, by what the controller is told: the true state, or real sensors.
+step, with `--real-time`, by what the controller knows: the true state, or real sensors.
 {share("pushes_real_time")}."""),
     ("Minutes", "minutes", lambda: """`bielle simulate walk --duration 60 --control mpc`, true state, largest slip of
 a sole since its touchdown. Takes hours, most of them in Simbody's world."""),

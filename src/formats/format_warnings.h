@@ -1,5 +1,5 @@
 #pragma once
-/// \file What a format for other programs cannot say, told in warnings.
+/// \file What a format for other programs cannot say, as warnings.
 #include <string>
 #include <vector>
 

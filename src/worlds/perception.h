@@ -1,5 +1,5 @@
 #pragma once
-/// \file What a controller is told: the truth, or what an estimator makes of sensors.
+/// \file What a controller knows of the robot: the truth, or what an estimator makes of sensors.
 #include <optional>
 
 #include "bielle/ocp/contact_schedule.h"
@@ -34,7 +34,7 @@ class Perception {
   /// At the time of the world. No allocation. \param plan_time  at which the controller is in its plan, s
   const Measurement& update(const World& world, double plan_time);
   bool isReal() const { return sensors_.has_value(); }
-  EstimationErrors errors() const;  ///< zero where the truth is told
+  EstimationErrors errors() const;  ///< zero where the truth is known
 
  private:
   VectorXd calcRestTorques(ConstVectorRef q, const std::vector<int>& contacts) const;

@@ -1,7 +1,7 @@
 #pragma once
 /// \file A controller that takes a closed robot for its serial model, as most do.
 ///
-/// It is told the joints that the serial model has, and asks for torques tau of those joints. With R the ratio of the motors to
+/// It measures the joints that the serial model has, and requests torques tau of those joints. With R the ratio of the motors to
 /// the joints (bielle/dynamics/ratio.h) the motors of the closed robot are given
 ///
 ///     u = R^{-T} tau                                                                                                (1)

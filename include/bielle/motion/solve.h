@@ -8,7 +8,7 @@
 ///   (problem_options.h, Eq. 2) and the starting point.
 /// - Stages that turn out too long are halved (refineStages()); if that does not help, linkages are kept farther from their
 ///   dead points (avoidDeadPoints()). A solution whose stages are still too long ends as Failed.
-/// - How far linkages are from their dead points is told at the start, and added to the message of a failure near one.
+/// - How far linkages are from their dead points is reported at the start, and added to the message of a failure near one.
 #include <functional>
 #include <optional>
 #include <string>
