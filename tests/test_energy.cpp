@@ -8,6 +8,7 @@
 #include "bielle/ocp/robot_problem.h"
 #include "check_derivative.h"
 #include "mechanisms.h"
+#include "motion/applied_options.h"
 
 using namespace bielle;
 using namespace bielle::testing;

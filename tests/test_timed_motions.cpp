@@ -6,6 +6,7 @@
 #include "bielle/motion/jump.h"
 #include "bielle/motion/walk.h"
 #include "bielle/results/result.h"
+#include "motion/applied_options.h"
 #include "own_robots.h"
 #include "solve_in_place.h"
 

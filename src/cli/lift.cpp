@@ -11,6 +11,7 @@
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/table.h"
+#include "motion/applied_options.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "motion/applied_options.h"
 #include "motion/foot_tasks.h"
 #include "motion/locomotion_stages.h"
 #include "motion/statics.h"

@@ -8,6 +8,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "dynamics/assembly_refinement.h"
+#include "motion/applied_options.h"
 #include "motion/motor_scale.h"
 #include "motion/neighbour_plans.h"
 #include "motion/statics.h"

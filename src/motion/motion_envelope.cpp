@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "motion/applied_options.h"
+
 namespace bielle {
 
 std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion) {

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "bielle/motion/motion.h"
-#include "bielle/motion/problem_options.h"
+#include "motion/applied_options.h"
 
 namespace bielle {
 

@@ -5,6 +5,7 @@
 
 #include "bielle/dynamics/linkage.h"
 #include "model/number_text.h"
+#include "motion/applied_options.h"
 #include "motion/join.h"
 #include "motion/motion_envelope.h"
 #include "motion/refinement.h"

@@ -3,7 +3,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
-#include "bielle/motion/problem_options.h"
+#include "motion/applied_options.h"
 
 namespace bielle {
 namespace {

@@ -7,6 +7,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/solve.h"
 #include "bielle/robots/robot_loader.h"
+#include "motion/applied_options.h"
 #include "results/interrupt.h"
 #include "results/remade_motion.h"
 

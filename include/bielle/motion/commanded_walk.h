@@ -73,9 +73,8 @@ class CommandedWalk {
   };
 
   /// From where the robot stands, at time 0.
-  /// \param options  `flight`, `rigid_landing` and `landing_speed` are
-  /// ignored; a time step of 0 is 12 ms
-  /// \throws InputError as planLocomotion() and addLimits() do
+  /// \param options  `flight`, `rigid_landing` and `landing_speed` are ignored; a time step of 0 is 12 ms
+  /// \throws InputError as planLocomotion() and makeMotion() do
   CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits, CommandSource command,
                 const StandingRobot& standing);
 

@@ -69,7 +69,8 @@ ObjectiveOptions scaleObjective(const Motion& effort, const ShootingTrajectory& 
 
 /// Turns a plan into a problem that starts at rest, adding limits, free durations, objective and step rule to its stages.
 /// Gains are limited to values that are stable for a step (limitGains).
-/// \throws InputError as addLimits(), freeTimings() and setObjective() do
+/// \throws InputError for an unknown motor or phase, a limit that is not positive, a margin or bound out of its range, a joint
+/// whose range has zero width or excludes where the motion starts
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as far as possible: with a = v = 0,

@@ -61,15 +61,6 @@ struct LimitOptions {
   bool areGiven() const { return !(efforts.empty() && velocities.empty() && powers.empty()); }
 };
 
-/// Effort limits by motor (nu), those of the model or the given replacements. \throws InputError as addLimits() does
-VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
-
-/// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
-/// \param q0  configuration of the first node (nq)
-/// \throws InputError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range
-/// has zero width or excludes q0
-bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages);
-
 /// Bounds of a duration relative to the nominal one.
 struct TimingBounds {
   double lower = 0.6, upper = 1.6;
@@ -86,14 +77,6 @@ struct TimingOptions {
   bool areGiven() const { return !phases.empty(); }
 };
 
-/// Makes the durations named by the options free, each phase of the schedule separately.
-/// \param stages  those of the schedule, and the terminal one
-/// \throws InputError when bounds are invalid, or there is no phase of a name
-void freeTimings(const TimingOptions& options, const ContactSchedule& schedule, std::vector<StageSpec>& stages);
-
-/// The options without names that are not phases of the schedule.
-TimingOptions selectTimings(const TimingOptions& options, const ContactSchedule& schedule);
-
 /// A phase of free duration.
 struct PhaseTiming {
   std::string phase;
@@ -105,13 +88,6 @@ struct PhaseTiming {
 /// The durations of the free phases in a trajectory.
 std::vector<PhaseTiming> listTimings(const RobotProblem& problem, const ContactSchedule& schedule,
                                      const ShootingTrajectory& trajectory);
-
-/// Fixes a plan's durations to the chosen ones, with the gains of the solve that chose them.
-void fixTimings(const std::vector<PhaseTiming>& timings, StepRule rule, ContactSchedule& schedule,
-                std::vector<StageSpec>& stages);
-
-/// Gives a trajectory of the robot the sizes of a problem, with the time scale 1 where it has none.
-void fitTimings(const RobotProblem& problem, ShootingTrajectory& trajectory);
 
 enum class Objective { Effort, Energy, PeakTorque };
 const char* getName(Objective objective);
@@ -134,13 +110,6 @@ double getDefaultRegularization(Objective objective);
 
 /// Electrical power of a motor at speed w and torque u, the integrand of Eq. (1) without smoothing, W.
 double calcElectricalPower(const Motor& motor, double u, double w, double regeneration);
-
-/// Weakens the costs that do not define the motion, and adds that of the energy.
-/// \throws InputError when a number is out of its range
-void setObjective(const Model& model, const ObjectiveOptions& options, std::vector<StageSpec>& stages);
-
-/// L of the peak torque, nu. \param limits  those of the motion, which replace some of the model
-VectorXd getPeakLimits(const Model& model, const LimitOptions& limits);
 
 /// Options of a problem besides those of the motion.
 struct ProblemOptions {

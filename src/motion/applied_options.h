@@ -1,0 +1,40 @@
+#pragma once
+/// \file What the options of a problem (bielle/motion/problem_options.h) make of the stages of a motion.
+#include <vector>
+
+#include "bielle/motion/problem_options.h"
+
+namespace bielle {
+
+/// Effort limits by motor (nu), those of the model or the given replacements. \throws InputError as addLimits() does
+VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
+
+/// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
+/// \param q0  configuration of the first node (nq)
+/// \throws InputError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range
+/// has zero width or excludes q0
+bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages);
+
+/// Makes the durations named by the options free, each phase of the schedule separately.
+/// \param stages  those of the schedule, and the terminal one
+/// \throws InputError when bounds are invalid, or there is no phase of a name
+void freeTimings(const TimingOptions& options, const ContactSchedule& schedule, std::vector<StageSpec>& stages);
+
+/// The options without names that are not phases of the schedule.
+TimingOptions selectTimings(const TimingOptions& options, const ContactSchedule& schedule);
+
+/// Fixes a plan's durations to the chosen ones, with the gains of the solve that chose them.
+void fixTimings(const std::vector<PhaseTiming>& timings, StepRule rule, ContactSchedule& schedule,
+                std::vector<StageSpec>& stages);
+
+/// Gives a trajectory of the robot the sizes of a problem, with the time scale 1 where it has none.
+void fitTimings(const RobotProblem& problem, ShootingTrajectory& trajectory);
+
+/// Weakens the costs that do not define the motion, and adds that of the energy.
+/// \throws InputError when a number is out of its range
+void setObjective(const Model& model, const ObjectiveOptions& options, std::vector<StageSpec>& stages);
+
+/// L of the peak torque, nu. \param limits  those of the motion, which replace some of the model
+VectorXd getPeakLimits(const Model& model, const LimitOptions& limits);
+
+}  // namespace bielle
