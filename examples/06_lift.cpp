@@ -55,7 +55,7 @@ bool planAndLift(const Model& closed, const SerialModel& serial, double depth) {
     const LiftNode& last = lifted.nodes.back();
     std::printf("  not lifted: node %zu, %s: %s\n", lifted.nodes.size() - 1, getName(last.status),
                 last.message.c_str());
-    return last.status != LiftStatus::Inaccurate;
+    return last.status != NumericalStatus::Inaccurate;
   }
   const MotionResult result = makeLiftedResult({"bipetto", "", {}}, closed, motion, lifted, 0);
   double acceleration = 0, speed = 0;

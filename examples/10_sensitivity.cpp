@@ -65,11 +65,11 @@ SlopedValue calcEffort(const Model& model, VectorXd q, const std::vector<ModelVa
     const VectorXd v = VectorXd::Constant(1, kSwing * w * std::cos(phase)),
                    a = VectorXd::Constant(1, -kSwing * w * w * std::sin(phase));
     if (!close(model, kMiddle + kSwing * std::sin(phase), q) ||
-        motion.update(makeConstraintSet(model), q, v, a, VectorXd()) != KeptMotionStatus::Ok)
+        motion.update(makeConstraintSet(model), q, v, a, VectorXd()) != NumericalStatus::Ok)
       return {1e3, {}, {}};  // out of reach
     squares += motion.u().squaredNorm() / kNodes;
     for (size_t i = 0; i < variations.size(); ++i)
-      if (motion.calcVariation(variations[i], variation) == KeptMotionStatus::Ok)
+      if (motion.calcVariation(variations[i], variation) == NumericalStatus::Ok)
         slope[static_cast<Eigen::Index>(i)] += motion.u().dot(variation.u) / kNodes;
   }
   const double f = std::sqrt(squares);

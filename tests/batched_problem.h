@@ -55,7 +55,7 @@ class BatchedProblem : public ShootingProblem {
       if (alike > most_alike) most_alike = alike;
       if (task.previous) {
         require(getOwn(task.previous).node == getNumber(task.node - 1), "the evaluation before is of another node");
-        require(task.previous->status == StepStatus::Ok, "the evaluation before is none");
+        require(task.previous->status == NumericalStatus::Ok, "the evaluation before is none");
         require(task.previous->x_next == *task.x, "the evaluation before leads elsewhere");
       }
       require(task.x->allFinite() && (task.node == numStages() || task.u->allFinite()),
@@ -71,7 +71,7 @@ class BatchedProblem : public ShootingProblem {
     const Use use(*this, scratch, count);
     for (int i = 0; i < count; ++i) {
       require(getOwn(tasks[i].at).node == getNumber(tasks[i].node), "the evaluation is of another node");
-      require(tasks[i].at->status == StepStatus::Ok, "the evaluation is none");
+      require(tasks[i].at->status == NumericalStatus::Ok, "the evaluation is none");
       require((tasks[i].next != nullptr) == (tasks[i].node < numStages()),
               "the next evaluation is missing, or too many");
       if (tasks[i].next)

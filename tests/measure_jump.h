@@ -95,7 +95,7 @@ inline void measureForces(const Motion& motion, const ShootingTrajectory& t, Jum
     const ConstraintSet& set = motion.problem->spec(static_cast<int>(k)).constraints;
     if (static_cast<int>(set.closures.size()) == set.num_loops) continue;
     const RobotEvaluation& at = evaluator.evaluate(static_cast<int>(k), t.xs[k], t.us[k]);
-    REQUIRE(at.status == StepStatus::Ok);
+    REQUIRE(at.status == NumericalStatus::Ok);
     for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
       const ContactFrame& contact = model.contacts()[set.getContact(static_cast<int>(c))];
       const Vector6d f = at.lambda.segment<6>(set.offsets[c]);

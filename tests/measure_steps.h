@@ -146,7 +146,7 @@ class StepMeter {
 
   void measureForces(int k, const ContactPhase& phase) {
     const RobotEvaluation& at = evaluator_.evaluate(k, t_.xs[k], t_.us[k]);
-    if (at.status != StepStatus::Ok) {
+    if (at.status != NumericalStatus::Ok) {
       out_.load = -1e9;
       return;
     }

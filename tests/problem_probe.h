@@ -17,19 +17,19 @@ class ProblemProbe {
   int tangentSize(int node) const { return problem_.tangentSize(node); }
   const VectorXd& initialState() const { return problem_.initialState(); }
 
-  StepStatus step(int stage, const VectorXd& x, const VectorXd& u, VectorXd& x_next, double& cost) {
+  NumericalStatus step(int stage, const VectorXd& x, const VectorXd& u, VectorXd& x_next, double& cost) {
     const RobotEvaluation& at = stage_.evaluate(stage, x, u);
-    if (at.status != StepStatus::Ok) return StepStatus::Failed;
+    if (at.status != NumericalStatus::Ok) return NumericalStatus::Failed;
     x_next = at.x_next;
     cost = at.cost;
-    return StepStatus::Ok;
+    return NumericalStatus::Ok;
   }
-  StepStatus calcTerminalCost(const VectorXd& x, double& cost) {
+  NumericalStatus calcTerminalCost(const VectorXd& x, double& cost) {
     const RobotEvaluation& at = stage_.evaluate(numStages(), x);
     cost = at.cost;
     return at.status;
   }
-  StepStatus calcDynamics(int stage, const VectorXd& x, const VectorXd& u, VectorXd& a, VectorXd& lambda) {
+  NumericalStatus calcDynamics(int stage, const VectorXd& x, const VectorXd& u, VectorXd& a, VectorXd& lambda) {
     const RobotEvaluation& at = stage_.evaluate(stage, x, u);
     a = at.a;
     lambda = at.lambda;
@@ -38,13 +38,14 @@ class ProblemProbe {
   // Why the last step failed.
   const std::string& failure() const { return stage_.evaluation().failure; }
 
-  StepStatus linearize(int stage, const VectorXd& x, const VectorXd& u, const VectorXd& x_next_node, StageModel& out) {
-    if (stage_.evaluate(stage, x, u).status != StepStatus::Ok) return StepStatus::Failed;
-    if (next_.evaluate(numStages(), x_next_node).status != StepStatus::Ok) return StepStatus::Failed;
+  NumericalStatus linearize(int stage, const VectorXd& x, const VectorXd& u, const VectorXd& x_next_node,
+                            StageModel& out) {
+    if (stage_.evaluate(stage, x, u).status != NumericalStatus::Ok) return NumericalStatus::Failed;
+    if (next_.evaluate(numStages(), x_next_node).status != NumericalStatus::Ok) return NumericalStatus::Failed;
     return stage_.linearize(&next_.evaluation(), out);
   }
-  StepStatus linearizeTerminal(const VectorXd& x, StageModel& out) {
-    if (stage_.evaluate(numStages(), x).status != StepStatus::Ok) return StepStatus::Failed;
+  NumericalStatus linearizeTerminal(const VectorXd& x, StageModel& out) {
+    if (stage_.evaluate(numStages(), x).status != NumericalStatus::Ok) return NumericalStatus::Failed;
     return stage_.linearize(nullptr, out);
   }
   VectorXd integrate(const VectorXd& x, const VectorXd& dx) { return evaluateAt(x).integrate(dx); }

@@ -30,8 +30,8 @@ inline std::string findWrong(const Model& model) {
   if (model.nv() > 300) return "";
   Workspace ws(model);
   ConstrainedWorkspace cws;
-  const DynamicsStatus status = updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), q, zero, zero);
-  if (status != DynamicsStatus::Ok) return "";
+  const NumericalStatus status = updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), q, zero, zero);
+  if (status != NumericalStatus::Ok) return "";
   if (!cws.a.allFinite() || !cws.lambda.allFinite()) return "accelerations or forces are not finite";
   return "";
 }

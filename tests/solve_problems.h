@@ -21,7 +21,7 @@ class PlainProblem : public NodewiseProblem {
   void evaluate(EvaluateTask& task, ProblemScratch*) const override {
     NodeEvaluation& out = *task.out;
     out.x = *task.x;
-    out.status = StepStatus::Ok;
+    out.status = NumericalStatus::Ok;
     if (task.node == numStages()) {
       out.cost = calcTerminalCost(out.x);
     } else {
@@ -31,7 +31,7 @@ class PlainProblem : public NodewiseProblem {
     }
   }
   void linearize(LinearizeTask& task, ProblemScratch*) const override {
-    task.status = StepStatus::Ok;
+    task.status = NumericalStatus::Ok;
     task.out->cost = task.at->cost;
     task.out->hessian().setZero();
     if (task.node == numStages()) return linearizeTerminal(task.at->x, *task.out);

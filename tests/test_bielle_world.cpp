@@ -92,7 +92,7 @@ TEST_CASE("bielle world: accelerations in the air are those of the full system")
   Workspace ws(model);
   ConstrainedWorkspace cws;
   REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), flight.q, flight.v,
-                                    calcMotorForces(model, flight.u)) == DynamicsStatus::Ok);
+                                    calcMotorForces(model, flight.u)) == NumericalStatus::Ok);
   const auto world = makeTestWorld();
   world->reset(flight.q, flight.v);
   world->setTorques(flight.u);

@@ -262,8 +262,8 @@ TEST_CASE("eval gives the library's dynamics, forces and derivatives") {
   const ConstraintSet set = makeConstraintSet(model, makeContactTargets(model, q, {foot}, 0, 0));
   Workspace ws(model);
   ConstrainedWorkspace cws;
-  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, calcMotorForces(model, u)) == DynamicsStatus::Ok);
-  REQUIRE(updateConstrainedDerivatives(model, ws, cws, set) == DynamicsStatus::Ok);
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, calcMotorForces(model, u)) == NumericalStatus::Ok);
+  REQUIRE(updateConstrainedDerivatives(model, ws, cws, set) == NumericalStatus::Ok);
   for (const Joint& joint : model.joints())
     if (joint.nv) {
       const VectorXd a = cws.a.segment(joint.idx_v, joint.nv);

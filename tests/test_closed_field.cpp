@@ -53,7 +53,7 @@ TEST_CASE("closed field: accelerations and forces of the full system, for every 
         Workspace ws(model);
         ConstrainedWorkspace cws;
         REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), field.configuration(),
-                                          field.velocity(), tau) == DynamicsStatus::Ok);
+                                          field.velocity(), tau) == NumericalStatus::Ok);
         CHECK(calcRelativeError(a, cws.a) < 1e-9);
         CHECK((d_rate - field.velocity()).norm() < 1e-12);
         VectorXd poisoned = tau;

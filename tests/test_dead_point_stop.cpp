@@ -65,7 +65,7 @@ TEST_CASE("dead point stop: the gradient of transmissions by the motors is that 
     VectorXd q = q0, moved = q0;
     const VectorXd offset = VectorXd::LinSpaced(model.nu(), -0.15, 0.2);
     REQUIRE(joints.reset(q0));
-    REQUIRE(joints.update(motors + offset, q) == ClosingStatus::Closed);
+    REQUIRE(joints.update(motors + offset, q) == NumericalStatus::Ok);
     calcTransmission(linkage, memory, model, q, gradient);
     VectorXd differences(model.nu());
     for (int m = 0; m < model.nu(); ++m) {
@@ -73,7 +73,7 @@ TEST_CASE("dead point stop: the gradient of transmissions by the motors is that 
       for (double sign : {-1.0, 1.0}) {
         VectorXd to = motors + offset;
         to[m] += sign * step;
-        REQUIRE(joints.update(to, moved) == ClosingStatus::Closed);
+        REQUIRE(joints.update(to, moved) == NumericalStatus::Ok);
         change += sign * calcTransmission(linkage, model, moved);
       }
       differences[m] = change / (2 * step);

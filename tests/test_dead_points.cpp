@@ -166,7 +166,7 @@ TEST_CASE("dead points of the motor: inertia carries the linkage through") {
     drift[i] = 0;
     double gap = 0, cost = 0;
     for (int k = 0; k < task.stages; ++k) {
-      REQUIRE(problem.step(k, x, VectorXd::Zero(1), next, cost) == StepStatus::Ok);
+      REQUIRE(problem.step(k, x, VectorXd::Zero(1), next, cost) == NumericalStatus::Ok);
       x = next;
       gap = std::max(gap, calcGap(options, x));
       drift[i] = std::max(drift[i], std::abs(calcEnergy(chain.model, x) - energy) / kinetic);
@@ -195,7 +195,7 @@ TEST_CASE("dead points of the motor: an optimal motion goes through them") {
   double cost = 0;
   testing::ProblemProbe probe(problem);
   for (int k = 0; k < task.stages; ++k)
-    REQUIRE(probe.step(k, trajectory.xs[k], trajectory.us[k], trajectory.xs[k + 1], cost) == StepStatus::Ok);
+    REQUIRE(probe.step(k, trajectory.xs[k], trajectory.us[k], trajectory.xs[k + 1], cost) == NumericalStatus::Ok);
   const FddpSummary summary = test::solveInPlace(problem, trajectory);
   CAPTURE(summary.message, summary.iterations, summary.cost);
   REQUIRE(summary.termination == FddpTermination::Converged);
@@ -235,20 +235,20 @@ TEST_CASE("change point: the folded parallelogram is refused by name") {
     double cost = 0;
     testing::ProblemProbe probe(problem);
     const auto land = [&](double u) { return probe.step(0, x, VectorXd::Constant(1, u), next, cost); };
-    REQUIRE(land(0) == StepStatus::Ok);
+    REQUIRE(land(0) == NumericalStatus::Ok);
     const double without = next[kCrank];
-    REQUIRE(land(1) == StepStatus::Ok);
+    REQUIRE(land(1) == NumericalStatus::Ok);
     double u = -without / (next[kCrank] - without), slope = next[kCrank] - without;
-    StepStatus status = StepStatus::Ok;
-    for (int i = 0; i < 50 && status == StepStatus::Ok; ++i) {
+    NumericalStatus status = NumericalStatus::Ok;
+    for (int i = 0; i < 50 && status == NumericalStatus::Ok; ++i) {
       status = land(u);
-      if (status == StepStatus::Ok) u -= next[kCrank] / slope;
+      if (status == NumericalStatus::Ok) u -= next[kCrank] / slope;
     }
-    CHECK(status == StepStatus::Failed);
+    CHECK(status == NumericalStatus::Failed);
     CHECK_THAT(probe.failure(), Catch::Contains("'loop1'"));
     CHECK(next.allFinite());
     // The node is none the worse for it.
-    CHECK(land(0) == StepStatus::Ok);
+    CHECK(land(0) == NumericalStatus::Ok);
     CHECK(probe.failure().empty());
     CHECK(next[kCrank] == without);
   }

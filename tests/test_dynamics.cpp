@@ -131,12 +131,12 @@ TEST_CASE("constrained dynamics: every joint kind times every closure kind, clos
           const VectorXd tau = calcMotorForces(model, u);
           Workspace ws(model);
           ConstrainedWorkspace cws;
-          REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
+          REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == NumericalStatus::Ok);
           REQUIRE(!cws.saddle_point->isRedundant());
           CHECK(cws.residual < 1e-9 * (1 + cws.gamma.cwiseAbs().maxCoeff()));
           CHECK(calcRelativeError(ws.M * cws.a + ws.b - cws.J.transpose() * cws.lambda, tau) < 1e-9);
           CHECK(cws.lambda.cwiseAbs().minCoeff() > 0);
-          REQUIRE(updateConstrainedDerivatives(model, ws, cws, set) == DynamicsStatus::Ok);
+          REQUIRE(updateConstrainedDerivatives(model, ws, cws, set) == NumericalStatus::Ok);
           const int nv = model.nv();
           Workspace other(model);
           ConstrainedWorkspace ocws;

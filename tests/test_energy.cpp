@@ -69,9 +69,9 @@ void checkEnergyStage(const RobotProblem& problem, int k, const VectorXd& x, con
   const Model& model = problem.model();
   const int ndx = problem.tangentSize(k), nu = problem.controlSize(k), rows = problem.constraintSize(k);
   const VectorXd x_next = evaluator.evaluate(k, x, u).x_next;
-  REQUIRE(evaluator.evaluation().status == StepStatus::Ok);
+  REQUIRE(evaluator.evaluation().status == NumericalStatus::Ok);
   node.evaluate(k + 1, x_next, VectorXd::Ones(problem.controlSize(k + 1)));
-  REQUIRE(node.evaluation().status == StepStatus::Ok);
+  REQUIRE(node.evaluation().status == NumericalStatus::Ok);
   ConstraintWeights weights{randomVector(rng, rows), randomVector(rng, rows).cwiseAbs()};
   const auto at = problem.makeEvaluation();
   const auto scratch = problem.makeScratch();
@@ -79,14 +79,14 @@ void checkEnergyStage(const RobotProblem& problem, int k, const VectorXd& x, con
   problem.evaluate(&evaluate, 1, scratch.get());
   StageModel stage;
   stage.resize(ndx, nu, problem.tangentSize(k + 1));
-  LinearizeTask task{k, at.get(), &node.evaluation(), &weights, &stage, StepStatus::Failed, {}};
+  LinearizeTask task{k, at.get(), &node.evaluation(), &weights, &stage, NumericalStatus::Failed, {}};
   problem.linearize(&task, 1, scratch.get());
-  REQUIRE(task.status == StepStatus::Ok);
+  REQUIRE(task.status == NumericalStatus::Ok);
   // Cost, weighted constraints and powers as functions of (du, dx).
   const auto step = [&](const VectorXd& d) {
     const VectorXd x1 = d.tail(ndx).isZero(0) ? x : evaluator.integrate(d.tail(ndx));
     const RobotEvaluation& to = moved.evaluate(k, x1, u + d.head(nu));
-    REQUIRE(to.status == StepStatus::Ok);
+    REQUIRE(to.status == NumericalStatus::Ok);
     VectorXd out(1 + 2 * model.nu());
     out << to.cost + weights.gradient.dot(to.constraints), calcPowers(model, to);
     return out;
@@ -191,9 +191,9 @@ TEST_CASE("energy: derivatives of voltages, and of powers behind lossy gears, in
     problem.evaluate(&evaluate, 1, scratch.get());
     StageModel out;
     out.resize(problem.tangentSize(0), problem.controlSize(0), problem.tangentSize(1));
-    LinearizeTask task{0, at.get(), &next.evaluation(), &weights, &out, StepStatus::Failed, {}};
+    LinearizeTask task{0, at.get(), &next.evaluation(), &weights, &out, NumericalStatus::Failed, {}};
     problem.linearize(&task, 1, scratch.get());
-    REQUIRE(task.status == StepStatus::Ok);
+    REQUIRE(task.status == NumericalStatus::Ok);
     const Eigen::Index nx = out.lx.size();
     const MatrixXd J = differentiate(VectorXd::Zero(u.size() + nx), 1e-4, [&](const VectorXd& d) {
       const VectorXd x1 = d.tail(nx).isZero(0) ? x : evaluator.integrate(d.tail(nx));

@@ -110,7 +110,7 @@ TEST_CASE("Eqs. 2, 4 and 6: lambda of the KKT system is the opposite of that of 
     const Kkt paper(model, c.q, c.v, tau);
     Workspace ws(model);
     ConstrainedWorkspace cws;
-    REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), c.q, c.v, tau) == DynamicsStatus::Ok);
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), c.q, c.v, tau) == NumericalStatus::Ok);
     CHECK(calcRelativeError(cws.a, paper.y.tail(model.nv())) < kEqual);
     CHECK(calcRelativeError(cws.lambda, -paper.y.head(6)) < kEqual);
     // Eq. 2 as printed holds with ours, not with that of eq. 4.

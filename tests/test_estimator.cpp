@@ -36,7 +36,7 @@ class Swing {
     VectorXd d(model_.nv());
     for (int i = 0; i < d.size(); ++i) d[i] = 0.04 * amplitude_[i] * (1 - std::cos((4 + frequency_[i]) * time));
     const AssemblyResult closed = closeConfiguration(model_, model_.integrate(start_, d));
-    REQUIRE(closed.status == AssemblyStatus::Closed);
+    REQUIRE(closed.status == NumericalStatus::Ok);
     VectorXd q = closed.q;
     if (!model_.hasFreeFlyer()) return q;
     const SE3 X = foot_ * calcFoot(q).inverse() * getTrunk(q);
@@ -105,7 +105,7 @@ TEST_CASE("estimator: exact sensors give the state of a robot on one foot") {
     Estimator estimator(model, swing.start(), options);
     estimator.reset(0, swing.start(), VectorXd::Zero(model.nv()), {0});
     for (int i = 1; i <= 150; ++i)
-      REQUIRE(estimator.update(read(model, swing, options.imu, i * kReadingPeriod), {0}) == EstimatorStatus::Ok);
+      REQUIRE(estimator.update(read(model, swing, options.imu, i * kReadingPeriod), {0}) == NumericalStatus::Ok);
     const double time = 150 * kReadingPeriod;
     const VectorXd q = swing.calcConfiguration(time), v = swing.calcVelocity(time);
     const Measurement& found = estimator.measurement();
@@ -188,7 +188,7 @@ TEST_CASE("estimator: passive joints of a fixed linkage follow its motors") {
   Swing swing(robot.model, 3);
   Estimator estimator(robot.model, swing.start());
   for (int i = 1; i <= 200; ++i) {
-    REQUIRE(estimator.update(read(robot.model, swing, {}, i * kReadingPeriod), {}) == EstimatorStatus::Ok);
+    REQUIRE(estimator.update(read(robot.model, swing, {}, i * kReadingPeriod), {}) == NumericalStatus::Ok);
     CHECK(getLargest(estimator.measurement().q - swing.calcConfiguration(i * kReadingPeriod)) < 1e-9);
   }
   CHECK(getLargest(estimator.measurement().v - swing.calcVelocity(200 * kReadingPeriod)) < 0.02);
@@ -203,19 +203,19 @@ TEST_CASE("estimator: near a dead point the status says so") {
   readings.motor_torques.setZero(2);
   readings.motor_positions = Eigen::Vector2d(q[0], q[2]);
   bool warned = false;
-  EstimatorStatus status = EstimatorStatus::Ok;
-  for (int i = 0; i < 2000 && status != EstimatorStatus::NotClosed; ++i) {  // the motors move apart
+  NumericalStatus status = NumericalStatus::Ok;
+  for (int i = 0; i < 2000 && status != NumericalStatus::NotClosed; ++i) {  // the motors move apart
     readings.time = i * kReadingPeriod;
     readings.motor_positions += Eigen::Vector2d(-1e-3, 1e-3);
     status = estimator.update(readings, {});
     CHECK(estimator.measurement().q.allFinite());
-    warned = warned || status == EstimatorStatus::NearDeadPoint;
-    if (status == EstimatorStatus::Ok) {
+    warned = warned || status == NumericalStatus::NearDeadPoint;
+    if (status == NumericalStatus::Ok) {
       CHECK_FALSE(warned);
       CHECK(estimator.margin() >= 0.02);
       CHECK(estimator.message().empty());
     }
-    if (status == EstimatorStatus::NearDeadPoint) {
+    if (status == NumericalStatus::NearDeadPoint) {
       CHECK(estimator.margin() < 0.02);
       CHECK(estimator.message().find("'pin' is near a dead point") != std::string::npos);
     }
@@ -239,13 +239,13 @@ TEST_CASE("estimator: readings that are not finite change nothing") {
      : part == 2 ? bad.motor_torques[0]
      : part == 3 ? bad.angular_velocity[1]
                  : bad.specific_force[2]) = std::numeric_limits<double>::quiet_NaN();
-    CHECK(estimator.update(bad, {0}) == EstimatorStatus::NotFinite);
+    CHECK(estimator.update(bad, {0}) == NumericalStatus::NotFinite);
     CHECK_FALSE(estimator.message().empty());
     CHECK(estimator.measurement().q == before.q);
     CHECK(estimator.measurement().v == before.v);
   }
   readings.time = 2 * kReadingPeriod;
-  CHECK(estimator.update(readings, {0}) == EstimatorStatus::Ok);
+  CHECK(estimator.update(readings, {0}) == NumericalStatus::Ok);
 }
 
 TEST_CASE("estimator: robots with joints that no motor determines are refused") {

@@ -382,8 +382,8 @@ TEST_CASE("sweeps of the full size allocate nothing after the first, stages with
   std::vector<ControlBox> boxes(3);
   for (int k = 0; k < 2; ++k) boxes[k] = {VectorXd::Constant(nu, -1e-3), VectorXd::Constant(nu, 1e-3)};
   LqSweep sweep;
-  REQUIRE(sweep.update(models, {}).status == LqStatus::Ok);
-  REQUIRE(sweep.update(models, {}, boxes).status == LqStatus::Ok);
+  REQUIRE(sweep.update(models, {}).status == NumericalStatus::Ok);
+  REQUIRE(sweep.update(models, {}, boxes).status == NumericalStatus::Ok);
   const long before = num_allocations;
   sweep.update(models, {});
   sweep.update(models, {}, boxes);

@@ -87,7 +87,7 @@ TEST_CASE("the reason of a failure does not depend on batches") {
     void evaluate(EvaluateTask& task, ProblemScratch* scratch) const override {
       PlantProblem<CartPole>::evaluate(task, scratch);
       if (*task.x == start) return;
-      task.out->status = StepStatus::Failed;
+      task.out->status = NumericalStatus::Failed;
       task.out->failure = "the cart moved at " + std::to_string(task.node);
     }
   } problem;

@@ -45,13 +45,13 @@ class SpoiledProblem : public NodewiseProblem {
   }
 
  private:
-  void spoil(double& value, StepStatus& status, std::string& failure) const {
+  void spoil(double& value, NumericalStatus& status, std::string& failure) const {
     ++num_spoiled;
     switch (fault) {
       case Fault::None:
         break;
       case Fault::Status:
-        status = StepStatus::Failed;
+        status = NumericalStatus::Failed;
         failure = "the knee is locked";
         break;
       case Fault::Nan:

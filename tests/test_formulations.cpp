@@ -108,7 +108,7 @@ VectorXd simulate(const Model& model, const VectorXd& q0, Formulation formulatio
   VectorXd x = problem.initialState();
   for (int k = 0; k < stages; ++k) {
     const RobotEvaluation& at = evaluator.evaluate(k, x, VectorXd::Constant(model.nu(), 0.3));
-    REQUIRE(at.status == StepStatus::Ok);
+    REQUIRE(at.status == NumericalStatus::Ok);
     x = at.x_next;
   }
   return x;

@@ -19,7 +19,7 @@ double calcEnergy(const MatrixXd& M, const VectorXd& v) { return 0.5 * v.dot(M *
 // After updateImpact(), against differences.
 void checkImpactDerivatives(const Model& model, const ConstraintSet& set, const VectorXd& q, const VectorXd& v,
                             ImpactWorkspace& iws) {
-  REQUIRE(updateImpactDerivatives(model, iws, set) == DynamicsStatus::Ok);
+  REQUIRE(updateImpactDerivatives(model, iws, set) == NumericalStatus::Ok);
   const int nv = model.nv();
   ImpactWorkspace other(model);
   const auto solve = [&](const VectorXd& x, const VectorXd& y) {
@@ -57,7 +57,7 @@ TEST_CASE(
           if (open) q = model.integrate(q, randomVector(rng, model.nv(), 0.1));
           const VectorXd v = randomVector(rng, model.nv(), 1);
           ImpactWorkspace iws(model);
-          REQUIRE(updateImpact(model, iws, set, q, v) == DynamicsStatus::Ok);
+          REQUIRE(updateImpact(model, iws, set, q, v) == NumericalStatus::Ok);
           const MatrixXd M = iws.ws.M, J = iws.J;
           const double before = calcEnergy(M, v);
           CHECK((J * iws.v_plus).norm() < 1e-10);
@@ -77,7 +77,7 @@ TEST_CASE("a block that lands flat stops; redundant loops meet the same velocity
   const ConstraintSet set = makeConstraintSet(model);
   REQUIRE(set.rows == 6);
   const VectorXd v = randomVector(rng, model.nv(), 1);
-  REQUIRE(updateImpact(model, iws, set, four_bar.q_closed, v) == DynamicsStatus::Ok);
+  REQUIRE(updateImpact(model, iws, set, four_bar.q_closed, v) == NumericalStatus::Ok);
   CHECK(iws.saddle_point->isRedundant());
   CHECK((iws.J * iws.v_plus).norm() < 1e-10);
   // Momentum along the null space N of J is conserved: N^T M v+ = N^T M v.
@@ -97,7 +97,7 @@ TEST_CASE("a block that lands flat stops; redundant loops meet the same velocity
   const Model block = builder.build();
   ImpactWorkspace flat(block);
   REQUIRE(updateImpact(block, flat, makeConstraintSet(block, {{0, SE3::Identity(), 0, 0}}), block.makeNeutral(),
-                       randomVector(rng, 6, 1)) == DynamicsStatus::Ok);
+                       randomVector(rng, 6, 1)) == NumericalStatus::Ok);
   CHECK(flat.v_plus.norm() < 1e-12);
 }
 
@@ -120,7 +120,7 @@ TEST_CASE("a body that lands on an edge goes on rolling about it, by its angular
     const ConstraintSet set = makeConstraintSet(model, {{0, X_WE, 0, 0}});
     REQUIRE(set.rows == 5);
     ImpactWorkspace iws(model);
-    REQUIRE(updateImpact(model, iws, set, q, v) == DynamicsStatus::Ok);
+    REQUIRE(updateImpact(model, iws, set, q, v) == NumericalStatus::Ok);
 
     // In the axes of the world: the impulse acts on the edge and has no moment about it.
     const Vector3d axis = X_WE.R.col(0), com = X_WB.act(inertia.com), arm = com - X_WE.p;
@@ -156,7 +156,7 @@ TEST_CASE("impacts of edges on mechanisms: derivatives agree with differences") 
     const ConstraintSet set = makeConstraintSet(model, {{0, randomPlacement(rng), 0, 0}});
     const VectorXd q = mechanism.q_closed, v = randomVector(rng, model.nv(), 1);
     ImpactWorkspace iws(model);
-    REQUIRE(updateImpact(model, iws, set, q, v) == DynamicsStatus::Ok);
+    REQUIRE(updateImpact(model, iws, set, q, v) == NumericalStatus::Ok);
     CHECK((iws.J * iws.v_plus).norm() < 1e-10);
     checkImpactDerivatives(model, set, q, v, iws);
   }
@@ -170,8 +170,8 @@ TEST_CASE("impacts allocate nothing after the first") {
   ImpactWorkspace iws(mechanism.model);
   const VectorXd v = randomVector(rng, mechanism.model.nv(), 1);
   const auto run = [&] {
-    return updateImpact(mechanism.model, iws, set, mechanism.q_closed, v) == DynamicsStatus::Ok &&
-           updateImpactDerivatives(mechanism.model, iws, set) == DynamicsStatus::Ok;
+    return updateImpact(mechanism.model, iws, set, mechanism.q_closed, v) == NumericalStatus::Ok &&
+           updateImpactDerivatives(mechanism.model, iws, set) == NumericalStatus::Ok;
   };
   REQUIRE(run());
   const long before = num_allocations;

@@ -73,7 +73,7 @@ TEST_CASE("a record holds what the dynamics say at each node") {
   ConstrainedWorkspace cws;
   const ConstraintSet& set = squat.motion.problem->spec(k).constraints;
   REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, calcMotorForces(model, squat.motion.guess.us[k])) ==
-          DynamicsStatus::Ok);
+          NumericalStatus::Ok);
   CHECK((record.a.row(k).transpose() - cws.a).norm() < 1e-9 * cws.a.norm());
   CHECK(record.closure_wrenches.cols() == 36);
   // The wrenches by name do the work of the rows of lambda.

@@ -156,10 +156,10 @@ TEST_CASE("joint forces: inverse and constrained dynamics against differences, e
 
       const ConstraintSet set = makeConstraintSet(model);
       ConstrainedWorkspace cws, ocws;
-      REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
-      REQUIRE(updateConstrainedDerivatives(model, ws, cws, set) == DynamicsStatus::Ok);
+      REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == NumericalStatus::Ok);
+      REQUIRE(updateConstrainedDerivatives(model, ws, cws, set) == NumericalStatus::Ok);
       const auto solve = [&](const VectorXd& x, const VectorXd& y) {
-        REQUIRE(updateConstrainedDynamics(model, other, ocws, set, x, y, tau) == DynamicsStatus::Ok);
+        REQUIRE(updateConstrainedDynamics(model, other, ocws, set, x, y, tau) == NumericalStatus::Ok);
         return ocws.a;
       };
       checkDerivative(cws.da_dq,
@@ -190,7 +190,7 @@ TEST_CASE("joint forces: the energy falls by what dampers and friction take") {
   ConstrainedWorkspace cws;
   const VectorXd& q = mechanism.q_closed;
   const VectorXd v = projectVelocity(model, ws, set, q, randomVector(rng, model.nv()));
-  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, VectorXd::Zero(model.nv())) == DynamicsStatus::Ok);
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, VectorXd::Zero(model.nv())) == NumericalStatus::Ok);
   const VectorXd a = cws.a;
   const auto energy = [&](const VectorXd& t) {
     updatePositions(model, ws, model.integrate(q, t[0] * (v + 0.5 * t[0] * a)));

@@ -67,7 +67,7 @@ struct Evaluations {
       tasks.push_back({k, &xs[k], k < problem.numStages() ? &us[k] : nullptr, nullptr, nodes[k].get()});
     problem.evaluate(tasks.data(), static_cast<int>(tasks.size()), scratch.get());
   }
-  std::vector<StepStatus> linearize(const std::vector<int>& some) {
+  std::vector<NumericalStatus> linearize(const std::vector<int>& some) {
     std::vector<LinearizeTask> tasks;
     for (int k : some) {
       tasks.emplace_back();
@@ -77,7 +77,7 @@ struct Evaluations {
       tasks.back().out = &models[k];
     }
     problem.linearize(tasks.data(), static_cast<int>(tasks.size()), scratch.get());
-    std::vector<StepStatus> statuses;
+    std::vector<NumericalStatus> statuses;
     for (const LinearizeTask& task : tasks) statuses.push_back(task.status);
     return statuses;
   }
@@ -262,8 +262,8 @@ TEST_CASE("nodes with all sorts of contacts go together") {
   for (int k = N; k >= 0; --k) {
     CAPTURE(k);
     alone.evaluate({k}, points, controls);
-    REQUIRE(alone.at(k).status == StepStatus::Ok);
-    REQUIRE(alone.linearize({k}) == std::vector<StepStatus>{StepStatus::Ok});
+    REQUIRE(alone.at(k).status == NumericalStatus::Ok);
+    REQUIRE(alone.linearize({k}) == std::vector<NumericalStatus>{NumericalStatus::Ok});
     CHECK(isSame(together.at(k), alone.at(k)));
     CHECK(isSame(together.models[k], alone.models[k]));
     if (k > 0 && k < N) CHECK((together.models[k].Fx() - together.models[k - 1].Fx()).norm() > 1e-3);
@@ -282,7 +282,7 @@ TEST_CASE("what comes out of a node does not depend on which come together, by t
   others.linearize({3, 4, 5});
   others.linearize({9});
   for (int k = 0; k <= N; ++k) {
-    REQUIRE(all.at(k).status == StepStatus::Ok);
+    REQUIRE(all.at(k).status == NumericalStatus::Ok);
     CHECK(isSame(all.at(k), others.at(k)));
   }
   for (int k : {3, 4, 5, 9}) CHECK(isSame(all.models[k], others.models[k]));
@@ -347,11 +347,11 @@ TEST_CASE("a step that fails does so alone, and says why") {
   walk.us[4].setConstant(1e9);  // beyond the reach of every closure
   walk.us[6][0] = std::numeric_limits<double>::quiet_NaN();
   bad.evaluate({2, 4, 5, 6}, walk.xs, walk.us);
-  CHECK(bad.at(4).status == StepStatus::Failed);
+  CHECK(bad.at(4).status == NumericalStatus::Failed);
   CHECK(bad.at(4).failure.find("closure") != std::string::npos);
-  CHECK(bad.at(6).status == StepStatus::Failed);
+  CHECK(bad.at(6).status == NumericalStatus::Failed);
   for (int k : {2, 5}) {
-    CHECK(bad.at(k).status == StepStatus::Ok);
+    CHECK(bad.at(k).status == NumericalStatus::Ok);
     CHECK(isSame(bad.at(k), good.at(k)));
   }
 }

@@ -20,7 +20,7 @@ Model loadOwn(const std::string& place) { return loadRobot(std::string(BIELLE_SO
 double calcAcceleration(const Model& model, const std::vector<ContactTarget>& contacts, const VectorXd& q,
                         const VectorXd& u) {
   const Modes modes = calcModes(model, makeConstraintSet(model, contacts), q, calcMotorForces(model, u));
-  REQUIRE(modes.status == DynamicsStatus::Ok);
+  REQUIRE(modes.status == NumericalStatus::Ok);
   return modes.acceleration;
 }
 
@@ -38,7 +38,7 @@ TEST_CASE("leaf springs: beside the middle of its feet a robot rests where they 
   aside.frames.push_back({"trunk", 1, SE3(), {Matrix3d::Identity(), aside.q_ref.head<3>()}});
   aside.frames.back().mask << false, true, true, false, false, false;
   const AssemblyResult moved = assemble(model, aside);
-  REQUIRE(moved.status == AssemblyStatus::Closed);
+  REQUIRE(moved.status == NumericalStatus::Ok);
   const VectorXd q = settlePosture(model, contacts, moved.q);
   const VectorXd change = model.difference(moved.q, q);
   CHECK(change.cwiseAbs().maxCoeff() < 0.05);

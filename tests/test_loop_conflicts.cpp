@@ -90,7 +90,7 @@ TEST_CASE("conflicts: bars too short by a known length, and the least change tha
     CAPTURE(ground);
     const Model model = makePlanarFourBar(ground, 0.15, 0.35, 0.3, 1).model;
     const AssemblyResult open = findClosedConfiguration(model);
-    REQUIRE(open.status == AssemblyStatus::NotClosed);
+    REQUIRE(open.status == NumericalStatus::NotClosed);
     const std::vector<LoopConflict> conflicts = findLoopConflicts(model, open.q);
     REQUIRE(conflicts.size() == 1);
     CHECK(conflicts[0].closures == std::vector<int>{0});
@@ -139,10 +139,10 @@ TEST_CASE("conflicts: loops that close alone but not together; one beside them h
   for (const ClosureKind kind : {ClosureKind::Ball3D, ClosureKind::Hinge5D}) {
     if (selection.isLeftOut()) continue;
     for (const Dyad& one : {up, down})
-      CHECK(findClosedConfiguration(makeSharedBar({one, idle}, kind)).status == AssemblyStatus::Closed);
+      CHECK(findClosedConfiguration(makeSharedBar({one, idle}, kind)).status == NumericalStatus::Ok);
     const Model model = makeSharedBar({idle, up, down}, kind);
     const AssemblyResult open = findClosedConfiguration(model);
-    REQUIRE(open.status == AssemblyStatus::NotClosed);
+    REQUIRE(open.status == NumericalStatus::NotClosed);
     const std::vector<LoopConflict> conflicts = findLoopConflicts(model, open.q);
     REQUIRE(conflicts.size() == 1);
     CHECK(listNames(model, conflicts[0]) == std::vector<std::string>{"rod_up", "rod_down"});
@@ -181,7 +181,7 @@ TEST_CASE("conflicts: of random mechanisms, no remedy is larger than what was mo
     builder.addFrame("tip_b", "b2", ws.X_WB[4].inverseTimes(ws.X_WB[2] * tip));
     builder.addClosure("weld", ClosureKind::Weld6D, "tip_a", "tip_b");
     const Model closed = builder.build();
-    REQUIRE(closeConfiguration(closed, q).status == AssemblyStatus::Closed);
+    REQUIRE(closeConfiguration(closed, q).status == NumericalStatus::Ok);
     CHECK(findLoopConflicts(closed, q).empty());
     LoopRemedy moved;
     moved.place = {seed % 2 ? ModelPlace::Kind::Joint : ModelPlace::Kind::Frame1, seed % 2 ? 3 : 0};
@@ -193,7 +193,7 @@ TEST_CASE("conflicts: of random mechanisms, no remedy is larger than what was mo
     AssemblyOptions options;
     options.max_iterations = 50;  // of the starts, none closes
     const AssemblyResult start = closeConfiguration(model, q, options);
-    REQUIRE(start.status == AssemblyStatus::NotClosed);
+    REQUIRE(start.status == NumericalStatus::NotClosed);
     const std::vector<LoopConflict> conflicts = findLoopConflicts(model, start.q);
     REQUIRE(conflicts.size() == 1);
     REQUIRE(!conflicts[0].remedies.empty());

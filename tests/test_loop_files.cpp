@@ -45,11 +45,11 @@ void checkLoop(const LoadedRobot& robot, ClosureKind kind, int mobility) {
     CHECK(closure.kind == kind);
   }
   CHECK(loops == 1);
-  CHECK(findClosedConfiguration(model).status == AssemblyStatus::Closed);
+  CHECK(findClosedConfiguration(model).status == NumericalStatus::Ok);
   // Elsewhere the loop closes too, so that its frames are where the axes are.
   const VectorXd apart = model.integrate(model.makeNeutral(), VectorXd::Constant(model.nv(), 0.1));
   const AssemblyResult closed = closeConfiguration(model, apart);
-  CHECK((closed.status == AssemblyStatus::Closed) == (mobility > 0));
+  CHECK((closed.status == NumericalStatus::Ok) == (mobility > 0));
 }
 
 bool tells(const LoadedRobot& robot, const std::string& text) {

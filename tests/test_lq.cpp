@@ -113,7 +113,7 @@ VectorXd stack(const std::vector<VectorXd>& dx, const std::vector<VectorXd>& du,
 // Largest distance between the sweep's step and the dense program's solution.
 double calcStepError(LqSweep& sweep, const std::vector<StageModel>& models, const DenseProgram& dense,
                      const LqRegularization& mu) {
-  REQUIRE(sweep.update(models, mu).status == LqStatus::Ok);
+  REQUIRE(sweep.update(models, mu).status == NumericalStatus::Ok);
   std::vector<VectorXd> dx, du;
   sweep.calcStep(models, dx, du);
   return (stack(dx, du, dense) - dense.calcSolution()).cwiseAbs().maxCoeff();
@@ -130,7 +130,7 @@ TEST_CASE("the sweep solves the dense program, whatever the sizes, gaps and regu
     const LqRegularization mu{trial % 2 ? 0.3 : 0.0, trial % 3 ? 0.7 : 0.0};
     const DenseProgram dense(models, mu);
     const LqResult result = sweep.update(models, mu);
-    REQUIRE(result.status == LqStatus::Ok);
+    REQUIRE(result.status == NumericalStatus::Ok);
     CHECK(result.node == -1);
     std::vector<VectorXd> dx, du;
     const double slope = sweep.calcStep(models, dx, du);
@@ -173,7 +173,7 @@ TEST_CASE("without gaps the expected change is half the slope, the sum of Qu.k")
 TEST_CASE("the value function is the optimal cost to go from any deviation") {
   auto models = makeModels(kTangents, kControls);
   LqSweep sweep;
-  REQUIRE(sweep.update(models, {}).status == LqStatus::Ok);
+  REQUIRE(sweep.update(models, {}).status == NumericalStatus::Ok);
   const int k = 2;
   const LqSweep::Node node = sweep.nodes()[k];
   const std::vector<StageModel> tail(models.begin() + k, models.end());
@@ -225,9 +225,9 @@ TEST_CASE("an indefinite control block and a value that is not finite are report
   auto bad = models;
   bad[3].luu() -= 1e4 * MatrixXd::Identity(5, 5);
   LqResult result = sweep.update(bad, {});
-  CHECK(result.status == LqStatus::Indefinite);
+  CHECK(result.status == NumericalStatus::Indefinite);
   CHECK(result.node == 3);
-  CHECK(sweep.update(bad, {2e4, 0}).status == LqStatus::Ok);
+  CHECK(sweep.update(bad, {2e4, 0}).status == NumericalStatus::Ok);
 
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto poisoned = [&](auto&& poison) {
@@ -240,7 +240,7 @@ TEST_CASE("an indefinite control block and a value that is not finite are report
         poisoned([&](StageModel& m) { m.gap(1) = nan; }), poisoned([&](StageModel& m) { m.lx(1) = nan; }),
         poisoned([&](StageModel& m) { m.lu(1) = nan; }), poisoned([&](StageModel& m) { m.lxx()(2, 1) = nan; }),
         poisoned([&](StageModel& m) { m.lux()(2, 1) = nan; }), poisoned([&](StageModel& m) { m.luu()(2, 1) = nan; })}) {
-    CHECK(r.status == LqStatus::NotFinite);
+    CHECK(r.status == NumericalStatus::NotFinite);
     CHECK((r.node == 3 || r.node == 2));
   }
 }
@@ -277,7 +277,7 @@ TEST_CASE("box QP: the best of all active sets, with its free factor") {
     }
 
     VectorXd d = 3 * random(n, 1);
-    REQUIRE(qp.solve(H, g, lower, upper, d) == BoxQpStatus::Ok);
+    REQUIRE(qp.solve(H, g, lower, upper, d) == NumericalStatus::Ok);
     CHECK((d - oracle).cwiseAbs().maxCoeff() < 1e-9);
     CHECK((d - lower).minCoeff() >= 0);
     CHECK((upper - d).minCoeff() >= 0);
@@ -290,8 +290,9 @@ TEST_CASE("box QP: the best of all active sets, with its free factor") {
   CHECK(clamped_in_all > 200);
   VectorXd d = VectorXd::Zero(2);
   const VectorXd wide = VectorXd::Constant(2, 1.0);
-  CHECK(qp.solve(-MatrixXd::Identity(2, 2), VectorXd::Zero(2), -wide, wide, d) == BoxQpStatus::Indefinite);
-  CHECK(qp.solve(MatrixXd::Identity(2, 2), VectorXd::Constant(2, NAN), -wide, wide, d) == BoxQpStatus::NotConverged);
+  CHECK(qp.solve(-MatrixXd::Identity(2, 2), VectorXd::Zero(2), -wide, wide, d) == NumericalStatus::Indefinite);
+  CHECK(qp.solve(MatrixXd::Identity(2, 2), VectorXd::Constant(2, NAN), -wide, wide, d) ==
+        NumericalStatus::NotConverged);
 }
 
 TEST_CASE("a sweep with boxes: wide ones change nothing, tight ones clamp k and empty the rows of K") {
@@ -314,7 +315,7 @@ TEST_CASE("a sweep with boxes: wide ones change nothing, tight ones clamp k and 
   // The value function must be that of the policy du = k + K dx, rolled out through the models.
   for (ControlBox& box : boxes) box.lower *= 2e-4, box.upper *= 2e-4;
   const LqResult tight = boxed.update(models, {}, boxes);
-  REQUIRE(tight.status == LqStatus::Ok);
+  REQUIRE(tight.status == NumericalStatus::Ok);
   int clamped = 0;
   for (size_t k = 0; k < boxes.size(); ++k) {
     for (int i = 0; i < kControls[k]; ++i) {
@@ -338,7 +339,7 @@ TEST_CASE("a sweep with any control clamped: gains and value function of the fre
     std::vector<ControlBox> boxes(3, {VectorXd::Constant(nu, -1e3), VectorXd::Constant(nu, 1e3)});
     for (ControlBox& box : boxes) box.lower[which] = box.upper[which] = 0.1;
     LqSweep sweep;
-    REQUIRE(sweep.update(models, {}, boxes).status == LqStatus::Ok);
+    REQUIRE(sweep.update(models, {}, boxes).status == NumericalStatus::Ok);
     std::vector<int> free;
     for (int i = 0; i < nu; ++i)
       if (i != which) free.push_back(i);

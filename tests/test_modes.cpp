@@ -167,10 +167,10 @@ TEST_CASE("stiffness in reduced coordinates against central differences, under l
     Workspace ws(model);
     ConstrainedWorkspace cws;
     const VectorXd rest = VectorXd::Zero(model.nv());
-    REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, rest, rest) == DynamicsStatus::Ok);
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, rest, rest) == NumericalStatus::Ok);
     const VectorXd tau = ws.b - cws.J.transpose() * randomVector(rng, set.rows, 50);
     const Modes found = calcModes(model, set, q, tau);
-    REQUIRE(found.status == DynamicsStatus::Ok);
+    REQUIRE(found.status == NumericalStatus::Ok);
     CHECK(found.acceleration < 1e-8);
     const MatrixXd M = ws.M, weights = found.N.transpose() * M;
     CHECK((weights * found.N - MatrixXd::Identity(found.N.cols(), found.N.cols())).norm() < 1e-10);

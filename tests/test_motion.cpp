@@ -60,7 +60,7 @@ double calcDefect(const RobotProblem& problem, const ShootingTrajectory& t) {
   testing::ProblemProbe probe(problem);
   VectorXd next(problem.stateSize());
   for (int k = 0; k < problem.numStages(); ++k) {
-    REQUIRE(probe.step(k, t.xs[k], t.us[k], next, cost) == StepStatus::Ok);
+    REQUIRE(probe.step(k, t.xs[k], t.us[k], next, cost) == NumericalStatus::Ok);
     defect = std::max(defect, probe.difference(t.xs[k + 1], next).cwiseAbs().maxCoeff());
   }
   return defect;
@@ -225,7 +225,7 @@ TEST_CASE("a foot beside its place returns as the limits of the gains have it") 
   double d = -kOff, e = 0;  // along x, m and m/s: Eqs. (1) and (2) of motion.h
   for (int k = 0; k < 12; ++k) {
     const RobotEvaluation& at = evaluator.evaluate(0, x, u);
-    REQUIRE(at.status == StepStatus::Ok);
+    REQUIRE(at.status == NumericalStatus::Ok);
     x = at.x_next;
     const double before = e;
     e = (1 - D) * e - K * d / h;

@@ -21,13 +21,13 @@ TEST_CASE("shooting problem: a linearization does not depend on what was compute
   const VectorXd x0 = problem.initialState(), u = used.guess.us[0];
   const VectorXd x = problem.integrate(x0, randomVector(rng, problem.tangentSize(0), 0.05));
   StageModel once, again, other;
-  REQUIRE(untouched.linearize(0, x, u, x0, once) == StepStatus::Ok);
+  REQUIRE(untouched.linearize(0, x, u, x0, once) == NumericalStatus::Ok);
   for (int i = 0; i < 3; ++i) {  // elsewhere, with other forces and velocities
     const VectorXd away = problem.integrate(x0, randomVector(rng, problem.tangentSize(0), 0.1));
-    REQUIRE(problem.linearize(0, away, u + randomVector(rng, model.nu(), 20), x0, other) == StepStatus::Ok);
+    REQUIRE(problem.linearize(0, away, u + randomVector(rng, model.nu(), 20), x0, other) == NumericalStatus::Ok);
   }
   for (int i = 0; i < 2; ++i) {  // the second time nothing is new
-    REQUIRE(problem.linearize(0, x, u, x0, again) == StepStatus::Ok);
+    REQUIRE(problem.linearize(0, x, u, x0, again) == NumericalStatus::Ok);
     CHECK(calcRelativeError(again.Fx(), once.Fx()) < 1e-9);
     CHECK(calcRelativeError(again.Fu(), once.Fu()) < 1e-9);
     CHECK(calcRelativeError(again.lx, once.lx) < 1e-9);
@@ -64,15 +64,15 @@ TEST_CASE("shooting problem: steps and linearizations allocate nothing after the
     };
     EvaluateTask steps[] = {{0, &at, &u, nullptr, stage.get()}, {1, &x, nullptr, nullptr, terminal.get()}};
     LinearizeTask linearizations[2];
-    linearizations[0] = {0, stage.get(), terminal.get(), nullptr, &models[0], StepStatus::Failed, {}};
-    linearizations[1] = {1, terminal.get(), nullptr, nullptr, &models[1], StepStatus::Failed, {}};
+    linearizations[0] = {0, stage.get(), terminal.get(), nullptr, &models[0], NumericalStatus::Failed, {}};
+    linearizations[1] = {1, terminal.get(), nullptr, nullptr, &models[1], NumericalStatus::Failed, {}};
     const IntegrateTask move{0, stage.get(), &small, &moved};
     const DifferenceTask difference{0, stage.get(), &x, &dx};
     measure(0, [&] { problem.evaluate(steps, 2, scratch.get()); });
     measure(1, [&] { problem.linearize(linearizations, 2, scratch.get()); });
     measure(2, [&] { problem.integrate(&move, 1, scratch.get()); });
     measure(3, [&] { problem.difference(&difference, 1, scratch.get()); });
-    for (const LinearizeTask& task : linearizations) CHECK(task.status == StepStatus::Ok);
+    for (const LinearizeTask& task : linearizations) CHECK(task.status == NumericalStatus::Ok);
     return counts;
   };
   const long before = num_allocations;
@@ -106,10 +106,10 @@ TEST_CASE("shooting problem: a stage that replaces another is as if it had alway
   const VectorXd x = probe.integrate(replaced.initialState(), randomVector(rng, replaced.tangentSize(0), 0.01)),
                  u = randomVector(rng, model.nu(), 1);
   StageModel before, after, wanted;
-  REQUIRE(probe.linearize(1, x, u, x, before) == StepStatus::Ok);  // what was computed before does not matter
+  REQUIRE(probe.linearize(1, x, u, x, before) == NumericalStatus::Ok);  // what was computed before does not matter
   replaced.replaceStage(1, makeStage({1}, 3));
-  REQUIRE(probe.linearize(1, x, u, x, after) == StepStatus::Ok);
-  REQUIRE(expected.linearize(1, x, u, x, wanted) == StepStatus::Ok);
+  REQUIRE(probe.linearize(1, x, u, x, after) == NumericalStatus::Ok);
+  REQUIRE(expected.linearize(1, x, u, x, wanted) == NumericalStatus::Ok);
   CHECK(after.cost == wanted.cost);
   CHECK(after.Fx() == wanted.Fx());
   CHECK(after.lx == wanted.lx);
@@ -155,13 +155,13 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
   VectorXd x = problem.initialState(), next = x;
   const VectorXd u = VectorXd::Zero(1);
   double cost = 0;
-  CHECK(problem.step(0, x, u, next, cost) == StepStatus::Ok);
+  CHECK(problem.step(0, x, u, next, cost) == NumericalStatus::Ok);
   x[1] = std::numeric_limits<double>::quiet_NaN();
-  CHECK(problem.step(0, x, u, next, cost) == StepStatus::Failed);
+  CHECK(problem.step(0, x, u, next, cost) == NumericalStatus::Failed);
   StageModel out;
-  CHECK(problem.linearize(0, x, u, next, out) == StepStatus::Failed);
-  CHECK(problem.calcTerminalCost(x, cost) == StepStatus::Failed);
-  CHECK(problem.linearizeTerminal(x, out) == StepStatus::Failed);
+  CHECK(problem.linearize(0, x, u, next, out) == NumericalStatus::Failed);
+  CHECK(problem.calcTerminalCost(x, cost) == NumericalStatus::Failed);
+  CHECK(problem.linearizeTerminal(x, out) == NumericalStatus::Failed);
 
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const std::function<void(StageSpec&)> spoils[] = {[&](StageSpec& s) { s.state.q_ref[0] = nan; },
@@ -170,6 +170,6 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
     for (const auto& spoil : spoils) {
       const RobotProblem whole_spoilt = make(spoil, formulation);
       ProblemProbe spoilt(whole_spoilt);
-      CHECK(spoilt.step(0, spoilt.initialState(), u, next, cost) == StepStatus::Failed);
+      CHECK(spoilt.step(0, spoilt.initialState(), u, next, cost) == NumericalStatus::Failed);
     }
 }

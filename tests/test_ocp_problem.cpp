@@ -32,7 +32,7 @@ struct Step {
 Step calcStep(ProblemProbe& problem, int stage, const Point& point, const VectorXd& dx, const VectorXd& du) {
   VectorXd next(problem.stateSize());
   double cost = 0;
-  REQUIRE(problem.step(stage, problem.integrate(point.x, dx), point.u + du, next, cost) == StepStatus::Ok);
+  REQUIRE(problem.step(stage, problem.integrate(point.x, dx), point.u + du, next, cost) == NumericalStatus::Ok);
   return {problem.difference(point.x_node, next), cost};
 }
 
@@ -43,7 +43,7 @@ VectorXd calcWeightedResiduals(ProblemProbe& problem, int node, const VectorXd& 
   const StageSpec& spec = problem.spec(node);
   const bool running = node < problem.numStages();
   VectorXd a, lambda;
-  if (running) REQUIRE(problem.calcDynamics(node, x, u, a, lambda) == StepStatus::Ok);
+  if (running) REQUIRE(problem.calcDynamics(node, x, u, a, lambda) == NumericalStatus::Ok);
   Workspace ws(model);
   updatePositions(model, ws, x.head(model.nq()));
   updateVelocities(model, ws, x.tail(model.nv()));
@@ -106,11 +106,11 @@ void checkGaussNewton(ProblemProbe& problem, int node, const Point& point, const
 // h: step in x; the one in u can be longer, as forces are linear in it.
 void checkProbedStage(ProblemProbe& problem, const Point& point, double h) {
   StageModel model;
-  REQUIRE(problem.linearize(0, point.x, point.u, point.x_node, model) == StepStatus::Ok);
+  REQUIRE(problem.linearize(0, point.x, point.u, point.x_node, model) == NumericalStatus::Ok);
   const VectorXd no_dx = VectorXd::Zero(problem.tangentSize(0)), no_du = VectorXd::Zero(point.u.size());
   Step here;  // not through integrate(), which closes reduced states anew, to rounding
   VectorXd next(problem.stateSize());
-  REQUIRE(problem.step(0, point.x, point.u, next, here.cost) == StepStatus::Ok);
+  REQUIRE(problem.step(0, point.x, point.u, next, here.cost) == NumericalStatus::Ok);
   here.gap = problem.difference(point.x_node, next);
   CHECK(model.cost == Approx(here.cost).epsilon(1e-13));
   CHECK((model.gap - here.gap).cwiseAbs().maxCoeff() <= 1e-13 * (1 + here.gap.cwiseAbs().maxCoeff()));
@@ -132,11 +132,11 @@ void checkProbedStage(ProblemProbe& problem, const Point& point, double h) {
 void checkTerminal(ProblemProbe& problem, const VectorXd& x, double h) {
   StageModel model;
   const int node = problem.numStages();
-  REQUIRE(problem.linearizeTerminal(x, model) == StepStatus::Ok);
+  REQUIRE(problem.linearizeTerminal(x, model) == NumericalStatus::Ok);
   checkDerivative(model.lx.transpose(),
                   differentiate(VectorXd::Zero(problem.tangentSize(node)), h, [&](const VectorXd& dx) {
                     double cost = 0;
-                    REQUIRE(problem.calcTerminalCost(problem.integrate(x, dx), cost) == StepStatus::Ok);
+                    REQUIRE(problem.calcTerminalCost(problem.integrate(x, dx), cost) == NumericalStatus::Ok);
                     return VectorXd::Constant(1, cost);
                   }));
   checkGaussNewton(problem, node, {x, {}, {}}, model, h);
@@ -146,7 +146,7 @@ void checkTerminal(ProblemProbe& problem, const VectorXd& x, double h) {
 VectorXd makeNextNode(std::mt19937& rng, ProblemProbe& problem, const VectorXd& x, const VectorXd& u, double gap) {
   VectorXd next(problem.stateSize());
   double cost = 0;
-  REQUIRE(problem.step(0, x, u, next, cost) == StepStatus::Ok);
+  REQUIRE(problem.step(0, x, u, next, cost) == NumericalStatus::Ok);
   return problem.integrate(next, randomVector(rng, problem.tangentSize(1), gap));
 }
 
@@ -210,7 +210,7 @@ TEST_CASE("shooting problem: a midpoint step is what the dynamics at its points 
     const VectorXd &q = mechanism.q_closed, v = randomVector(rng, model.nv()), u = randomVector(rng, model.nu(), 5);
     RobotEvaluator evaluator(problem);
     const RobotEvaluation& at = evaluator.evaluate(0, join(q, v), u);
-    REQUIRE(at.status == StepStatus::Ok);
+    REQUIRE(at.status == NumericalStatus::Ok);
     const StageSpec& spec = problem.spec(0);
     const double h = spec.dt;
     Workspace ws(model);
@@ -226,9 +226,9 @@ TEST_CASE("shooting problem: a midpoint step is what the dynamics at its points 
       stabilization.segment(plain.offsets[c], getRows(plain.closures[c].kind)) =
           calcClosureStabilization(ws, spec.constraints.closures[c]);
     CHECK(stabilization.norm() > 1);
-    REQUIRE(updateConstrainedDynamics(model, ws, cws, plain, q_mid, v, tau) == DynamicsStatus::Ok);
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, plain, q_mid, v, tau) == NumericalStatus::Ok);
     const VectorXd v_mid = v + h / 2 * cws.a;
-    REQUIRE(updateConstrainedDynamics(model, ws, cws, plain, q_mid, v_mid, tau) == DynamicsStatus::Ok);
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, plain, q_mid, v_mid, tau) == NumericalStatus::Ok);
     const int nv = model.nv(), rows = plain.rows;
     MatrixXd system = MatrixXd::Zero(nv + rows, nv + rows);
     system << ws.M, -cws.J.transpose(), cws.J, MatrixXd::Zero(rows, rows);

@@ -44,7 +44,7 @@ class Node {
   Node(const RobotProblem& problem, int node, const VectorXd& x, const VectorXd& u)
       : problem_(problem), node_(node), x_(x), u_(u), at_(problem), next_(problem) {
     at_.evaluate(node, x, u);
-    REQUIRE(at_.evaluation().status == StepStatus::Ok);
+    REQUIRE(at_.evaluation().status == NumericalStatus::Ok);
     if (node == 0) next_.evaluate(1, at_.evaluation().x_next);
     tangent_ = at_.integrate(VectorXd::Zero(problem.tangentSize(node)));
   }
@@ -54,7 +54,7 @@ class Node {
     RobotEvaluator moved(problem_);
     const VectorXd x = at_.integrate(dx), u = u_ + du;
     const RobotEvaluation& out = moved.evaluate(node_, x, u);
-    REQUIRE(out.status == StepStatus::Ok);
+    REQUIRE(out.status == NumericalStatus::Ok);
     return out.constraints;
   }
   MatrixXd differentiate() {
@@ -75,10 +75,10 @@ class Node {
     problem_.evaluate(&step, 1, scratch.get());
     StageModel out;
     out.resize(problem_.tangentSize(node_), nu(), node_ == 0 ? problem_.tangentSize(1) : 0);
-    LinearizeTask task{node_, at.get(), node_ == 0 ? &next_.evaluation() : nullptr, weights, &out, StepStatus::Failed,
-                       {}};
+    LinearizeTask task{
+        node_, at.get(), node_ == 0 ? &next_.evaluation() : nullptr, weights, &out, NumericalStatus::Failed, {}};
     problem_.linearize(&task, 1, scratch.get());
-    REQUIRE(task.status == StepStatus::Ok);
+    REQUIRE(task.status == NumericalStatus::Ok);
     return out;
   }
 

@@ -81,7 +81,7 @@ void checkNode(const Inner& inner, const PeakProblem& problem, int node) {
   if (running) after.evaluate(node + 1, next, u_next);
   at.evaluate(node, x, u);
   StageModel model, inner_model;
-  REQUIRE(at.linearize(running ? &after.evaluation() : nullptr, model) == StepStatus::Ok);
+  REQUIRE(at.linearize(running ? &after.evaluation() : nullptr, model) == NumericalStatus::Ok);
   const int nu = static_cast<int>(u.size()), ndx = problem.tangentSize(node);
   ShootingTrajectory states{{x, next}, {}};
   const auto getInnerControl = [&](const VectorXd& d) {
@@ -109,7 +109,7 @@ void checkNode(const Inner& inner, const PeakProblem& problem, int node) {
   // The inner Hessian, and the map.
   if (running) inner_after.evaluate(node + 1, next.head(inner.stateSize()), VectorXd::Zero(2));
   inner_at.evaluate(node, x.head(inner.stateSize()), getInnerControl(zero));
-  REQUIRE(inner_at.linearize(running ? &inner_after.evaluation() : nullptr, inner_model) == StepStatus::Ok);
+  REQUIRE(inner_at.linearize(running ? &inner_after.evaluation() : nullptr, inner_model) == NumericalStatus::Ok);
   const int inner_nx = inner.tangentSize(node);
   const MatrixXd map = testing::differentiate(zero, 1e-4, [&](const VectorXd& d) {
     const VectorXd v = getInnerControl(d);

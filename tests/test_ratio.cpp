@@ -52,7 +52,7 @@ VectorXd closeAt(const Model& model, const VectorXd& q, const std::string& joint
   problem.weights = VectorXd::Constant(model.nv(), 1e-7);
   problem.weights[pulled.idx_v] = 1;
   const AssemblyResult result = assemble(model, problem);
-  REQUIRE(result.status == AssemblyStatus::Closed);
+  REQUIRE(result.status == NumericalStatus::Ok);
   REQUIRE(std::abs(result.q[pulled.idx_q] - angle) < 1e-10);
   return result.q;
 }

@@ -64,7 +64,7 @@ struct State {
 // A closed state near q with a random velocity that keeps it closed.
 State makeClosedState(const Model& model, const VectorXd& q, double distance, double speed, std::mt19937& rng) {
   const AssemblyResult result = closeConfiguration(model, model.integrate(q, randomVector(rng, model.nv(), distance)));
-  REQUIRE(result.status == AssemblyStatus::Closed);
+  REQUIRE(result.status == NumericalStatus::Ok);
   Workspace ws(model);
   return {result.q,
           projectVelocity(model, ws, makeConstraintSet(model), result.q, randomVector(rng, model.nv(), speed))};
@@ -96,12 +96,12 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
   const VectorXd x = state.x(), u = randomVector(rng, model.nu(), 5);
   const int ndx = problem.tangentSize(0);
   StageModel stage;
-  REQUIRE(problem.linearize(0, x, u, x_node, stage) == StepStatus::Ok);
+  REQUIRE(problem.linearize(0, x, u, x_node, stage) == NumericalStatus::Ok);
   const StageModel linear = stage;
   const auto step = [&](const VectorXd& at, const VectorXd& control) {
     VectorXd x_next(x.size()), out(ndx + 1);
     double cost = 0;
-    REQUIRE(problem.step(0, at, control, x_next, cost) == StepStatus::Ok);
+    REQUIRE(problem.step(0, at, control, x_next, cost) == NumericalStatus::Ok);
     if (reduced) CHECK(calcGap(model, x_next) < 1e-10);
     if (reduced) CHECK(calcClosureSpeed(model, x_next) < 1e-9);
     out << problem.difference(x_node, x_next), cost;
@@ -148,7 +148,7 @@ TEST_CASE("reduced step: random mechanisms, every joint kind times every closure
         ProblemProbe problem(whole);
         VectorXd x_next(state.x().size());
         double cost = 0;
-        REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == StepStatus::Ok);
+        REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == NumericalStatus::Ok);
         checkLinearization(model, contacts, state, x_next, rng, StageKind::Dynamics, Formulation::Reduced, rule);
         const State node = makeClosedState(model, x_next.head(model.nq()), 0.05, 1, rng);
         checkLinearization(model, contacts, state, node.x(), rng, StageKind::Dynamics, Formulation::Reduced, rule);
@@ -275,7 +275,7 @@ TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, w
       ProblemProbe problem(whole);
       VectorXd x_next(state.x().size());
       double cost = 0;
-      REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == StepStatus::Ok);
+      REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == NumericalStatus::Ok);
       CHECK(x_next.head(model.nq()) == state.q);
       Workspace ws(model);
       const VectorXd v_next = x_next.tail(model.nv());
@@ -305,8 +305,8 @@ TEST_CASE("reduced accelerations are those of the full formulation") {
     const VectorXd u = randomVector(rng, model.nu(), 5);
     VectorXd x_next(state.x().size()), a, lambda;
     double cost = 0;
-    REQUIRE(problem.step(0, state.x(), u, x_next, cost) == StepStatus::Ok);
-    REQUIRE(problem.calcDynamics(0, state.x(), u, a, lambda) == StepStatus::Ok);
+    REQUIRE(problem.step(0, state.x(), u, x_next, cost) == NumericalStatus::Ok);
+    REQUIRE(problem.calcDynamics(0, state.x(), u, a, lambda) == NumericalStatus::Ok);
     // The projection moves the velocity by O(h^2), the acceleration seen by O(h).
     CHECK(((x_next.tail(model.nv()) - state.v) / h - a).norm() < 1e-2 * a.norm());
   }

@@ -113,7 +113,7 @@ TEST_CASE("robots come back from SDF with their bodies, loops, ranges and spring
     }
     for (const Frame& frame : a.frames())
       if (frame.body > 0) CHECK(b.findFrame(frame.name) >= 0);
-    CHECK(findClosedConfiguration(b).status == AssemblyStatus::Closed);
+    CHECK(findClosedConfiguration(b).status == NumericalStatus::Ok);
     CHECK_NOTHROW(formatRobot(b));
   }
 }
@@ -136,7 +136,7 @@ TEST_CASE("joints of SDF: frames that poses are relative to, ranges, springs, an
   REQUIRE(model.closures().size() == 1);
   CHECK(model.closures()[0].name == "close");
   CHECK(model.closures()[0].kind == ClosureKind::Hinge5D);
-  CHECK(findClosedConfiguration(model).status == AssemblyStatus::Closed);
+  CHECK(findClosedConfiguration(model).status == NumericalStatus::Ok);
   CHECK(model.references()[0].name == "initial");
   const Joint &slide = getSdfJoint(model, "slide"), &cross = getSdfJoint(model, "cross");
   CHECK(slide.kind == JointKind::Prismatic);
@@ -190,7 +190,7 @@ TEST_CASE("Drake's bushings in SDF are the joints that they stand for") {
   const LoadedRobot hinge = loadSdf(makeFourBar(bushing("3000 3000 0"), ""));
   REQUIRE(hinge.model.closures().size() == 1);
   CHECK(hinge.model.closures()[0].kind == ClosureKind::Hinge5D);
-  CHECK(findClosedConfiguration(hinge.model).status == AssemblyStatus::Closed);
+  CHECK(findClosedConfiguration(hinge.model).status == NumericalStatus::Ok);
   CHECK(warnsOf(hinge, "<drake:linear_bushing_rpy> (line 10): its springs become a hinge that does not give"));
   CHECK(loadSdf(makeFourBar(bushing("0 0 0"), "")).model.closures()[0].kind == ClosureKind::Ball3D);
   const auto getSdfError = [&](const std::string& in_model) {

@@ -38,7 +38,7 @@ struct Trial {
     v_s = VectorXd::LinSpaced(model.nv(), -1, 1);
     for (int j : model.serialJoints()) q_s[model.joints()[j].idx_q] += bend * (j % 3 - 1);
     PostureLift posture(closed, serial);
-    REQUIRE(posture.setConfiguration(q_s, kSingular) == LiftStatus::Lifted);
+    REQUIRE(posture.setConfiguration(q_s, kSingular) == NumericalStatus::Ok);
     q = posture.q();
     v = posture.liftVelocity(v_s);
     tau = VectorXd::LinSpaced(model.nu(), 3, -5);

@@ -146,7 +146,7 @@ TEST_CASE("a plan with the final durations makes the same steps") {
   for (int k = 0; k < fixed.problem->numStages(); ++k) {
     const ShootingTrajectory& t = walk.motion.guess;
     const RobotEvaluation& at = evaluator.evaluate(k, t.xs[k].head(size), t.us[k].head(model.nu()));
-    REQUIRE(at.status == StepStatus::Ok);
+    REQUIRE(at.status == NumericalStatus::Ok);
     CHECK((at.x_next - t.xs[k + 1].head(size)).cwiseAbs().maxCoeff() < 1e-8);
   }
 }

@@ -92,8 +92,8 @@ void checkTimedStage(const RobotProblem& problem, int k, const VectorXd& x, cons
   RobotEvaluator evaluator(problem), node(problem), moved(problem);
   const int ndx = problem.tangentSize(k), nu = problem.controlSize(k), next = problem.tangentSize(k + 1);
   node.evaluate(k + 1, x_node, k + 1 < problem.numStages() ? VectorXd::Ones(problem.controlSize(k + 1)) : VectorXd());
-  REQUIRE(node.evaluation().status == StepStatus::Ok);
-  REQUIRE(evaluator.evaluate(k, x, u).status == StepStatus::Ok);
+  REQUIRE(node.evaluation().status == NumericalStatus::Ok);
+  REQUIRE(evaluator.evaluate(k, x, u).status == NumericalStatus::Ok);
   ConstraintWeights weights{randomVector(rng, problem.constraintSize(k)),
                             randomVector(rng, problem.constraintSize(k)).cwiseAbs()};
   const auto at = problem.makeEvaluation();
@@ -102,14 +102,14 @@ void checkTimedStage(const RobotProblem& problem, int k, const VectorXd& x, cons
   problem.evaluate(&evaluate, 1, scratch.get());
   StageModel model;
   model.resize(ndx, nu, next);
-  LinearizeTask task{k, at.get(), &node.evaluation(), &weights, &model, StepStatus::Failed, {}};
+  LinearizeTask task{k, at.get(), &node.evaluation(), &weights, &model, NumericalStatus::Failed, {}};
   problem.linearize(&task, 1, scratch.get());
-  REQUIRE(task.status == StepStatus::Ok);
+  REQUIRE(task.status == NumericalStatus::Ok);
   // Next state, weighted cost and roots as functions of (du, dx).
   const auto step = [&](const VectorXd& d) {
     const VectorXd x1 = d.tail(ndx).isZero(0) ? x : evaluator.integrate(d.tail(ndx));
     const RobotEvaluation& to = moved.evaluate(k, x1, u + d.head(nu));
-    REQUIRE(to.status == StepStatus::Ok);
+    REQUIRE(to.status == NumericalStatus::Ok);
     const VectorXd gap = node.difference(to.x_next), roots = calcRoots(problem, k, to, weights);
     VectorXd out(gap.size() + 1 + roots.size());
     out << gap, to.cost + weights.gradient.dot(to.constraints), roots;
@@ -162,7 +162,7 @@ TEST_CASE("free timings: derivatives by the length of a step, every joint kind t
         if (k == 1 || k == 2) x[x.size() - 1] = 1.3;
         if (k == 0) u[model.nu()] = 0.8;
         const RobotEvaluation& at = evaluator.evaluate(k, x, u);
-        REQUIRE(at.status == StepStatus::Ok);
+        REQUIRE(at.status == NumericalStatus::Ok);
         CHECK(at.dt == Approx(problem.spec(k).dt * (k == 0 ? 0.8 : k < 3 ? 1.3 : 1)));
         const VectorXd x_next = at.x_next;
         CHECK(x_next[x_next.size() - 1] == (k == 0 ? 0.8 : k == 1 ? 1.3 : 1));
@@ -170,7 +170,7 @@ TEST_CASE("free timings: derivatives by the length of a step, every joint kind t
         VectorXd open = x_next;
         const AssemblyResult closed =
             closeConfiguration(model, model.integrate(x_next.head(model.nq()), randomVector(rng, model.nv(), 0.05)));
-        REQUIRE(closed.status == AssemblyStatus::Closed);
+        REQUIRE(closed.status == NumericalStatus::Ok);
         open.head(model.nq()) = closed.q;
         open.segment(model.nq(), model.nv()) = makeVelocity(closed.q);
         if (k < 2) open[open.size() - 1] += 0.1;
@@ -317,13 +317,18 @@ TEST_CASE("free timings: steps and linearizations allocate nothing after the fir
     weights[k] = {VectorXd::Ones(problem.constraintSize(k)), VectorXd::Ones(problem.constraintSize(k))};
   }
   for (int k = 0; k < 5; ++k)
-    linearizations.push_back(
-        {k, nodes[k].get(), k < 4 ? nodes[k + 1].get() : nullptr, &weights[k], &models[k], StepStatus::Failed, {}});
+    linearizations.push_back({k,
+                              nodes[k].get(),
+                              k < 4 ? nodes[k + 1].get() : nullptr,
+                              &weights[k],
+                              &models[k],
+                              NumericalStatus::Failed,
+                              {}});
   const auto scratch = problem.makeScratch();
   const auto run = [&] {
     problem.evaluate(evaluations.data(), 5, scratch.get());
     problem.linearize(linearizations.data(), 5, scratch.get());
-    for (const LinearizeTask& task : linearizations) REQUIRE(task.status == StepStatus::Ok);
+    for (const LinearizeTask& task : linearizations) REQUIRE(task.status == NumericalStatus::Ok);
   };
   run();
   const long before = num_allocations;
@@ -356,6 +361,6 @@ TEST_CASE("free timings: what makes no sense is refused") {
   const RobotProblem problem = make([](std::vector<StageSpec>&) {});
   RobotEvaluator evaluator(problem);
   VectorXd u = VectorXd::Zero(2);
-  CHECK(evaluator.evaluate(0, problem.initialState(), u).status == StepStatus::Failed);
+  CHECK(evaluator.evaluate(0, problem.initialState(), u).status == NumericalStatus::Failed);
   CHECK(evaluator.evaluation().failure == "the time scale is not positive");
 }

@@ -120,14 +120,14 @@ void checkForwardDynamics(std::mt19937& rng, const Model& model, const std::vect
   const VectorXd v = randomVector(rng, model.nv()), tau = calcMotorForces(model, randomVector(rng, 2, 10));
   Workspace ws(model);
   ConstrainedWorkspace cws;
-  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == NumericalStatus::Ok);
   const std::vector<ModelVariation> directions = listVariations(rng, model);
   const DynamicsVariation analytic = calcConstrainedVariation(model, ws, cws, set, directions);
   const MatrixXd numeric = differentiateModel(model, directions, kModelStep, [&](const Model& moved) {
     Workspace other(moved);
     ConstrainedWorkspace ocws;
     REQUIRE(updateConstrainedDynamics(moved, other, ocws, makeConstraintSet(moved, contacts), q, v, tau) ==
-            DynamicsStatus::Ok);
+            NumericalStatus::Ok);
     VectorXd out(moved.nv() + set.rows);
     out << ocws.a, ocws.lambda;
     return out;
@@ -177,7 +177,7 @@ TEST_CASE("variation: redundant rows, changes that leave them so") {
   REQUIRE(closing.isDetermined());
   const VectorXd v = closing.calcTangent() * VectorXd::Constant(1, 2.0);
   const VectorXd tau = VectorXd::Unit(4, 0) * 3;
-  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == NumericalStatus::Ok);
   REQUIRE(cws.saddle_point->isRedundant());
   std::vector<ModelVariation> directions;
   for (int body = 2; body <= 4; ++body)  // lengths of crank, coupler and rocker, and their joints out of line
@@ -194,7 +194,7 @@ TEST_CASE("variation: redundant rows, changes that leave them so") {
   const auto solve = [&](const Model& moved, const VectorXd& x, const VectorXd& y) {
     Workspace other(moved);
     ConstrainedWorkspace ocws;
-    REQUIRE(updateConstrainedDynamics(moved, other, ocws, makeConstraintSet(moved), x, y, tau) == DynamicsStatus::Ok);
+    REQUIRE(updateConstrainedDynamics(moved, other, ocws, makeConstraintSet(moved), x, y, tau) == NumericalStatus::Ok);
     VectorXd out(8);
     out << ocws.a, ocws.J.transpose() * ocws.lambda;
     return out;
@@ -248,7 +248,7 @@ TEST_CASE("variation: motor torques, forces and closing of a kept motion") {
       const int rows = set.rows, loops = getRows(closure), nk = static_cast<int>(kept.size());
       const VectorXd v = randomVector(rng, nk), a = randomVector(rng, nk), forces = randomVector(rng, rows - loops, 5);
       KeptMotion motion(model, kept);
-      REQUIRE(motion.update(set, q, v, a, forces) == KeptMotionStatus::Ok);
+      REQUIRE(motion.update(set, q, v, a, forces) == NumericalStatus::Ok);
 
       // The motion is closed and balanced, and no forces that do the same are nearer.
       Workspace ws(model);
@@ -273,7 +273,7 @@ TEST_CASE("variation: motor torques, forces and closing of a kept motion") {
         const VectorXd d = closeHeld(moved, q, kept);
         KeptMotion other(moved, kept);
         REQUIRE(other.update(makeConstraintSet(moved, contacts), moved.integrate(q, d), v, a, forces) ==
-                KeptMotionStatus::Ok);
+                NumericalStatus::Ok);
         VectorXd out(4 * nv + nu + rows);
         out << d, other.v(), other.a(), other.tangent() * a, other.u(), other.lambda();
         return out;
@@ -281,7 +281,7 @@ TEST_CASE("variation: motor torques, forces and closing of a kept motion") {
       MatrixXd analytic(numeric.rows(), numeric.cols());
       for (Eigen::Index i = 0; i < numeric.cols(); ++i) {
         KeptMotion::Variation variation(model);
-        REQUIRE(motion.calcVariation(directions[i], variation) == KeptMotionStatus::Ok);
+        REQUIRE(motion.calcVariation(directions[i], variation) == NumericalStatus::Ok);
         analytic.col(i) << variation.motion.q, variation.motion.v, variation.motion.a,
             motion.calcTangentVariation(directions[i], variation.motion, a), variation.u, variation.lambda;
       }
@@ -332,15 +332,15 @@ TEST_CASE("variation: impossible changes are reported") {
   const ConstraintSet set = makeConstraintSet(mechanism.model);
   const VectorXd none, one = VectorXd::Ones(1);
   KeptMotion free(mechanism.model, {});
-  CHECK(free.update(set, mechanism.q_closed, none, none, none) == KeptMotionStatus::Undetermined);
+  CHECK(free.update(set, mechanism.q_closed, none, none, none) == NumericalStatus::NearDeadPoint);
   KeptMotion crank(mechanism.model, {0});
-  CHECK(crank.update(set, mechanism.q_closed, one, one, none) == KeptMotionStatus::Ok);
+  CHECK(crank.update(set, mechanism.q_closed, one, one, none) == NumericalStatus::Ok);
   KeptMotion::Variation variation(mechanism.model);
   ModelVariation change(mechanism.model);
   change.frames1[0] = Vector6d::Unit(0);  // in the plane, then out of it
-  CHECK(crank.calcVariation(change, variation) == KeptMotionStatus::Ok);
+  CHECK(crank.calcVariation(change, variation) == NumericalStatus::Ok);
   change.frames1[0] = Vector6d::Unit(1);
-  CHECK(crank.calcVariation(change, variation) == KeptMotionStatus::Open);
+  CHECK(crank.calcVariation(change, variation) == NumericalStatus::Contradictory);
   // Without its motor the crank cannot be given an acceleration.
   ModelBuilder builder("pendulum");
   Joint joint;
@@ -350,6 +350,6 @@ TEST_CASE("variation: impossible changes are reported") {
   builder.addLink("bob", "world", joint, bob);
   const Model pendulum = builder.build();
   KeptMotion swing(pendulum, {0});
-  CHECK(swing.update(makeConstraintSet(pendulum), VectorXd::Zero(1), one, one, none) == KeptMotionStatus::Unbalanced);
-  CHECK(swing.update(makeConstraintSet(pendulum), VectorXd::Zero(1), one, 9.81 * one, none) == KeptMotionStatus::Ok);
+  CHECK(swing.update(makeConstraintSet(pendulum), VectorXd::Zero(1), one, one, none) == NumericalStatus::Unbalanced);
+  CHECK(swing.update(makeConstraintSet(pendulum), VectorXd::Zero(1), one, 9.81 * one, none) == NumericalStatus::Ok);
 }

@@ -296,7 +296,7 @@ TEST_CASE("walk: feet that come down strike within the cone of friction") {
       const ConstraintSet& set = stage.constraints;
       const VectorXd& x = motion.guess.xs[k];
       REQUIRE(updateImpact(model, impact, set, x.head(model.nq()), x.segment(model.nq(), model.nv())) ==
-              DynamicsStatus::Ok);
+              NumericalStatus::Ok);
       double normal = 0;
       for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
         const Vector3d impulse = impact.impulse.segment<3>(set.offsets[c]);

@@ -189,7 +189,7 @@ VectorXd swing(const Model& model, VectorXd q, double duration, double h) {
   VectorXd v = VectorXd::Zero(model.nv());
   const VectorXd tau = v;
   const auto calcAcceleration = [&](const VectorXd& x, const VectorXd& rate) {
-    REQUIRE(updateConstrainedDynamics(model, ws, cws, loops, x, rate, tau) == DynamicsStatus::Ok);
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, loops, x, rate, tau) == NumericalStatus::Ok);
     return cws.a;
   };
   for (int i = 0; i < std::lround(duration / h); ++i) {  // all joints turn about fixed axes: q + dq

@@ -54,9 +54,9 @@ class Integrator {
       rate.d.segment(joint.idx_v, joint.nv) = J_dv.inverse() * v.segment(joint.idx_v, joint.nv);
     }
     const VectorXd tau = VectorXd::Zero(model_.nv());
-    const DynamicsStatus status = updateConstrainedDynamics(model_, ws_, cws_, set_, model_.integrate(q, d), v, tau);
+    const NumericalStatus status = updateConstrainedDynamics(model_, ws_, cws_, set_, model_.integrate(q, d), v, tau);
     rate.v = cws_.a;
-    return status == DynamicsStatus::Ok;
+    return status == NumericalStatus::Ok;
   }
 
   const Model& model_;

@@ -14,7 +14,7 @@ SampleSource::SampleSource(const Model& model, const ValidationOptions& options)
     : model_(model), options_(options), rng_(options.seed) {
   const AssemblyResult start =
       options.start.size() > 0 ? closeConfiguration(model, options.start) : findClosedConfiguration(model);
-  if (start.status != AssemblyStatus::Closed) failure = "no closed configuration was found: " + start.message;
+  if (start.status != NumericalStatus::Ok) failure = "no closed configuration was found: " + start.message;
   q_ref_ = start.q;
 }
 
@@ -24,7 +24,7 @@ Sample SampleSource::draw() {
   double scale = options_.perturbation;
   for (int attempt = 0; attempt < 8; ++attempt, scale /= 2) {
     const AssemblyResult result = closeConfiguration(model_, model_.integrate(q_ref_, random(model_.nv(), scale)));
-    if (result.status != AssemblyStatus::Closed) continue;
+    if (result.status != NumericalStatus::Ok) continue;
     sample.q = result.q;
     break;
   }

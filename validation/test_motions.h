@@ -167,7 +167,7 @@ inline CheckedMotion makeFourBarMotion(double h, Formulation formulation,
   for (int k = 0; k < stages; ++k) {
     trajectory.us.push_back(VectorXd::Constant(model.nu(), 0.3));
     const RobotEvaluation& step = evaluator.evaluate(k, trajectory.xs[k], trajectory.us[k]);
-    REQUIRE(step.status == StepStatus::Ok);
+    REQUIRE(step.status == NumericalStatus::Ok);
     trajectory.xs.push_back(step.x_next);
   }
   CheckedMotion checked = makeFreeMotion(model, h, formulation, stages);

@@ -53,7 +53,7 @@ TEST_CASE("modes of a standing robot with springs, dampers and loops agree with 
   const ConstraintSet set = makeConstraintSet(model, makeContactTargets(model, q, {0, 1}, 0, 0));
   const VectorXd tau = calcMotorForces(model, calcStaticTorques(model, set, q).u);
   const Modes modes = calcModes(model, set, q, tau);
-  REQUIRE(modes.status == DynamicsStatus::Ok);
+  REQUIRE(modes.status == NumericalStatus::Ok);
 
   SimbodyBridge bridge(model, set.closures);
   const auto accelerate = [&](const VectorXd& at, const VectorXd& v) {

@@ -139,8 +139,8 @@ class Comparison {
                       const std::string& label) {
     Workspace ws(model);
     ConstrainedWorkspace cws;
-    const DynamicsStatus status = updateConstrainedDynamics(model, ws, cws, set, sample.q, sample.v, sample.tau);
-    if (status != DynamicsStatus::Ok) cws.a.setConstant(std::numeric_limits<double>::quiet_NaN());
+    const NumericalStatus status = updateConstrainedDynamics(model, ws, cws, set, sample.q, sample.v, sample.tau);
+    if (status != NumericalStatus::Ok) cws.a.setConstant(std::numeric_limits<double>::quiet_NaN());
     const std::string suffix = ", " + label;
     const VectorXd free_force = sample.tau - ws.b, free = ws.M.llt().solve(free_force);
     const double force = kFloor * free_force.cwiseAbs().maxCoeff();
@@ -164,8 +164,8 @@ class Comparison {
     const int nv = model_.nv(), nu = model_.nu(), nw = redundant ? 0 : 6 * static_cast<int>(set.closures.size());
     Workspace ws(model_), other(model_);
     ConstrainedWorkspace cws;
-    if (updateConstrainedDynamics(model_, ws, cws, set, sample.q, sample.v, sample.tau) != DynamicsStatus::Ok ||
-        updateConstrainedDerivatives(model_, ws, cws, set) != DynamicsStatus::Ok)
+    if (updateConstrainedDynamics(model_, ws, cws, set, sample.q, sample.v, sample.tau) != NumericalStatus::Ok ||
+        updateConstrainedDerivatives(model_, ws, cws, set) != NumericalStatus::Ok)
       return;  // reported by the row of the accelerations
     // Accelerations, then wrenches.
     const auto solve = [&](const VectorXd& q, const VectorXd& v, const VectorXd& tau) {

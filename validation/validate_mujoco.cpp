@@ -62,7 +62,7 @@ class MujocoComparison {
     Workspace ws(model_);
     ConstrainedWorkspace cws;
     const ConstraintSet set = makeConstraintSet(model_);
-    if (updateConstrainedDynamics(model_, ws, cws, set, sample.q, sample.v, sample.tau) != DynamicsStatus::Ok)
+    if (updateConstrainedDynamics(model_, ws, cws, set, sample.q, sample.v, sample.tau) != NumericalStatus::Ok)
       cws.a.setConstant(std::numeric_limits<double>::quiet_NaN());
     const VectorXd weight = ws.M.diagonal().cwiseSqrt(), free = ws.M.llt().solve(sample.tau - ws.b);
     addDifference(

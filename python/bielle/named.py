@@ -13,7 +13,7 @@ class Dynamics(NamedTuple):
 
     a: Array  #: (nv,)
     forces: Array  #: (rows,), each on body 1 in frame 1 of its closure, N and N m
-    status: Array  #: 0: computed; 1: singular mass matrix; 2: not finite; 3: rows contradict each other
+    status: Array  #: a NumericalStatus as a number, 0: ok; results are NaN unless OK or CONTRADICTORY
 
 
 class DynamicsDerivatives(NamedTuple):

@@ -17,9 +17,9 @@ struct ConstrainedMemory {
 };
 
 // The status, as a number, goes with the result of a state; results of a state without one are NaN.
-bool record(DynamicsStatus status, State& s) {
+bool record(NumericalStatus status, State& s) {
   s.out.back()[0] = static_cast<double>(status);
-  const bool valid = status == DynamicsStatus::Ok || status == DynamicsStatus::ContradictoryRows;
+  const bool valid = status == NumericalStatus::Ok || status == NumericalStatus::Contradictory;
   if (!valid)
     for (size_t i = 0; i + 1 < s.out.size(); ++i) s.out[i].setConstant(std::numeric_limits<double>::quiet_NaN());
   return valid;
@@ -157,9 +157,26 @@ void addImpact(ModelType& type) {
       py::arg("q"), py::arg("v"), py::arg("contacts"), "Derivatives of impact by the tangent of q and by v.");
 }
 
+void bindStatus(py::module_& module) {
+  py::enum_<NumericalStatus> type(module, "NumericalStatus", "How a computation ended.");
+  const std::pair<const char*, NumericalStatus> values[] = {{"OK", NumericalStatus::Ok},
+                                                            {"NOT_FINITE", NumericalStatus::NotFinite},
+                                                            {"SINGULAR", NumericalStatus::Singular},
+                                                            {"INDEFINITE", NumericalStatus::Indefinite},
+                                                            {"CONTRADICTORY", NumericalStatus::Contradictory},
+                                                            {"NOT_CLOSED", NumericalStatus::NotClosed},
+                                                            {"NEAR_DEAD_POINT", NumericalStatus::NearDeadPoint},
+                                                            {"UNBALANCED", NumericalStatus::Unbalanced},
+                                                            {"INACCURATE", NumericalStatus::Inaccurate},
+                                                            {"NOT_CONVERGED", NumericalStatus::NotConverged},
+                                                            {"FAILED", NumericalStatus::Failed}};
+  for (const auto& [name, value] : values) type.value(name, value, getMessage(value));
+}
+
 }  // namespace
 
 void bindDynamics(py::module_& module) {
+  bindStatus(module);
   ModelType type = getModelType(module);
   addForward(type);
   addInverse(type);

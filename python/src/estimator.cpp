@@ -20,7 +20,7 @@ class HeldEstimator {
     estimator_.reset(time, readVector(q, model_->nq(), "q"), readVector(v, model_->nv(), "v"), find(contacts));
   }
 
-  EstimatorStatus update(const SensorReadings& readings, const std::vector<std::string>& planned) {
+  NumericalStatus update(const SensorReadings& readings, const std::vector<std::string>& planned) {
     for (const VectorXd* numbers : {&readings.motor_positions, &readings.motor_torques})
       if (numbers->size() != model_->nu())
         throw py::value_error("readings: expected " + std::to_string(model_->nu()) + " numbers, one per motor, got " +
@@ -92,11 +92,6 @@ void bindEstimatorOptions(py::module_& module) {
              "normal force of a standing foot relative to the weight")
       .field("surprising_contact", &EstimatorOptions::surprising_contact, "the same where no contact is planned")
       .field("slip", &EstimatorOptions::slip, "a foot has slipped if its deviation, 6 on average, exceeds this");
-  py::enum_<EstimatorStatus>(module, "EstimatorStatus")
-      .value("OK", EstimatorStatus::Ok)
-      .value("NEAR_DEAD_POINT", EstimatorStatus::NearDeadPoint, "a linkage hardly follows its motors")
-      .value("NOT_CLOSED", EstimatorStatus::NotClosed, "no closed configuration fits the motors: the last one is kept")
-      .value("NOT_FINITE", EstimatorStatus::NotFinite, "readings were not finite and are ignored");
 }
 
 }  // namespace

@@ -77,11 +77,6 @@ void bindOutcome(py::module_& module) {
   py::enum_<LiftMethod>(module, "LiftMethod")
       .value("NEWTON", LiftMethod::Newton, "each node separately, torques from inverse dynamics")
       .value("NLOPT", LiftMethod::Nlopt, "one step of the closed dynamics after the other, torques by SLSQP");
-  py::enum_<LiftStatus>(module, "LiftStatus")
-      .value("LIFTED", LiftStatus::Lifted)
-      .value("UNREACHABLE_POSTURE", LiftStatus::UnreachablePosture)
-      .value("SINGULAR_LINKAGE", LiftStatus::SingularLinkage)
-      .value("INACCURATE", LiftStatus::Inaccurate);
   Value<LiftOptions>(module, "LiftOptions", "How a motion is lifted.")
       .field("method", &LiftOptions::method, "LiftMethod")
       .field("singular", &LiftOptions::singular, "margin below which a linkage is at a dead point")
@@ -90,7 +85,7 @@ void bindOutcome(py::module_& module) {
       .field("position_tolerance", &LiftOptions::position_tolerance, "NLOPT: of the serial joints, rad and m")
       .field("velocity_tolerance", &LiftOptions::velocity_tolerance, "NLOPT: rad/s and m/s");
   Value<LiftNode>(module, "LiftNode", "How one node was lifted; errors are the largest of the serial coordinates.")
-      .field("status", &LiftNode::status, "LiftStatus")
+      .field("status", &LiftNode::status, "NumericalStatus")
       .field("message", &LiftNode::message, "why not lifted")
       .field("joint", &LiftNode::joint, "at which the lift ended, or empty")
       .field("position_error", &LiftNode::position_error, "rad or m")

@@ -174,7 +174,7 @@ void addConfigurations(ModelType& type) {
 }
 
 const AssemblyResult& requireClosed(const Model& model, const AssemblyResult& result) {
-  if (result.status != AssemblyStatus::Closed)
+  if (result.status != NumericalStatus::Ok)
     throw InputError(model.name(), "posture", result.message, "start from a closer configuration");
   return result;
 }
@@ -199,7 +199,7 @@ void addAssembly(ModelType& type) {
         {
           const py::gil_scoped_release release;
           result = name.empty() ? findClosedConfiguration(m) : assembleReference(m, name);
-          if (name.empty() && result.status != AssemblyStatus::Closed) throw makeClosingError(m, m.name(), result);
+          if (name.empty() && result.status != NumericalStatus::Ok) throw makeClosingError(m, m.name(), result);
         }
         return makeArray(requireClosed(m, result).q);
       },

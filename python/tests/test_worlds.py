@@ -170,7 +170,7 @@ def estimate(controller, model, noise, duration):
     errors, torques = [], controller.update(0, state.q, state.v)
     while state.time < duration:
         state = world.step(torques, 2e-3)
-        assert estimator.update(sensors.read(), feet) == bielle.EstimatorStatus.OK
+        assert estimator.update(sensors.read(), feet) == bielle.NumericalStatus.OK
         torques = controller.update(float(state.time), estimator.q, estimator.v)
         errors.append([abs(estimator.q[2] - state.q[2]), np.abs(estimator.v[:3] - state.v[:3]).max()])
     assert estimator.contacts == {name: True for name in feet}

@@ -49,7 +49,7 @@ void extend(const RobotProblem& whole, RobotEvaluator& evaluator, int new_stage,
   VectorXd& u = trajectory.us.back();
   u = calcStaticTorques(whole.model(), whole.spec(new_stage).constraints, last.head(whole.model().nq())).u;
   const RobotEvaluation& step = evaluator.evaluate(new_stage, last, u);
-  trajectory.xs.back() = step.status == StepStatus::Ok ? step.x_next : last;
+  trajectory.xs.back() = step.status == NumericalStatus::Ok ? step.x_next : last;
 }
 
 // Height of the first body and its direction that was initially up.
@@ -139,7 +139,7 @@ class ShiftedWalk {
       window_.move(k, x);
       const bool solved = solve(k, solver, trajectory);
       const RobotEvaluation& step = evaluator_.evaluate(k, x, trajectory.us[0]);
-      out_.up = solved && step.status == StepStatus::Ok;
+      out_.up = solved && step.status == NumericalStatus::Ok;
       if (!out_.up) break;
       next = step.x_next;
       out_.violation = std::max(out_.violation, calcViolation(k, step));

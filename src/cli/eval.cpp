@@ -28,7 +28,7 @@ struct Evaluation {
   ConstraintSet constraints;
   Workspace ws;
   ConstrainedWorkspace cws;
-  DynamicsStatus status;
+  NumericalStatus status;
 };
 
 Json listNumbers(const VectorXd& vector) { return std::vector<double>(vector.begin(), vector.end()); }
@@ -89,8 +89,8 @@ Json describe(const Model& model, const EvalState& state, const Evaluation& at) 
           {"bias", listNumbers(at.ws.b)}};
 }
 
-void requireOk(DynamicsStatus status) {
-  if (status != DynamicsStatus::Ok) throw std::runtime_error(getMessage(status));
+void requireOk(NumericalStatus status) {
+  if (status != NumericalStatus::Ok) throw std::runtime_error(getMessage(status));
 }
 
 int evaluate(const EvalArguments& arguments) {

@@ -45,7 +45,7 @@ VectorXd findPosture(const LoadedRobot& robot, const std::string& reference) {
   if (reference.empty() && !model.references().empty()) return makeStandingPosture(model);
   const AssemblyResult result =
       reference.empty() ? findClosedConfiguration(model) : assembleReference(model, reference);
-  if (result.status != AssemblyStatus::Closed)
+  if (result.status != NumericalStatus::Ok)
     throw InputError(robot.directory, reference.empty() ? "posture" : "reference '" + reference + "'", result.message,
                      "choose another one");
   return result.q;
@@ -90,7 +90,7 @@ ModesReport analyse(const LoadedRobot& robot, const ModesArguments& arguments) {
   report.standing = contacts;
   const VectorXd tau = calcMotorForces(model, report.u);
   report.modes = calcModes(model, constraints, report.q, tau);
-  if (arguments.contact_stiffness > 0 && !contacts.empty() && report.modes.status == DynamicsStatus::Ok) {
+  if (arguments.contact_stiffness > 0 && !contacts.empty() && report.modes.status == NumericalStatus::Ok) {
     const Model compliant =
         makeCompliantContacts(model, constraints, report.q, report.modes.lambda, arguments.contact_stiffness);
     ConstraintSet loops = makeConstraintSet(compliant);
@@ -98,7 +98,7 @@ ModesReport analyse(const LoadedRobot& robot, const ModesArguments& arguments) {
     report.standing.clear();
     report.modes = calcModes(compliant, loops, report.q, tau);
   }
-  if (report.modes.status != DynamicsStatus::Ok) throw std::runtime_error(getMessage(report.modes.status));
+  if (report.modes.status != NumericalStatus::Ok) throw std::runtime_error(getMessage(report.modes.status));
   return report;
 }
 

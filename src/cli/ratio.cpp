@@ -31,7 +31,7 @@ struct RatioArguments {
 VectorXd findStart(const LoadedRobot& robot, const std::string& reference) {
   if (reference.empty()) return findClosedConfiguration(robot.model).q;
   const AssemblyResult result = assembleReference(robot.model, reference);
-  if (result.status != AssemblyStatus::Closed)
+  if (result.status != NumericalStatus::Ok)
     throw InputError(robot.directory, "reference '" + reference + "'", result.message, "start from another one");
   return result.q;
 }

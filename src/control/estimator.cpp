@@ -29,7 +29,7 @@ struct Estimator::Parts {
   Parts(const Model& model, ConstVectorRef q, const EstimatorOptions& options);
 
   void reset(double time, ConstVectorRef q, ConstVectorRef v, const std::vector<int>& contacts);
-  EstimatorStatus update(const SensorReadings& readings, const std::vector<int>& planned);
+  NumericalStatus update(const SensorReadings& readings, const std::vector<int>& planned);
   void observe(ConstVectorRef positions, double h);
   void updateAcceleration(ConstVectorRef u, double h);
   void readTrunk();
@@ -50,7 +50,7 @@ struct Estimator::Parts {
   VectorXd torques[3];         // nu, after each of the filters
   VectorXd v_seen, v_last, a;  // nv
   Vector3d gyro = Vector3d::Zero();
-  EstimatorStatus status = EstimatorStatus::Ok;
+  NumericalStatus status = NumericalStatus::Ok;
 };
 
 Estimator::Parts::Parts(const Model& m, ConstVectorRef q, const EstimatorOptions& o)
@@ -158,14 +158,14 @@ void Estimator::Parts::updateFeet(const std::vector<int>& planned) {
   }
 }
 
-EstimatorStatus Estimator::Parts::update(const SensorReadings& readings, const std::vector<int>& planned) {
+NumericalStatus Estimator::Parts::update(const SensorReadings& readings, const std::vector<int>& planned) {
   const double h = readings.time - measurement.time;
   if (!readings.motor_positions.allFinite() || !readings.motor_torques.allFinite() ||
       !readings.angular_velocity.allFinite() || !readings.specific_force.allFinite() || !std::isfinite(h))
-    return status = EstimatorStatus::NotFinite;
+    return status = NumericalStatus::NotFinite;
   measurement.time = readings.time;
   if (h > 0) observe(readings.motor_positions, h);
-  const ClosingStatus closing = joints.update(readings.motor_positions, measurement.q);
+  const NumericalStatus closing = joints.update(readings.motor_positions, measurement.q);
   if (floats && h > 0) {
     filter.predict(readings.angular_velocity, readings.specific_force, h, unrest);
     gyro = readings.angular_velocity;
@@ -180,9 +180,9 @@ EstimatorStatus Estimator::Parts::update(const SensorReadings& readings, const s
   calm_speeds = speeds;
   feet.calmFeet(measurement.contacts, measurement.v.head(floats ? 6 : 0), calm_speeds);
   joints.expand(calm_speeds, measurement.v);
-  status = closing == ClosingStatus::Closed          ? EstimatorStatus::Ok
-           : closing == ClosingStatus::NearDeadPoint ? EstimatorStatus::NearDeadPoint
-                                                     : EstimatorStatus::NotClosed;
+  status = closing == NumericalStatus::Ok              ? NumericalStatus::Ok
+           : closing == NumericalStatus::NearDeadPoint ? NumericalStatus::NearDeadPoint
+                                                       : NumericalStatus::NotClosed;
   return status;
 }
 
@@ -194,7 +194,7 @@ Estimator::Estimator(Estimator&&) noexcept = default;
 void Estimator::reset(double time, ConstVectorRef q, ConstVectorRef v, const std::vector<int>& contacts) {
   parts_->reset(time, q, v, contacts);
 }
-EstimatorStatus Estimator::update(const SensorReadings& readings, const std::vector<int>& planned) {
+NumericalStatus Estimator::update(const SensorReadings& readings, const std::vector<int>& planned) {
   return parts_->update(readings, planned);
 }
 const Measurement& Estimator::measurement() const { return parts_->measurement; }
@@ -204,13 +204,13 @@ double Estimator::margin() const { return parts_->joints.margin(); }
 
 std::string Estimator::message() const {
   switch (parts_->status) {
-    case EstimatorStatus::Ok:
+    case NumericalStatus::Ok:
       return {};
-    case EstimatorStatus::NearDeadPoint:
+    case NumericalStatus::NearDeadPoint:
       return "the linkage of closure '" + parts_->joints.weakest() + "' is near a dead point of its motors";
-    case EstimatorStatus::NotClosed:
+    case NumericalStatus::NotClosed:
       return "the loops do not close at the motors' positions";
-    case EstimatorStatus::NotFinite:
+    case NumericalStatus::NotFinite:
       return "readings are not finite";
   }
   return {};

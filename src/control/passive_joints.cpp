@@ -75,18 +75,18 @@ bool PassiveJoints::follow(Follower& f, ConstVectorRef positions) {
   return f.margin < kDeadPointMargin;
 }
 
-ClosingStatus PassiveJoints::update(ConstVectorRef positions, VectorRef q) {
-  ClosingStatus status = ClosingStatus::Closed;
+NumericalStatus PassiveJoints::update(ConstVectorRef positions, VectorRef q) {
+  NumericalStatus status = NumericalStatus::Ok;
   margin_ = 1;
   for (Follower& f : followers_) {
-    if (!follow(f, positions)) status = ClosingStatus::NotClosed;
+    if (!follow(f, positions)) status = NumericalStatus::NotClosed;
     if (f.margin < margin_) {
       margin_ = f.margin;
       weakest_ = &f.cluster.closures.closures.front().name;
     }
     scatterConfiguration(model_, f.cluster, f.state.basis.q, q);
   }
-  if (margin_ < kDeadPointMargin && status == ClosingStatus::Closed) status = ClosingStatus::NearDeadPoint;
+  if (margin_ < kDeadPointMargin && status == NumericalStatus::Ok) status = NumericalStatus::NearDeadPoint;
   for (int m = 0; m < model_.nu(); ++m) {
     const Motor& motor = model_.motors()[m];
     if (places_[motor.dof].cluster < 0) q[model_.joints()[motor.joint].idx_q] = positions[m];

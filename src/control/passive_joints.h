@@ -14,12 +14,6 @@
 
 namespace bielle {
 
-enum class ClosingStatus {
-  Closed,
-  NearDeadPoint,  ///< closed, but some linkage hardly follows its motors
-  NotClosed       ///< no closed configuration was found near the last one, which is kept
-};
-
 /// No function allocates but the constructor.
 class PassiveJoints {
  public:
@@ -33,7 +27,9 @@ class PassiveJoints {
   /// Starts from a closed configuration.
   bool reset(ConstVectorRef q);
   /// \param positions  of the motors (nu)   \param q  nq: all but the free-flyer is written
-  ClosingStatus update(ConstVectorRef positions, VectorRef q);
+  /// \return NearDeadPoint: closed, but some linkage hardly follows its motors; NotClosed: no closed configuration was
+  /// found near the last one, which is kept
+  NumericalStatus update(ConstVectorRef positions, VectorRef q);
 
   /// v of Eq. (1) at the last configuration. \param v  nv: all but the free-flyer is written
   void expand(ConstVectorRef velocities, VectorRef v) const;

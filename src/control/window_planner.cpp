@@ -215,13 +215,13 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   // About the state that was predicted: there the last window began.
   const NodeEvaluation* predicted = solver_.getEvaluation(0);
   if (!predicted || predicted->x != x_) predicted = &evaluator_.evaluate(node, x_, u_);
-  if (predicted->status != StepStatus::Ok) return false;
+  if (predicted->status != NumericalStatus::Ok) return false;
   measured_ = interpolate(node, *predicted, measured_, 1);
   if (updateImpact(model_, impact_, problem_.spec(node).constraints, measured_.head(model_.nq()),
-                   measured_.tail(model_.nv())) == DynamicsStatus::Ok)
+                   measured_.tail(model_.nv())) == NumericalStatus::Ok)
     measured_.tail(model_.nv()) = impact_.v_plus;
   const RobotEvaluation* step = &evaluator_.evaluate(node, measured_, u_);
-  if (step->status != StepStatus::Ok) return false;
+  if (step->status != NumericalStatus::Ok) return false;
   x_ = step->x_next;
   if (request.progress > 0) x_ = findRest(request, *step);
   int target = chooseNext(request, solution);
@@ -229,7 +229,7 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   advance_ += horizon_->getStart(target) - horizon_->getStart(request.stage + 1);
   while (isImpact(target)) {
     step = &evaluator_.evaluate(horizon_->getNode(target), VectorXd(x_), VectorXd::Zero(model_.nu()));
-    if (step->status != StepStatus::Ok) return false;
+    if (step->status != NumericalStatus::Ok) return false;
     x_ = step->x_next;
     ++target;
   }

@@ -28,7 +28,7 @@ double calcPostureGap(const Model& start, const Model& model, const VectorXd& po
   options.max_iterations = 30;
   options.continuation_steps = 4;
   const AssemblyResult result = assemble(model, problem, options);
-  return result.status == AssemblyStatus::Closed ? 0 : std::max(result.gap, options.tolerance);
+  return result.status == NumericalStatus::Ok ? 0 : std::max(result.gap, options.tolerance);
 }
 
 std::vector<int> findNamed(const Model& model, const std::vector<std::string>& names, const char* where) {

@@ -106,7 +106,7 @@ ShootingTrajectory makeClosedStart(const MotionRecord& record, const Motion& mot
   const Model& model = motion.problem->model();
   for (VectorXd& x : trajectory.xs) {
     const AssemblyResult closed = closeConfiguration(model, x.head(model.nq()));
-    if (closed.status == AssemblyStatus::Closed) x.head(model.nq()) = closed.q;
+    if (closed.status == NumericalStatus::Ok) x.head(model.nq()) = closed.q;
   }
   return trajectory;
 }

@@ -235,10 +235,10 @@ class SlopeRecorder {
     out_.dmargin.assign(variations.size(), of_clusters);
   }
 
-  KeptMotionStatus record(int k, const SerialTrajectory& trajectory, const LiftResult& lifted) {
-    const KeptMotionStatus status = motion_.update(lifted.constraints[k], lifted.trajectory.xs[k].head(model_.nq()),
-                                                   trajectory.v[k], trajectory.a[k], trajectory.forces[k]);
-    if (status != KeptMotionStatus::Ok) return status;
+  NumericalStatus record(int k, const SerialTrajectory& trajectory, const LiftResult& lifted) {
+    const NumericalStatus status = motion_.update(lifted.constraints[k], lifted.trajectory.xs[k].head(model_.nq()),
+                                                  trajectory.v[k], trajectory.a[k], trajectory.forces[k]);
+    if (status != NumericalStatus::Ok) return status;
     write(k, motion_.u(), motion_.v(), out_.u, out_.v);
     std::vector<VectorXd> fastest;
     for (size_t c = 0; c < clusters_.size(); ++c) {
@@ -246,8 +246,8 @@ class SlopeRecorder {
       out_.margin(c, k) = 1 / (motion_.tangent() * fastest[c]).squaredNorm();
     }
     for (size_t i = 0; i < variations_.size(); ++i) {
-      const KeptMotionStatus varied = motion_.calcVariation(variations_[i], variation_);
-      if (varied != KeptMotionStatus::Ok) return varied;
+      const NumericalStatus varied = motion_.calcVariation(variations_[i], variation_);
+      if (varied != NumericalStatus::Ok) return varied;
       write(k, variation_.u, variation_.motion.v, out_.du[i], out_.dv[i]);
       if (distances_ && distances_->isAsked(k))
         distances_->record(k, lifted.trajectory.xs[static_cast<size_t>(k)], i, variation_.motion.q);
@@ -293,8 +293,8 @@ MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dof
     recorder.setDistances(&*least);
   }
   for (int k = 0; k < static_cast<int>(lifted.dt.size()); ++k) {
-    const KeptMotionStatus status = recorder.record(k, trajectory, lifted);
-    if (status == KeptMotionStatus::Ok) continue;
+    const NumericalStatus status = recorder.record(k, trajectory, lifted);
+    if (status == NumericalStatus::Ok) continue;
     MotorSlopes out;
     out.failure = "no gradient at node " + std::to_string(k) + ": " + getMessage(status);
     return out;

@@ -45,7 +45,7 @@ std::vector<RatioSample> repeatTurns(const RatioSweep& sweep) {
 
 JointRatios calcJointRatios(const Model& model, const std::string& joint, const VectorXd& angles) {
   const AssemblyResult start = findClosedConfiguration(model);
-  if (start.status != AssemblyStatus::Closed)
+  if (start.status != NumericalStatus::Ok)
     throw InputError(model.name(), "loops", "they do not close", "correct the lengths, or the posture");
   const Linkage linkage = makeLinkage(model, start.q, {joint});
   if (linkage.size() != 1)

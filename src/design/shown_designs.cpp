@@ -84,7 +84,7 @@ Model makeWritten(const Parametrization& robot, const VectorXd& x) {
     const std::vector<ReferenceJoint> joints = listReferenceJoints(model, reference, result.q);
     const bool moves = std::any_of(joints.begin(), joints.end(),
                                    [](const ReferenceJoint& joint) { return joint.moved > kReferenceTolerance; });
-    if (!moves || result.status != AssemblyStatus::Closed) continue;
+    if (!moves || result.status != NumericalStatus::Ok) continue;
     for (const ReferenceJoint& joint : joints)
       reference.joints[model.joints()[joint.joint].name].assign(joint.assembled.begin(), joint.assembled.end());
     if (model.hasFreeFlyer()) reference.joints[model.joints()[1].name].assign(result.q.begin(), result.q.begin() + 7);

@@ -158,7 +158,7 @@ class Explorer {
     options.max_iterations = 20;
     options.continuation_steps = 2;
     const AssemblyResult result = assemble(model_, problem, options);
-    if (result.status != AssemblyStatus::Closed || !isGood(result.q)) return false;
+    if (result.status != NumericalStatus::Ok || !isGood(result.q)) return false;
     postures_[point] = result.q;
     queue_.push_back(point);
     return true;

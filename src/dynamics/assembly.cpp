@@ -183,7 +183,7 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, cons
   const auto [worst, gap] = conditions.findWorst();
   result.worst = worst;
   result.gap = conditions.calcLoopGap();
-  result.status = closed ? AssemblyStatus::Closed : AssemblyStatus::NotClosed;
+  result.status = closed ? NumericalStatus::Ok : NumericalStatus::NotClosed;
   if (closed) {
     result.message = "closed";
   } else {
@@ -228,7 +228,7 @@ AssemblyResult refineAssembly(const Model& model, const AssemblyProblem& problem
   conditions.update(result.q);
   result.gap = conditions.calcLoopGap();
   const bool met = conditions.rows() == 0 || conditions.h.cwiseAbs().maxCoeff() <= options.tolerance;
-  if (met && last < kShort) result.status = AssemblyStatus::Closed;
+  if (met && last < kShort) result.status = NumericalStatus::Ok;
   return result;
 }
 
@@ -244,8 +244,8 @@ AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions
   AssemblyResult best;
   best.gap = std::numeric_limits<double>::infinity();
   const auto closes = [&](const AssemblyResult& result) {
-    if (result.status == AssemblyStatus::Closed || result.gap < best.gap) best = result;
-    return result.status == AssemblyStatus::Closed;
+    if (result.status == NumericalStatus::Ok || result.gap < best.gap) best = result;
+    return result.status == NumericalStatus::Ok;
   };
   for (const Reference& reference : model.references())
     if (closes(assemble(model, makeReferenceProblem(model, reference), options))) return best;

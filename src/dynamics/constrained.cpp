@@ -52,21 +52,6 @@ bool areContradictory(const ConstrainedWorkspace& cws) {
 
 }  // namespace
 
-const char* getMessage(DynamicsStatus status) {
-  switch (status) {
-    case DynamicsStatus::Ok:
-      return "ok";
-    case DynamicsStatus::MassMatrixSingular:
-      return "the mass matrix is singular: a joint moves no inertia; give its links mass or the joint an armature";
-    case DynamicsStatus::NotFinite:
-      return "the accelerations are not finite";
-    case DynamicsStatus::ContradictoryRows:
-      return "redundant rows of closures and contacts contradict each other: close the loops, or make their "
-             "stabilisations agree";
-  }
-  return "?";
-}
-
 bool updateConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
                              const ConstraintSet& constraints, ConstVectorRef q) {
   resize(model, cws, constraints.rows);
@@ -80,9 +65,9 @@ bool updateConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorks
   return cws.saddle_point->factorize(ws.M, cws.J);
 }
 
-DynamicsStatus solveConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
-                                      const ConstraintSet& constraints, ConstVectorRef tau,
-                                      const VectorXd* stabilization) {
+NumericalStatus solveConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                       const ConstraintSet& constraints, ConstVectorRef tau,
+                                       const VectorXd* stabilization) {
   updateBias(model, ws);  // leaves the accelerations of a = 0
   for (size_t c = 0; c < constraints.closures.size(); ++c) {
     const Closure& closure = constraints.closures[c];
@@ -94,15 +79,15 @@ DynamicsStatus solveConstrainedSystem(const Model& model, Workspace& ws, Constra
   cws.violation = cws.gamma;
   cws.violation.noalias() += cws.J * cws.a;
   cws.residual = constraints.rows > 0 ? cws.violation.cwiseAbs().maxCoeff() : 0;
-  if (!cws.a.allFinite() || !cws.lambda.allFinite()) return DynamicsStatus::NotFinite;
+  if (!cws.a.allFinite() || !cws.lambda.allFinite()) return NumericalStatus::NotFinite;
   updateAccelerations(model, ws, cws.a);
-  return areContradictory(cws) ? DynamicsStatus::ContradictoryRows : DynamicsStatus::Ok;
+  return areContradictory(cws) ? NumericalStatus::Contradictory : NumericalStatus::Ok;
 }
 
-DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
-                                         const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
-                                         ConstVectorRef tau) {
-  if (!updateConstrainedSystem(model, ws, cws, constraints, q)) return DynamicsStatus::MassMatrixSingular;
+NumericalStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                          const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
+                                          ConstVectorRef tau) {
+  if (!updateConstrainedSystem(model, ws, cws, constraints, q)) return NumericalStatus::Singular;
   updateVelocities(model, ws, v);
   calcStabilization(ws, constraints, cws.stabilization);
   return solveConstrainedSystem(model, ws, cws, constraints, tau, &cws.stabilization);

@@ -4,8 +4,8 @@
 
 namespace bielle {
 
-DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
-                                            const ConstraintSet& constraints) {
+NumericalStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                             const ConstraintSet& constraints) {
   updateConstrainedSources(model, ws, cws, constraints);
   addStabilizationSources(ws, constraints, cws);
   cws.saddle_point->updateInverse();
@@ -45,12 +45,12 @@ void addStabilizationSources(const Workspace& ws, const ConstraintSet& constrain
   }
 }
 
-DynamicsStatus solveConstrainedSources(ConstrainedWorkspace& cws) {
+NumericalStatus solveConstrainedSources(ConstrainedWorkspace& cws) {
   cws.saddle_point->solveDerivatives(cws.da_dq, cws.dlambda_dq);
   cws.saddle_point->solveDerivatives(cws.da_dv, cws.dlambda_dv);
   cws.saddle_point->solveDerivatives(cws.da_du, cws.dlambda_du);
   const bool finite = cws.da_dq.allFinite() && cws.da_dv.allFinite() && cws.dlambda_dq.allFinite();
-  return finite ? DynamicsStatus::Ok : DynamicsStatus::NotFinite;
+  return finite ? NumericalStatus::Ok : NumericalStatus::NotFinite;
 }
 
 }  // namespace bielle

@@ -10,9 +10,9 @@ bool updateConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorks
                              const ConstraintSet& constraints, ConstVectorRef q);
 /// Accelerations and forces at the velocities of the workspace, after updateConstrainedSystem and updateVelocities, with
 /// a stabilisation (rows) or, if it is null, without one.
-DynamicsStatus solveConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
-                                      const ConstraintSet& constraints, ConstVectorRef tau,
-                                      const VectorXd* stabilization);
+NumericalStatus solveConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                       const ConstraintSet& constraints, ConstVectorRef tau,
+                                       const VectorXd* stabilization);
 /// Of all rows, at the velocities of the workspace.
 void calcStabilization(const Workspace& ws, const ConstraintSet& constraints, VectorRef out);
 
@@ -23,6 +23,6 @@ void updateConstrainedSources(const Model& model, Workspace& ws, ConstrainedWork
 /// Adds those of the stabilisation at the velocities of the workspace.
 void addStabilizationSources(const Workspace& ws, const ConstraintSet& constraints, ConstrainedWorkspace& cws);
 /// Turns sources into derivatives, after updateInverse() of the system.
-DynamicsStatus solveConstrainedSources(ConstrainedWorkspace& cws);
+NumericalStatus solveConstrainedSources(ConstrainedWorkspace& cws);
 
 }  // namespace bielle

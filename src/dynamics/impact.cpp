@@ -25,8 +25,8 @@ ImpactWorkspace::ImpactWorkspace(const Model& model) : ws(model) {
   f_ext.assign(model.numBodies(), Vector6d::Zero());
 }
 
-DynamicsStatus updateImpact(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints,
-                            ConstVectorRef q, ConstVectorRef v) {
+NumericalStatus updateImpact(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints,
+                             ConstVectorRef q, ConstVectorRef v) {
   resize(model, iws, constraints.rows);
   updatePositions(model, iws.ws, q);
   updateMassMatrix(model, iws.ws);
@@ -34,14 +34,14 @@ DynamicsStatus updateImpact(const Model& model, ImpactWorkspace& iws, const Cons
     const Closure& closure = constraints.closures[c];
     calcClosureJacobian(iws.ws, closure, iws.J.middleRows(constraints.offsets[c], getRows(closure.kind)));
   }
-  if (!iws.saddle_point->factorize(iws.ws.M, iws.J)) return DynamicsStatus::MassMatrixSingular;
+  if (!iws.saddle_point->factorize(iws.ws.M, iws.J)) return NumericalStatus::Singular;
   iws.momentum.noalias() = iws.ws.M * v;
   iws.saddle_point->solve(iws.momentum, iws.zero, iws.v_plus, iws.impulse);
   iws.change = iws.v_plus - v;
-  return iws.v_plus.allFinite() && iws.impulse.allFinite() ? DynamicsStatus::Ok : DynamicsStatus::NotFinite;
+  return iws.v_plus.allFinite() && iws.impulse.allFinite() ? NumericalStatus::Ok : NumericalStatus::NotFinite;
 }
 
-DynamicsStatus updateImpactDerivatives(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints) {
+NumericalStatus updateImpactDerivatives(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints) {
   Workspace& ws = iws.ws;
   updateVelocities(model, ws, iws.v_plus);
   iws.dimpulse_dq.setZero();
@@ -73,7 +73,7 @@ DynamicsStatus updateImpactDerivatives(const Model& model, ImpactWorkspace& iws,
   iws.saddle_point->updateInverse();
   iws.saddle_point->solveDerivatives(iws.dv_dq, iws.dimpulse_dq);
   iws.saddle_point->solveDerivatives(iws.dv_dv, iws.dimpulse_dv);
-  return iws.dv_dq.allFinite() && iws.dv_dv.allFinite() ? DynamicsStatus::Ok : DynamicsStatus::NotFinite;
+  return iws.dv_dq.allFinite() && iws.dv_dv.allFinite() ? NumericalStatus::Ok : NumericalStatus::NotFinite;
 }
 
 }  // namespace bielle

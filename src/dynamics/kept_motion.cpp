@@ -68,20 +68,6 @@ double Closing::calcMotion(const Model& model, const Workspace& ws, const ModelV
   return gap;
 }
 
-const char* getMessage(KeptMotionStatus status) {
-  switch (status) {
-    case KeptMotionStatus::Ok:
-      return "ok";
-    case KeptMotionStatus::Undetermined:
-      return "the kept coordinates do not determine the loops: a dead point";
-    case KeptMotionStatus::Unbalanced:
-      return "motors and contacts cannot produce this motion";
-    case KeptMotionStatus::Open:
-      return "the change opens a loop with redundant rows";
-  }
-  return "?";
-}
-
 KeptMotion::KeptMotion(const Model& model, std::vector<int> kept)
     : model_(model), kept_(std::move(kept)), loops_(makeConstraintSet(model)), ws_(model), virtual_ws_(model) {}
 
@@ -96,15 +82,15 @@ bool KeptMotion::solveBalance(const VectorXd& rhs, VectorXd& solution) const {
   return calcLargest(balance_ * solution - rhs) <= kBalanceTolerance * (1 + calcLargest(rhs));
 }
 
-KeptMotionStatus KeptMotion::update(const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v_kept,
-                                    ConstVectorRef a_kept, ConstVectorRef forces) {
+NumericalStatus KeptMotion::update(const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v_kept,
+                                   ConstVectorRef a_kept, ConstVectorRef forces) {
   constraints_ = constraints;
   for (Closure& closure : constraints_.closures) closure.kp = closure.kd = 0;
   const Eigen::Index nu = model_.nu(), nf = constraints.rows - loops_.rows,
                      nk = static_cast<Eigen::Index>(kept_.size());
   updatePositions(model_, ws_, q);
   closing_.emplace(model_, ws_, loops_, kept_);
-  if (!closing_->isDetermined()) return KeptMotionStatus::Undetermined;
+  if (!closing_->isDetermined()) return NumericalStatus::NearDeadPoint;
   T_ = closing_->calcTangent();
   v_ = T_ * v_kept;
   updateVelocities(model_, ws_, v_);
@@ -128,7 +114,7 @@ KeptMotionStatus KeptMotion::update(const ConstraintSet& constraints, ConstVecto
   decomposition_.compute(balance_);
   VectorXd rhs(nu + nf + nk), solution;
   rhs << VectorXd::Zero(nu), -forces, T_.transpose() * force;
-  if (!solveBalance(rhs, solution)) return KeptMotionStatus::Unbalanced;  // Eq. (4)
+  if (!solveBalance(rhs, solution)) return NumericalStatus::Unbalanced;  // Eq. (4)
   u_ = solution.head(nu);
   lambda_.resize(constraints.rows);
   lambda_ << closing_
@@ -139,7 +125,7 @@ KeptMotionStatus KeptMotion::update(const ConstraintSet& constraints, ConstVecto
 
   updatePositions(model_, virtual_ws_, q);
   m_ = T_ * solution.tail(nk);
-  return KeptMotionStatus::Ok;
+  return NumericalStatus::Ok;
 }
 
 // n, and in `rows` e, for a velocity v that is closed: Eq. (5).
@@ -160,11 +146,11 @@ VectorXd KeptMotion::calcTangentVariation(const ModelVariation& change, const Mo
   return calcLift(change, motion.q, T_ * w, rows);
 }
 
-KeptMotionStatus KeptMotion::calcVariation(const ModelVariation& change, Variation& out) {
+NumericalStatus KeptMotion::calcVariation(const ModelVariation& change, Variation& out) {
   const Eigen::Index nu = model_.nu(), nf = J_contacts_.rows(), nk = T_.cols(), loops = loops_.rows;
   const double gap = closing_->calcMotion(model_, ws_, change, out.motion);
   const double moved = calcLargest(out.motion.q) + calcLargest(out.motion.v) + calcLargest(out.motion.a);
-  if (!(gap <= kGapTolerance * (1 + moved))) return KeptMotionStatus::Open;
+  if (!(gap <= kGapTolerance * (1 + moved))) return NumericalStatus::Contradictory;
   VariationWorkspace variation(model_);
   updateVariation(model_, ws_, change, out.motion, variation);
   const VectorXd force =
@@ -174,7 +160,7 @@ KeptMotionStatus KeptMotion::calcVariation(const ModelVariation& change, Variati
   const VectorXd n = calcLift(change, out.motion.q, m_, e);
   VectorXd rhs(nu + nf + nk), solution;
   rhs << -selectMotors(n), -(e.tail(nf) + J_contacts_ * n), T_.transpose() * force;
-  if (!solveBalance(rhs, solution)) return KeptMotionStatus::Unbalanced;  // Eq. (5)
+  if (!solveBalance(rhs, solution)) return NumericalStatus::Unbalanced;  // Eq. (5)
   out.u = solution.head(nu);
   out.lambda.resize(constraints_.rows);
   out.lambda << closing_
@@ -182,7 +168,7 @@ KeptMotionStatus KeptMotion::calcVariation(const ModelVariation& change, Variati
                                       J_contacts_.transpose() * solution.segment(nu, nf))
                     .head(loops),
       solution.segment(nu, nf);
-  return KeptMotionStatus::Ok;
+  return NumericalStatus::Ok;
 }
 
 }  // namespace bielle

@@ -82,7 +82,7 @@ double calcBalanceError(const Model& model, const Linkage& linkage, ConstVectorR
   updateBias(model, ws);
   const VectorXd gravity = ws.b;
   const auto calcAcceleration = [&](const VectorXd& tau) {
-    const bool ok = updateConstrainedDynamics(model, ws, cws, loops, q, rest, gravity + tau) == DynamicsStatus::Ok;
+    const bool ok = updateConstrainedDynamics(model, ws, cws, loops, q, rest, gravity + tau) == NumericalStatus::Ok;
     return ok ? cws.a : VectorXd::Constant(model.nv(), std::numeric_limits<double>::infinity());
   };
   double error = 0;

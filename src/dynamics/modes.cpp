@@ -122,12 +122,12 @@ Modes calcModes(const Model& model, const ConstraintSet& constraints, ConstVecto
   Workspace ws(model);
   ConstrainedWorkspace cws;
   out.status = updateConstrainedDynamics(model, ws, cws, constraints, q, VectorXd::Zero(model.nv()), tau);
-  if (out.status != DynamicsStatus::Ok) return out;
+  if (out.status != NumericalStatus::Ok) return out;
   out.acceleration = cws.a.cwiseAbs().maxCoeff();
   out.lambda = cws.lambda;
   const MatrixXd M = ws.M;
   out.status = updateConstrainedDerivatives(model, ws, cws, constraints);
-  if (out.status != DynamicsStatus::Ok) return out;
+  if (out.status != NumericalStatus::Ok) return out;
   out.N = makeBasis(cws.J, M, rank_tolerance);
   const MatrixXd weights = out.N.transpose() * M;
   out.stiffness = -weights * cws.da_dq * out.N;

@@ -39,7 +39,7 @@ class Adopter {
            "only robots that stand on feet can be adopted; complete others by hand, with a YAML file that has the key "
            "`model`, motors and a reference");
     const AssemblyResult closed = findClosedConfiguration(model_);
-    if (closed.status != AssemblyStatus::Closed) fail("its loops do not close: " + closed.message, "correct the robot");
+    if (closed.status != NumericalStatus::Ok) fail("its loops do not close: " + closed.message, "correct the robot");
     updatePositions(model_, ws_, closed.q);
   }
 
@@ -211,7 +211,7 @@ class Adopter {
       AssemblyProblem problem = makeReferenceProblem(*with_feet_, reference);
       problem.weights.tail(model_.nv() - 6) = problem.weights.tail(model_.nv() - 6).cwiseMin(kJointWeight);
       const AssemblyResult result = assemble(*with_feet_, problem);
-      if (result.status != AssemblyStatus::Closed) return false;
+      if (result.status != NumericalStatus::Ok) return false;
       for (const Joint& joint : model_.joints())
         if (joint.nv == 1 && (result.q[joint.idx_q] < model_.lowerLimits()[joint.idx_v] ||
                               result.q[joint.idx_q] > model_.upperLimits()[joint.idx_v]))
@@ -246,7 +246,7 @@ class Adopter {
   // ground.
   bool writeGivenPosture(const Reference& given) {
     const AssemblyResult posture = assembleReference(model_, given.name);
-    if (posture.status != AssemblyStatus::Closed) return false;
+    if (posture.status != NumericalStatus::Ok) return false;
     Workspace ws(model_);
     updatePositions(model_, ws, posture.q);
     for (double share = 1 - kStep; share > kLowest; share -= kStep) {

@@ -435,7 +435,7 @@ class MjcfWriter {
   void writeKeyframes(XMLElement& section) {
     for (const Reference& reference : model_.references()) {
       const AssemblyResult result = assembleReference(model_, reference.name);
-      if (result.status != AssemblyStatus::Closed) {
+      if (result.status != NumericalStatus::Ok) {
         warn("reference '" + reference.name + "'", "it does not close and is left out: " + result.message);
         continue;
       }

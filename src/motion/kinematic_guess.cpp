@@ -125,7 +125,7 @@ class FeetPlacer {
       if (!flat[i]) problem.frames.back().mask.tail<3>().setConstant(false);
     }
     AssemblyResult result = bielle::assemble(model_, problem, options_);
-    if (result.status != AssemblyStatus::Closed || !keepsRanges(result.q)) return {};
+    if (result.status != NumericalStatus::Ok || !keepsRanges(result.q)) return {};
     const double transmission = calcTransmission(result.q);
     if (transmission <= kLeastTransmission) return {};
     return Posture{std::move(result.q), transmission};

@@ -68,12 +68,12 @@ class Lifter {
     return makeConstraintSet(closed_, targets);
   }
 
-  bool fail(LiftStatus status, const std::string& why) {
+  bool fail(NumericalStatus status, const std::string& why) {
     result_.nodes.back().status = status;
     result_.nodes.back().message = why;
     return false;
   }
-  bool failAtLinkage(LiftStatus status, const PostureLift& posture) {
+  bool failAtLinkage(NumericalStatus status, const PostureLift& posture) {
     result_.nodes.back().joint = posture.joint();
     return fail(status, posture.why());
   }
@@ -83,10 +83,10 @@ class Lifter {
     LiftNode& node = result_.nodes.back();
     const bool stepped = options_.method == LiftMethod::Nlopt && k > 0;
     if (stepped) x = next_;
-    const LiftStatus status = stepped ? posture_.setClosedConfiguration(x.head(closed_.nq()), options_.singular)
-                                      : posture_.setConfiguration(trajectory_.q[k], options_.singular);
+    const NumericalStatus status = stepped ? posture_.setClosedConfiguration(x.head(closed_.nq()), options_.singular)
+                                           : posture_.setConfiguration(trajectory_.q[k], options_.singular);
     node.margin = posture_.margin();
-    if (status != LiftStatus::Lifted) return failAtLinkage(status, posture_);
+    if (status != NumericalStatus::Ok) return failAtLinkage(status, posture_);
     if (!stepped) {
       x.resize(closed_.nq() + closed_.nv());
       x << posture_.q(), posture_.liftVelocity(trajectory_.v[k]);
@@ -102,10 +102,10 @@ class Lifter {
   // The state is too far from the serial one: out of reach, or merely inaccurate.
   bool failToFollow(int k, const char* what, double error) {
     PostureLift other = posture_;
-    const LiftStatus status = other.setConfiguration(trajectory_.q[k], options_.singular);
-    if (status != LiftStatus::Lifted) return failAtLinkage(status, other);
+    const NumericalStatus status = other.setConfiguration(trajectory_.q[k], options_.singular);
+    if (status != NumericalStatus::Ok) return failAtLinkage(status, other);
     const bool posture = error == result_.nodes.back().position_error;
-    return fail(LiftStatus::Inaccurate,
+    return fail(NumericalStatus::Inaccurate,
                 describe(what, error, posture ? options_.position_tolerance : options_.velocity_tolerance));
   }
 
@@ -120,14 +120,14 @@ class Lifter {
     u = calcInverseTorques(k, x);
     if (options_.method == LiftMethod::Nlopt && !followBySlsqp(k, x, u)) return false;
     LiftNode& node = result_.nodes.back();
-    const DynamicsStatus status =
+    const NumericalStatus status =
         updateConstrainedDynamics(closed_, ws_, cws_, result_.constraints[k], x.head(closed_.nq()),
                                   x.tail(closed_.nv()), calcMotorForces(closed_, u));
-    if (status != DynamicsStatus::Ok) return fail(LiftStatus::SingularLinkage, getMessage(status));
+    if (status != NumericalStatus::Ok) return fail(status, getMessage(status));
     node.acceleration_error = calcLargest(restrictVelocity(closed_, serial_, cws_.a) - trajectory_.a[k]);
     const double tolerance = options_.acceleration_tolerance * (1 + calcLargest(trajectory_.a[k]));
     if (options_.method == LiftMethod::Newton && !(node.acceleration_error <= tolerance))
-      return fail(LiftStatus::Inaccurate, describe("an acceleration", node.acceleration_error, tolerance));
+      return fail(NumericalStatus::Inaccurate, describe("an acceleration", node.acceleration_error, tolerance));
     return true;
   }
 
@@ -167,7 +167,7 @@ class Lifter {
     bool failed = false;
     const auto follow = [&](const VectorXd& torques) {
       const RobotEvaluation& step = evaluator_->evaluate(k, x, torques);
-      failed |= step.status != StepStatus::Ok;
+      failed |= step.status != NumericalStatus::Ok;
       if (!failed) next_ = step.x_next;
       return failed ? VectorXd(VectorXd::Zero(2 * serial_.nv())) : calcTrackingError(k + 1, next_);
     };
@@ -196,7 +196,7 @@ class Lifter {
     result_.nodes.back().evaluations = best.evaluations;
     follow(u);
     if (failed)
-      return fail(LiftStatus::SingularLinkage,
+      return fail(NumericalStatus::NearDeadPoint,
                   "the step of the closed dynamics fails: " + evaluator_->evaluation().failure);
     return true;
   }
@@ -216,20 +216,6 @@ class Lifter {
 }  // namespace
 
 const char* getName(LiftMethod method) { return method == LiftMethod::Newton ? "newton" : "nlopt"; }
-
-const char* getName(LiftStatus status) {
-  switch (status) {
-    case LiftStatus::Lifted:
-      return "lifted";
-    case LiftStatus::UnreachablePosture:
-      return "unreachable posture";
-    case LiftStatus::SingularLinkage:
-      return "singular linkage";
-    case LiftStatus::Inaccurate:
-      return "inaccurate";
-  }
-  return "?";
-}
 
 std::vector<StageSpec> makeStages(const std::vector<double>& dt, const std::vector<ConstraintSet>& constraints) {
   std::vector<StageSpec> stages(constraints.size() + 1);

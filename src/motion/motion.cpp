@@ -62,15 +62,15 @@ VectorXd makeStandingPosture(const Model& model, NeighbourPlans* neighbours) {
   AssemblyResult result;
   if (neighbours && neighbours->posture.size() == model.nq())
     result = refineAssembly(model, makeReferenceProblem(model, *standing), neighbours->posture);
-  if (result.status != AssemblyStatus::Closed) {
+  if (result.status != NumericalStatus::Ok) {
     result = assembleReference(model, standing->name);
-    if (neighbours && result.status == AssemblyStatus::Closed) {  // as exact as those of the others
+    if (neighbours && result.status == NumericalStatus::Ok) {  // as exact as those of the others
       const AssemblyResult refined = refineAssembly(model, makeReferenceProblem(model, *standing), result.q);
-      if (refined.status == AssemblyStatus::Closed) result = refined;
+      if (refined.status == NumericalStatus::Ok) result = refined;
       neighbours->posture = result.q;
     }
   }
-  if (result.status != AssemblyStatus::Closed)
+  if (result.status != NumericalStatus::Ok)
     throw InputError(model.name(), "reference '" + standing->name + "'", result.message, "correct its targets");
   return settleReference(model, *standing, result.q);
 }

@@ -29,7 +29,7 @@ PostureLift::PostureLift(const Model& closed, const SerialModel& serial)
   for (int i : reduction.free_joints) free_joints_.emplace_back(i, serial_.findJoint(closed.joints()[i].name));
 }
 
-LiftStatus PostureLift::setConfiguration(const VectorXd& q_s, double singular) {
+NumericalStatus PostureLift::setConfiguration(const VectorXd& q_s, double singular) {
   for (const auto& [closed, serial] : free_joints_) {
     const Joint &to = closed_.joints()[closed], &from = serial_.joints()[serial];
     q_.segment(to.idx_q, to.nq) = q_s.segment(from.idx_q, from.nq);
@@ -39,29 +39,29 @@ LiftStatus PostureLift::setConfiguration(const VectorXd& q_s, double singular) {
     for (int j = 0; j < target.size(); ++j) target[j] = q_s[drive.serial_positions[j]];
     gatherConfiguration(closed_, *drive.linkage.cluster, q_, q_cluster);
     if (!drive.here.update(*drive.linkage.cluster, q_cluster))
-      return fail(LiftStatus::SingularLinkage, drive.linkage.joint_names.front(),
+      return fail(NumericalStatus::NearDeadPoint, drive.linkage.joint_names.front(),
                   drive.here.describeFailure(*drive.linkage.cluster));
-    const LiftStatus status = closeDrive(drive, target);
-    if (status != LiftStatus::Lifted) return status;
+    const NumericalStatus status = closeDrive(drive, target);
+    if (status != NumericalStatus::Ok) return status;
     scatterConfiguration(closed_, *drive.linkage.cluster, drive.here.basis().q, q_);
   }
   return checkMargin(singular);
 }
 
-LiftStatus PostureLift::setClosedConfiguration(const VectorXd& q, double singular) {
+NumericalStatus PostureLift::setClosedConfiguration(const VectorXd& q, double singular) {
   q_ = q;
   for (Drive& drive : drives_) {
     VectorXd q_cluster(drive.linkage.cluster->model.nq());
     gatherConfiguration(closed_, *drive.linkage.cluster, q_, q_cluster);
     if (!drive.here.update(*drive.linkage.cluster, q_cluster))
-      return fail(LiftStatus::SingularLinkage, drive.linkage.joint_names.front(),
+      return fail(NumericalStatus::NearDeadPoint, drive.linkage.joint_names.front(),
                   drive.here.describeFailure(*drive.linkage.cluster));
   }
   return checkMargin(singular);
 }
 
 // Newton steps along the closed configurations towards the target, as long as the distance decreases.
-LiftStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
+NumericalStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
   const Linkage& linkage = drive.linkage;
   const auto calcMiss = [&](const ClusterPoint& point) {
     VectorXd miss = target;
@@ -82,22 +82,22 @@ LiftStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
     std::swap(drive.here, drive.next);
     miss = calcMiss(drive.here);
   }
-  if (miss.cwiseAbs().maxCoeff() <= 1e3 * kTolerance) return LiftStatus::Lifted;
+  if (miss.cwiseAbs().maxCoeff() <= 1e3 * kTolerance) return NumericalStatus::Ok;
   Eigen::Index worst;
   miss.cwiseAbs().maxCoeff(&worst);
   std::ostringstream text;
   text << "joint '" << linkage.joint_names[worst] << "' must reach " << target[worst]
        << ", but its linkage only reaches " << target[worst] - miss[worst];
-  return fail(LiftStatus::UnreachablePosture, linkage.joint_names[worst], text.str());
+  return fail(NumericalStatus::NotClosed, linkage.joint_names[worst], text.str());
 }
 
-LiftStatus PostureLift::fail(LiftStatus status, const std::string& joint, const std::string& why) {
+NumericalStatus PostureLift::fail(NumericalStatus status, const std::string& joint, const std::string& why) {
   joint_ = joint;
   why_ = why;
   return status;
 }
 
-LiftStatus PostureLift::checkMargin(double singular) {
+NumericalStatus PostureLift::checkMargin(double singular) {
   margin_ = 1;
   for (const Drive& drive : drives_) {
     MatrixXd T;
@@ -106,10 +106,10 @@ LiftStatus PostureLift::checkMargin(double singular) {
     margin_ = std::min(margin_, margin);
     if (margin > singular) continue;
     const std::string& joint = drive.linkage.joint_names.front();
-    return fail(LiftStatus::SingularLinkage, joint,
+    return fail(NumericalStatus::NearDeadPoint, joint,
                 "the linkage of joint '" + joint + "' is at a dead point of the joint");
   }
-  return LiftStatus::Lifted;
+  return NumericalStatus::Ok;
 }
 
 VectorXd PostureLift::liftVelocity(const VectorXd& v_s) { return calcTangent() * v_s; }

@@ -14,9 +14,9 @@ class PostureLift {
 
   // Closes the loops on the serial joints of q_s, from the configuration of the previous call. On failure, see why()
   // and joint().
-  LiftStatus setConfiguration(const VectorXd& q_s, double singular);
+  NumericalStatus setConfiguration(const VectorXd& q_s, double singular);
   // Sets a closed configuration.
-  LiftStatus setClosedConfiguration(const VectorXd& q, double singular);
+  NumericalStatus setClosedConfiguration(const VectorXd& q, double singular);
 
   const VectorXd& q() const { return q_; }
   // The closed velocity and acceleration for the serial ones.
@@ -34,9 +34,9 @@ class PostureLift {
     ClusterPoint here, next;
     std::vector<int> serial_positions, serial_dofs;  // of the linkage's joints in the serial model
   };
-  LiftStatus closeDrive(Drive& drive, const VectorXd& target);
-  LiftStatus checkMargin(double singular);
-  LiftStatus fail(LiftStatus status, const std::string& joint, const std::string& why);
+  NumericalStatus closeDrive(Drive& drive, const VectorXd& target);
+  NumericalStatus checkMargin(double singular);
+  NumericalStatus fail(NumericalStatus status, const std::string& joint, const std::string& why);
 
   const Model &closed_, &serial_;
   std::vector<Drive> drives_;

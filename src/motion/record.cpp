@@ -40,7 +40,7 @@ void recordStage(const RobotProblem& problem, RobotEvaluator& evaluator, const V
     return;
   }
   const RobotEvaluation& at = evaluator.evaluate(k, x, u);
-  if (at.status != StepStatus::Ok) {
+  if (at.status != NumericalStatus::Ok) {
     for (RowMatrixXd* table :
          {&record.a, &record.closure_wrenches, &record.contact_wrenches, &record.q_mid, &record.v_mid})
       if (table->cols() > 0) table->row(k).setConstant(std::numeric_limits<double>::quiet_NaN());

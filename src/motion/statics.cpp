@@ -92,7 +92,7 @@ VectorXd settleSprings(const Model& model, const std::vector<const JointForce*>&
       problem.weights[springs[i]->dof] = kFirm;
     }
     const AssemblyResult next = assemble(model, problem);
-    if (next.status != AssemblyStatus::Closed) break;
+    if (next.status != NumericalStatus::Ok) break;
     q = next.q;
   }
   return unloaded;

@@ -31,7 +31,7 @@ class Follower {
     for (int k = 0; k <= N_; ++k)
       weights.push_back(makeActiveWeights(problem_, k, y_[k], at_[k]->constraints, penalty_));
     const std::vector<StageModel> models = linearizeNodes(problem_, at_, weights, scratch_.get());
-    if (sweepNodes(problem_, models, z_.us, sweep_, dx_, du_) != LqStatus::Ok) return false;
+    if (sweepNodes(problem_, models, z_.us, sweep_, dx_, du_) != NumericalStatus::Ok) return false;
     std::vector<IntegrateTask> tasks;
     std::vector<VectorXd> xs(z_.xs);
     for (int k = 0; k <= N_; ++k) {

@@ -13,7 +13,7 @@ EvaluationList makeEvaluations(const ShootingProblem& problem, int count) {
 
 bool allOk(const EvaluationList& evaluations, int count) {
   return std::all_of(evaluations.begin(), evaluations.begin() + count,
-                     [](const auto& at) { return at->status == StepStatus::Ok; });
+                     [](const auto& at) { return at->status == NumericalStatus::Ok; });
 }
 
 void requireSameSizes(const ShootingProblem& a, const ShootingProblem& b) {
@@ -103,23 +103,23 @@ std::vector<StageModel> linearizeNodes(const ShootingProblem& problem, const Eva
   for (int first = 0; first <= N; first += size)
     problem.linearize(&tasks[first], std::min(size, N + 1 - first), scratch);
   for (const LinearizeTask& task : tasks)
-    if (task.status != StepStatus::Ok)
+    if (task.status != NumericalStatus::Ok)
       throw std::invalid_argument("the optimum has no derivatives at node " + std::to_string(task.node) + ": " +
                                   task.failure);
   return models;
 }
 
-LqStatus sweepNodes(const ShootingProblem& problem, const std::vector<StageModel>& models,
-                    const std::vector<VectorXd>& us, LqSweep& sweep, std::vector<VectorXd>& dx,
-                    std::vector<VectorXd>& du) {
+NumericalStatus sweepNodes(const ShootingProblem& problem, const std::vector<StageModel>& models,
+                           const std::vector<VectorXd>& us, LqSweep& sweep, std::vector<VectorXd>& dx,
+                           std::vector<VectorXd>& du) {
   std::vector<ControlBox> boxes;
   for (size_t k = 0; k < us.size(); ++k) {
     const ControlBox bounds = getControlBounds(problem, static_cast<int>(k));
     boxes.push_back({(bounds.lower - us[k]).cwiseMin(0), (bounds.upper - us[k]).cwiseMax(0)});
   }
   const double regularization = FddpOptions().min_regularization;
-  const LqStatus status = sweep.update(models, {regularization, regularization}, boxes).status;
-  if (status == LqStatus::Ok) sweep.calcStep(models, dx, du);
+  const NumericalStatus status = sweep.update(models, {regularization, regularization}, boxes).status;
+  if (status == NumericalStatus::Ok) sweep.calcStep(models, dx, du);
   return status;
 }
 

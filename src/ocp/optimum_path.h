@@ -30,8 +30,8 @@ std::vector<StageModel> linearizeNodes(const ShootingProblem& problem, const Eva
                                        const std::vector<ConstraintWeights>& weights, ProblemScratch* scratch);
 
 // A sweep over all nodes within the bounds of the controls us, and its step. Not Ok: no step.
-LqStatus sweepNodes(const ShootingProblem& problem, const std::vector<StageModel>& models,
-                    const std::vector<VectorXd>& us, LqSweep& sweep, std::vector<VectorXd>& dx,
-                    std::vector<VectorXd>& du);
+NumericalStatus sweepNodes(const ShootingProblem& problem, const std::vector<StageModel>& models,
+                           const std::vector<VectorXd>& us, LqSweep& sweep, std::vector<VectorXd>& dx,
+                           std::vector<VectorXd>& du);
 
 }  // namespace bielle

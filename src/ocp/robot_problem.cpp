@@ -136,7 +136,7 @@ bool startEvaluation(const Model& model, const EvaluateTask& task, const NodeLis
   at.residuals.resize(costs.rows());
   at.constraints.resize(costs.constraintRows());
   at.state_cost = 0;
-  at.status = StepStatus::Failed;
+  at.status = NumericalStatus::Failed;
   at.failure.clear();
   if (place.isFree() && !(at.time_scale > 0)) at.failure = "the time scale is not positive";
   return at.x.allFinite() && at.u.allFinite() && at.failure.empty();

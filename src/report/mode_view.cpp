@@ -48,7 +48,7 @@ Json describeSwing(const Model& model, ConstVectorRef q, const std::vector<Frame
     for (size_t i = 0, rest = node; i < parts.size(); ++i, rest /= count)
       change += kLargestSwing * (2.0 * static_cast<double>(rest % count) / (count - 1) - 1) * parts[i];
     const AssemblyResult result = assemble(model, {model.integrate(q, change), {}, held}, options);
-    closed.push_back(result.status == AssemblyStatus::Closed);
+    closed.push_back(result.status == NumericalStatus::Ok);
     updatePlacements(model, ws, result.q);
     for (int body = 1; body < model.numBodies(); ++body) {
       const SE3& X_WP = ws.X_WB[model.joints()[body].parent];

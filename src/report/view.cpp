@@ -47,7 +47,7 @@ std::vector<Group> listGroups(const Model& model) {
 VectorXd makeStart(const LoadedRobot& robot) {
   const Model& model = robot.model;
   const AssemblyResult start = findClosedConfiguration(model);
-  if (start.status != AssemblyStatus::Closed) throw makeClosingError(model, robot.directory, start);
+  if (start.status != NumericalStatus::Ok) throw makeClosingError(model, robot.directory, start);
   return start.q;
 }
 
@@ -135,7 +135,7 @@ class GroupGrid {
     options.max_iterations = 30;
     options.continuation_steps = 0;
     const AssemblyResult result = assemble(model_, problem, options);
-    if (result.status != AssemblyStatus::Closed) return {};
+    if (result.status != NumericalStatus::Ok) return {};
     for (size_t i = 0; i < group_.motors.size(); ++i)
       if (std::abs(result.q[getIndex(i)] - wished[i]) > 1e-4) return {};
     return result.q;

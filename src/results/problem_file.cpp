@@ -197,7 +197,7 @@ void addValues(const Motion& motion, const MotionSummary& summary, const MotionR
     VectorXd x(problem.stateSize());
     x << record.q.row(k).transpose(), record.v.row(k).transpose();
     const RobotEvaluation& at = evaluator.evaluate(k, x, running ? VectorXd(record.u.row(k).transpose()) : VectorXd());
-    requireSame(summary, at.status == StepStatus::Ok, "states");
+    requireSame(summary, at.status == NumericalStatus::Ok, "states");
     requireSame(summary, !known || record.multipliers.values[k].size() == problem.constraintSize(k), "constraints");
     cost.push_back(at.cost);
     rows.push_back(static_cast<double>(at.constraints.size()));

@@ -38,7 +38,7 @@ FrameState interpolateState(const Model& model, Workspace& ws, const ConstraintS
                  v0 = record.v.row(stage).transpose(), v1 = record.v.row(stage + 1).transpose();
   const VectorXd way = s * s * (3 - 2 * s) * model.difference(q0, q1) + h * s * (1 - s) * ((1 - s) * v0 - s * v1);
   const AssemblyResult closed = closeConfiguration(model, model.integrate(q0, way));
-  if (closed.status != AssemblyStatus::Closed)
+  if (closed.status != NumericalStatus::Ok)
     throw InputError("", "time " + formatNumber(time) + " s",
                      "the loops do not close between the nodes: " + closed.message, "solve with shorter time steps");
   return {closed.q, projectVelocity(model, ws, loops, closed.q, (1 - s) * v0 + s * v1)};

@@ -32,7 +32,7 @@ std::vector<Posture> makePostures(const Model& model) {
   std::vector<Posture> postures = {{"neutral", model.makeNeutral(), true, ""}};
   for (const Reference& reference : model.references()) {
     const AssemblyResult result = assembleReference(model, reference.name);
-    postures.push_back({reference.name, result.q, result.status == AssemblyStatus::Closed, result.message});
+    postures.push_back({reference.name, result.q, result.status == NumericalStatus::Ok, result.message});
   }
   return postures;
 }
@@ -150,7 +150,7 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
   std::string place = "closed neutral";
   const AssemblyResult found = findClosedConfiguration(model);
   VectorXd q = found.q;
-  bool closed = found.status == AssemblyStatus::Closed;
+  bool closed = found.status == NumericalStatus::Ok;
   for (size_t i = postures.size(); i-- > 1;)
     if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
   const Mobility mobility = calcMobility(model, q);
@@ -257,7 +257,7 @@ std::vector<std::string> checkReferences(const LoadedRobot& robot) {
   std::vector<std::string> warnings;
   for (const Reference& reference : model.references()) {
     const AssemblyResult result = assembleReference(model, reference.name);
-    const bool closed = result.status == AssemblyStatus::Closed;
+    const bool closed = result.status == NumericalStatus::Ok;
     const std::string element = "reference '" + reference.name + "'";
     std::string moved, outside;
     for (const ReferenceJoint& of : listReferenceJoints(model, reference, result.q)) {

@@ -68,7 +68,7 @@ int BackwardPass::update(const BackwardInput& input) {
 // Stops at the first node that could not be linearized or swept.
 void BackwardPass::sweepReadyNodes(const BackwardInput& input) {
   const int N = input.problem.numStages();
-  while (sweep_node_ >= 0 && sweep_.result().status == LqStatus::Ok &&
+  while (sweep_node_ >= 0 && sweep_.result().status == NumericalStatus::Ok &&
          linearized_[sweep_node_].load(std::memory_order_acquire)) {
     StageModel& model = models_[sweep_node_];
     sweep_.updateNode(sweep_node_, model,
@@ -82,7 +82,7 @@ void BackwardPass::sweepReadyNodes(const BackwardInput& input) {
 void BackwardPass::linearize(const BackwardInput& input, int thread, int begin, int end) {
   for (int k = begin; k < end; ++k) {
     hessians_.lend(models_[k]);
-    tasks_[k].status = StepStatus::Failed;
+    tasks_[k].status = NumericalStatus::Failed;
     tasks_[k].failure.clear();
   }
   input.problem.linearize(&tasks_[begin], end - begin, input.evaluations.getScratch(thread));
@@ -95,7 +95,7 @@ void BackwardPass::linearize(const BackwardInput& input, int thread, int begin, 
 // Describes what is wrong with the model of a node; empty if nothing is.
 std::string BackwardPass::checkModel(const ShootingProblem& problem, int k) const {
   const StageModel& model = models_[k];
-  if (tasks_[k].status != StepStatus::Ok) {
+  if (tasks_[k].status != NumericalStatus::Ok) {
     const std::string& reason = tasks_[k].failure;
     return "the problem could not be linearized" + (reason.empty() ? "" : ": " + reason);
   }

@@ -19,10 +19,11 @@ constexpr double kAcceptable = 1e-9;
 
 }  // namespace
 
-BoxQpStatus BoxQp::solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lower, ConstVectorRef upper, VectorRef d) {
+NumericalStatus BoxQp::solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lower, ConstVectorRef upper,
+                             VectorRef d) {
   const int n = static_cast<int>(g.size());
   num_free_ = 0;
-  if (n == 0) return BoxQpStatus::Ok;
+  if (n == 0) return NumericalStatus::Ok;
   if (static_cast<int>(free_.size()) < n) {
     free_.resize(n);
     factor_.resize(n, n);
@@ -38,13 +39,13 @@ BoxQpStatus BoxQp::solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lowe
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     r = g;
     r.noalias() += H_sym * d;
-    if (!r.allFinite()) return BoxQpStatus::NotConverged;
+    if (!r.allFinite()) return NumericalStatus::NotConverged;
     const bool same_set = updateFreeSet(r, d, lower, upper);
-    if ((iteration == 0 || !same_set) && !factorize(H)) return BoxQpStatus::Indefinite;
+    if ((iteration == 0 || !same_set) && !factorize(H)) return NumericalStatus::Indefinite;
     double free_gradient = 0;
     for (int i = 0; i < num_free_; ++i) free_gradient = std::max(free_gradient, std::abs(r[free_[i]]));
     const double scale = largest_g + n * largest_H * d.cwiseAbs().maxCoeff();
-    if (free_gradient <= kTolerance * scale) return BoxQpStatus::Ok;
+    if (free_gradient <= kTolerance * scale) return NumericalStatus::Ok;
 
     calcNewtonStep(r, s);
     for (double t = 1;; t *= kShrink) {  // Eq. (3), the decrease computed from the move: no cancellation
@@ -53,11 +54,12 @@ BoxQpStatus BoxQp::solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lowe
       H_move.noalias() = H_sym * move;
       const double slope = r.dot(move);
       if (-slope - 0.5 * move.dot(H_move) >= -kArmijo * slope) break;
-      if (t < kMinStep) return free_gradient <= kAcceptable * scale ? BoxQpStatus::Ok : BoxQpStatus::NotConverged;
+      if (t < kMinStep)
+        return free_gradient <= kAcceptable * scale ? NumericalStatus::Ok : NumericalStatus::NotConverged;
     }
     d = trial;
   }
-  return BoxQpStatus::NotConverged;
+  return NumericalStatus::NotConverged;
 }
 
 // Eq. (2). Returns whether the set is the one of the last call.

@@ -16,18 +16,14 @@
 
 namespace bielle {
 
-enum class BoxQpStatus {
-  Ok,
-  Indefinite,   ///< a free block H_ff has no Cholesky factor: increase the diagonal of H
-  NotConverged  ///< r_f did not vanish: the data are not finite, or H is singular to rounding
-};
-
 /// Workspace and solution of (1). No allocation after the first solve() of the largest size.
 class BoxQp {
  public:
   /// H (n x n; the lower triangle is read), g, lower <= upper (n, infinite if there is no bound).
   /// d (n): on entry the start (clamped first), on return the solution.
-  BoxQpStatus solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lower, ConstVectorRef upper, VectorRef d);
+  /// \return Indefinite: a free block H_ff has no Cholesky factor; NotConverged: r_f did not vanish, the data are not
+  /// finite or H is singular to rounding
+  NumericalStatus solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lower, ConstVectorRef upper, VectorRef d);
 
   /// Number of free components, and their indices in increasing order in its first entries.
   int numFree() const { return num_free_; }

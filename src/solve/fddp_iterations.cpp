@@ -119,12 +119,12 @@ FddpIterations::End FddpIterations::updateStep() {
     const Clock::time_point start = Clock::now();
     const LqSweep& sweep = memory_.backward.sweep();
     const LqResult result = sweep.result();
-    if (result.status == LqStatus::NotFinite) {
+    if (result.status == NumericalStatus::NotFinite) {
       summary_.message = "node " + std::to_string(result.node) + ": the quadratic models are not finite";
       return FddpTermination::Failed;
     }
     line_.regularization = regularization_;
-    if (result.status == LqStatus::Ok) {
+    if (result.status == NumericalStatus::Ok) {
       slope_ = sweep.calcStep(memory_.backward.models(), memory_.dx, memory_.du);
       summary_.sweep_seconds += calcSecondsSince(start);
       curvature_ = 2 * (result.expected_change - slope_);  // Eq. (8) of the sweep

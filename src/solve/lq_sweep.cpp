@@ -31,7 +31,8 @@ LqResult LqSweep::update(const std::vector<StageModel>& models, const LqRegulari
     const ControlBox* box = k < N && !boxes.empty() ? &boxes[k] : nullptr;
     const ConstMatrixMap hessian = models[k].hessian();
     std::copy_n(hessian.data(), hessian.outerStride() * hessian.cols(), hessian_.data());
-    if (updateNode(k, models[k], shapePadded(hessian_, hessian.rows(), hessian.cols()), box) != LqStatus::Ok) break;
+    if (updateNode(k, models[k], shapePadded(hessian_, hessian.rows(), hessian.cols()), box) != NumericalStatus::Ok)
+      break;
   }
   return result_;
 }
@@ -42,32 +43,32 @@ void LqSweep::start(const std::vector<StageModel>& models, const LqRegularizatio
   result_ = LqResult();
 }
 
-LqStatus LqSweep::updateNode(int k, StageModel& model, const ControlBox* box) {
+NumericalStatus LqSweep::updateNode(int k, StageModel& model, const ControlBox* box) {
   return updateNode(k, model, model.hessian(), box);
 }
 
-LqStatus LqSweep::updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box) {
+NumericalStatus LqSweep::updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box) {
   Node& node = nodes_[k];
   if (k + 1 == static_cast<int>(nodes_.size())) {
     node.Vx = model.lx;
     node.Vxx = Q;
     node.Vxx.diagonal().array() += regularization_.state;
     copyLowerToUpper(node.Vxx);
-    return LqStatus::Ok;
+    return NumericalStatus::Ok;
   }
-  const LqStatus status = updateStage(model, nodes_[k + 1], box, Q, node);
-  if (status != LqStatus::Ok) result_ = {status, k, 0};
+  const NumericalStatus status = updateStage(model, nodes_[k + 1], box, Q, node);
+  if (status != NumericalStatus::Ok) result_ = {status, k, 0};
   return status;
 }
 
-LqStatus LqSweep::updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q,
-                              Node& node) {
+NumericalStatus LqSweep::updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q,
+                                     Node& node) {
   updateQuadratic(model, next, Q, node);
-  if (!node.Vx.allFinite()) return LqStatus::NotFinite;
+  if (!node.Vx.allFinite()) return NumericalStatus::NotFinite;
   result_.expected_change += next.Vx.dot(model.gap) + 0.5 * model.gap.dot(Vxx_gap_.head(model.gap.size()));
-  const LqStatus status = box ? eliminateBoxedControls(*box, Q, node) : eliminateControls(Q, node);
-  if (status != LqStatus::Ok) return status;
-  return isFinite(node) ? LqStatus::Ok : LqStatus::NotFinite;
+  const NumericalStatus status = box ? eliminateBoxedControls(*box, Q, node) : eliminateControls(Q, node);
+  if (status != NumericalStatus::Ok) return status;
+  return isFinite(node) ? NumericalStatus::Ok : NumericalStatus::NotFinite;
 }
 
 // Eqs. (2) to (4). Vx holds Qx until the elimination.
@@ -90,10 +91,10 @@ void LqSweep::updateQuadratic(const StageModel& model, const Node& next, MatrixM
 }
 
 // Eqs. (5) to (7).
-LqStatus LqSweep::eliminateControls(MatrixMap Q, Node& node) {
+NumericalStatus LqSweep::eliminateControls(MatrixMap Q, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  if (!hasFiniteLower(Q, nu) || !node.Qu.allFinite()) return LqStatus::NotFinite;
-  if (!factorizeColumns(Q, nu)) return LqStatus::Indefinite;
+  if (!hasFiniteLower(Q, nu) || !node.Qu.allFinite()) return NumericalStatus::NotFinite;
+  if (!factorizeColumns(Q, nu)) return NumericalStatus::Indefinite;
   const auto L = Q.topLeftCorner(nu, nu).triangularView<Eigen::Lower>();
   node.k = -node.Qu;
   L.solveInPlace(node.k);
@@ -102,21 +103,21 @@ LqStatus LqSweep::eliminateControls(MatrixMap Q, Node& node) {
   result_.expected_change += 0.5 * node.Qu.dot(node.k);
   updateGains(static_cast<int>(nu), Q, node);
   node.K = shapePadded(Kt_, n, nu).transpose();
-  return LqStatus::Ok;
+  return NumericalStatus::Ok;
 }
 
 // Eqs. (5) to (7) with the box.
-LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, MatrixMap Q, Node& node) {
+NumericalStatus LqSweep::eliminateBoxedControls(const ControlBox& box, MatrixMap Q, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
   const auto Quu = Q.topLeftCorner(nu, nu);
   node.k.setZero();
   switch (box_qp_.solve(Quu, node.Qu, box.lower, box.upper, node.k)) {
-    case BoxQpStatus::Ok:
+    case NumericalStatus::Ok:
       break;
-    case BoxQpStatus::Indefinite:
-      return LqStatus::Indefinite;
-    case BoxQpStatus::NotConverged:
-      return hasFiniteLower(Q, nu) ? LqStatus::Indefinite : LqStatus::NotFinite;
+    case NumericalStatus::Indefinite:
+      return NumericalStatus::Indefinite;
+    case NumericalStatus::NotConverged:
+      return hasFiniteLower(Q, nu) ? NumericalStatus::Indefinite : NumericalStatus::NotFinite;
   }
   node.Vx.noalias() += Q.bottomLeftCorner(n, nu) * node.k;
   auto Quu_k = Kt_.head(nu);
@@ -129,11 +130,11 @@ LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, MatrixMap Q, Nod
     if (const int free = box_qp_.getFreeIndex(j); free != j) Q.col(j) = Q.col(free);
     for (int i = j; i < num_free; ++i) Q(i, j) = Q(box_qp_.getFreeIndex(i), j);
   }
-  if (!factorizeColumns(Q, num_free)) return LqStatus::Indefinite;
+  if (!factorizeColumns(Q, num_free)) return NumericalStatus::Indefinite;
   updateGains(num_free, Q, node);
   node.K.setZero();
   for (int i = 0; i < num_free; ++i) node.K.row(box_qp_.getFreeIndex(i)) = shapePadded(Kt_, n, nu).col(i).transpose();
-  return LqStatus::Ok;
+  return NumericalStatus::Ok;
 }
 
 // Vxx of Eq. (6), and K^T of Eq. (5) of the free controls, from L and Y^T in the first columns of Q.

@@ -40,16 +40,10 @@ struct ControlBox {
   VectorXd lower, upper;
 };
 
-enum class LqStatus {
-  Ok,
-  Indefinite,  ///< Quu of `node` has no Cholesky factor: raise the regularization
-  NotFinite    ///< the models from `node` on contain a value that is not finite
-};
-
 struct LqResult {
-  LqStatus status = LqStatus::Ok;
-  int node = -1;               ///< where the sweep stopped, -1 if it succeeded
-  double expected_change = 0;  ///< v_0, Eq. (7)
+  NumericalStatus status = NumericalStatus::Ok;  ///< Indefinite: Quu of `node`; NotFinite: the models from `node` on
+  int node = -1;                                 ///< where the sweep stopped, -1 if it succeeded
+  double expected_change = 0;                    ///< v_0, Eq. (7)
 };
 
 /// Owns all data that a sweep writes. Sized by the first update(); later ones of the same sizes allocate nothing.
@@ -70,7 +64,7 @@ class LqSweep {
   /// k = N .. 0 as long as the status is Ok. start() reads only the sizes of the models. updateNode() overwrites the
   /// Hessian of the model.
   void start(const std::vector<StageModel>& models, const LqRegularization& regularization);
-  LqStatus updateNode(int k, StageModel& model, const ControlBox* box = nullptr);
+  NumericalStatus updateNode(int k, StageModel& model, const ControlBox* box = nullptr);
   /// Result of the nodes updated so far.
   const LqResult& result() const { return result_; }
 
@@ -83,11 +77,12 @@ class LqSweep {
  private:
   void resize(const std::vector<StageModel>& models);
   // Q: the Hessian of the model, which becomes [Quu . ; Qxu Qxx]; then its first columns become L over Y^T.
-  LqStatus updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box);
-  LqStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q, Node& node);
+  NumericalStatus updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box);
+  NumericalStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q,
+                              Node& node);
   void updateQuadratic(const StageModel& model, const Node& next, MatrixMap Q, Node& node);
-  LqStatus eliminateControls(MatrixMap Q, Node& node);
-  LqStatus eliminateBoxedControls(const ControlBox& box, MatrixMap Q, Node& node);
+  NumericalStatus eliminateControls(MatrixMap Q, Node& node);
+  NumericalStatus eliminateBoxedControls(const ControlBox& box, MatrixMap Q, Node& node);
   void updateGains(int num_free, MatrixMap Q, Node& node);
 
   std::vector<Node> nodes_;

@@ -64,7 +64,7 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
   });
   errors.rethrow();
   seconds_ = seconds;
-  const auto isOk = [](const std::unique_ptr<NodeEvaluation>& e) { return e->status == StepStatus::Ok; };
+  const auto isOk = [](const std::unique_ptr<NodeEvaluation>& e) { return e->status == NumericalStatus::Ok; };
   const auto end = iterate_.begin() + num_nodes, failed = std::find_if_not(iterate_.begin(), end, isOk);
   return failed == end ? -1 : static_cast<int>(failed - iterate_.begin());
 }

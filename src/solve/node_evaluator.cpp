@@ -16,7 +16,7 @@ const NodeEvaluation& NodeEvaluator::evaluate(int node, const VectorXd& x, const
   return *at_;
 }
 
-StepStatus NodeEvaluator::linearize(const NodeEvaluation* next, StageModel& out) {
+NumericalStatus NodeEvaluator::linearize(const NodeEvaluation* next, StageModel& out) {
   const bool running = node_ < problem_.numStages();
   const int ndx = problem_.tangentSize(node_), nu = running ? problem_.controlSize(node_) : 0;
   const int ndx_next = running ? problem_.tangentSize(node_ + 1) : 0;

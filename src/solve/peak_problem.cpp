@@ -160,14 +160,14 @@ void PeakProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* mem
     inner[i].next = getInner(tasks[i].next);
     inner[i].weights = tasks[i].weights;
     inner[i].out = &scratch.takeModel(ndx, nu, ndx_next);
-    inner[i].status = StepStatus::Failed;
+    inner[i].status = NumericalStatus::Failed;
     inner[i].failure.clear();
   }
   inner_.linearize(inner.data(), count, scratch.inner.get());
   for (int i = 0; i < count; ++i) {
     tasks[i].status = inner[i].status;
     tasks[i].failure = inner[i].failure;
-    if (inner[i].status == StepStatus::Ok)
+    if (inner[i].status == NumericalStatus::Ok)
       setModel(tasks[i].node, *tasks[i].at, tasks[i].next, *inner[i].out, *tasks[i].out);
   }
 }

@@ -199,7 +199,7 @@ void Rollout::evaluateNodes(const RolloutInput& input, int step, Group& group) {
     Track& track = *group.active[i];
     const NodeEvaluation& out = *group.evaluations[i].out;
     const int k = group.evaluations[i].node;
-    const bool ok = out.status == StepStatus::Ok;
+    const bool ok = out.status == NumericalStatus::Ok;
     if (ok) track.cost += out.cost;
     if (ok) track.merit += out.cost + input.lagrangian.calc(k, out.constraints);
     if (!ok || !std::isfinite(track.merit) || (k < N_ && !out.x_next.allFinite())) track.fail(k, out.failure);

@@ -84,7 +84,7 @@ bool FallDetector::followsBack(const VectorXd& q) {
       const int at = joints[model_.motors()[m].joint].idx_q;
       motors_[m] = q[at] + (q_[at] - q[at]) * i / steps;
     }
-    if (linkages_->update(motors_, q_back_) != ClosingStatus::Closed) return false;
+    if (linkages_->update(motors_, q_back_) != NumericalStatus::Ok) return false;
   }
   return std::all_of(joints.begin(), joints.end(),
                      [this](const Joint& joint) { return calcDeviation(joint, q_back_) < kSamePlace; });

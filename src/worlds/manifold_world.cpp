@@ -131,7 +131,7 @@ void ManifoldWorld::reset(ConstVectorRef q, ConstVectorRef v) {
 void ManifoldWorld::checkStart(int rank) {
   const VectorXd aside = model_.integrate(q_, kBeside * VectorXd::LinSpaced(model_.nv(), -0.7, 1.1));
   const AssemblyResult beside = closeConfiguration(model_, aside);
-  if (beside.status != AssemblyStatus::Closed) return;
+  if (beside.status != NumericalStatus::Ok) return;
   const int other = calcMobility(model_, beside.q).rank;
   if (other > rank)
     fail("the loops are singular at the start: they have rank " + std::to_string(rank) + ", and " +

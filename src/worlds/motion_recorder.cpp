@@ -67,7 +67,7 @@ void MotionRecorder::addClosureForces(const World& world) {
       !isWithinStops(model_, world.configuration()))
     return;
   if (updateConstrainedDynamics(model_, ws_, cws_, loops_, world.configuration(), world.velocity(),
-                                calcMotorForces(model_, world.torques())) != DynamicsStatus::Ok)
+                                calcMotorForces(model_, world.torques())) != NumericalStatus::Ok)
     return;
   for (size_t c = 0; c < loops_.closures.size(); ++c) {
     const Closure& closure = loops_.closures[c];

@@ -27,7 +27,7 @@ MjcfOptions makeRobotOptions(const MujocoWorldOptions& options, const MujocoGrou
 
 VectorXd findPosture(const Model& model) {
   const AssemblyResult closed = findClosedConfiguration(model);
-  if (closed.status != AssemblyStatus::Closed) throw makeClosingError(model, model.name(), closed);
+  if (closed.status != NumericalStatus::Ok) throw makeClosingError(model, model.name(), closed);
   return closed.q;
 }
 

@@ -46,13 +46,13 @@ Model makeMachine(const Model& model, const RobotErrors& errors) {
 
 VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRef q) {
   const AssemblyResult closed = closeConfiguration(machine, q);
-  if (closed.status != AssemblyStatus::Closed)
+  if (closed.status != NumericalStatus::Ok)
     throw InputError(machine.name(), closed.worst, "its loop cannot be closed: " + closed.message,
                      "allow smaller errors; loops with redundant rows allow no errors");
   PassiveJoints joints(machine, closed.q);
   VectorXd motors(machine.nu()), out = q;
   for (int m = 0; m < machine.nu(); ++m) motors[m] = q[machine.joints()[machine.motors()[m].joint].idx_q];
-  if (joints.update(motors, out) != ClosingStatus::Closed)
+  if (joints.update(motors, out) != NumericalStatus::Ok)
     throw InputError(machine.name(), "closures", "they cannot close at the motors' positions", "allow smaller errors");
   if (machine.hasFreeFlyer() && !machine.contacts().empty())
     out[2] += calcLeastHeight(model, q) - calcLeastHeight(machine, out);

@@ -53,7 +53,7 @@ void SerialController::update(const Measurement& measurement, VectorRef u) {
   believed.v = restrictVelocity(closed_, serial_, measurement.v);
   VectorXd tau(serial_.nu());
   inner_.update(believed, tau);
-  if (belief_ == Belief::Serial && posture_->setClosedConfiguration(measurement.q, kSingular) == LiftStatus::Lifted)
+  if (belief_ == Belief::Serial && posture_->setClosedConfiguration(measurement.q, kSingular) == NumericalStatus::Ok)
     calcRatio(closed_, serial_, *posture_, R_);
   u = calcMotorTorques(R_, tau);
 }
@@ -67,14 +67,14 @@ SerialReference makeReference(const Model& closed, const SerialModel& serial, co
   const auto setState = [&](double time, VectorXd& q, VectorXd& v) {
     VectorXd q_s = serial.model.makeNeutral(), v_s(serial.model.nv());
     plan.getReference(time, q_s, v_s);
-    const LiftStatus status = posture.setConfiguration(q_s, kSingular);
-    if (status != LiftStatus::Lifted && out.first_missed < 0) {
+    const NumericalStatus status = posture.setConfiguration(q_s, kSingular);
+    if (status != NumericalStatus::Ok && out.first_missed < 0) {
       out.first_missed = time;
       out.message = posture.why();
     }
-    if (status == LiftStatus::Lifted && belief == Belief::Serial) calcRatio(closed, serial.model, posture, R);
+    if (status == NumericalStatus::Ok && belief == Belief::Serial) calcRatio(closed, serial.model, posture, R);
     q = posture.q();
-    v = status == LiftStatus::Lifted ? posture.liftVelocity(v_s) : VectorXd(VectorXd::Zero(closed.nv()));
+    v = status == NumericalStatus::Ok ? posture.liftVelocity(v_s) : VectorXd(VectorXd::Zero(closed.nv()));
   };
   std::vector<Policy::Stage> stages;
   VectorXd q, v, q_next;

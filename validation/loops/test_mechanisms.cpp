@@ -25,7 +25,7 @@ Accelerations calcAccelerations(const Model& model, const VectorXd& torques, con
   Workspace ws(model);
   ConstrainedWorkspace cws;
   REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), motion.q, motion.v,
-                                    calcMotorForces(model, torques)) == DynamicsStatus::Ok);
+                                    calcMotorForces(model, torques)) == NumericalStatus::Ok);
   return {cws.a, cws.lambda, ws.X_WB};
 }
 

@@ -90,9 +90,7 @@ LiftFacts readLift(const std::string& directory, const Performance& lifted) {
     if (!lifted.success) {
       facts.message = json.at("message");
       facts.joint = json.at("joint");
-      const std::string status = json.at("status");
-      facts.at_linkage =
-          status == getName(LiftStatus::UnreachablePosture) || status == getName(LiftStatus::SingularLinkage);
+      facts.at_linkage = json.at("status") != getName(NumericalStatus::Inaccurate);
     }
     for (const Json& node : json.at("nodes")) facts.margin = std::fmin(facts.margin, node.at("margin").get<double>());
   });

@@ -121,7 +121,7 @@ Deviation compareTerms(Motion& motion, const ShootingTrajectory& t, const Json& 
     std::map<std::string, double> ours;
     const double scale = k < stages ? problem.spec(k).dt : 1;
     const RobotEvaluation& at = evaluator.evaluate(k, t.xs[k], k < stages ? t.us[k] : VectorXd());
-    REQUIRE(at.status == StepStatus::Ok);
+    REQUIRE(at.status == NumericalStatus::Ok);
     for (const CostValue& value : problem.getCosts(k, at))
       REQUIRE(ours.emplace(value.name, scale * value.value).second);
     CAPTURE(k);
@@ -145,7 +145,7 @@ double calcLargestGap(const Motion& motion, const ShootingTrajectory& t) {
   double largest = 0, cost = 0;
   VectorXd next;
   for (int k = 0; k < probe.numStages(); ++k) {
-    REQUIRE(probe.step(k, t.xs[k], t.us[k], next, cost) == StepStatus::Ok);
+    REQUIRE(probe.step(k, t.xs[k], t.us[k], next, cost) == NumericalStatus::Ok);
     largest = std::max(largest, probe.difference(t.xs[k + 1], next).cwiseAbs().maxCoeff());
   }
   return largest;

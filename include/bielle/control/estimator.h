@@ -53,13 +53,6 @@ struct EstimatorOptions {
   double slip = 60;  ///< a foot has slipped if y' S^-1 y of its deviation, 6 on average, exceeds this
 };
 
-enum class EstimatorStatus {
-  Ok,
-  NearDeadPoint,  ///< a linkage hardly follows its motors: message() names it
-  NotClosed,      ///< no closed configuration fits the motors: the last one is kept
-  NotFinite       ///< readings were not finite and are ignored
-};
-
 /// Independent of any simulator: the same object can run on a robot. update() neither allocates nor throws.
 class Estimator {
  public:
@@ -72,7 +65,9 @@ class Estimator {
   /// Starts from a closed configuration (nq) and velocity (nv), standing on the given contacts of the model.
   void reset(double time, ConstVectorRef q, ConstVectorRef v, const std::vector<int>& contacts);
   /// \param planned  contacts in the plan at this time; empty if there is no plan
-  EstimatorStatus update(const SensorReadings& readings, const std::vector<int>& planned);
+  /// \return NearDeadPoint: message() names the linkage; NotClosed: no closed configuration fits the motors, the last
+  /// one is kept; NotFinite: the readings are ignored
+  NumericalStatus update(const SensorReadings& readings, const std::vector<int>& planned);
 
   const Measurement& measurement() const;           ///< as of the last update()
   const std::vector<char>& contacts() const;        ///< per contact of the model, whether it stands

@@ -50,10 +50,8 @@ struct AssemblyOptions {
   double rank_tolerance = 1e-7;
 };
 
-enum class AssemblyStatus { Closed, NotClosed };
-
 struct AssemblyResult {
-  AssemblyStatus status = AssemblyStatus::NotClosed;
+  NumericalStatus status = NumericalStatus::NotClosed;
   VectorXd q;           ///< nq, the best found
   std::string message;  ///< names the worst loop or target and its gap when not closed
   int iterations = 0;

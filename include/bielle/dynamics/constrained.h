@@ -31,15 +31,6 @@ class SaddlePointMemory {
   std::unique_ptr<SaddlePoint> system_;
 };
 
-enum class DynamicsStatus {
-  Ok,
-  MassMatrixSingular,
-  NotFinite,
-  /// Redundant rows require different accelerations: no a satisfies (1), and `a` is the least-squares solution.
-  ContradictoryRows
-};
-const char* getMessage(DynamicsStatus status);
-
 /// Memory of one constrained solve; sized for a constraint set at first use and then reused without allocation.
 struct ConstrainedWorkspace {
   MatrixXd J;           ///< rows x nv
@@ -66,13 +57,14 @@ struct ConstrainedWorkspace {
 constexpr double kContradiction = 0.05;
 
 /// Accelerations and forces for generalized forces tau (nv) at (q, v). Fills `ws` up to the accelerations.
-DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
-                                         const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
-                                         ConstVectorRef tau);
+/// \return Singular, NotFinite, or Contradictory: no a satisfies (1), and `a` is the least-squares solution
+NumericalStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                          const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
+                                          ConstVectorRef tau);
 
-/// Derivatives at the solution held by the workspaces; to be called after updateConstrainedDynamics.
-DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
-                                            const ConstraintSet& constraints);
+/// Derivatives at the solution held by the workspaces; to be called after updateConstrainedDynamics. Ok or NotFinite.
+NumericalStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                             const ConstraintSet& constraints);
 
 /// Generalized forces of motor torques u (nu).
 void calcMotorForces(const Model& model, ConstVectorRef u, VectorRef tau);

@@ -29,11 +29,11 @@ struct ImpactWorkspace {
   std::vector<Vector6d> f_ext;      ///< nb
 };
 
-/// Eq. (1) at (q, v) for a constraint set, whose stabilisation is ignored.
-DynamicsStatus updateImpact(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints,
-                            ConstVectorRef q, ConstVectorRef v);
+/// Eq. (1) at (q, v) for a constraint set, whose stabilisation is ignored. Ok, Singular or NotFinite.
+NumericalStatus updateImpact(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints,
+                             ConstVectorRef q, ConstVectorRef v);
 
-/// Eq. (2), to be called after updateImpact.
-DynamicsStatus updateImpactDerivatives(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints);
+/// Eq. (2), to be called after updateImpact. Ok or NotFinite.
+NumericalStatus updateImpactDerivatives(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints);
 
 }  // namespace bielle

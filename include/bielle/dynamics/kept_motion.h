@@ -56,14 +56,6 @@ class Closing {
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition_;
 };
 
-enum class KeptMotionStatus {
-  Ok,
-  Undetermined,  ///< the kept dofs do not determine the loops: a dead point
-  Unbalanced,    ///< motors and contacts cannot produce this motion, or motors are not independent
-  Open           ///< the change opens loops with redundant rows
-};
-const char* getMessage(KeptMotionStatus status);
-
 /// The inverse problem at one configuration.
 class KeptMotion {
  public:
@@ -72,8 +64,10 @@ class KeptMotion {
 
   /// \param q  nq, closed   \param v_kept, a_kept  of the kept dofs
   /// \param constraints  the loops of the model, then contacts   \param forces  lambda*, on the rows of the contacts
-  KeptMotionStatus update(const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v_kept,
-                          ConstVectorRef a_kept, ConstVectorRef forces);
+  /// \return NearDeadPoint: the kept dofs do not determine the loops; Unbalanced: motors and contacts cannot produce
+  /// this motion, or motors are not independent
+  NumericalStatus update(const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v_kept,
+                         ConstVectorRef a_kept, ConstVectorRef forces);
   const VectorXd& v() const { return v_; }            ///< nv
   const VectorXd& a() const { return ws_.a; }         ///< nv
   const VectorXd& u() const { return u_; }            ///< nu
@@ -86,8 +80,9 @@ class KeptMotion {
     VectorXd u, lambda;
   };
   const MatrixXd& tangent() const { return T_; }  ///< T (nv x kept)
-  /// Needs an update() that was Ok. Open or Unbalanced if the changed mechanism could not perform the motion.
-  KeptMotionStatus calcVariation(const ModelVariation& change, Variation& out);
+  /// Needs an update() that was Ok. Contradictory (the change opens loops with redundant rows) or Unbalanced if the
+  /// changed mechanism could not perform the motion.
+  NumericalStatus calcVariation(const ModelVariation& change, Variation& out);
   /// Change (nv) of T w for speeds w of the kept dofs, dq being that of the motion: Eq. (2) at v = T w.
   VectorXd calcTangentVariation(const ModelVariation& change, const MotionVariation& motion, ConstVectorRef w);
 

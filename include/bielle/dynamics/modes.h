@@ -26,7 +26,7 @@ struct Mode {
 };
 
 struct Modes {
-  DynamicsStatus status = DynamicsStatus::Ok;
+  NumericalStatus status = NumericalStatus::Ok;
   double acceleration = 0;  ///< largest |a| at the posture, rad/s^2 or m/s^2: 0 where the robot rests
   VectorXd lambda;          ///< rows, forces of the constraints
   MatrixXd N;               ///< nv x r

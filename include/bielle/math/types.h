@@ -1,5 +1,5 @@
 #pragma once
-/// \file Eigen types used everywhere.
+/// \file Eigen types, and the status of computations, used everywhere.
 #include <Eigen/Core>
 #include <vector>
 
@@ -37,5 +37,23 @@ struct ArgumentsOf {
   using Matrix = Eigen::Ref<MatrixX<T>>;
   using Wrenches = std::vector<Vector6<T>>;
 };
+
+/// How a computation ended. A numerical failure is a status, never an exception or a NaN passed on; bad input throws an
+/// InputError instead.
+enum class NumericalStatus {
+  Ok,
+  NotFinite,      ///< a value is not finite
+  Singular,       ///< the mass matrix has no inverse
+  Indefinite,     ///< a matrix has no Cholesky factor: raise the regularization
+  Contradictory,  ///< redundant rows of closures and contacts require different things
+  NotClosed,      ///< no configuration was found that closes the loops or meets what else was requested
+  NearDeadPoint,  ///< a linkage hardly follows its motors, or not at all
+  Unbalanced,     ///< motors and contacts cannot produce the motion
+  Inaccurate,     ///< errors exceed their tolerances
+  NotConverged,   ///< iterations ended before their tolerance
+  Failed          ///< for another reason, or not evaluated
+};
+const char* getName(NumericalStatus status);     ///< e.g. "near a dead point"
+const char* getMessage(NumericalStatus status);  ///< a sentence with the remedy, without the full stop
 
 }  // namespace bielle

@@ -34,9 +34,7 @@ struct SerialTrajectory {
 };
 
 enum class LiftMethod { Newton, Nlopt };
-enum class LiftStatus { Lifted, UnreachablePosture, SingularLinkage, Inaccurate };
 const char* getName(LiftMethod method);
-const char* getName(LiftStatus status);
 
 struct LiftOptions {
   LiftMethod method = LiftMethod::Newton;
@@ -48,7 +46,8 @@ struct LiftOptions {
 
 /// Errors are the largest of the serial coordinates.
 struct LiftNode {
-  LiftStatus status = LiftStatus::Lifted;
+  /// NotClosed: the posture is out of reach; NearDeadPoint, or why the closed dynamics failed; Inaccurate
+  NumericalStatus status = NumericalStatus::Ok;
   std::string message;  ///< why not lifted
   std::string joint;  ///< the joint at which the lift ended, or empty: out of reach, the joint of the linkage with the
                       ///< largest error; at a dead point, its first joint
@@ -65,7 +64,7 @@ struct LiftResult {
   std::vector<double> dt;                  ///< of these stages, s
   ShootingTrajectory trajectory;           ///< of the closed model, as far as it was lifted
 
-  bool lifted() const { return !nodes.empty() && nodes.back().status == LiftStatus::Lifted; }
+  bool lifted() const { return !nodes.empty() && nodes.back().status == NumericalStatus::Ok; }
 };
 
 /// The stages of a problem with these dynamics and without costs, terminal node included.

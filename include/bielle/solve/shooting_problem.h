@@ -76,8 +76,6 @@ class StageModel {
 };
 
 /// A numerical failure is a status, never an exception or a NaN passed on.
-enum class StepStatus { Ok, Failed };
-
 /// A node evaluated at (x, u). Problems derive their own class from it, with the data that derivatives will need. It
 /// belongs to the problem that made it and can be reused for any of its nodes.
 struct NodeEvaluation {
@@ -87,7 +85,7 @@ struct NodeEvaluation {
   VectorXd x_next;       ///< f_k(x, u), stateSize; not used at the terminal node
   double cost = 0;       ///< l_k(x, u), or l_N(x)
   VectorXd constraints;  ///< c_k(x, u), or c_N(x), constraintSize
-  StepStatus status = StepStatus::Failed;
+  NumericalStatus status = NumericalStatus::Failed;
   std::string failure;  ///< why the status is not Ok, for messages; may be empty
 };
 
@@ -116,7 +114,7 @@ struct LinearizeTask {
   /// l_k. Null: nothing.
   const ConstraintWeights* weights = nullptr;
   StageModel* out = nullptr;  ///< of the right sizes; its content is overwritten
-  StepStatus status = StepStatus::Failed;
+  NumericalStatus status = NumericalStatus::Failed;
   std::string failure;  ///< why the status is not Ok, for messages; may be empty
 };
 
@@ -219,7 +217,7 @@ class NodeEvaluator {
   const NodeEvaluation& evaluate(int node, const VectorXd& x, const VectorXd& u = VectorXd());
   /// Quadratic model about the last evaluation, which must be Ok.
   /// \param next  evaluation of the next node; null at the terminal node
-  StepStatus linearize(const NodeEvaluation* next, StageModel& out);
+  NumericalStatus linearize(const NodeEvaluation* next, StageModel& out);
   /// x (+) dx and x1 (-) x about the state x of the last evaluation.
   VectorXd integrate(const VectorXd& dx);
   VectorXd difference(const VectorXd& x1);

@@ -38,7 +38,7 @@ VectorXd makePosture(const Model& model, const std::string& name) {
   const AssemblyResult result = name.empty()        ? findClosedConfiguration(model)
                                 : name == "neutral" ? closeConfiguration(model, model.makeNeutral())
                                                     : assembleReference(model, name);
-  if (result.status != AssemblyStatus::Closed) throw makeClosingError(model, model.name(), result);
+  if (result.status != NumericalStatus::Ok) throw makeClosingError(model, model.name(), result);
   VectorXd q = result.q;
   if (name == "neutral") lift(model, q);
   return q;
@@ -60,7 +60,7 @@ void close(const Model& model, const std::string& file, cli::EvalState& state) {
     problem.weights.segment(joint.idx_v, joint.nv).setOnes();
   }
   const AssemblyResult closed = assemble(model, problem);
-  if (closed.status != AssemblyStatus::Closed)
+  if (closed.status != NumericalStatus::Ok)
     throw InputError(file, closed.worst, "its loop does not close near these positions: " + closed.message,
                      "give other joints, or fewer: those that are not given follow");
   const VectorXd moved = model.difference(state.q, closed.q);

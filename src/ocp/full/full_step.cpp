@@ -30,14 +30,14 @@ double getLastDrift(const StageSpec& spec, double h) { return isMidpoint(spec) ?
 auto getVelocity(const Model& model, const VectorXd& x) { return x.segment(model.nq(), model.nv()); }
 
 // a and lambda of the step, after the drifts that come before.
-DynamicsStatus updateEulerAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
-                                       FullEvaluation& at) {
+NumericalStatus updateEulerAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+                                        FullEvaluation& at) {
   return updateConstrainedDynamics(model, at.ws, at.cws, spec.constraints, at.x.head(model.nq()),
                                    getVelocity(model, at.x), scratch.tau);
 }
 
-DynamicsStatus updateMidpointAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
-                                          FullEvaluation& at) {
+NumericalStatus updateMidpointAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+                                           FullEvaluation& at) {
   if (!at.midpoint) at.midpoint = std::make_unique<FullEvaluation::Midpoint>(model);
   FullEvaluation::Midpoint& mid = *at.midpoint;
   const auto q = at.x.head(model.nq());
@@ -45,11 +45,10 @@ DynamicsStatus updateMidpointAcceleration(const Model& model, const StageSpec& s
   updateNode(model, at.x, at.ws);
   scratch.displacement = at.dt / 2 * v;
   model.integrate(q, scratch.displacement, at.q_mid);
-  if (!updateConstrainedSystem(model, mid.ws, at.cws, spec.constraints, at.q_mid))
-    return DynamicsStatus::MassMatrixSingular;
+  if (!updateConstrainedSystem(model, mid.ws, at.cws, spec.constraints, at.q_mid)) return NumericalStatus::Singular;
   updateVelocities(model, mid.ws, v);
-  const DynamicsStatus status = solveConstrainedSystem(model, mid.ws, at.cws, spec.constraints, scratch.tau, nullptr);
-  if (status != DynamicsStatus::Ok) return status;
+  const NumericalStatus status = solveConstrainedSystem(model, mid.ws, at.cws, spec.constraints, scratch.tau, nullptr);
+  if (status != NumericalStatus::Ok) return status;
   mid.a_0 = at.cws.a;
   mid.lambda_0 = at.cws.lambda;
   at.v_mid = v + at.dt / 2 * mid.a_0;
@@ -61,12 +60,13 @@ DynamicsStatus updateMidpointAcceleration(const Model& model, const StageSpec& s
 
 }  // namespace
 
-DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullStepScratch& scratch, FullEvaluation& at) {
+NumericalStatus updateFullStep(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+                               FullEvaluation& at) {
   const int nq = model.nq();
   calcMotorForces(model, at.u, scratch.tau);
-  const DynamicsStatus status = isMidpoint(spec) ? updateMidpointAcceleration(model, spec, scratch, at)
-                                                 : updateEulerAcceleration(model, spec, scratch, at);
-  if (status != DynamicsStatus::Ok) return status;
+  const NumericalStatus status = isMidpoint(spec) ? updateMidpointAcceleration(model, spec, scratch, at)
+                                                  : updateEulerAcceleration(model, spec, scratch, at);
+  if (status != NumericalStatus::Ok) return status;
   at.a = at.cws.a;
   at.lambda = at.cws.lambda;
   auto v_next = at.x_next.segment(nq, model.nv());
@@ -135,8 +135,8 @@ void chainDrift(const Model& model, double h, const VectorXd& displacement, Matr
 
 }  // namespace
 
-DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, bool free, FullStepScratch& scratch,
-                                         FullEvaluation& at) {
+NumericalStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, bool free,
+                                          FullStepScratch& scratch, FullEvaluation& at) {
   ConstrainedWorkspace& cws = at.cws;
   if (!isMidpoint(spec)) return updateConstrainedDerivatives(model, at.ws, cws, spec.constraints);
   FullEvaluation::Midpoint& mid = *at.midpoint;
@@ -147,8 +147,8 @@ DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& sp
   updateAccelerations(model, mid.ws, mid.a_0);
   updateConstrainedSources(model, mid.ws, cws, spec.constraints);
   cws.lambda = at.lambda;
-  const DynamicsStatus status = solveConstrainedSources(cws);
-  if (status != DynamicsStatus::Ok) return status;
+  const NumericalStatus status = solveConstrainedSources(cws);
+  if (status != NumericalStatus::Ok) return status;
   mid.A0_q = cws.da_dq;
   mid.A0_v = cws.da_dv;
   mid.A0_u = cws.da_du;

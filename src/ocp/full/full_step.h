@@ -50,11 +50,11 @@ struct FullStepScratch {
 void updateNode(const Model& model, const VectorXd& x, Workspace& ws);
 
 /// The step of at.x under at.u: fills a, lambda, x_next and, of a midpoint step, q_mid and v_mid.
-DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullStepScratch& scratch, FullEvaluation& at);
+NumericalStatus updateFullStep(const Model& model, const StageSpec& spec, FullStepScratch& scratch, FullEvaluation& at);
 
 /// The derivatives of `at.cws`, after updateFullStep; with `free`, those of a midpoint step by s too.
-DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, bool free, FullStepScratch& scratch,
-                                         FullEvaluation& at);
+NumericalStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, bool free,
+                                          FullStepScratch& scratch, FullEvaluation& at);
 
 /// The derivatives of the speeds of the motors of a midpoint step, after updateFullStepDerivatives.
 void updateSpeedDerivatives(const Model& model, bool free, FullStepScratch& scratch, FullEvaluation& at);

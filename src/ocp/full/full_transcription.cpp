@@ -84,7 +84,7 @@ class FullTranscription : public Transcription {
   bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
 
   void evaluate(EvaluateTask& task, FullScratch& scratch) const;
-  DynamicsStatus updateImpactStep(int node, FullEvaluation& at) const;
+  NumericalStatus updateImpactStep(int node, FullEvaluation& at) const;
   double calcStateCost(const StateCost& state, const FullEvaluation& at, VectorXd& difference) const;
 
   void linearize(LinearizeTask& task, FullScratch& scratch) const;
@@ -114,9 +114,10 @@ void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const
   const int node = task.node;
   if (!startEvaluation(model_, task, nodes_, costs_[node], at)) return;
   if (isRunning(node)) {
-    const DynamicsStatus status =
+    const NumericalStatus status =
         isImpact(node) ? updateImpactStep(node, at) : updateFullStep(model_, specs_[node], scratch.step, at);
-    if (status != DynamicsStatus::Ok) {
+    if (status != NumericalStatus::Ok) {
+      at.status = status;
       at.failure = getMessage(status);
       return;
     }
@@ -129,14 +130,14 @@ void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const
   costs_[node].calc(
       {model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, nullptr, &scratch.linkages},
       at);
-  if (std::isfinite(at.cost)) at.status = StepStatus::Ok;
+  if (std::isfinite(at.cost)) at.status = NumericalStatus::Ok;
 }
 
-DynamicsStatus FullTranscription::updateImpactStep(int node, FullEvaluation& at) const {
+NumericalStatus FullTranscription::updateImpactStep(int node, FullEvaluation& at) const {
   if (!at.impact) at.impact = std::make_unique<ImpactWorkspace>(model_);
   updateNode(model_, at.x, at.ws);
-  const DynamicsStatus status = updateImpact(model_, *at.impact, specs_[node].constraints, at.ws.q, at.ws.v);
-  if (status != DynamicsStatus::Ok) return status;
+  const NumericalStatus status = updateImpact(model_, *at.impact, specs_[node].constraints, at.ws.q, at.ws.v);
+  if (status != NumericalStatus::Ok) return status;
   at.lambda = at.impact->impulse;
   at.a.setZero();
   at.x_next.head(model_.nq()) = at.ws.q;
@@ -157,13 +158,14 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
   const int node = task.node;
   const TimeScalePlace& place = nodes_.places[node];
   StageModel& out = *task.out;
-  task.status = StepStatus::Failed;
+  task.status = NumericalStatus::Failed;
   task.failure.clear();
   if (isRunning(node)) {
-    const DynamicsStatus status =
+    const NumericalStatus status =
         isImpact(node) ? updateImpactDerivatives(model_, *at.impact, specs_[node].constraints)
                        : updateFullStepDerivatives(model_, specs_[node], place.isFree(), scratch.step, at);
-    if (status != DynamicsStatus::Ok) {
+    if (status != NumericalStatus::Ok) {
+      task.status = status;
       task.failure = getMessage(status);
       return;
     }
@@ -182,7 +184,7 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
   addStateCost(node, at, scratch.difference, out);
   if (isRunning(node)) costs_[node].addControlCost(at, out);
   if (place.isFree()) addTimeScaleCost(countLeading(model_, place), at, scratch.no_squares, out);
-  if (isFinite(out)) task.status = StepStatus::Ok;
+  if (isFinite(out)) task.status = NumericalStatus::Ok;
 }
 
 void FullTranscription::setImpact(const FullEvaluation& at, StageModel& out) const {

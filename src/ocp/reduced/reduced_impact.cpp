@@ -19,11 +19,11 @@ void ReducedImpact::update(const ReducedKernel::StepItem& item) {
   ReducedEvaluation& at = *item.at;
   const int nq = model_.nq(), nv = model_.nv();
   if (!at.impact) at.impact = std::make_unique<ImpactWorkspace>(model_);
-  const DynamicsStatus status =
+  const NumericalStatus status =
       updateImpact(model_, *at.impact, item.spec->constraints, at.x.head(nq), at.x.segment(nq, nv));
-  if (status != DynamicsStatus::Ok) {
+  if (status != NumericalStatus::Ok) {
     at.failure = getMessage(status);
-    at.status = StepStatus::Failed;
+    at.status = status;
     return;
   }
   at.lambda = at.impact->impulse;
@@ -36,12 +36,12 @@ void ReducedImpact::update(const ReducedKernel::StepItem& item) {
   }
 }
 
-DynamicsStatus ReducedImpact::linearize(const ConstraintSet& constraints, const ReducedEvaluation& at,
-                                        const ReducedEvaluation& next, const LaneView& view, NodeAssembly& assembly,
-                                        StageModel& out) {
+NumericalStatus ReducedImpact::linearize(const ConstraintSet& constraints, const ReducedEvaluation& at,
+                                         const ReducedEvaluation& next, const LaneView& view, NodeAssembly& assembly,
+                                         StageModel& out) {
   ImpactWorkspace& impact = *at.impact;
-  const DynamicsStatus status = updateImpactDerivatives(model_, impact, constraints);
-  if (status != DynamicsStatus::Ok) return status;
+  const NumericalStatus status = updateImpactDerivatives(model_, impact, constraints);
+  if (status != NumericalStatus::Ok) return status;
   int closure_rows = 0;
   for (const Closure& closure : model_.closures()) closure_rows += getRows(closure.kind);
   const Eigen::Index contact_rows = impact.dimpulse_dq.rows() - closure_rows;
@@ -56,7 +56,7 @@ DynamicsStatus ReducedImpact::linearize(const ConstraintSet& constraints, const 
   for (size_t i = 0; i < clusters_.size(); ++i) linearizeCluster(i, at, next, out);
   assembly.calcFreeGaps(at, next, out.gap);
   for (const NodeAssembly::FreeJoint& free : assembly.freeJoints()) linearizeFreeJoint(free, out);
-  return DynamicsStatus::Ok;
+  return NumericalStatus::Ok;
 }
 
 // Eq. (a) for one cluster.

@@ -15,8 +15,9 @@ class ReducedImpact {
   // Computes v+ and impulses at a state that the kernel has placed; a failure is recorded in the status.
   void update(const ReducedKernel::StepItem& item);
   // Eq. (a), and the derivatives of the impulses.
-  DynamicsStatus linearize(const ConstraintSet& constraints, const ReducedEvaluation& at, const ReducedEvaluation& next,
-                           const LaneView& view, NodeAssembly& assembly, StageModel& out);
+  NumericalStatus linearize(const ConstraintSet& constraints, const ReducedEvaluation& at,
+                            const ReducedEvaluation& next, const LaneView& view, NodeAssembly& assembly,
+                            StageModel& out);
 
  private:
   struct Cluster {

@@ -135,7 +135,7 @@ void ReducedKernel::updateStateCosts(const StepItem* items, int count) {
 void ReducedKernel::place(const StepItem* items, int count, std::vector<LaneView>& views) {
   const LaneMask placed = placeAll(items, count);
   storeMotion(count, views);
-  for (int l = 0; l < count; ++l) items[l].at->status = placed[l] ? StepStatus::Ok : StepStatus::Failed;
+  for (int l = 0; l < count; ++l) items[l].at->status = placed[l] ? NumericalStatus::Ok : NumericalStatus::Failed;
 }
 
 void ReducedKernel::step(const StepItem* items, int count, std::vector<LaneView>& views) {
@@ -181,7 +181,7 @@ void ReducedKernel::step(const StepItem* items, int count, std::vector<LaneView>
   for (int l = 0; l < count; ++l) {
     const bool moved = placed[l] && reached[l];
     if (moved && !regular[l]) items[l].at->failure = "the mass matrix is singular";
-    items[l].at->status = moved && regular[l] && closed[l] ? StepStatus::Ok : StepStatus::Failed;
+    items[l].at->status = moved && regular[l] && closed[l] ? NumericalStatus::Ok : NumericalStatus::Failed;
   }
 }
 

@@ -116,7 +116,7 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
   if (states.count > 0) scratch.kernel.place(states.items.data(), states.count, scratch.views);
   for (int l = 0; l < states.count; ++l) {
     const ReducedKernel::StepItem& item = states.items[l];
-    if (isImpact(item.node) && item.at->status == StepStatus::Ok) scratch.impact.update(item);
+    if (isImpact(item.node) && item.at->status == NumericalStatus::Ok) scratch.impact.update(item);
     finishEvaluation(item.node, scratch.views[l], linkages, *item.at);
   }
 }
@@ -147,12 +147,12 @@ void ReducedTranscription::mapGains(const RobotEvaluation& at, const RowMatrixXd
 // Computes the costs after a successful step.
 void ReducedTranscription::finishEvaluation(int node, const LaneView& view, LinkageWorkspaces& linkages,
                                             RobotEvaluation& at) const {
-  if (at.status != StepStatus::Ok) return;
+  if (at.status != NumericalStatus::Ok) return;
   if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
   const NodeBases bases(reduction_, static_cast<const ReducedEvaluation&>(at));
   costs_[node].calc(
       {model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases, &linkages}, at);
-  if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = StepStatus::Failed;
+  if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = NumericalStatus::NotFinite;
 }
 
 void ReducedTranscription::linearize(LinearizeTask* tasks, int count, ProblemScratch* memory) const {
@@ -161,7 +161,7 @@ void ReducedTranscription::linearize(LinearizeTask* tasks, int count, ProblemScr
   Batch<ReducedKernel::LinearizeItem> states;
   for (int i = 0; i < count; ++i) {
     const int node = tasks[i].node;
-    tasks[i].status = StepStatus::Failed;
+    tasks[i].status = NumericalStatus::Failed;
     tasks[i].failure.clear();
     const auto* at = static_cast<const ReducedEvaluation*>(tasks[i].at);
     const auto* next = static_cast<const ReducedEvaluation*>(tasks[i].next);
@@ -191,8 +191,9 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
     if (costs_[node].needsSpeeds() && isMidpoint(node)) assembly.setSpeeds(at, view);
     setNextTimeScale(place, at, next->x, out);
   } else if (isImpact(node)) {
-    const DynamicsStatus status = scratch.impact.linearize(specs_[node].constraints, at, *next, view, assembly, out);
-    if (status != DynamicsStatus::Ok) {
+    const NumericalStatus status = scratch.impact.linearize(specs_[node].constraints, at, *next, view, assembly, out);
+    if (status != NumericalStatus::Ok) {
+      task.status = status;
       task.failure = getMessage(status);
       return;
     }
@@ -203,7 +204,7 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
     addStateCostModel(model_, reduction_, view.state_cost, costs_[node].getScale(at), out);
   if (isRunning(node)) costs_[node].addControlCost(at, out);
   if (place.isFree()) addTimeScaleCost(at.leading, at, assembly.gradientOfNoSquares(), out);
-  if (isFinite(out)) task.status = StepStatus::Ok;
+  if (isFinite(out)) task.status = NumericalStatus::Ok;
 }
 
 }  // namespace
