@@ -23,7 +23,7 @@ if(BIELLE_BUILD_VALIDATION)
     set_tests_properties(documents_${page} PROPERTIES LABELS system FIXTURES_REQUIRED solved_motions)
   endforeach()
   # A few rows of each page of results.
-  foreach(page architectures checks dataset execution formulations motions objectives speed suite synthesis)
+  foreach(page architectures checks dataset execution formulations motions objectives speed suite synthesis turn)
     add_test(NAME results_${page} COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/${page}.py --quick
       --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
     set_tests_properties(results_${page} PROPERTIES LABELS system)

@@ -20,7 +20,7 @@ class PassiveJoints {
   /// Below this a linkage is near a dead point.
   static constexpr double kDeadPointMargin = 0.02;
 
-  /// \param model  must outlive it   \param q  closed configuration at which ranks are determined
+  /// \param q  closed configuration at which ranks are determined
   /// \throws InputError when motors do not determine a joint other than the free-flyer of the trunk
   PassiveJoints(const Model& model, ConstVectorRef q);
 
@@ -68,7 +68,7 @@ class PassiveJoints {
   };
   bool follow(Follower& follower, ConstVectorRef positions);
 
-  const Model& model_;
+  Model model_;
   std::vector<Follower> followers_;
   std::vector<Place> places_;  // per dof
   VectorXd no_guess_;

@@ -17,7 +17,6 @@ enum class LinkageSide {
 /// the linkage. Clusters with fewer motors than mobility are omitted. The same for joints.
 class LinkageConditioning {
  public:
-  /// The model must outlive it.
   /// \param q  closed configuration at which ranks are determined. \throws InputError as makeReduction
   LinkageConditioning(const Model& model, ConstVectorRef q, LinkageSide side = LinkageSide::Motors);
   /// The worst cluster at a closed configuration; infinite if one has lost rank.
@@ -32,7 +31,7 @@ class LinkageConditioning {
     ClusterPoint point;
     VectorXd q;
   };
-  const Model& model_;
+  Model model_;
   std::vector<Entry> entries_;
 };
 
