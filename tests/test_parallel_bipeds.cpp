@@ -159,7 +159,7 @@ TEST_CASE("belt knee and differential ankle: bielle solve squat and walk converg
 
 TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 96 redundant rows") {
   const double standing = 0.744;
-  // Coarser steps than usual, and two of the walk's: its redundant rows make it slow.
+  // Longer time steps than usual, and a walk of two steps: the redundant rows make it slow.
   const std::vector<std::string> squat = {"squat", "--set", "time_step=0.03"},
                                  walk = {"walk", "--steps", "2", "--set", "time_step=0.02"};
   struct Case {

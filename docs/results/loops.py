@@ -255,7 +255,7 @@ def add_long(page, engines):
     if not rows:
         return
     page.heading("N four-bars, in full")
-    page.add(f"""Errors of B0 [m] after 1, 5 and 10 s and processor time; no errors after a trial that ended early. *{comment}.*""")
+    page.add(f"""Errors of B0 [m] after 1, 5 and 10 s and processor time; a trial that ended early has no later errors. *{comment}.*""")
     lines = []
     for row in rows:
         errors = [tell_error(row, time) for time in (1, 5, 10)]

@@ -3,7 +3,7 @@
 
     docs/results/turn.py --other PROGRAM [--other-commit HASH] [--bielle build/bin/bielle] [--repeat 3]
 
-Iterations and costs tell whether a change of the code left the motions alone, ratios of time what it won. `--quick` solves one
+Iterations and costs tell whether a change of the code left the motions alone, ratios of times what it gained. `--quick` solves one
 motion once and prints the page; without --other, this program takes both turns.
 """
 import common
@@ -26,10 +26,12 @@ def main():
     parser.add_argument("--other-commit", default="another program", metavar="HASH")
     parser.add_argument("--repeat", type=int, default=3)
     arguments = parser.parse_args()
+    if arguments.quick:
+        arguments.repeat = 1
     runners = [common.Runner(arguments.other or arguments.bielle), common.Runner(arguments.bielle)]
     rows = []
     for motion in MOTIONS[:1] if arguments.quick else MOTIONS:
-        turns = [[solve(runner, *motion) for runner in runners] for _ in range(1 if arguments.quick else arguments.repeat)]
+        turns = [[solve(runner, *motion) for runner in runners] for _ in range(arguments.repeat)]
         (_, before, _), (_, now, _) = turns[0]
         ratios = [ours[2] / other[2] for other, ours in turns]
         robot, name, *options = motion
@@ -38,7 +40,7 @@ def main():
                      f"{min(ratios):.2f} to {max(ratios):.2f}"))
     page = common.Page(__file__, "Two programs in turn", common.describe_run(arguments.commit))
     page.add(f"Motions solved by this program and by that of {arguments.other_commit}, one after the other, {arguments.repeat} times, "
-             "on two threads, from a cold start. Seconds are the least of this program, ratios those of the pairs.")
+             "on two threads, from a cold start. Seconds are this program's least; ratios are of the pairs, least to largest.")
     page.table(["motion", "iterations, other", "iterations", "cost", "relative difference of costs", "seconds", "ratio of times"], rows)
     page.write(arguments.quick)
 

@@ -165,7 +165,7 @@ NumericalStatus Estimator::Parts::update(const SensorReadings& readings, const s
     return status = NumericalStatus::NotFinite;
   measurement.time = readings.time;
   if (h > 0) observe(readings.motor_positions, h);
-  const NumericalStatus closing = joints.update(readings.motor_positions, measurement.q);
+  status = joints.update(readings.motor_positions, measurement.q);
   if (floats && h > 0) {
     filter.predict(readings.angular_velocity, readings.specific_force, h, unrest);
     gyro = readings.angular_velocity;
@@ -180,9 +180,6 @@ NumericalStatus Estimator::Parts::update(const SensorReadings& readings, const s
   calm_speeds = speeds;
   feet.calmFeet(measurement.contacts, measurement.v.head(floats ? 6 : 0), calm_speeds);
   joints.expand(calm_speeds, measurement.v);
-  status = closing == NumericalStatus::Ok              ? NumericalStatus::Ok
-           : closing == NumericalStatus::NearDeadPoint ? NumericalStatus::NearDeadPoint
-                                                       : NumericalStatus::NotClosed;
   return status;
 }
 

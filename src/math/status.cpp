@@ -15,7 +15,7 @@ const char* getName(NumericalStatus status) {
     case NumericalStatus::Contradictory:
       return "contradictory";
     case NumericalStatus::NotClosed:
-      return "not closed";
+      return "loops do not close";
     case NumericalStatus::NearDeadPoint:
       return "near a dead point";
     case NumericalStatus::Unbalanced:

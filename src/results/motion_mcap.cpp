@@ -97,7 +97,7 @@ class MotionMcap {
     try {
       urdf = formatRobot(ModelBuilder::restore(std::move(parts))).urdf;
     } catch (const InputError&) {
-      return;  // a URDF does not have such joints
+      return;  // no file of ours can express this robot
     }
     const auto size = static_cast<std::uint32_t>(urdf.size() + 1);  // with the zero at its end
     std::string message("\0\1\0\0", 4);                             // CDR, little-endian
