@@ -307,7 +307,7 @@ std::string writeBipettoWithMotors(const RobotDirectory& directory) {
   const Model model = loadRobot(kRobots + "bipetto").model;
   const AssemblyResult standing = assembleReference(model, "half_sitting");
   std::string yaml = readFile(kRobots + "bipetto/bipetto.yaml");
-  for (const std::string& side : {"left", "right"}) {
+  for (const std::string side : {"left", "right"}) {
     const std::string knee = "      knee_" + side + ":", motor = "motor_knee_" + side;
     const double angle = standing.q[model.joints()[model.findJoint(motor)].idx_q];
     yaml = replaceOnce(yaml, knee, "      " + motor + ": " + std::to_string(angle) + "\n" + knee);

@@ -273,7 +273,7 @@ TEST_CASE("workspace: a bound on the conditioning, by the leg's equations") {
     CAPTURE(foot.transpose());
     const double conditioning = calcConditioning(p, foot);
     if (std::abs(conditioning - 1.5) < 1e-6) continue;
-    CHECK(static_cast<bool>(coverage.reached[i]) == conditioning < 1.5);
+    CHECK(static_cast<bool>(coverage.reached[i]) == (conditioning < 1.5));
     ++(conditioning < 1.5 ? good : bad);
   }
   CHECK(good > 50);

@@ -201,16 +201,15 @@ double Estimator::margin() const { return parts_->joints.margin(); }
 
 std::string Estimator::message() const {
   switch (parts_->status) {
-    case NumericalStatus::Ok:
-      return {};
     case NumericalStatus::NearDeadPoint:
       return "the linkage of closure '" + parts_->joints.weakest() + "' is near a dead point of its motors";
     case NumericalStatus::NotClosed:
       return "the loops do not close at the motors' positions";
     case NumericalStatus::NotFinite:
       return "readings are not finite";
+    default:
+      return {};
   }
-  return {};
 }
 
 }  // namespace bielle

@@ -111,14 +111,9 @@ NumericalStatus LqSweep::eliminateBoxedControls(const ControlBox& box, MatrixMap
   const Index n = node.Vx.size(), nu = node.Qu.size();
   const auto Quu = Q.topLeftCorner(nu, nu);
   node.k.setZero();
-  switch (box_qp_.solve(Quu, node.Qu, box.lower, box.upper, node.k)) {
-    case NumericalStatus::Ok:
-      break;
-    case NumericalStatus::Indefinite:
-      return NumericalStatus::Indefinite;
-    case NumericalStatus::NotConverged:
-      return hasFiniteLower(Q, nu) ? NumericalStatus::Indefinite : NumericalStatus::NotFinite;
-  }
+  const NumericalStatus status = box_qp_.solve(Quu, node.Qu, box.lower, box.upper, node.k);
+  if (status == NumericalStatus::NotConverged && !hasFiniteLower(Q, nu)) return NumericalStatus::NotFinite;
+  if (status != NumericalStatus::Ok) return NumericalStatus::Indefinite;
   node.Vx.noalias() += Q.bottomLeftCorner(n, nu) * node.k;
   auto Quu_k = Kt_.head(nu);
   Quu_k.noalias() = Quu.selfadjointView<Eigen::Lower>() * node.k;
