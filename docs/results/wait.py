@@ -3,8 +3,8 @@
     docs/results/wait.py --against REVISION [--steps demo edit ...] [--measure REVISION ...]
 
 Each step runs in a fresh clone, this commit's and the other's one after the other, and is a line of docs/results/data/wait.csv
-when it has ended; what is there for the same commit and processor is not measured again. All steps of both take three hours of two
-cores.
+when it has ended; what is there for the same commit is not measured again. All steps of both take four hours of two cores; the page
+has the last rows of each step.
 """
 import argparse
 import csv
@@ -84,13 +84,14 @@ def record(revision, step, measured):
             print(title, f"{processor:.1f}, {clock:.1f} min", file=sys.stderr)
 
 
-def find(revision):
-    """{title: minutes of processor and of clock}, with sums, of what is measured of a revision."""
-    rows = [row for row in read() if row["commit"] == revision[:12]]
-    out = {row["title"]: (row["processor"], row["clock"]) for row in rows}
+def find(chosen):
+    """{title: (minutes of processor, of clock, run)}, with sums, by the last rows that are chosen."""
+    rows = {row["title"]: row for row in read() if chosen(row)}
+    out = {title: (row["processor"], row["clock"], row["run"]) for title, row in rows.items()}
     for title, steps in SUMS.items():
-        if set(steps) <= {row["step"] for row in rows}:
-            out[title] = tuple(sum(row[key] for row in rows if row["step"] in steps) for key in ("processor", "clock"))
+        parts = [row for row in rows.values() if row["step"] in steps]
+        if {row["step"] for row in parts} == set(steps) and len({row["commit"] for row in parts}) == 1:
+            out[title] = (*(sum(row[key] for row in parts) for key in ("processor", "clock")), parts[0]["run"])
     return out
 
 
@@ -107,19 +108,19 @@ def main():
         return subprocess.run(command, cwd=common.SOURCE, text=True, check=True, stdout=subprocess.PIPE).stdout.strip()
 
     here, there = parse(arguments.commit), parse(arguments.against)
-    with tempfile.TemporaryDirectory(prefix="bielle-wait-") as directory, open("wait.log", "w", encoding="utf-8") as log:
+    with tempfile.TemporaryDirectory(prefix="bielle-wait-") as directory, open("wait.log", "a", encoding="utf-8") as log:
         os.chmod(directory, 0o755)  # a test runs the program as another user
         for step in arguments.steps:
             for revision in (here, there) if arguments.measure is None else map(parse, arguments.measure):
                 if not any(row["commit"] == revision[:12] and row["step"] == step for row in read()):
                     record(revision, step, measure(step, revision, directory, log))
-    one, other = find(here), find(there)
-    page = common.Page(__file__, "The wait", next(row["run"] for row in reversed(read()) if row["commit"] == here[:12]))
+    one, other = find(lambda row: row["commit"] != there[:12]), find(lambda row: row["commit"] == there[:12])
+    page = common.Page(__file__, "The wait", "Each row names its commit, date and machine")
     page.add("Minutes of processor and of clock on all cores, each in a fresh clone and without a compiler cache.")
     titles = [title for _, commands in STEPS.values() for title in commands] + list(SUMS)
-    page.table(("", f"{arguments.against}: processor", "clock", "this commit: processor", "clock", "ratio of processor times"),
-               [(title, *(f"{minutes:.1f}" for minutes in (*other[title], *one[title])), f"{one[title][0] / other[title][0]:.2f}")
-                for title in titles if title in one and title in other])
+    page.table(("", f"{arguments.against}: processor", "clock", "here: processor", "clock", "ratio of processor times", "measured"),
+               [(title, *(f"{minutes:.1f}" for minutes in (*other[title][:2], *one[title][:2])),
+                 f"{one[title][0] / other[title][0]:.2f}", one[title][2]) for title in titles if title in one and title in other])
     page.write(False)
 
 
