@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "bielle/control/predictive_controller.h"
+#include "bielle/dynamics/ball_cuts.h"
 #include "bielle/motion/walk.h"
 #include "bielle/robots/robot_loader.h"
 #include "worlds/make_world.h"
@@ -125,8 +126,8 @@ void printTimes(const PredictiveCounts& counts, Outcome of) {
 }  // namespace
 
 int main() {
-  const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
-  const Model& model = robot.model;
+  // Its rods are not cut in two, as those of its files: solves take three quarters of the time.
+  const Model model = cutAtBalls(loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto").model);
   WalkOptions options;
   options.speed = 0.4;
   const Solution solution = solve(makeWalk(model, options, {}));

@@ -2,10 +2,13 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/control/policy.h"
+#include "bielle/dynamics/ball_cuts.h"
 #include "bielle/dynamics/constrained.h"
+#include "bielle/motion/serial_model.h"
 #include "bielle/motion/squat.h"
 #include "bielle/robots/robot_loader.h"
 #include "bielle/solve/shooting_problem.h"
+#include "control/restricted_controller.h"
 #include "count_allocations.h"
 
 namespace bielle {
@@ -196,6 +199,46 @@ TEST_CASE("policy: an update does not allocate") {
   }
   const long allocations = num_allocations - before;
   CHECK(allocations == 0);
+}
+
+namespace {
+
+// Hears, and answers with the speeds of the motors.
+class Echo : public Controller {
+ public:
+  explicit Echo(const Model& model) : model_(model) {}
+  void update(const Measurement& measurement, VectorRef u) override {
+    heard = measurement;
+    for (int m = 0; m < model_.nu(); ++m) u[m] = measurement.v[model_.motors()[m].dof];
+  }
+  double getPlanTime(double time) const override { return 2 * time; }
+  Measurement heard;
+
+ private:
+  const Model model_;
+};
+
+}  // namespace
+
+TEST_CASE("restricted controller: it hears of the joints that its model has, and its torques reach the same motors") {
+  const Model &model = getSquat().robot.model, cut = cutAtBalls(model);
+  REQUIRE(cut.nv() < model.nv());
+  Echo inner(cut);
+  RestrictedController controller(model, cut, inner);
+  Measurement measurement{
+      0.5, VectorXd::LinSpaced(model.nq(), 0, 1), VectorXd::LinSpaced(model.nv(), -1, 1), {1, 0}, 3e-3};
+  VectorXd u(model.nu());
+  controller.update(measurement, u);
+  CHECK(inner.heard.time == 0.5);
+  CHECK(inner.heard.delay == 3e-3);
+  CHECK(inner.heard.contacts == std::vector<char>{1, 0});
+  CHECK(inner.heard.q == restrictConfiguration(model, cut, measurement.q));
+  CHECK(inner.heard.v == restrictVelocity(model, cut, measurement.v));
+  for (int m = 0; m < model.nu(); ++m) CHECK(u[m] == measurement.v[model.motors()[m].dof]);
+  CHECK(controller.getPlanTime(1) == 2);
+  const long before = num_allocations_here;
+  controller.update(measurement, u);
+  CHECK(num_allocations_here == before);
 }
 
 }  // namespace bielle

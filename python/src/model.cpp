@@ -1,6 +1,7 @@
 #include <pybind11/stl.h>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/ball_cuts.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
@@ -292,6 +293,10 @@ void bindModel(py::module_& module) {
   addAttributes(type);
   addConfigurations(type);
   addAssembly(type);
+  type.def(
+      "cut_at_balls", [](const Model& model) { return std::make_shared<Model>(cutAtBalls(model)); },
+      py::call_guard<py::gil_scoped_release>(),
+      "The same mechanism with fewer coordinates: rods that were cut and welded are whole, and end in balls.");
   type.def("__repr__", [](const Model& m) {
     return "<Model '" + m.name() + "': nq " + std::to_string(m.nq()) + ", nv " + std::to_string(m.nv()) + ", " +
            std::to_string(m.nu()) + " motors, " + std::to_string(m.closures().size()) + " closures>";

@@ -111,6 +111,13 @@ def test_jacobians(model, state):
     assert np.abs(model.closure_residual(q)).max() < 1e-11
 
 
+def test_cut_at_balls_it_is_the_same_mechanism(model):
+    cut = model.cut_at_balls()
+    assert (cut.nv, cut.nu, cut.mobility(cut.standing())["mobility"]) == (36, model.nu, 18)
+    assert cut.mass == pytest.approx(model.mass)
+    assert set(cut.v_names) < set(model.v_names)
+
+
 def test_batches_are_single_states_to_the_last_bit(model, state):
     q, v, u = state
     random = np.random.default_rng(3)

@@ -246,6 +246,14 @@ VectorXd restrictVelocity(const Model& from, const Model& model, ConstVectorRef 
   return out;
 }
 
+std::vector<int> findRestrictedCoordinates(const Model& from, const Model& model) {
+  std::vector<int> coordinates(model.nq());
+  forCommonJoints(from, model, [&](const Joint& source, const Joint& target) {
+    std::iota(coordinates.begin() + target.idx_q, coordinates.begin() + target.idx_q + target.nq, source.idx_q);
+  });
+  return coordinates;
+}
+
 std::vector<int> findRestrictedDofs(const Model& from, const Model& model) {
   std::vector<int> dofs(model.nv());
   forCommonJoints(from, model, [&](const Joint& source, const Joint& target) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "bielle/dynamics/ball_cuts.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/robot_loader.h"
 
@@ -71,7 +72,11 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   foresee(walk, request.duration > 0 ? request.duration : plan->commands.back().time, *plan);
   plan->ground.height = makeStance(model, options, standing).feet[0].p.z();
   plan->ground.friction = options.friction;
-  plan->predictive = std::make_unique<PredictiveController>(walk, predictive);
+  const Model cut = cutAtBalls(model);
+  const StandingRobot standing_cut = makeStandingRobot(cut, restrictConfiguration(model, cut, standing.q));
+  plan->predictive =
+      std::make_unique<PredictiveController>(CommandedWalk(cut, options, {}, source, standing_cut), predictive);
+  adaptPredictive(cut, *plan);
   return plan;
 }
 

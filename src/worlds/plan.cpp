@@ -4,9 +4,11 @@
 #include <cmath>
 #include <filesystem>
 
+#include "bielle/dynamics/ball_cuts.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/solve.h"
 #include "bielle/robots/robot_loader.h"
+#include "control/restricted_controller.h"
 #include "motion/applied_options.h"
 #include "results/interrupt.h"
 #include "results/remade_motion.h"
@@ -94,6 +96,16 @@ MotionRequest fixDurations(const MotionSummary& summary, MotionRequest request) 
   return request;
 }
 
+// In states of a model that has fewer joints.
+ShootingTrajectory restrictTrajectory(const Model& from, const Model& model, ShootingTrajectory trajectory) {
+  for (VectorXd& x : trajectory.xs) {
+    const VectorXd all = x;
+    x.resize(model.nq() + model.nv());
+    x << restrictConfiguration(from, model, all.head(from.nq())), restrictVelocity(from, model, all.tail(from.nv()));
+  }
+  return trajectory;
+}
+
 // A plan with robot and summary, from its request. `guess`: directory of a solution, or empty.
 void finishPlan(const MotionRequest& request, const std::string& guess, PlanControl control,
                 const PredictiveOptions& predictive, Plan& plan) {
@@ -125,11 +137,12 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
   // A plan may be closer to a dead point than motors would let it come, or start from one: without a margin there is no stop.
   PredictiveOptions stopping = predictive;
   stopping.dead_point_stop = std::min(stopping.dead_point_stop, kStopShare * problem.limits.dead_point_margin);
+  const Model cut = plan.serial ? model : cutAtBalls(model);
+  const VectorXd q0 = restrictConfiguration(model, cut, motion.problem->initialState().head(model.nq()));
   plan.predictive = std::make_unique<PredictiveController>(
-      makePredictiveMotion(model,
-                           freed.plan(model, makeStandingRobot(model, motion.problem->initialState().head(model.nq()))),
-                           problem, stopping),
-      solution.trajectory, stopping);
+      makePredictiveMotion(cut, freed.plan(cut, makeStandingRobot(cut, q0)), problem, stopping),
+      restrictTrajectory(model, cut, solution.trajectory), stopping);
+  adaptPredictive(cut, plan);
 }
 
 void setModel(Belief belief, MotionSummary& summary) {
@@ -152,7 +165,7 @@ void finishBelief(Plan& plan) {
   if (!plan.serial) return;
   Controller& inner = plan.predictive ? static_cast<Controller&>(*plan.predictive) : *plan.policy;
   plan.reference = makeReference(plan.robot.model, *plan.serial, *plan.policy, plan.belief);
-  plan.serial_controller = std::make_unique<SerialController>(plan.robot.model, *plan.serial, inner, plan.belief);
+  plan.adapter = std::make_unique<SerialController>(plan.robot.model, *plan.serial, inner, plan.belief);
 }
 
 // As many steps as there is time for.
@@ -165,6 +178,11 @@ void chooseSteps(double duration, OptionSet& options) {
 }
 
 }  // namespace
+
+void adaptPredictive(const Model& cut, Plan& plan) {
+  if (!cut.isCopyOf(plan.model()))
+    plan.adapter = std::make_unique<RestrictedController>(plan.model(), cut, *plan.predictive);
+}
 
 void requireNoInterrupt() {
   if (isInterrupted()) throw InterruptedPlan();

@@ -29,9 +29,9 @@ struct Plan {
   Belief belief = Belief::Closed;
   std::unique_ptr<SerialModel> serial;               ///< null for Belief::Closed
   std::unique_ptr<Policy> policy;                    ///< of the model that is believed in
-  std::unique_ptr<PredictiveController> predictive;  ///< likewise, or null
+  std::unique_ptr<PredictiveController> predictive;  ///< of the same cut at its balls (dynamics/ball_cuts.h), or null
   SerialReference reference;                         ///< empty for Belief::Closed
-  std::unique_ptr<SerialController> serial_controller;
+  std::unique_ptr<Controller> adapter;               ///< of a controller whose model is not the robot's, or null
   int iterations = 0;  ///< that the solver took for the gains; 0: the motion in the files was its solution
 
   /// Of the model that is believed in.
@@ -44,7 +44,7 @@ struct Plan {
   /// The plan in states of the closed robot.
   const Policy& getReference() const { return reference.policy ? *reference.policy : *policy; }
   Controller& getController() {
-    if (serial_controller) return *serial_controller;
+    if (adapter) return *adapter;
     return predictive ? static_cast<Controller&>(*predictive) : *policy;
   }
 };
@@ -73,6 +73,9 @@ struct PlanRequest {
 /// \throws InputError when robot, motion or an option do not exist, or it does not converge
 std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control,
                                const PredictiveOptions& predictive = {});
+
+/// Makes the plan's predictive controller, whose model this is, one of the plan's model.
+void adaptPredictive(const Model& cut, Plan& plan);
 
 /// Sets what predictive control wants of steps: feet stand where they landed and may land elsewhere than planned, and wrenches
 /// keep away from the edges of their cones.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "model/ball_leaf.h"
 #include "model/joint.h"
 
 namespace bielle {
@@ -92,7 +93,7 @@ SimbodyTree::SimbodyTree(const Model& m, const std::vector<Closure>& c, LoopCut 
   SimTK::Force::UniformGravity(forces, matter, toSimTK(model.gravity()));
   matter.setShowDefaultGeometry(false);
   if (cut == LoopCut::FewestRows)
-    for (size_t i = 0; i < closures.size(); ++i) cut_joints[i] = findCutJoint(closures[i]);
+    for (size_t i = 0; i < closures.size(); ++i) cut_joints[i] = findBallLeaf(model, closures, closures[i], cut_joints);
   bodies.resize(model.numBodies());
   bodies[0] = matter.Ground();
   first_pins.resize(model.numBodies());
@@ -133,23 +134,6 @@ void SimbodyTree::finish() {
 
 bool SimbodyTree::isCut(int joint) const {
   return std::find(cut_joints.begin(), cut_joints.end(), joint) != cut_joints.end();
-}
-
-// The joint of a leaf that only this weld holds, -1 if there is none. The other body must not depend on another cut.
-int SimbodyTree::findCutJoint(const Closure& closure) const {
-  if (closure.kind != ClosureKind::Weld6D) return -1;
-  for (const auto& [leaf, other] : {std::pair{closure.body1, closure.body2}, {closure.body2, closure.body1}}) {
-    const int body = leaf;
-    const auto uses = [body](const Closure& c) { return c.body1 == body || c.body2 == body; };
-    const auto hangs = [body](const Joint& joint) { return joint.parent == body; };
-    const auto drives = [body](const Motor& motor) { return motor.joint == body; };
-    const auto none = [](const auto& list, const auto& test) { return std::none_of(list.begin(), list.end(), test); };
-    if (body > 0 && model.joints()[body].kind == JointKind::Spherical && !isCut(other) &&
-        std::count_if(closures.begin(), closures.end(), uses) == 1 && none(model.joints(), hangs) &&
-        none(model.motors(), drives))
-      return body;
-  }
-  return -1;
 }
 
 void SimbodyTree::addBody(int i) {

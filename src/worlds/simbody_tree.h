@@ -17,7 +17,7 @@
 /// of body 1. Coupler: CoordinateCoupler of a linear function. All together u = T(q) v, in the order of our dofs.
 ///
 /// The time of a step goes with the number of constraints. A weld that has a leaf on a spherical joint at one side closes the
-/// same loop as a ball in place of that joint, with three rows and three dofs less: with LoopCut::FewestRows the leaf is
+/// same loop as a ball in place of that joint (model/ball_leaf.h): with LoopCut::FewestRows the leaf is
 /// welded to the other body of the closure, for good, and its joint becomes the Ball. Its coordinates are then read from
 /// the placements of its bodies, and what is scattered to them is dropped.
 #include <Simbody.h>
@@ -86,7 +86,6 @@ struct SimbodyTree {
 
  private:
   bool isCut(int joint) const;
-  int findCutJoint(const Closure& closure) const;
   void addBody(int i);
   void addClosure(const Closure& closure);
   void addCoupler(const Closure& closure);

@@ -51,7 +51,8 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q_reference, con
 /// Entries of q (nq) or v (nv) of the joints that `model` also has, by name: the serial part of a closed state.
 VectorXd restrictConfiguration(const Model& from, const Model& model, ConstVectorRef q);
 VectorXd restrictVelocity(const Model& from, const Model& model, ConstVectorRef v);
-/// For each dof of `model`, the dof of the joint of that name in `from`: restrictVelocity(...)[i] = v[result[i]].
+/// For each entry of q, or of v, of `model` that of the joint of that name in `from`: restrictVelocity(...)[i] = v[result[i]].
+std::vector<int> findRestrictedCoordinates(const Model& from, const Model& model);
 std::vector<int> findRestrictedDofs(const Model& from, const Model& model);
 
 }  // namespace bielle
