@@ -185,9 +185,10 @@ class Gate {
 
 // A robot that stands until it is commanded otherwise, by a command that comes through a gate.
 struct Standing {
-  explicit Standing(bool own_thread) : q(makeStandingPosture(getBipetto())) {
+  explicit Standing(bool own_thread, int solve_ticks = 0) : q(makeStandingPosture(getBipetto())) {
     PredictiveOptions options = makeShortWindow(1);
     options.own_thread = own_thread;
+    options.solve_time = 1e-3 * solve_ticks;
     const CommandSource source = [this](double) {
       gate.pass();
       return VelocityCommand{};
@@ -289,6 +290,63 @@ TEST_CASE(
   for (const PredictiveSolve& solve : solves)
     CHECK((solve.latency > 0) == (&solve != &solves.back()));  // not yet in force
   CHECK(controller.counts().failed == 0);
+}
+
+TEST_CASE("predictive control: solves that are given a stage have the policies of those that are ready at once") {
+  Standing given(false, kStageTicks), at_once(false);
+  for (int tick = 0; tick < 20 * kStageTicks; ++tick) {
+    given.update(tick);
+    at_once.update(tick);
+    REQUIRE(given.u == at_once.u);
+  }
+  CHECK(given.controller->counts().solves == 19);  // the last one is under way
+  CHECK(given.controller->counts().missed == 0);
+}
+
+TEST_CASE("predictive control: a stage that leaves time has several solves, and the next one the policy of the last") {
+  constexpr int kTicks = 5, kStages = 20;  // two solves a stage, and 2 ms are left
+  static_assert(kStageTicks == 12, "a third solve would begin");
+  for (const bool own_thread : {false, true}) {
+    Standing standing(own_thread, kTicks), once(false);
+    const auto update = [&](int tick) {
+      for (Standing* one : {&standing, &once}) one->update(tick);
+      // The thread's solve is ready as late as that which is said to take so long.
+      if (tick % kStageTicks == kTicks - 1 || tick % kStageTicks == 2 * kTicks - 1) standing.controller->waitForSolve();
+    };
+    int tick = 0;
+    for (; tick < kStages * kStageTicks; ++tick) update(tick);
+    const PredictiveCounts& counts = standing.controller->counts();
+    CAPTURE(own_thread);
+    CHECK(counts.missed == 0);
+    CHECK(counts.failed == 0);
+    if (own_thread) continue;  // when it has ended depends on the machine
+    CHECK(counts.solves == 2 * kStages);
+    for (int i = 0; i < counts.solves; ++i) {
+      CAPTURE(i);
+      const double latency = i % 2 ? 1e-3 * (kStageTicks - kTicks) : -1;  // the first of each stage is replaced
+      CHECK(counts.last[i].latency == Approx(i == counts.solves - 1 ? -1 : latency));
+    }
+    // What happens between the two solves of a stage is known to the policy that follows.
+    for (; tick < kStages * kStageTicks + 2; ++tick) update(tick);
+    for (Standing* one : {&standing, &once}) one->at.v[0] += 0.1;
+    for (; tick <= (kStages + 1) * kStageTicks; ++tick) update(tick);
+    const Policy::Stage &reacts = standing.controller->policy().stages().front(),
+                        &knows_not = once.controller->policy().stages().front();
+    CHECK(reacts.start == Approx(knows_not.start));
+    CHECK(reacts.v[0] - knows_not.v[0] > 0.02);
+  }
+}
+
+TEST_CASE("predictive control: solves that are given more than a stage come late, and stages without one are counted") {
+  constexpr int kTicks = 30;
+  Standing standing(false, kTicks);
+  for (int tick = 0; tick < 20 * kStageTicks; ++tick) standing.update(tick);
+  const PredictiveCounts& counts = standing.controller->counts();
+  CHECK(counts.solves == 7);   // one begins at each 30th tick; the last is under way
+  CHECK(counts.missed == 11);  // of 19 stages that are over
+  CHECK(counts.failed == 0);
+  for (const PredictiveSolve& solve : counts.last) CHECK(solve.latency == Approx(1e-3 * kTicks));
+  CHECK_THROWS_WITH(Standing(false, -1), Catch::Contains("solve_time"));
 }
 
 namespace {

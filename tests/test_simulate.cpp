@@ -305,6 +305,7 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
       {{"--terrain", "moon"}, "moon"},
       {{"--delay", "1", "--jitter", "2"}, "--jitter"},
       {{"--real-time", "--control", "gains"}, "--real-time"},
+      {{"--solve-time", "5", "--control", "gains"}, "--solve-time"},
       {{"--world", "moon"}, "moon"}};
   for (const auto& [options, named] : cases) {
     const CommandResult result = simulate(output, options);
@@ -312,8 +313,9 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
     CHECK(result.status == 2);
     CHECK(result.err.find(named) != std::string::npos);
   }
-  for (const std::string number : {"friction", "duration", "hold", "time-step", "control-period", "record-period",
-                                   "noise", "look-ahead", "mass-error", "rod-error", "delay", "jitter", "speed"})
+  for (const std::string number :
+       {"friction", "duration", "hold", "time-step", "control-period", "record-period", "noise", "look-ahead",
+        "mass-error", "rod-error", "delay", "jitter", "solve-time", "speed"})
     for (const std::string value : {"nan", "-nan", "inf", "-inf", "1e400", "1e300", "much"}) {
       const CommandResult result = simulate(output, {"--" + number, value, "--dry-run"});
       CAPTURE(number, value, result.err);

@@ -80,6 +80,9 @@ void bindControllers(py::module_& module) {
       .field("threads", &PredictiveOptions::threads, "0: all; at most 1024; results are bitwise independent of it")
       .field("own_thread", &PredictiveOptions::own_thread,
              "solves run in parallel with control; results then depend on their speed")
+      .field("solve_time", &PredictiveOptions::solve_time,
+             "time that a solve is given, s: another one begins in a stage that leaves so much; without own_thread, "
+             "policies come into force only when it has passed; 0: one solve for each stage")
       .field("end_place", &PredictiveOptions::end_place,
              "weight of heading and place at the end of a window, 1/m^2 or 1")
       .field("end_posture", &PredictiveOptions::end_posture, "weight of the other coordinates")

@@ -1,6 +1,6 @@
 #include "bielle/control/predictive_controller.h"
 
-#include <chrono>
+#include <stdexcept>
 #include <utility>
 
 #include "control/clock.h"
@@ -11,8 +11,6 @@
 namespace bielle {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr size_t kSolves = 100000;  // that are kept
 
 }  // namespace
@@ -21,9 +19,12 @@ constexpr size_t kSolves = 100000;  // that are kept
 class PredictiveController::Loop {
  public:
   Loop(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options)
-      : planner_(std::move(horizon), options),
+      : solve_time_(options.solve_time),
+        planner_(std::move(horizon), options),
         solution_(planner_.makeEmpty()),
+        next_(planner_.makeEmpty()),
         dead_point_stop_(planner_.model(), planner_.startPosture(), options.dead_point_stop) {
+    if (!(solve_time_ >= 0)) throw std::invalid_argument("PredictiveOptions: solve_time must not be negative");
     const Model& model = planner_.model();
     WindowPlanner::Solution first = planner_.makeFirst();
     policy_ = std::make_unique<Policy>(model, std::move(first.stages), first.u_hold);
@@ -37,25 +38,23 @@ class PredictiveController::Loop {
   }
 
   void update(const Measurement& measurement, VectorRef u) {
-    if (thread_ && thread_->state() == SolvingThread::State::Done) {
-      receive();
-      thread_->setIdle();
-    }
-    if (ready_ && measurement.actionTime() + kClockTolerance >= getStart(solution_.target)) {
-      policy_->exchange(solution_.stages, solution_.u_hold);
-      ready_ = false;
-      counts_.last[newest_].latency = std::chrono::duration<double>(Clock::now() - measured_).count();
+    const double time = measurement.time + kClockTolerance;
+    if (solves_ && isDone(time)) receive();
+    if (next_.solved && time + measurement.delay >= getStart(next_.target)) {
+      policy_->exchange(next_.stages, next_.u_hold);
+      next_.solved = false;
+      counts_.last[next_place_].latency = measurement.time - next_measured_;
     }
     policy_->update(measurement, u);
     dead_point_stop_.add(measurement, u);
     const int before = stage_;
-    while (measurement.time + kClockTolerance >= getStart(stage_ + 1)) ++stage_;  // an impact takes no time
+    while (time >= getStart(stage_ + 1)) ++stage_;  // an impact takes no time
     if (stage_ != before) {
       counts_.missed += waits_;
       ++counts_.stages;
       waits_ = true;
     }
-    if (waits_ && !(thread_ && thread_->state() != SolvingThread::State::Idle)) solve(measurement, u);
+    if (!solves_ && (waits_ || leavesTime(measurement))) solve(measurement, u);
   }
   double getPlanTime(double time) const { return awaited_ >= 0 ? awaited_ : time + advance_; }
   const PredictiveCounts& counts() const { return counts_; }
@@ -68,54 +67,71 @@ class PredictiveController::Loop {
  private:
   double getStart(int stage) const { return planner_.getStart(stage) - advance_; }
 
+  bool isDone(double time) const {
+    return thread_ ? thread_->state() == SolvingThread::State::Done : time >= request_.measurement.time + solve_time_;
+  }
+
+  // The present stage, for another solve.
+  bool leavesTime(const Measurement& measurement) const {
+    return solve_time_ > 0 && measurement.actionTime() + solve_time_ <= getStart(stage_ + 1) + kClockTolerance;
+  }
+
   void solve(const Measurement& measurement, ConstVectorRef u) {
     const double begin = getStart(stage_), end = getStart(stage_ + 1);
-    waits_ = false;
     request_.stage = stage_;
+    request_.again = !waits_;
     const double passed = measurement.time - begin;
     request_.progress = passed > kClockTolerance ? std::min(passed / (end - begin), 1.0) : 0;
     request_.measurement = measurement;
     request_.u = u;
-    requested_ = Clock::now();
+    waits_ = false;
+    solves_ = true;
     if (thread_) return thread_->begin();
     planner_.solve(request_, solution_);
+    if (solve_time_ > 0) return;
     counts_.missed += solution_.took.seconds > end - begin - measurement.delay;
     receive();
   }
 
   void receive() {
-    ready_ = solution_.solved;
+    if (thread_) thread_->setIdle();
+    solves_ = false;
     stage_ += solution_.skipped;
     advance_ = solution_.advance;
     awaited_ = solution_.awaited;
-    if (solution_.solved) footholds_ = solution_.footholds;  // there is room for those of all contacts
     counts_.failed += !solution_.solved;
     counts_.early += solution_.early;
     counts_.late += solution_.late;
-    measured_ = requested_;
-    newest_ = static_cast<size_t>(counts_.solves) % kSolves;
+    const size_t place = static_cast<size_t>(counts_.solves) % kSolves;
     if (counts_.last.size() < kSolves)
       counts_.last.push_back(solution_.took);
     else
-      counts_.last[newest_] = solution_.took;
+      counts_.last[place] = solution_.took;
     ++counts_.solves;
+    if (!solution_.solved) return;
+    footholds_ = solution_.footholds;  // there is room for those of all contacts
+    std::swap(solution_, next_);
+    next_place_ = place;
+    next_measured_ = request_.measurement.time;
   }
 
+  const double solve_time_;
   WindowPlanner planner_;
   WindowPlanner::Request request_;
-  WindowPlanner::Solution solution_;  // that is not in force yet, or memory for the next one
+  WindowPlanner::Solution solution_;  // of the solve under way, or memory for the next one
+  WindowPlanner::Solution next_;      // if solved, it awaits the stage from which on it is in force
   DeadPointStop dead_point_stop_;
   std::unique_ptr<Policy> policy_;
   std::vector<PredictedFoothold> footholds_;
   int stage_ = -1;       // the present one
   bool waits_ = false;   // it has no solve yet
-  bool ready_ = false;   // the solution awaits the stage from which on it is in force
+  bool solves_ = false;  // a solve is under way
   double advance_ = 0;   // of the clock of the motion, s
   double awaited_ = -1;  // the landing of a late foot, s of the motion; negative: none is late
   PredictiveCounts counts_;
-  size_t newest_ = 0;                       // the solution's place in the counts
-  Clock::time_point requested_, measured_;  // when the measurements of request and solution were taken
-  std::unique_ptr<SolvingThread> thread_;   // last: it ends first
+  size_t next_place_ = 0;                  // its place in the counts
+  double next_measured_ = 0;               // when the state was measured that it was solved for, s
+  std::unique_ptr<SolvingThread> thread_;  // last: it ends first
 };
 
 double PredictiveCounts::calcQuantile(double share, double PredictiveSolve::*value) const {

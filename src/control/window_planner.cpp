@@ -12,7 +12,7 @@ namespace bielle {
 namespace {
 
 constexpr int kAhead = 3;               // stages of a policy: what is left when solves fail
-constexpr int kAheadInThread = 8;       // or when they come late
+constexpr int kAheadIfLate = 8;         // or where they may come late
 constexpr int kEarly = 2;               // stages before its landing at which a foot counts as early
 constexpr double kLandingWay = 0.01;    // that it may then be farther off than where it may land, m
 constexpr int kLate = 1;                // stages after its landing at which a foot counts as late
@@ -65,7 +65,7 @@ WindowPlanner::WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveO
 
 WindowPlanner::Solution WindowPlanner::makeEmpty() const {
   Solution solution;
-  solution.stages.resize(options_.own_thread ? kAheadInThread : kAhead);
+  solution.stages.resize(options_.own_thread || options_.solve_time > 0 ? kAheadIfLate : kAhead);
   for (Policy::Stage& stage : solution.stages) stage.K.setZero(model_.nu(), 2 * model_.nv());
   solution.u_hold.setZero(model_.nu());
   solution.footholds.reserve(model_.contacts().size());
@@ -197,7 +197,7 @@ int WindowPlanner::chooseNext(const Request& request, Solution& solution) {
     solution.late = true;
   }
   const int begin = late_.landing - kLowering;
-  late_.waited += horizon_->getStart(begin + 1) - horizon_->getStart(begin);
+  if (!request.again) late_.waited += horizon_->getStart(begin + 1) - horizon_->getStart(begin);
   if (!contacts[late_.foot] && kLoweringSpeed * late_.waited < kDepth) return begin;
   late_.foot = -1;
   return late_.landing;

@@ -15,6 +15,7 @@ class WindowPlanner {
   struct Request {
     int stage = 0;
     double progress = 0;  // the share of the stage that has passed
+    bool again = false;   // it is not the first one in this stage
     Measurement measurement;
     VectorXd u;  // nu, required at this instant
   };

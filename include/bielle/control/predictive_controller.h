@@ -16,7 +16,8 @@
 /// Either update() waits for the solve at the beginning of a stage: the same measurements then give the same torques, on any
 /// machine. Or, for a robot, solves run in a separate thread, and update() never waits: a solution found after t_{k+1}
 /// takes effect on arrival, and the next solve begins then, from what is measured in the middle of a stage. Eq. (1) is then
-/// for the rest of that stage, with the acceleration of the whole.
+/// for the rest of that stage, with the acceleration of the whole. If a stage leaves time for another solve
+/// (PredictiveOptions::solve_time), that begins likewise, and replaces the first one's solution.
 ///
 /// Early landing: a foot on the ground in the second half of its swing (Measurement::contacts) has landed. The motion
 /// continues with the stage of its landing, and stays ahead of the plan by the time saved. Late landing: a foot still
@@ -53,6 +54,10 @@ struct PredictiveOptions {
   int threads = 0;  ///< 0: all; at most 1024. Results are bitwise independent of it.
   /// Solves run in a separate thread; results then depend on its speed.
   bool own_thread = false;
+  /// That a solve is given, s, counted from its measurement: another one begins in a stage that leaves so much time. Without a
+  /// separate thread policies come into force only when it has passed, as if solves took as long, on any machine. 0: there is
+  /// one solve for each stage, and without a separate thread its policy is ready at once.
+  double solve_time = 0;
   /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the
   /// other coordinates, of the velocities; 1/m^2 or 1, s^2/m^2 or s^2.
   double end_place = 1, end_posture = 100, end_velocity = 10;
@@ -65,7 +70,8 @@ struct PredictiveSolve {
   double predict = 0, evaluate = 0, linearize = 0, sweep = 0, rollout = 0, policy = 0;
   double step = 1;            ///< its shortest, alpha
   double regularization = 0;  ///< the largest of its sweeps
-  double latency = -1;  ///< from the measurement until its policy came into force, s; negative: it did not, or not yet
+  /// From its measurement to the one at which its policy came into force, s; negative: it did not, or not yet.
+  double latency = -1;
 };
 
 /// Solves since the start.
@@ -75,8 +81,8 @@ struct PredictiveCounts {
   int failed = 0;  ///< the last policy stayed in force
   int early = 0;   ///< feet that landed in the second half of their swing
   int late = 0;    ///< feet that had not landed when they should have stood
-  /// Without a separate thread, solves that took longer than their stage: in real time, their policy would be late. With one,
-  /// stages that had no solve, because an earlier one lasted until their end.
+  /// Without a separate thread, solves that took longer than their stage: in real time, their policy would be late. With one
+  /// or with PredictiveOptions::solve_time, stages that had no solve, because an earlier one lasted until their end.
   int missed = 0;
   std::vector<PredictiveSolve> last;  ///< 100000 solves
 

@@ -109,7 +109,10 @@ void parseOptions(SimulateArguments& arguments) {
     throw InputError("", "--live", "writing files would delay the world in real time", "leave out --real-time");
   if (arguments.execution.real_time && !is_predictive)
     throw InputError("", "--real-time", "only predictive control solves while the motion runs", "give --control mpc");
+  if (arguments.solve_time > 0 && !is_predictive)
+    throw InputError("", "--solve-time", "only predictive control solves while the motion runs", "give --control mpc");
   arguments.predictive.own_thread = arguments.execution.real_time;
+  arguments.predictive.solve_time = 1e-3 * arguments.solve_time;
   if (arguments.jitter > arguments.delay)
     throw InputError("", "--jitter", "it is longer than the delay", "give at most --delay");
   arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};
@@ -190,6 +193,13 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   app.add_flag("--real-time", a.execution.real_time,
                "run the world in real time while predictive control solves in a separate thread. Late policies take "
                "effect on arrival; results depend on the machine");
+  app.add_option(
+         "--solve-time", a.solve_time,
+         "time that each solve of predictive control is given [ms]: within a stage another one begins while "
+         "there is that much left. Except with --real-time, policies come into force only when it has passed, as "
+         "if the machine were that fast or slow. 0: one solve for each stage")
+      ->check(isWithin(0, 1000))
+      ->capture_default_str();
   app.add_option("--terrain", a.terrain,
                  "planned: the plan's ground; flat; ramp=SLOPE: height over length [1], from x = 0.3 m on; "
                  "tiles=HEIGHT: 0.25 m long, random heights from 0 to HEIGHT [m], from x = 0.2 m on; uneven=HEIGHT: "

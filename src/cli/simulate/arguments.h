@@ -33,6 +33,7 @@ struct SimulateArguments {
   double noise = 1;
   std::optional<double> look_ahead;  // ms
   double delay = 0, jitter = 0;      // ms
+  double solve_time = 0;             // ms
   RobotErrors errors;
   unsigned seed = 1;
   bool live = false, no_report = false, summary_only = false, dry_run = false;

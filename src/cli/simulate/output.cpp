@@ -308,7 +308,8 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
                   "                      %d of %d stages %s\n",
                   c.solves, c.failed, 1e3 * c.calcQuantile(0.5), 1e3 * c.calcQuantile(0.99), 1e3 * c.calcQuantile(1),
                   c.missed, c.stages,
-                  arguments.execution.real_time ? "had no solve of their own" : "are shorter than their solve");
+                  arguments.execution.real_time || arguments.solve_time > 0 ? "had no solve of their own"
+                                                                            : "are shorter than their solve");
     std::cout << text;
     if (arguments.execution.real_time) printTimes(c, e);
   }
