@@ -67,9 +67,9 @@ int countProgress(const CommandResult& result) {
   return count;
 }
 
-tasks::CampaignRun makeRun(const std::string& direction, const std::string& impulse, bool stood) {
+tasks::CampaignRun makeRun(std::vector<std::string> values, bool stood) {
   tasks::CampaignRun run;
-  run.values = {"walk", direction, impulse};
+  run.values = std::move(values);
   run.result = {{"outcome", stood ? "stood" : "fell"}};
   return run;
 }
@@ -276,8 +276,9 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
 }
 
 TEST_CASE("campaign: the specifications of the examples are read") {
-  const std::vector<std::pair<std::string, size_t>> examples{
-      {"pushes", 32}, {"pushes_predictive", 80}, {"pushes_felt", 80}, {"unknown", 500}, {"worlds", 198}};
+  const std::vector<std::pair<std::string, size_t>> examples{{"pushes", 32},      {"pushes_predictive", 80},
+                                                             {"pushes_felt", 80}, {"solve_times", 1600},
+                                                             {"unknown", 500},    {"worlds", 198}};
   for (const auto& [name, expected] : examples) {
     const tasks::CampaignSpec spec = tasks::readCampaignSpec(BIELLE_SOURCE_DIR "/examples/campaign/" + name + ".yaml");
     CHECK(spec.search.has_value() == (name == "pushes"));
@@ -318,7 +319,7 @@ TEST_CASE("campaign: an impulse counts as survived if all smaller ones were") {
                                                                {"90", "2", false},
                                                                {"90", "3", true},
                                                                {"180", "1", false}})
-    results.runs.push_back(makeRun(direction, impulse, stood));
+    results.runs.push_back(makeRun({"walk", direction, impulse}, stood));
   const std::vector<tasks::SurvivedImpulse> found = findSurvivedImpulses(results);
   REQUIRE(found.size() == 3);
   CHECK(found[0].impulse == 10);
@@ -327,4 +328,30 @@ TEST_CASE("campaign: an impulse counts as survived if all smaller ones were") {
   CHECK(found[1].bounded);
   CHECK(found[2].impulse == 0);
   CHECK(found[2].bounded);
+}
+
+TEST_CASE(
+    "campaign: where instants of a push and a condition vary, the map shows the condition's means over the instants") {
+  const RobotDirectory directory;
+  tasks::CampaignResults results;
+  results.columns = {"delay", "push time", "push direction", "push impulse"};
+  const auto draw = [&](const std::vector<std::string>& delays) {
+    results.runs.clear();
+    for (const std::string& delay : delays)
+      for (const std::string time : {"1", "2"})
+        for (const std::string direction : {"0", "120", "240"})
+          for (const std::string impulse : {"4", "8"})
+            results.runs.push_back(makeRun({delay, time, direction, impulse}, time == "2" || impulse == "4"));
+    std::vector<std::string> notes;
+    writeCampaign(directory.path(), results, notes);
+    CHECK(notes.empty());
+    return readFile(directory.path() + "/map.svg");
+  };
+  const std::string both = draw({"5", "10"}), alone = draw({"5"});
+  CHECK_THAT(both, Contains("mean of all instants") && Contains(">10<") && !Contains(">10, 1<"));
+  CHECK_THAT(alone, !Contains("mean of all instants") && Contains(">2<"));
+  // The table has every instant.
+  draw({"5", "10"});
+  CHECK_THAT(readFile(directory.path() + "/campaign.md"),
+             Contains("| 10 | 1 | 4 | 4 | 4 |") && Contains("| 10 | 2 | ≥ 8 |"));
 }

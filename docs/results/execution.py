@@ -6,15 +6,16 @@
     docs/results/execution.py --measure minutes real_time   these take hours and minutes
     docs/results/execution.py --record unknown=DIR          takes a table from a campaign: `bielle campaign SPEC -o DIR`
 
-The campaigns are worlds, pushes, pushes_predictive, pushes_felt, cleobot, unknown, worlds_real_time and pushes_real_time, each
-from examples/campaign/NAME.yaml; they take hours, those in real time a quarter of one, on a quiet machine. Every table keeps the commit, the date and the machine of its figures. `--quick` runs and records a
-small campaign.
+The campaigns are worlds, pushes, pushes_predictive, pushes_felt, solve_times, cleobot, unknown, worlds_real_time and
+pushes_real_time, each from examples/campaign/NAME.yaml; they take hours, those in real time a quarter of one, on a quiet
+machine. Every table keeps the commit, the date and the machine of its figures. `--quick` runs and records a small campaign.
 """
 import contextlib
 import csv
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -24,6 +25,7 @@ from common import show
 
 DATA = common.HERE / "data"
 SPECS = "examples/campaign"
+MAP = common.SOURCE / "docs/images/solve_times.svg"
 STOOD = "stood"
 WORLDS = ("bielle", "mujoco", "simbody")
 
@@ -84,9 +86,21 @@ def list_impulses(directory):
     return ["phase", *columns], [[phase, *(row[column] for column in columns)] for phase, row in cells.items()]
 
 
+def count_impulses(directory):
+    """Runs that stand, by the time of a solve and by impulse; the campaign's map becomes the image of the page."""
+    counts, runs = {}, read_runs(directory)
+    for run in runs:
+        row = counts.setdefault(run["solve-time"], {})
+        row[run["push impulse"]] = row.get(run["push impulse"], 0) + (run["outcome"] == STOOD)
+    shutil.copy(pathlib.Path(directory) / "map.svg", MAP)
+    columns = list(next(iter(counts.values())))
+    return (["given to a solve [ms]", *(f"{impulse} N s" for impulse in columns), "runs of each"],
+            [[time, *row.values(), len(runs) // len(counts) // len(columns)] for time, row in counts.items()])
+
+
 CAMPAIGNS = {"worlds": list_falls, "pushes": list_impulses, "pushes_predictive": count_by("push time"),
              "pushes_felt": count_by("push time"), "unknown": count_by("friction"),
-             "cleobot": count_by("motion", str),
+             "cleobot": count_by("motion", str), "solve_times": count_impulses,
              "worlds_real_time": list_falls, "pushes_real_time": count_by("sensors", str)}
 
 
@@ -271,6 +285,9 @@ found by bisection to 0.25 N s."""),
 directions at ten instants [s] of one step, true state: {share("pushes_predictive")}."""),
     ("Pushes, real sensors and late torques", "pushes_felt", lambda: f"""The same pushes with real sensors and torques
 that are 5 ± 1 ms late: {share("pushes_felt")}."""),
+    ("What a millisecond is worth", "solve_times", lambda: """Pushes of 5 to 20 N s (0.2 to 0.8 N s per kg) from the same
+directions at the same instants, true state: how many runs stand, by the time that a solve is given (`--solve-time`). A
+stage takes 12 ms and has as many solves as fit into it."""),
     ("Cleobot, pushed near dead points", "cleobot", lambda: """Cleobot walks at 0.4 m/s and climbs stairs of 5 cm, pushed by
 10 and 15 N s from eight directions at three instants, by plans that keep 0.15 of the transmission at the start and by plans
 without that margin. It saves one walk of 48 and no climb."""),
@@ -300,6 +317,8 @@ commits; `git log COMMIT..` lists what has changed since. Campaigns under predic
         page.heading(title)
         page.add(describe())
         add_table(page, name)
+        if name == "solve_times" and MAP.exists():
+            page.add(f"![largest impulse without a fall, by direction](../images/{MAP.name})")
     return page
 
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <sstream>
 
@@ -15,7 +16,8 @@ namespace fs = std::filesystem;
 namespace bielle::tasks {
 namespace {
 
-constexpr const char *kImpulse = "push impulse", *kDirection = "push direction";
+constexpr const char *kImpulse = "push impulse", *kDirection = "push direction", *kTime = "push time",
+                     *kPhase = "push phase";
 constexpr size_t kLeastDirections = 3;  // of a map
 
 // Values of a column in the order of the runs.
@@ -91,8 +93,7 @@ std::vector<std::string> pick(const std::vector<std::string>& values, const std:
 
 // Survived impulses by the values of the varied columns, in the order of the runs: curves of a map, rows of a table.
 using Groups = std::vector<std::pair<std::vector<std::string>, std::vector<SurvivedImpulse>>>;
-Groups groupImpulses(const CampaignResults& results) {
-  const std::vector<size_t> varied = listVaried(results);
+Groups groupImpulses(const CampaignResults& results, const std::vector<size_t>& varied) {
   Groups groups;
   for (const SurvivedImpulse& found : findSurvivedImpulses(results)) {
     const std::vector<std::string> key = pick(found.values, varied);
@@ -130,7 +131,7 @@ void printShares(std::ostream& page, const CampaignResults& results) {
 }
 
 void printImpulses(std::ostream& page, const CampaignResults& results) {
-  const Groups groups = groupImpulses(results);
+  const Groups groups = groupImpulses(results, listVaried(results));
   if (groups.empty()) return;
   const std::optional<size_t> direction = findAxis(results, kDirection);
   const std::vector<std::string> directions =
@@ -194,15 +195,29 @@ Json makeSummary(const CampaignResults& results) {
           {"largest_impulses", impulses}};
 }
 
-// Seen from above, x upwards, y to the left.
-Plot makeMap(const Groups& groups, size_t direction) {
-  Plot plot{"Largest impulse without a fall, N s, by direction", "", "", PlotScale::Polar};
+// What tells the curves of a map apart. Instants do only if nothing else varies.
+std::vector<size_t> listMapped(const CampaignResults& results) {
+  const std::vector<size_t> varied = listVaried(results);
+  std::vector<size_t> others;
+  for (const size_t i : varied)
+    if (results.columns[i] != kTime && results.columns[i] != kPhase) others.push_back(i);
+  return others.empty() ? varied : others;
+}
+
+// Seen from above, x upwards, y to the left. Of several instants the mean.
+Plot makeMap(const CampaignResults& results, const Groups& groups, size_t direction) {
+  const bool of_instants = listMapped(results).size() < listVaried(results).size();
+  Plot plot{
+      std::string("Largest impulse without a fall, N s, by direction") + (of_instants ? ", mean of all instants" : ""),
+      "", "", PlotScale::Polar};
   for (const auto& [condition, found] : groups) {
     std::string title;
     for (const std::string& value : condition) title += (title.empty() ? "" : ", ") + value;
     Curve curve{title, getCurveColor(plot.curves.size()), CurveStyle::LinesPoints, false, {}};
-    for (const SurvivedImpulse& one : found) curve.points.emplace_back(std::stod(one.values[direction]), one.impulse);
-    std::sort(curve.points.begin(), curve.points.end());
+    std::map<double, std::vector<double>> impulses;
+    for (const SurvivedImpulse& one : found) impulses[std::stod(one.values[direction])].push_back(one.impulse);
+    for (const auto& [angle, all] : impulses)
+      curve.points.emplace_back(angle, std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size()));
     curve.points.push_back(curve.points.front());
     plot.curves.push_back(curve);
   }
@@ -242,9 +257,9 @@ std::vector<std::string> writeCampaign(const std::string& directory, const Campa
   const auto locate = [&directory](const char* name) { return (fs::path(directory) / name).string(); };
   std::vector<std::string> paths;
   const std::optional<size_t> direction = findAxis(results, kDirection);
-  const Groups groups = groupImpulses(results);
+  const Groups groups = groupImpulses(results, listMapped(results));
   bool has_map = direction && !groups.empty() && listAxisValues(results, *direction).size() >= kLeastDirections;
-  if (has_map && !drawPlots(locate("map.svg"), {makeMap(groups, *direction)})) {
+  if (has_map && !drawPlots(locate("map.svg"), {makeMap(results, groups, *direction)})) {
     notes.push_back("map.svg was not drawn: gnuplot is not installed");
     has_map = false;
   }
