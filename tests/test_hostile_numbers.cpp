@@ -204,7 +204,7 @@ TEST_CASE("optimal control of random mechanisms with random options") {
     const Range range = pick(rng, {Range::Usual, Range::Any});
     const double dt =
         range == Range::Usual ? pick(rng, {1e-3, 0.015}) : pick(rng, {0.0, 1e-12, 1e-3, 0.015, 0.3, 10.0, 1e6});
-    const int stages = pick(rng, {1, 1, 2, 5, 60});
+    const int stages = pick(rng, {1, 1, 2, 5, 20});
     const Formulation formulation = pick(rng, {Formulation::Full, Formulation::Reduced});
     // Sometimes a start that is open, which the reduced formulation refuses.
     const VectorXd q0 =

@@ -30,9 +30,13 @@ TEST_CASE("parts: bipeds of them squat and walk, and have Simbody's dynamics") {
                                                 is_stiff ? "0" : "0.02", "--motion-step", "1e-4", robot});
     INFO(validated.out << validated.err);
     CHECK(validated.status == 0);
-    for (const char* motion : {"squat", "walk"}) {
-      const CommandResult solved = runCommand(
-          {BIELLE_COMMAND, "solve", motion, "--robot", robot, "--no-report", "-o", files.path() + "/" + name + motion});
+    const std::pair<const char*, std::vector<std::string>> motions[] = {
+        {"squat", {"--set", "duration=1", "--set", "settle=0.2"}}, {"walk", {"--steps", "2"}}};
+    for (const auto& [motion, settings] : motions) {
+      std::vector<std::string> arguments = {BIELLE_COMMAND, "solve",       motion, "--robot",
+                                            robot,          "--no-report", "-o",   files.path() + "/" + name + motion};
+      arguments.insert(arguments.end(), settings.begin(), settings.end());
+      const CommandResult solved = runCommand(arguments);
       INFO(solved.out << solved.err);
       CHECK(solved.status == 0);
       CHECK_THAT(solved.out, Contains(": passed"));

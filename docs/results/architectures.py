@@ -192,8 +192,10 @@ def main():
         small = re.sub(r"architecture:\s*\[[^]]*\]", "architecture: [belt, parallel_spring_knee]", specification)
         small = small.replace("slsqp, evaluations: 5", "sbplx, evaluations: 1").replace("knee: four_bar", "knee: belt")
         small = re.sub(r"  - \{motion: (walk, set: \{speed: 1|stairs|jump).*\n", "", small)
+        small = small.replace("speed: 0.5", "speed: 0.5, steps: 2")
         PARTS.update(hip=["serial"], ankle=["rsu"])
-        MOTIONS[1:], TITLES[1:], SEARCHED[1:], SPEEDS[1:] = [], [], [], []
+        MOTIONS[:] = [("walk", {"speed": 0.5, "steps": 2})]
+        TITLES[1:], SEARCHED[1:], SPEEDS[1:], arguments.solve = [], [], [], 1
         with tempfile.TemporaryDirectory() as directory:
             page, _ = make_page(run(arguments, pathlib.Path(directory), small))
         page.write(True)
