@@ -241,9 +241,6 @@ MEASUREMENTS = {"gains": measure_gains, "sensors": measure_sensors, "errors": me
 
 def add_table(page, name, directory=DATA):
     """One table with its origin and how to repeat it."""
-    if not (pathlib.Path(directory) / f"{name}.csv").exists():
-        page.add("Not measured.")
-        return
     comments, columns, rows = read_data(name, directory)
     page.table(columns, [[cell or "–" for cell in row] for row in rows])
     repeat = f"`docs/results/execution.py --measure {name}`"
@@ -314,6 +311,8 @@ def make_page():
     page.add("""[Motions carried out](../execution.md) explains the options and the words. Tables are as old as their
 commits; `git log COMMIT..` lists what has changed since. Campaigns under predictive control take hours.""")
     for title, name, describe in SECTIONS:
+        if not (DATA / f"{name}.csv").exists():
+            continue
         page.heading(title)
         page.add(describe())
         add_table(page, name)
