@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/ball_cuts.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/model/builder.h"
 #include "bielle/motion/serial_model.h"
 #include "mechanisms.h"
@@ -110,6 +111,9 @@ TEST_CASE("ball cuts: whichever side the leaf is on, with springs, frames and vi
     spring.point2 = {0.02, 0.01, 0.03};
     spring.stiffness = 500, spring.damping = 3, spring.rest = 0.1;
     parts.point_springs.push_back(spring);
+    spring.name = "within the rod";  // whose ends do not move against each other
+    spring.body1 = parts.closures[0].body1;
+    parts.point_springs.push_back(spring);
     parts.frames.push_back({"mark", leaf, {Matrix3d::Identity(), Vector3d(0.1, 0, 0)}});
     Closure& first = parts.closures[0];
     std::swap(first.body1, first.body2);
@@ -119,6 +123,7 @@ TEST_CASE("ball cuts: whichever side the leaf is on, with springs, frames and vi
   CHECK(cut.nv() == 36);
   CHECK(compare(model, cut, findClosed(model)) < 1e-9);
   CHECK(cut.visuals().size() == model.visuals().size());
+  CHECK(cut.pointSprings().size() == 1);
   const Frame& mark = cut.frames()[cut.findFrame("mark")];
   CHECK(cut.bodies()[mark.body].name == model.bodies()[model.closures()[0].body2].name);
   const Model moved = change(cut, [](ModelParts& parts) { parts.point_springs[0].point2.x() += 0.01; });

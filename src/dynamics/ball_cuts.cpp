@@ -65,6 +65,9 @@ void moveAttachments(const std::vector<Merged>& merged, ModelParts& parts) {
       *body = m.into;
       *point = m.X_IB.act(*point);
     }
+  const auto is_idle = [](const PointSpring& spring) { return spring.body1 == spring.body2; };
+  std::vector<PointSpring>& springs = parts.point_springs;
+  springs.erase(std::remove_if(springs.begin(), springs.end(), is_idle), springs.end());
 }
 
 VectorXd keepDofs(const VectorXd& numbers, const std::vector<int>& dofs) {
