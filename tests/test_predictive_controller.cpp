@@ -292,7 +292,8 @@ TEST_CASE(
   CHECK(controller.counts().failed == 0);
 }
 
-TEST_CASE("predictive control: solves that are given a stage have the policies of those that are ready at once") {
+TEST_CASE(
+    "predictive control: solves that are given a whole stage yield the same policies as those that are ready at once") {
   Standing given(false, kStageTicks), at_once(false);
   for (int tick = 0; tick < 20 * kStageTicks; ++tick) {
     given.update(tick);

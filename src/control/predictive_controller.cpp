@@ -71,7 +71,7 @@ class PredictiveController::Loop {
     return thread_ ? thread_->state() == SolvingThread::State::Done : time >= request_.measurement.time + solve_time_;
   }
 
-  // The present stage, for another solve.
+  // Whether the present stage does, for another solve.
   bool leavesTime(const Measurement& measurement) const {
     return solve_time_ > 0 && measurement.actionTime() + solve_time_ <= getStart(stage_ + 1) + kClockTolerance;
   }

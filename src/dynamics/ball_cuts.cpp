@@ -24,6 +24,7 @@ bool hasNone(const List& list, const Test& test) {
   return std::none_of(list.begin(), list.end(), test);
 }
 
+// Nothing would be lost with its joint.
 bool isPlain(const Model& model, int leaf) {
   const Joint& joint = model.joints()[leaf];
   const auto of = [&joint](const VectorXd& numbers) { return numbers.segment(joint.idx_v, joint.nv); };
@@ -68,12 +69,6 @@ void moveAttachments(const std::vector<Merged>& merged, ModelParts& parts) {
   const auto is_idle = [](const PointSpring& spring) { return spring.body1 == spring.body2; };
   std::vector<PointSpring>& springs = parts.point_springs;
   springs.erase(std::remove_if(springs.begin(), springs.end(), is_idle), springs.end());
-}
-
-VectorXd keepDofs(const VectorXd& numbers, const std::vector<int>& dofs) {
-  VectorXd out(dofs.size());
-  for (size_t i = 0; i < dofs.size(); ++i) out[static_cast<Eigen::Index>(i)] = numbers[dofs[i]];
-  return out;
 }
 
 // References give all joints but the base: what follows from closing the loops could be on another branch where they are cut
@@ -132,7 +127,7 @@ void removeBodies(const std::vector<Merged>& merged, ModelParts& parts) {
     motor.dof = joints[motor.joint].idx_v;
   }
   for (VectorXd* numbers : {&parts.lower_limits, &parts.upper_limits, &parts.velocity_limits, &parts.armature})
-    *numbers = keepDofs(*numbers, dofs);
+    *numbers = VectorXd((*numbers)(dofs));
   parts.bodies = std::move(bodies);
   parts.joints = std::move(joints);
 }

@@ -4,9 +4,9 @@
 
 namespace bielle {
 
-// The leaf on a spherical joint that nothing but this weld holds and that has no motor, so that it may count as part of the
-// other body; not if that counts as part of a further one, being among those `taken`. -1: there is none.
-// \param closures  all that act on the model
+// The body on a spherical joint without a motor that carries no other and that only this weld holds: it may count as part of
+// the other body of the weld. -1: there is none, or that other body is itself in `taken`.
+// \param closures  all that act on the model   \param taken  leaves that count as part of other bodies already
 int findBallLeaf(const Model& model, const std::vector<Closure>& closures, const Closure& weld,
                  const std::vector<int>& taken);
 

@@ -29,7 +29,7 @@ struct Plan {
   Belief belief = Belief::Closed;
   std::unique_ptr<SerialModel> serial;               ///< null for Belief::Closed
   std::unique_ptr<Policy> policy;                    ///< of the model that is believed in
-  std::unique_ptr<PredictiveController> predictive;  ///< of the same cut at its balls (dynamics/ball_cuts.h), or null
+  std::unique_ptr<PredictiveController> predictive;  ///< of the same, cut at its balls (dynamics/ball_cuts.h), or null
   SerialReference reference;                         ///< empty for Belief::Closed
   std::unique_ptr<Controller> adapter;               ///< of a controller whose model is not the robot's, or null
   int iterations = 0;  ///< that the solver took for the gains; 0: the motion in the files was its solution

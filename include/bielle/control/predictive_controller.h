@@ -54,7 +54,7 @@ struct PredictiveOptions {
   int threads = 0;  ///< 0: all; at most 1024. Results are bitwise independent of it.
   /// Solves run in a separate thread; results then depend on its speed.
   bool own_thread = false;
-  /// That a solve is given, s, counted from its measurement: another one begins in a stage that leaves so much time. Without a
+  /// Time that a solve is given, s, from its measurement on: another one begins in a stage that leaves so much. Without a
   /// separate thread policies come into force only when it has passed, as if solves took as long, on any machine. 0: there is
   /// one solve for each stage, and without a separate thread its policy is ready at once.
   double solve_time = 0;

@@ -120,11 +120,18 @@ std::vector<std::string> splitWorlds(const std::string& text) {
 
 // What only a plan can use.
 void refuseOptionsOfPlans(const SimulateArguments& a) {
-  const std::pair<bool, const char*> options[] = {
-      {!a.control.empty(), "--control"},    {!a.commands.empty(), "--command"}, {!a.model.empty(), "--model"},
-      {a.speed.has_value(), "--speed"},     {!a.settings.empty(), "--set"},     {a.execution.real_time, "--real-time"},
-      {a.sensors != "ideal", "--sensors"},  {a.delay != 0, "--delay"},          {a.live, "--live"},
-      {a.errors.mass != 0, "--mass-error"}, {a.errors.rod != 0, "--rod-error"}};
+  const std::pair<bool, const char*> options[] = {{!a.control.empty(), "--control"},
+                                                  {!a.commands.empty(), "--command"},
+                                                  {!a.model.empty(), "--model"},
+                                                  {a.speed.has_value(), "--speed"},
+                                                  {!a.settings.empty(), "--set"},
+                                                  {a.execution.real_time, "--real-time"},
+                                                  {a.sensors != "ideal", "--sensors"},
+                                                  {a.delay != 0, "--delay"},
+                                                  {a.live, "--live"},
+                                                  {a.solve_time != 0, "--solve-time"},
+                                                  {a.errors.mass != 0, "--mass-error"},
+                                                  {a.errors.rod != 0, "--rod-error"}};
   for (const auto& [is_given, name] : options)
     if (is_given)
       throw InputError("", name, "'" + a.directory + "' is a robot without a plan, which moves freely",
