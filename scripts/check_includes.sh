@@ -7,7 +7,7 @@ cd "$bielle_root"
 turn=0 turns=12
 if [ "${1:-}" = --all ]; then turns=1; else turn=$((16#$(git rev-parse "HEAD^{tree}" | head -c 6) % turns)); fi
 cmake -S . -B build/includes -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-fsyntax-only -DBIELLE_PRECOMPILE=OFF \
-  -DCMAKE_UNITY_BUILD=OFF -DBIELLE_BUILD_TESTS=OFF >/dev/null
+  -DCMAKE_UNITY_BUILD=OFF >/dev/null
 # Headers that are generated come first.
 if ninja -C build/includes -t query bielle_messages >/dev/null 2>&1; then ninja -C build/includes bielle_messages >/dev/null; fi
 ninja -C build/includes -t targets all | awk -F: '/\.cpp\.o:/ {print $1}' | sort |

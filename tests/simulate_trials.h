@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "robot_directory.h"
 #include "run_command.h"
 
 namespace bielle::testing {

@@ -6,6 +6,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
+#include "bielle/model/builder.h"
 #include "bielle/results/robot_info.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/adopt.h"

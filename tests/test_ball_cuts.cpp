@@ -7,6 +7,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/ball_cuts.h"
 #include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/builder.h"
 #include "bielle/motion/serial_model.h"
 #include "mechanisms.h"

@@ -1,4 +1,5 @@
 // Results as files: whole, read back, and refused with their place.
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>

@@ -21,16 +21,19 @@ import common
 DATA = common.HERE / "data/wait.csv"
 COLUMNS = ("commit", "step", "title", "processor", "clock", "run")
 RELEASE = "cmake --preset release -G Ninja >/dev/null && "
+# Files that are compiled without precompiled headers, since there are any.
+CHECK = "if [ -f scripts/check_includes.sh ]; then scripts/check_includes.sh; fi && "
 SANITIZED = "source scripts/setup.sh && eval \"$(sed -n '{}' .ci/run)\""
 # What runs once before and is not counted; what is counted, by its title.
 STEPS = {
     "demo": ("", {"`scripts/demo.sh`": "scripts/demo.sh"}),
     "test": ("", {"`scripts/test.sh`, building": "sed -i '/^run_tests/d' scripts/test.sh && scripts/test.sh",
                   "`scripts/test.sh`, testing": "source scripts/setup.sh && run_tests build/test"}),
-    "ci": ("", {"`.ci/run` after it: building with sanitizers": SANITIZED.format("/^bielle_targets=/,/^build/p"),
+    "ci": ("", {"`.ci/run` after it: building with sanitizers": CHECK + SANITIZED.format("/^bielle_targets=/,/^build/p"),
                 "`.ci/run` after it: testing with sanitizers": SANITIZED.format("/^run_tests build.sanitize/p")}),
     "edit": (RELEASE + "ninja -C build {target}",
-             {"one source of `motion` edited, its test built": "echo '// edited' >> src/motion/walk.cpp && ninja -C build {target}"}),
+             {"one source of `motion` edited, its test built and run":
+              "echo '// edited' >> src/motion/walk.cpp && ninja -C build {target} && ctest --test-dir build -R '^walk$'"}),
     "pip": ("python3 -m venv --system-site-packages environment",
             {"`pip install .` in a fresh virtual environment": "environment/bin/pip install --no-build-isolation ."}),
 }
