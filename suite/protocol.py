@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The protocol of docs/suite.md: every problem of the suite from perturbed guesses, by Bielle with each ingredient on and off.
 
-    suite/protocol.py DIR RUNS.jsonl [--count 100] [--seed 0] [--variants NAME ...] [--until HH:MM] [--bielle build/bin/bielle]
+    suite/protocol.py DIR RUNS.jsonl [--count 100] [--first 0] [--seed 0] [--variants NAME ...] [--until HH:MM]
+                      [--bielle build/bin/bielle]
 
 DIR is what `bielle dataset suite/suite.yaml -o DIR` wrote. A run is a line of RUNS.jsonl, appended when it is finished; those that
 are there are not repeated. Runs go guess by guess, so that what is cut off has as many guesses of every problem.
@@ -85,6 +86,7 @@ def main():
     parser.add_argument("runs", type=pathlib.Path)
     parser.add_argument("--bielle", default="bielle", help="the command")
     parser.add_argument("--count", type=int, default=100, help="guesses of each problem")
+    parser.add_argument("--first", type=int, default=0, help="of these guesses: those before it are left out")
     parser.add_argument("--seed", type=int, default=0, help="of the guesses")
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=VARIANTS, metavar="NAME",
                         help="some of: " + ", ".join(VARIANTS))
@@ -97,7 +99,7 @@ def main():
         done = {tuple(json.loads(line)[key] for key in ("problem", "variant", "seed", "guess"))
                 for line in arguments.runs.read_text(encoding="utf-8").splitlines()}
     with open(arguments.runs, "a", encoding="utf-8") as file:
-        for trial in range(arguments.count):
+        for trial in range(arguments.first, arguments.count):
             for entry in entries:
                 name = entry["name"]
                 missing = [variant for variant in arguments.variants if (name, variant, arguments.seed, trial) not in done]

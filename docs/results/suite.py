@@ -2,7 +2,8 @@
 """Writes docs/results/suite.md and docs/images/suite.svg: the suite of problems, and the protocol of docs/suite.md.
 
     docs/results/suite.py                                 the page from the tables in docs/results/data
-    docs/results/suite.py --record DIR RUNS.jsonl ...     takes them from the suite's data set and runs of the protocol first
+    docs/results/suite.py --record DIR RUNS.jsonl ...     takes them from the suite's data set and runs of the protocol first;
+                                                          of runs that are there already, the others stay
 
 `--quick` exports a small problem, has it read, and prints the page.
 """
@@ -59,15 +60,22 @@ def record(directory, runs, run):
                      f"{summary['constraints']['largest_violation']:.1e}", summary["iterations"],
                      f"{max(value for _, value, bound in found if bound == reader.TOLERANCE):.1e}"])
     write_table("suite_problems", run, PROBLEMS, rows)
-    lines = [json.loads(line) for path in runs for line in pathlib.Path(path).read_text(encoding="utf-8").splitlines()]
-    counts = collections.Counter((line["problem"], line["variant"]) for line in lines)
-    least = min(counts[row[0], variant] for row in rows for _, variant in counts)
-    kept = [line for line in lines if line["guess"] < least]  # as many guesses of every problem
-    write_table("suite_runs", run, RUNS, [[show_entry(line[key]) for key in RUNS] for line in kept])
+    before, known = read_table("suite_runs")
+    lines = [[show_entry(json.loads(line)[key]) for key in RUNS]
+             for path in runs for line in pathlib.Path(path).read_text(encoding="utf-8").splitlines()]
+    lines = {tuple(map(str, line[:4])): line for line in [*([row[key] for key in RUNS] for row in known), *lines]}
+    write_table("suite_runs", run if run in before else f"{before}; {run}", RUNS, lines.values())
 
 
 def show_entry(value):
     return "" if value is None else f"{value:.9g}" if isinstance(value, float) else value
+
+
+def keep_complete(runs):
+    """As many guesses of every problem by every variant."""
+    counts = collections.Counter((run["problem"], run["variant"]) for run in runs)
+    least = min(counts[problem, variant] for problem in {key[0] for key in counts} for variant in {key[1] for key in counts})
+    return [run for run in runs if int(run["guess"]) < least]
 
 
 def judge(runs):
@@ -128,7 +136,8 @@ def show_problem(name):
 
 def make_page(figure):
     run, problems = read_table("suite_problems")
-    _, runs = read_table("suite_runs")
+    machines, runs = read_table("suite_runs")
+    runs = keep_complete(runs)
     judge(runs)
     profiles, count = make_profiles(runs)
     page = common.Page(__file__, "The suite of problems with closed chains", run)
@@ -140,7 +149,7 @@ in the files, of costs, constraints, equations of motion, steps, loops and URDF;
     guesses = len({run["guess"] for run in runs})
     page.heading("From perturbed guesses")
     page.add(f"""{guesses} guesses of seed 0 for each problem, one thread, ended after 20 s of processor time at the latest. Times
-are processor times of the command, reading and writing included. The protocol asks for 100 guesses. A run succeeds if it
+are processor times of the command, reading and writing included ({machines}). The protocol asks for 100 guesses. A run succeeds if it
 converges, holds its constraints and costs at most one per cent more than the best one of its variant. *Solved within twice the
 time*: of the fastest variant for the same problem and guess, with success.""")
     rows = []

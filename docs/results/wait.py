@@ -2,8 +2,8 @@
 
     docs/results/wait.py --against REVISION [--steps demo edit ...] [--measure REVISION ...]
 
-Each step runs in a fresh clone, this commit's and the other's one after the other, and is a line of docs/results/data/wait.csv
-when it has ended; what is there for the same commit is not measured again. All steps of both take four hours of two cores; the page
+Each step runs in a fresh clone, this commit's and the other's one after the other, and adds lines to docs/results/data/wait.csv as
+its parts end; what is there for the same commit is not measured again. All steps of both take four hours of two cores; the page
 has the last rows of each step.
 """
 import argparse
@@ -54,7 +54,7 @@ def run(command, directory, log):
 
 
 def measure(step, revision, directory, log):
-    """[(title, minutes of processor, of clock), ...] in a fresh clone."""
+    """Yields (title, minutes of processor, of clock), in a fresh clone."""
     before, commands = STEPS[step]
     clone = pathlib.Path(directory) / revision[:12] / "clone"
     if not clone.exists():
@@ -66,7 +66,8 @@ def measure(step, revision, directory, log):
     target = "test_motion" if "test_${area}" in targets else "test_walk"
     if before:
         run(before.format(target=target), clone, log)
-    return [(title, *run(command.format(target=target), clone, log)) for title, command in commands.items()]
+    for title, command in commands.items():
+        yield title, *run(command.format(target=target), clone, log)
 
 
 def read():
@@ -84,6 +85,7 @@ def record(revision, step, measured):
             writer.writerow(COLUMNS)
         for title, processor, clock in measured:
             writer.writerow((revision[:12], step, title, f"{processor:.2f}", f"{clock:.2f}", common.describe_run(revision[:8])))
+            file.flush()
             print(title, f"{processor:.1f}, {clock:.1f} min", file=sys.stderr)
 
 
@@ -115,7 +117,7 @@ def main():
         os.chmod(directory, 0o755)  # a test runs the program as another user
         for step in arguments.steps:
             for revision in (here, there) if arguments.measure is None else map(parse, arguments.measure):
-                if not any(row["commit"] == revision[:12] and row["step"] == step for row in read()):
+                if not set(STEPS[step][1]) <= {row["title"] for row in read() if row["commit"] == revision[:12]}:
                     record(revision, step, measure(step, revision, directory, log))
     one, other = find(lambda row: row["commit"] != there[:12]), find(lambda row: row["commit"] == there[:12])
     page = common.Page(__file__, "The wait", "Each row names its commit, date and machine")
