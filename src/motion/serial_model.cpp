@@ -230,22 +230,6 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialM
   return out;
 }
 
-VectorXd restrictConfiguration(const Model& from, const Model& model, ConstVectorRef q) {
-  VectorXd out(model.nq());
-  forCommonJoints(from, model, [&](const Joint& source, const Joint& target) {
-    out.segment(target.idx_q, target.nq) = q.segment(source.idx_q, source.nq);
-  });
-  return out;
-}
-
-VectorXd restrictVelocity(const Model& from, const Model& model, ConstVectorRef v) {
-  VectorXd out(model.nv());
-  forCommonJoints(from, model, [&](const Joint& source, const Joint& target) {
-    out.segment(target.idx_v, target.nv) = v.segment(source.idx_v, source.nv);
-  });
-  return out;
-}
-
 std::vector<int> findRestrictedCoordinates(const Model& from, const Model& model) {
   std::vector<int> coordinates(model.nq());
   forCommonJoints(from, model, [&](const Joint& source, const Joint& target) {
@@ -260,6 +244,14 @@ std::vector<int> findRestrictedDofs(const Model& from, const Model& model) {
     std::iota(dofs.begin() + target.idx_v, dofs.begin() + target.idx_v + target.nv, source.idx_v);
   });
   return dofs;
+}
+
+VectorXd restrictConfiguration(const Model& from, const Model& model, ConstVectorRef q) {
+  return q(findRestrictedCoordinates(from, model));
+}
+
+VectorXd restrictVelocity(const Model& from, const Model& model, ConstVectorRef v) {
+  return v(findRestrictedDofs(from, model));
 }
 
 }  // namespace bielle
