@@ -34,8 +34,8 @@ STEPS = {
     "edit": (RELEASE + "ninja -C build {target}",
              {"one source of `motion` edited, its test built and run":
               "echo '// edited' >> src/motion/walk.cpp && ninja -C build {target} && ctest --test-dir build -R '^walk$'"}),
-    "pip": ("python3 -m venv --system-site-packages environment",
-            {"`pip install .` in a fresh virtual environment": "environment/bin/pip install --no-build-isolation ."}),
+    "pip": ("/usr/bin/python3 -m venv --system-site-packages environment",  # Debian's, which has NumPy
+            {"`pip install .` in a fresh virtual environment": "environment/bin/pip install ."}),
 }
 SUMS = {"`scripts/test.sh`": ["test"], "`.ci/run`": ["test", "ci"]}
 # Ratios that were aimed at.
