@@ -72,10 +72,12 @@ def show_entry(value):
 
 
 def keep_complete(runs):
-    """As many guesses of every problem by every variant."""
+    """As many guesses of every problem by every variant that has tried all problems."""
     counts = collections.Counter((run["problem"], run["variant"]) for run in runs)
-    least = min(counts[problem, variant] for problem in {key[0] for key in counts} for variant in {key[1] for key in counts})
-    return [run for run in runs if int(run["guess"]) < least]
+    problems = {problem for problem, _ in counts}
+    tried = {variant: min(counts[problem, variant] for problem in problems) for _, variant in counts}
+    least = min(count for count in tried.values() if count)
+    return [run for run in runs if tried[run["variant"]] and int(run["guess"]) < least]
 
 
 def judge(runs):
