@@ -46,11 +46,9 @@ def build_package(target: Path) -> None:
     parts = {"TESTS": "OFF", "EXAMPLES": "OFF", "BENCHMARKS": "OFF", "VALIDATION": "OFF", "SIMULATION": "OFF",
              "PYTHON": "ON"}  # fmt: skip
     options = [f"-DBIELLE_BUILD_{part}={value}" for part, value in parts.items()]
-    configure = ["cmake", "-S", str(ROOT), "-B", str(build), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
-                 "-DCMAKE_UNITY_BUILD=ON"]  # fmt: skip
-    python = [f"-DPython3_EXECUTABLE={sys.executable}", "-DBIELLE_PYTHON_DIR=."]
-    subprocess.run(configure + options + python, check=True)
-    subprocess.run(["cmake", "--build", str(build), "--target", "bielle_stubs"], check=True)
+    options += ["-DCMAKE_BUILD_TYPE=Release", f"-DPython3_EXECUTABLE={sys.executable}", "-DBIELLE_PYTHON_DIR=."]
+    program = 'set -euo pipefail; source "$0"; bielle_targets=(bielle_stubs); build "$@"'
+    subprocess.run(["bash", "-c", program, str(ROOT / "scripts" / "setup.sh"), str(build), *options], check=True)
     install = ["cmake", "--install", str(build), "--component", "python", "--strip"]
     subprocess.run(install + ["--prefix", str(target)], check=True)
 

@@ -1,6 +1,6 @@
 #!/bin/bash
 # check_includes.sh [--all]: compiles sources without precompiled headers, each by itself, so that a file that forgets an include
-# is noticed. Without --all it takes every twelfth file, other ones for each state of the tree. Needs build/test (scripts/test.sh).
+# is noticed. Without --all it takes every twelfth file, other ones for each state of the tree.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 cd "$bielle_root"

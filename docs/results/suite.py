@@ -2,8 +2,8 @@
 """Writes docs/results/suite.md and docs/images/suite.svg: the suite of problems, and the protocol of docs/suite.md.
 
     docs/results/suite.py                                 the page from the tables in docs/results/data
-    docs/results/suite.py --record DIR RUNS.jsonl ...     takes them from the suite's data set and runs of the protocol first;
-                                                          of runs that are there already, the others stay
+    docs/results/suite.py --record DIR RUNS.jsonl ...     first takes them from the suite's data set and adds runs of the
+                                                          protocol, which replace earlier runs of the same guesses
 
 `--quick` exports a small problem, has it read, and prints the page.
 """
@@ -138,7 +138,7 @@ def show_problem(name):
 
 def make_page(figure):
     run, problems = read_table("suite_problems")
-    machines, runs = read_table("suite_runs")
+    origin, runs = read_table("suite_runs")
     runs = keep_complete(runs)
     judge(runs)
     profiles, count = make_profiles(runs)
@@ -150,10 +150,10 @@ in the files, of costs, constraints, equations of motion, steps, loops and URDF;
                 "iterations", "reader"], [[show_problem(row["problem"]), *(row[key] for key in PROBLEMS[1:])] for row in problems])
     guesses = len({run["guess"] for run in runs})
     page.heading("From perturbed guesses")
-    page.add(f"""{guesses} guesses of seed 0 for each problem, one thread, ended after 20 s of processor time at the latest. Times
-are processor times of the command, reading and writing included ({machines}). The protocol asks for 100 guesses. A run succeeds if it
-converges, holds its constraints and costs at most one per cent more than the best one of its variant. *Solved within twice the
-time*: of the fastest variant for the same problem and guess, with success.""")
+    page.add(f"""{guesses} guesses of seed 0 for each problem, one thread, ended after 20 s of processor time at the latest
+({origin}). Times are processor times of the command, reading and writing included. The protocol asks for 100 guesses. A run
+succeeds if it converges, holds its constraints and costs at most one per cent more than the best one of its variant. *Solved within
+twice the time*: of the fastest variant for the same problem and guess, with success.""")
     rows = []
     for variant, ratios in profiles.items():
         ours = [run for run in runs if run["variant"] == variant]

@@ -2,9 +2,9 @@
 
     docs/results/wait.py --against REVISION [--steps demo edit ...] [--measure REVISION ...]
 
-Each step runs in a fresh clone, this commit's and the other's one after the other, and adds lines to docs/results/data/wait.csv as
-its parts end; what is there for the same commit is not measured again. All steps of both take four hours of two cores; the page
-has the last rows of each step.
+Each step runs in fresh clones, first of this commit, then of the other. Every part that ends adds a line to
+docs/results/data/wait.csv; what is there for the same commit is not measured again. All steps of both take four hours of two cores;
+the page has the last rows of each step.
 """
 import argparse
 import csv
@@ -21,7 +21,7 @@ import common
 DATA = common.HERE / "data/wait.csv"
 COLUMNS = ("commit", "step", "title", "processor", "clock", "run")
 RELEASE = "cmake --preset release -G Ninja >/dev/null && "
-# Files that are compiled without precompiled headers, since there are any.
+# Some commits also check that sources compile without precompiled headers.
 CHECK = "if [ -f scripts/check_includes.sh ]; then scripts/check_includes.sh; fi && "
 SANITIZED = "source scripts/setup.sh && eval \"$(sed -n '{}' .ci/run)\""
 # What runs once before and is not counted; what is counted, by its title.
@@ -38,7 +38,7 @@ STEPS = {
             {"`pip install .` in a fresh virtual environment": "environment/bin/pip install ."}),
 }
 SUMS = {"`scripts/test.sh`": ["test"], "`.ci/run`": ["test", "ci"]}
-# Ratios that were aimed at.
+# Largest ratios that were aimed at.
 GOALS = {"`scripts/demo.sh`": 0.4, "`scripts/test.sh`": 0.4, "`.ci/run`": 0.4,
          "one source of `motion` edited, its test built and run": 0.4, "`pip install .` in a fresh virtual environment": 0.5}
 
@@ -145,9 +145,8 @@ def main():
                  f"{one[title][0] / other[title][0]:.2f}", str(GOALS.get(title, "")), one[title][2])
                 for title in titles if title in one and title in other])
     sizes = {revision: count(revision) for revision in (there, here)}
-    page.add(f"""Ratios are those of processor times. {arguments.against} has {show_sizes(sizes[there])}; this has
-{show_sizes(sizes[here])}. Ratios above their goals come of that: what was added costs what was won. The time of a build is spread
-over all rooms (`scripts/build_times.py`).""")
+    page.add(f"""Ratios are those of processor times. Goals were set for what {arguments.against} builds and tests, which has
+{show_sizes(sizes[there])}; this has {show_sizes(sizes[here])}.""")
     page.write(False)
 
 
