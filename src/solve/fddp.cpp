@@ -142,7 +142,7 @@ FddpSolve::End FddpSolve::updateMultipliers() {
 // The accepted trial, if there is one, is left in accepted_.
 FddpSolve::End FddpSolve::searchLine() {
   const int segments = getNumSegments();
-  if (segments > 1 && first_step_ == 1) {
+  if (segments > 1 && last_step_ == 1 && first_step_ == 1) {
     if (tryFullStep(segments) || tryShorterStep(segments)) return {};
     if (const End end = tryHolding(segments)) return end;
     if (accepted_) return {};
