@@ -112,7 +112,7 @@ FddpSolve::End FddpSolve::findStep() {
 // ended at their minimum, which with bounds of controls or regularization it does not.
 bool FddpSolve::hasSettledMerit() const {
   const AugmentedLagrangian& lagrangian = memory_.lagrangian;
-  const bool newton = memory_.boxes.empty() && regularization_ <= options_.min_regularization;
+  const bool newton = memory_.boxes.empty() && !isDamped();
   return model_error_ && newton && lagrangian.canSettle() && !lagrangian.isSatisfied() &&
          lagrangian.isDue(*model_error_);
 }
@@ -143,9 +143,12 @@ FddpSolve::End FddpSolve::updateMultipliers() {
 FddpSolve::End FddpSolve::searchLine() {
   const int segments = getNumSegments();
   if (segments > 1 && last_step_ == 1 && first_step_ == 1) {
-    if (tryFullStep(segments) || tryShorterStep(segments)) return {};
-    if (const End end = tryHolding(segments)) return end;
-    if (accepted_) return {};
+    if (tryFullStep(segments)) return {};
+    if (!isDamped()) {
+      if (tryShorterStep(segments)) return {};
+      if (const End end = tryHolding(segments)) return end;
+      if (accepted_) return {};
+    }
   }
   searchInOnePiece(startSearch());
   return {};
@@ -177,7 +180,7 @@ bool FddpSolve::tryShorterStep(int segments) {
 FddpSolve::End FddpSolve::tryHolding(int segments) {
   AugmentedLagrangian& lagrangian = memory_.lagrangian;
   const Trial& trial = memory_.rollout.getTrial(0);
-  if (mustClose() || !lagrangian.canSettle() || regularization_ > first_regularization_) return {};
+  if (mustClose() || !lagrangian.canSettle()) return {};
   const Foreseen plain = foreseen_;
   const double gradient = line_.gradient;
   double last_error = -foreseen_.calcChange(trial.alpha) - calcReal(trial);
@@ -206,13 +209,8 @@ FddpSolve::End FddpSolve::sweepAgain() {
   return updateStep();
 }
 
-// Whether the step must close the gaps: the last one allowed, and one after which the gradient vanishes, unless multipliers will
-// move the optimum again.
-bool FddpSolve::mustClose() const {
-  const AugmentedLagrangian& lagrangian = memory_.lagrangian;
-  const bool will_move = lagrangian.canSettle() && !lagrangian.isSatisfied();
-  return closing_ || line_.iteration >= max_iterations_ || (vanishesNext() && !will_move);
-}
+// Whether the step must close the gaps: the last one allowed, and the one after which the gradient vanishes.
+bool FddpSolve::mustClose() const { return closing_ || line_.iteration >= max_iterations_ || vanishesNext(); }
 
 // Whether a full step in segments, after another one, makes too little of what is foreseen. The merit of Eq. (4) counts the
 // gaps of both steps differently: before, by what closing them takes of the foreseen decrease, after, by Eq. (8). Here both

@@ -80,6 +80,7 @@ class FddpIterations {
   bool isInterrupted() const { return observer_.interrupt && observer_.interrupt->load(); }
   // \param shortest  stages
   int getNumSegments(int shortest = 6) const { return std::max(1, std::min(options_.rollout_segments, N_ / shortest)); }
+  bool isDamped() const { return regularization_ > options_.min_regularization; }
   bool isClosed() const { return line_.gap <= options_.gap_tolerance; }
   bool isStationary() const { return isClosed() && (stalled_ || line_.gradient <= options_.gradient_tolerance); }
   const EvaluationList& getIterate() const { return memory_.evaluations.getIterate(); }
