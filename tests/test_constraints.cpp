@@ -219,29 +219,6 @@ TEST_CASE("constraints: a quadratic program has the solution of its dense condit
   CHECK((poisoned.head(n) - u_solver).lpNorm<Eigen::Infinity>() > 1e-4);
 }
 
-TEST_CASE("constraints: rows that a full step would violate are held, and no step on a quadratic program is short") {
-  Constrained<PlantProblem<Linear>> problem(makeLinear());
-  const int N = problem.stages;
-  problem.rows.push_back({"speed", 1, N, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
-  problem.rows.push_back({"mix", 3, 9, -kFree, 0.8, [](const Complex* x, const Complex* u) { return u[1] - x[2]; }});
-  FddpOptions options = makeTightOptions();
-  options.constraints.initial_penalty = 1e3;
-  double cost = 0;
-  for (const int segments : {16, 1}) {  // rows are held after steps in segments alone
-    options.rollout_segments = segments;
-    const FddpSummary summary = solve(problem, makeGuess(problem), options).summary;
-    double shortest = 1;
-    for (const FddpIteration& line : summary.log)
-      if (line.step > 0) shortest = std::min(shortest, line.step);
-    CAPTURE(segments, summary.message, summary.iterations);
-    REQUIRE(summary.termination == FddpTermination::Converged);
-    CHECK((shortest == 1) == (segments > 1));
-    CHECK(summary.iterations < (segments > 1 ? 8 : 40));
-    if (segments > 1) cost = summary.cost;
-    CHECK(summary.cost == Approx(cost).epsilon(1e-9));
-  }
-}
-
 TEST_CASE("constraints: with bounds on the control they hold together") {
   auto problem = makeBoundedCartPole();
   problem.rows.erase(problem.rows.begin() + 1);  // the push

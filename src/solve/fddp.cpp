@@ -1,7 +1,6 @@
 #include "bielle/solve/fddp.h"
 
 #include <cmath>
-#include <utility>
 
 #include "solve/fddp_checks.h"
 #include "solve/fddp_solve.h"
@@ -11,9 +10,6 @@ namespace bielle {
 namespace {
 
 constexpr double kGoodStep = 0.1;       // alpha after which a foreseen decrease is believed
-constexpr int kHoldings = 5;            // times that rows are held, at most, after a full step has violated them
-constexpr double kBetter = 0.5;         // ratio to which each should reduce the errors of models
-constexpr double kShortest = 0.4;       // alpha of a step in segments after a full one that went too far
 constexpr int kSettling = 30;           // steps that settle() takes, at most
 constexpr double kSettlingFactor = 10;  // of the regularization, between these steps
 
@@ -48,11 +44,7 @@ FddpSolve::End FddpSolve::linearize() {
   if (const End end = evaluate()) return end;
   if (!memory_.lagrangian.canSettle()) settling_ = 0;  // what minimizes violations alone may move far
   if (settling_ == 0 && isCreeping()) settling_ = kSettling;
-  if (settling_ > 0) {
-    settle();
-  } else if (hasSettledMerit()) {
-    updateMultipliers();  // now, so that this iterate is linearized once
-  }
+  if (settling_ > 0) settle();
   return updateModels();
 }
 
@@ -102,19 +94,9 @@ FddpSolve::End FddpSolve::findStep() {
       if (const End end = updateMultipliers()) return end;
       continue;
     }
-    if (const End end = searchLine()) return end;
-    if (accepted_ && (accepted_->alpha == 1 || !isRounding())) return {};
+    if (searchLine() && (accepted_->alpha == 1 || !isRounding())) return {};
     if (const End end = raiseRegularizationOrStall()) return end;
   }
-}
-
-// Whether the next full step will hardly decrease the merit: models were wrong about the last one by so little. That one must have
-// ended at their minimum, which with bounds of controls or regularization it does not.
-bool FddpSolve::hasSettledMerit() const {
-  const AugmentedLagrangian& lagrangian = memory_.lagrangian;
-  const bool newton = memory_.boxes.empty() && !isDamped();
-  return model_error_ && newton && lagrangian.canSettle() && !lagrangian.isSatisfied() &&
-         lagrangian.isDue(*model_error_);
 }
 
 // New multipliers are due once the cost can hardly fall under the old ones.
@@ -139,74 +121,20 @@ FddpSolve::End FddpSolve::updateMultipliers() {
   return {};
 }
 
-// The accepted trial, if there is one, is left in accepted_.
-FddpSolve::End FddpSolve::searchLine() {
+bool FddpSolve::searchLine() {
+  const RolloutInput input = startSearch();
   const int segments = getNumSegments();
-  if (segments > 1 && last_step_ == 1 && first_step_ == 1) {
-    if (tryFullStep(segments)) return {};
-    if (!isDamped()) {
-      if (tryShorterStep(segments)) return {};
-      if (const End end = tryHolding(segments)) return end;
-      if (accepted_) return {};
-    }
-  }
-  searchInOnePiece(startSearch());
-  return {};
+  if (segments > 1 && last_step_ == 1 && first_step_ == 1 && tryFullStep(input, segments)) return true;
+  return searchInOnePiece(input);
 }
 
 // A full step in segments, which start where linear models predict them. If it is rejected, a rollout in one piece may
 // still succeed.
-bool FddpSolve::tryFullStep(int segments) {
-  const RolloutInput input = startSearch();
+bool FddpSolve::tryFullStep(const RolloutInput& input, int segments) {
   if (mustClose()) return tryClosed(input, segments);
   Trial& trial = memory_.rollout.getTrial(0);
   memory_.rollout.cut(input, 1, segments);
   return !isOvershooting(trial) && accept(trial);
-}
-
-// A step in segments to the least merit on a parabola through the full one, if that has gone too far because models are too flat.
-// (Rows that it has violated tell of far shorter ones.)
-bool FddpSolve::tryShorterStep(int segments) {
-  Trial& trial = memory_.rollout.getTrial(0);
-  if (mustClose() || !trial.ok) return false;
-  const double alpha = findMinimum(trial);
-  if (alpha < kShortest || alpha >= 1) return false;
-  memory_.rollout.cut(startSearch(), alpha, segments);
-  return accept(trial);
-}
-
-// Full steps by models in which the rows that the rejected one has violated are held at their bounds, Eq. (15). Rows that such a step
-// leaves inside are released again, unless that has led astray. Gives up where the models are wrong for other reasons.
-FddpSolve::End FddpSolve::tryHolding(int segments) {
-  AugmentedLagrangian& lagrangian = memory_.lagrangian;
-  const Trial& trial = memory_.rollout.getTrial(0);
-  if (mustClose() || !lagrangian.canSettle()) return {};
-  const Foreseen plain = foreseen_;
-  const double gradient = line_.gradient;
-  double last_error = -foreseen_.calcChange(trial.alpha) - calcReal(trial);
-  bool holds = false, keep = false;
-  for (int i = 0; i < kHoldings && trial.ok; ++i) {
-    if (!lagrangian.holdViolated(getIterate(), memory_.evaluations.trial(), keep)) break;
-    holds = true;
-    if (const End end = sweepAgain()) return end;
-    line_.gradient = gradient;  // that of the merit
-    foreseen_.excess = lagrangian.excess();
-    const double foreseen = calcForeseen();
-    if (foreseen <= 0) foreseen_ = plain;  // a step that promises nothing must do what the plain one did not
-    if (tryFullStep(segments)) return {};
-    const double error = foreseen - calcReal(trial);
-    if (error > kBetter * last_error && std::exchange(keep, true)) break;
-    last_error = error;
-  }
-  if (!holds) return {};
-  lagrangian.evaluate(getIterate());
-  return sweepAgain();
-}
-
-// About the same evaluations, with new weights of constraints.
-FddpSolve::End FddpSolve::sweepAgain() {
-  swept_ = false;
-  return updateStep();
 }
 
 // Whether the step must close the gaps: the last one allowed, and the one after which the gradient vanishes.

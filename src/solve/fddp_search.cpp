@@ -1,5 +1,4 @@
 #include <cmath>
-#include <limits>
 
 #include "solve/fddp_iterations.h"
 
@@ -37,8 +36,7 @@ double FddpIterations::calcRounding() const {
 }
 
 RolloutInput FddpIterations::startSearch() {
-  accepted_ = nullptr;
-  const double penalized = std::max(0.0, foreseen_.slope + 0.5 * std::max(0.0, foreseen_.curvature) + foreseen_.excess);
+  const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
   gap_weight_ = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
   return {problem_,
           trajectory_,
@@ -80,12 +78,6 @@ bool FddpIterations::tryClosed(const RolloutInput& input, int segments) {
   return closes() && accept(trial);
 }
 
-// alpha of the least merit on the parabola that has the slope of Eq. (1) and meets the trial.
-double FddpIterations::findMinimum(const Trial& trial) const {
-  const double alpha = trial.alpha, bend = -2 * (calcReal(trial) + alpha * foreseen_.slope);
-  return bend > 0 ? -foreseen_.slope * alpha * alpha / bend : std::numeric_limits<double>::infinity();
-}
-
 bool FddpIterations::accept(Trial& trial) {
   if (!trial.ok && failure_.empty() && trial.failed_node >= 0) {
     failed_node_ = trial.failed_node;
@@ -98,8 +90,8 @@ bool FddpIterations::accept(Trial& trial) {
 // Whether the merit of a trial has fallen enough, Eqs. (4) and (8).
 bool FddpIterations::isAcceptable(const Trial& trial) const {
   const double alpha = trial.alpha;
-  const double foreseen = -foreseen_.calcChange(alpha) + gap_weight_ * alpha * gap_sum_;
-  const double real = calcReal(trial) + gap_weight_ * (gap_sum_ - trial.gap_sum);
+  const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + gap_weight_ * alpha * gap_sum_;
+  const double real = calcMerit() - trial.merit - trial.closing_cost + gap_weight_ * (gap_sum_ - trial.gap_sum);
   const double rounding = calcRounding();
   const double decrease = std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation
   return real >= options_.acceptance * decrease - rounding &&

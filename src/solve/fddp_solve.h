@@ -21,14 +21,10 @@ class FddpSolve : private FddpIterations {
   bool isCreeping() const;
   void settle();
   End findStep();
-  bool hasSettledMerit() const;
   bool mustUpdateMultipliers() const;
   End updateMultipliers();
-  End searchLine();
-  bool tryFullStep(int segments);
-  bool tryShorterStep(int segments);
-  End tryHolding(int segments);
-  End sweepAgain();
+  bool searchLine();
+  bool tryFullStep(const RolloutInput& input, int segments);
   bool mustClose() const;
   bool isOvershooting(const Trial& trial) const;
 
