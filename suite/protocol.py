@@ -86,7 +86,7 @@ def main():
     parser.add_argument("runs", type=pathlib.Path)
     parser.add_argument("--bielle", default="bielle", help="the command")
     parser.add_argument("--count", type=int, default=100, help="guesses of each problem, those before --first included")
-    parser.add_argument("--first", type=int, default=0, help="guess to begin with; --count counts from 0")
+    parser.add_argument("--first", type=int, default=0, help="first guess to run")
     parser.add_argument("--seed", type=int, default=0, help="of the guesses")
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=VARIANTS, metavar="NAME",
                         help="some of: " + ", ".join(VARIANTS))
