@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The protocol of docs/suite.md: every problem of the suite from perturbed guesses, by Bielle with each ingredient on and off.
 
-    suite/protocol.py DIR RUNS.jsonl [--count 100] [--first 0] [--seed 0] [--variants NAME ...] [--until HH:MM]
+    suite/protocol.py DIR RUNS.jsonl [--guesses 0:100] [--seed 0] [--variants NAME ...] [--until HH:MM]
                       [--bielle build/bin/bielle]
 
 DIR is what `bielle dataset suite/suite.yaml -o DIR` wrote. A run is a line of RUNS.jsonl, appended when it is finished; those that
@@ -12,6 +12,7 @@ import datetime
 import json
 import os
 import pathlib
+import re
 import resource
 import signal
 import subprocess
@@ -34,6 +35,13 @@ VARIANTS = {
     "no multipliers": ["--no-multipliers"],
     "no margin to dead points": ["--dead-point-margin", "0"],
 }
+
+
+def parse_guesses(text):
+    match = re.fullmatch(r"(\d+):(\d+)", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"{text} is not FIRST:END, such as 25:50")
+    return range(int(match[1]), int(match[2]))
 
 
 def write_guess(directory, solved, guess):
@@ -85,8 +93,8 @@ def main():
     parser.add_argument("directory", type=pathlib.Path)
     parser.add_argument("runs", type=pathlib.Path)
     parser.add_argument("--bielle", default="bielle", help="the command")
-    parser.add_argument("--count", type=int, default=100, help="guesses of each problem, those before --first included")
-    parser.add_argument("--first", type=int, default=0, help="first guess to run")
+    parser.add_argument("--guesses", type=parse_guesses, default="0:100", metavar="FIRST:END",
+                        help="numbers of the guesses of each problem, END excluded; 0:100 by default")
     parser.add_argument("--seed", type=int, default=0, help="of the guesses")
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=VARIANTS, metavar="NAME",
                         help="some of: " + ", ".join(VARIANTS))
@@ -99,7 +107,7 @@ def main():
         done = {tuple(json.loads(line)[key] for key in ("problem", "variant", "seed", "guess"))
                 for line in arguments.runs.read_text(encoding="utf-8").splitlines()}
     with open(arguments.runs, "a", encoding="utf-8") as file:
-        for trial in range(arguments.first, arguments.count):
+        for trial in arguments.guesses:
             for entry in entries:
                 name = entry["name"]
                 missing = [variant for variant in arguments.variants if (name, variant, arguments.seed, trial) not in done]

@@ -1,11 +1,11 @@
 # Runs every command of the pages as a reader would and compares its output; compares programs with the examples.
 set(pages tutorial tutorial_walker modelling springs signs new_robot parts formats motions objectives constraints linkages checks
-  execution datasets problems suite ten_results free_motions speed design design_reference new_controller on_a_robot installing)
+  execution datasets problems suite ten_results free_motions speed design_reference new_controller on_a_robot installing)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()
 if(PAGMO_LIBRARY AND PAGMO_INCLUDE_DIR)
-  list(APPEND pages design_fronts)
+  list(APPEND pages design)
 endif()
 get_property(writes_mcap GLOBAL PROPERTY BIELLE_WRITES_MCAP)
 if(writes_mcap)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes docs/results/design.md and docs/images/design_front.svg: the front of docs/design_fronts.md, by two searches.
+"""Writes docs/results/design.md and docs/images/design_front.svg: the front of docs/design.md, by two searches.
 
     docs/results/design.py [--bielle build/bin/bielle] [--quick]
 
-Reads the specification two.yaml from docs/design_fronts.md. The longer search takes a few minutes of processor time.
+Reads the specification two.yaml from docs/design.md. The longer search takes a few minutes of processor time.
 """
 import json
 import pathlib
@@ -19,7 +19,7 @@ KNEES = ("four_bar", "belt", "serial")  # choices in the order of the specificat
 
 
 def read_specification():
-    guide = (common.SOURCE / "docs/design_fronts.md").read_text(encoding="utf-8")
+    guide = (common.SOURCE / "docs/design.md").read_text(encoding="utf-8")
     return re.search(r"cat > two.yaml <<'END'\n(.*?)END\n", guide, re.DOTALL)[1]
 
 
@@ -74,7 +74,7 @@ def main():
     arguments = common.make_parser(__doc__).parse_args()
     runner = common.Runner(arguments.bielle)
     page = common.Page(__file__, "A front of two sizes", common.describe_run(arguments.commit))
-    page.add("""The specification `two.yaml` of the [guide](../design_fronts.md), as it is there and with more designs, finer
+    page.add("""The specification `two.yaml` of the [guide](../design.md), as it is there and with more designs, finer
 stages and a walk of six steps.""")
     text = read_specification()
     add_search(page, "Short", search(runner, text))
