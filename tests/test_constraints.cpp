@@ -219,6 +219,35 @@ TEST_CASE("constraints: a quadratic program has the solution of its dense condit
   CHECK((poisoned.head(n) - u_solver).lpNorm<Eigen::Infinity>() > 1e-4);
 }
 
+TEST_CASE("constraints: near the solution, no step on a quadratic program is short") {
+  const auto makeProblem = [](double inside) {
+    Constrained<PlantProblem<Linear>> problem(makeLinear());
+    const auto getSpeed = [](const Complex* x, const Complex*) { return x[1] + x[2]; };
+    problem.rows.push_back({"speed", 1, problem.stages, -0.4 + inside, kFree, getSpeed});
+    problem.rows.push_back(
+        {"mix", 3, 9, -kFree, 0.8 - inside, [](const Complex* x, const Complex* u) { return u[1] - x[2]; }});
+    return problem;
+  };
+  FddpOptions options = makeTightOptions();
+  options.constraints.initial_penalty = 1e3;
+  const auto tighter = makeProblem(0.02), problem = makeProblem(0);
+  const ShootingTrajectory start = solve(tighter, makeGuess(tighter), options).trajectory;
+  double cost = 0;
+  for (const int segments : {16, 1}) {  // rows are held after steps in segments alone
+    options.rollout_segments = segments;
+    const FddpSummary summary = solve(problem, start, options).summary;
+    double shortest = 1;
+    for (const FddpIteration& line : summary.log)
+      if (line.step > 0) shortest = std::min(shortest, line.step);
+    CAPTURE(segments, summary.message, summary.iterations);
+    REQUIRE(summary.termination == FddpTermination::Converged);
+    CHECK((shortest == 1) == (segments > 1));
+    CHECK(summary.iterations < (segments > 1 ? 8 : 40));
+    if (segments > 1) cost = summary.cost;
+    CHECK(summary.cost == Approx(cost).epsilon(1e-9));
+  }
+}
+
 TEST_CASE("constraints: with bounds on the control they hold together") {
   auto problem = makeBoundedCartPole();
   problem.rows.erase(problem.rows.begin() + 1);  // the push

@@ -18,6 +18,7 @@ constexpr double kHalf = 0.5;   // the same by a step of settle()
 constexpr double kNear = 0.03, kNearPenalty = 1e3;  // the latter over the initial penalty, at most
 // Foreseen decrease over the gain of new multipliers at which they are due; and while violations alone are minimized.
 constexpr double kShare = 0.1, kRestorationShare = 1e-6;
+constexpr double kFirst = 2;  // share of a step up to which bounds are met first, over the least one
 // Penalty times squared violations over the cost, while violations alone are minimized.
 constexpr double kRestorationWeight = 1e6;
 constexpr double kDominance = 100;  // the same ratio, from which on the least violations are known to a per cent
@@ -79,6 +80,57 @@ void AugmentedLagrangian::evaluate(const EvaluationList& iterate) {
 void AugmentedLagrangian::hold(const EvaluationList& iterate) {
   holds_ = true;
   measure(iterate);
+}
+
+template <class Visit>
+void AugmentedLagrangian::visitInequalities(const EvaluationList& iterate, const EvaluationList& trial,
+                                            const Visit& visit) {
+  for (size_t k = 0; k < nodes_.size(); ++k) {
+    Node& node = nodes_[k];
+    const VectorXd &c = iterate[k]->constraints, &c_trial = trial[k]->constraints;
+    for (Eigen::Index i = 0; i < node.lower.size(); ++i) {
+      if (node.lower[i] == node.upper[i]) continue;
+      const double violation = calcDistance(node, i, c_trial[i]), z = c[i] + node.multipliers[i] / penalty_;
+      const double d = z - (violation > 0 ? node.upper : node.lower)[i];
+      visit(node.weights.gradient[i], node.weights.hessian[i], d, violation, calcDistance(node, i, c[i]));
+    }
+  }
+}
+
+bool AugmentedLagrangian::holdViolated(const EvaluationList& iterate, const EvaluationList& trial, bool keep) {
+  const auto findShare = [](double d, double violation) { return std::max(0.0, d / (d - violation)); };
+  double first = std::numeric_limits<double>::infinity();
+  visitInequalities(iterate, trial, [&](double&, double& hessian, double d, double violation, double) {
+    if (violation != 0 && hessian == 0) first = std::min(first, findShare(d, violation));
+  });
+  bool changes = false;
+  at_.excess = 0;
+  visitInequalities(iterate, trial, [&](double& gradient, double& hessian, double d, double violation, double before) {
+    const bool held = hessian != 0;
+    if (!keep || !held) {
+      const bool holds = violation != 0 && (!keep || findShare(d, violation) <= kFirst * first);
+      changes |= holds != held;
+      gradient = holds ? penalty_ * d : 0;
+      hessian = holds ? penalty_ : 0;
+    }
+    at_.excess += 0.5 * (gradient * gradient / penalty_ - penalty_ * before * before);
+  });
+  return changes;
+}
+
+double AugmentedLagrangian::calcKinks(const EvaluationList& iterate, const EvaluationList& trial) const {
+  double kinks = 0;
+  for (size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    const VectorXd &c = iterate[k]->constraints, &c_trial = trial[k]->constraints;
+    for (Eigen::Index i = 0; i < node.lower.size(); ++i) {
+      if (node.lower[i] == node.upper[i]) continue;
+      const double real = calcDistance(node, i, c_trial[i]);
+      const double held = node.weights.hessian[i] != 0 ? node.weights.gradient[i] / penalty_ + c_trial[i] - c[i] : 0;
+      kinks += 0.5 * penalty_ * (real * real - held * held);
+    }
+  }
+  return kinks;
 }
 
 void AugmentedLagrangian::measure(const EvaluationList& iterate) {

@@ -37,6 +37,14 @@ class AugmentedLagrangian {
   bool updateMultipliers(const EvaluationList& iterate, double cost);
   /// Holds the rows that have a multiplier at their bounds (receding.h, Eq. 14) until the next evaluate().
   void hold(const EvaluationList& iterate);
+  /// Holds the inequalities that a trial violates at the bounds that they violate there, and no others, Eq. (15): in the weights
+  /// alone, and until the next evaluate(). Returns whether they are others than before.
+  /// \param keep  those that are held, and add only the ones that a step towards the trial violates first
+  bool holdViolated(const EvaluationList& iterate, const EvaluationList& trial, bool keep);
+  /// What inequalities add to the value of a trial beyond what those that the weights hold add, as if they were equations.
+  double calcKinks(const EvaluationList& iterate, const EvaluationList& trial) const;
+  /// What these weights make of the iterate beyond getValue().
+  double excess() const { return at_.excess; }
   /// Minimizes the violations alone from now on, as updateMultipliers() does in the end. False if that was so already.
   bool restore(const EvaluationList& iterate, double cost);
   /// Whether settle() makes sense: violations are not minimized on their own.
@@ -69,11 +77,15 @@ class AugmentedLagrangian {
     double value = 0, violation = 0, complementarity = 0;
     double gain = 0;     // increase of `value` by Eq. (12), to first order: |y+ - y|^2 / (2 rho)
     double squares = 0;  // sum of the squared violations
+    double excess = 0;   // rho/2 times the sum of the squares of Eq. (15) less those of Eq. (10)
     int worst_node = 0, worst_row = 0;
   };
   bool isHeld(const Node& node, Eigen::Index row) const { return holds_ && node.multipliers[row] != 0; }
   double calcDistance(const Node& node, Eigen::Index row, double c) const;  // d of Eq. (10) or (14)
   double calcContribution(double d, double multiplier) const;
+  // visit(gradient, Hessian, d of Eq. (15), those of Eq. (10) in the trial and at the iterate) for all inequalities.
+  template <class Visit>
+  void visitInequalities(const EvaluationList& iterate, const EvaluationList& trial, const Visit& visit);
   void startRestoration(double cost);
   void measure(const EvaluationList& iterate);
 

@@ -1,6 +1,7 @@
 #include "bielle/solve/fddp.h"
 
 #include <cmath>
+#include <utility>
 
 #include "solve/fddp_checks.h"
 #include "solve/fddp_solve.h"
@@ -9,7 +10,12 @@ namespace bielle {
 
 namespace {
 
-constexpr double kGoodStep = 0.1;       // alpha after which a foreseen decrease is believed
+constexpr double kGoodStep = 0.1;   // alpha after which a foreseen decrease is believed
+constexpr int kHoldings = 5;        // times that rows are held, at most, after a full step has violated them
+constexpr int kDampedHoldings = 2;  // the same with a raised regularization
+constexpr double kMuch = 0.1;    // regularization up to which full steps are tried that hold rows, before shorter ones
+constexpr double kBetter = 0.5;  // ratio to which each should reduce the errors of models
+constexpr double kShortest = 0.4;       // alpha of a step in segments after a full one that went too far
 constexpr int kSettling = 30;           // steps that settle() takes, at most
 constexpr double kSettlingFactor = 10;  // of the regularization, between these steps
 
@@ -44,7 +50,11 @@ FddpSolve::End FddpSolve::linearize() {
   if (const End end = evaluate()) return end;
   if (!memory_.lagrangian.canSettle()) settling_ = 0;  // what minimizes violations alone may move far
   if (settling_ == 0 && isCreeping()) settling_ = kSettling;
-  if (settling_ > 0) settle();
+  if (settling_ > 0) {
+    settle();
+  } else if (hasSettledMerit()) {
+    updateMultipliers();  // now, so that this iterate is linearized once
+  }
   return updateModels();
 }
 
@@ -94,9 +104,20 @@ FddpSolve::End FddpSolve::findStep() {
       if (const End end = updateMultipliers()) return end;
       continue;
     }
-    if (searchLine() && (accepted_->alpha == 1 || !isRounding())) return {};
+    if (const End end = searchLine()) return end;
+    if (renewed_) continue;
+    if (accepted_ && (accepted_->alpha == 1 || !isRounding())) return {};
     if (const End end = raiseRegularizationOrStall()) return end;
   }
+}
+
+// Whether the next full step will hardly decrease the merit: models were wrong about the last one by so little. That one must have
+// ended at their minimum, which with bounds of controls or regularization it does not.
+bool FddpSolve::hasSettledMerit() const {
+  const AugmentedLagrangian& lagrangian = memory_.lagrangian;
+  const bool newton = memory_.boxes.empty() && !isDamped();
+  return model_error_ && newton && lagrangian.canSettle() && !lagrangian.isSatisfied() &&
+         lagrangian.isDue(*model_error_);
 }
 
 // New multipliers are due once the cost can hardly fall under the old ones.
@@ -121,24 +142,100 @@ FddpSolve::End FddpSolve::updateMultipliers() {
   return {};
 }
 
-bool FddpSolve::searchLine() {
-  const RolloutInput input = startSearch();
+// Leaves the accepted trial in accepted_, or renewed_ set. Where constraints and gaps are small, full steps that violate rows are
+// cheaper by holding these rows or by more regularization than a shorter one in one piece. Where the cost hardly changes either, shorter
+// steps may be taken in segments, since nothing moves far.
+FddpSolve::End FddpSolve::searchLine() {
   const int segments = getNumSegments();
-  if (segments > 1 && last_step_ == 1 && first_step_ == 1 && tryFullStep(input, segments)) return true;
-  return searchInOnePiece(input);
+  const bool near = line_.violation < kClose && line_.gap <= kClose;
+  const bool settles = near && calcForeseen() <= kClose * std::abs(line_.cost);
+  renewed_ = false;
+  if (segments > 1 && (last_step_ == 1 || settles) && first_step_ == 1) {
+    if (tryFullStep(segments)) return {};
+    if (settles && tryShorterStep(segments)) return {};
+    if (near && hasViolatedFreeRows()) {
+      if (const End end = tryHolding(segments)) return end;
+      if (accepted_ || renewed_ || regularization_ < kMuch) return {};
+    }
+  }
+  searchInOnePiece(startSearch());
+  return {};
 }
 
 // A full step in segments, which start where linear models predict them. If it is rejected, a rollout in one piece may
 // still succeed.
-bool FddpSolve::tryFullStep(const RolloutInput& input, int segments) {
+bool FddpSolve::tryFullStep(int segments) {
+  const RolloutInput input = startSearch();
   if (mustClose()) return tryClosed(input, segments);
   Trial& trial = memory_.rollout.getTrial(0);
   memory_.rollout.cut(input, 1, segments);
   return !isOvershooting(trial) && accept(trial);
 }
 
-// Whether the step must close the gaps: the last one allowed, and the one after which the gradient vanishes.
-bool FddpSolve::mustClose() const { return closing_ || line_.iteration >= max_iterations_ || vanishesNext(); }
+// A step in segments to the least merit on a parabola through the full one, if that has gone too far because models are too flat.
+// (Rows that it has violated tell of far shorter ones.)
+bool FddpSolve::tryShorterStep(int segments) {
+  Trial& trial = memory_.rollout.getTrial(0);
+  if (mustClose() || !trial.ok) return false;
+  const double alpha = findMinimum(trial);
+  if (alpha < kShortest || alpha >= 1) return false;
+  memory_.rollout.cut(startSearch(), alpha, segments);
+  return accept(trial);
+}
+
+// Whether the models are wrong about the last trial because of the rows that it violates although they are free in them.
+bool FddpSolve::hasViolatedFreeRows() {
+  const Trial& trial = memory_.rollout.getTrial(0);
+  if (!trial.ok || !memory_.lagrangian.canSettle()) return false;
+  const double error = calcModelError(trial);
+  return error > 0 && memory_.lagrangian.calcKinks(getIterate(), memory_.evaluations.trial()) > kBetter * error;
+}
+
+// Full steps by models in which the rows that the rejected one has violated are held at their bounds, Eq. (15). Rows that such a step
+// leaves inside are released again, unless that has led astray.
+FddpSolve::End FddpSolve::tryHolding(int segments) {
+  AugmentedLagrangian& lagrangian = memory_.lagrangian;
+  const Trial& trial = memory_.rollout.getTrial(0);
+  const Foreseen plain = foreseen_;
+  const double gradient = line_.gradient;
+  const int holdings = regularization_ > first_regularization_ ? kDampedHoldings : kHoldings;
+  double last_error = calcModelError(trial), last_foreseen = calcForeseen();
+  bool keep = false;
+  for (int i = 0; i < holdings && trial.ok; ++i) {
+    if (!lagrangian.holdViolated(getIterate(), memory_.evaluations.trial(), keep)) {
+      // These are the rows that a step to the minimum violates. If it promises little, then the merit is at its minimum.
+      renewed_ = i > 0 && !updated_ && lagrangian.isDue(last_foreseen);
+      break;
+    }
+    if (const End end = sweepAgain()) return end;
+    line_.gradient = gradient;  // that of the merit
+    foreseen_.excess = lagrangian.excess();
+    const double foreseen = calcForeseen();
+    if (foreseen <= 0) foreseen_ = plain;  // a step that promises nothing must do what the plain one did not
+    if (tryFullStep(segments)) return {};
+    const double error = foreseen - calcReal(trial);
+    const bool worse = error > kBetter * last_error;
+    if (worse && keep) break;
+    keep = worse;
+    last_error = error;
+    last_foreseen = foreseen;
+  }
+  if (renewed_) return updateMultipliers();
+  lagrangian.evaluate(getIterate());
+  return sweepAgain();
+}
+
+// About the same evaluations, with new weights of constraints.
+FddpSolve::End FddpSolve::sweepAgain() {
+  swept_ = false;
+  return updateStep();
+}
+
+// Whether the step must close the gaps: the last one allowed, and the one after which the gradient vanishes, unless it is so long that
+// only a rollout in one piece would close them; then the next one does.
+bool FddpSolve::mustClose() const {
+  return closing_ || line_.iteration >= max_iterations_ || (vanishesNext() && closesTwice(getNumSegments()));
+}
 
 // Whether a full step in segments, after another one, makes too little of what is foreseen. The merit of Eq. (4) counts the
 // gaps of both steps differently: before, by what closing them takes of the foreseen decrease, after, by Eq. (8). Here both

@@ -125,9 +125,9 @@ FddpIterations::End FddpIterations::updateStep() {
     }
     line_.regularization = regularization_;
     if (result.status == NumericalStatus::Ok) {
-      slope_ = sweep.calcStep(memory_.backward.models(), memory_.dx, memory_.du);
+      foreseen_ = {sweep.calcStep(memory_.backward.models(), memory_.dx, memory_.du)};
       summary_.sweep_seconds += calcSecondsSince(start);
-      curvature_ = 2 * (result.expected_change - slope_);  // Eq. (8) of the sweep
+      foreseen_.curvature = 2 * (result.expected_change - foreseen_.slope);  // Eq. (8) of the sweep
       line_.gradient = calcGradient();
       return {};
     }
@@ -162,8 +162,9 @@ void FddpIterations::chooseFirstStep() {
   const bool creeps = alpha < 1 && last_step_ < 1 && line_.violation < kClose;
   if (!creeps || line_.gap > kSmallGap) return;
   const double curvature =
-      2 * (accepted_->merit - calcMerit() - alpha * slope_) / (alpha * alpha);  // of Eq. (1), as it is
-  if (curvature_ > 0 && curvature > kSteep * curvature_) first_step_ = std::max(kShortestFirst, curvature_ / curvature);
+      2 * (accepted_->merit - calcMerit() - alpha * foreseen_.slope) / (alpha * alpha);  // of Eq. (1), as it is
+  const double foreseen = foreseen_.curvature;
+  if (foreseen > 0 && curvature > kSteep * foreseen) first_step_ = std::max(kShortestFirst, foreseen / curvature);
 }
 
 void FddpIterations::acceptStep() {
@@ -177,7 +178,11 @@ void FddpIterations::acceptStep() {
   line_.step = accepted_->alpha;
   accepted_merit_ = accepted_->merit;
   closed_merit_.reset();
-  if (accepted_->alpha == 1) closed_merit_ = accepted_->merit + accepted_->closing_cost;
+  model_error_.reset();
+  if (accepted_->alpha == 1) {
+    closed_merit_ = accepted_->merit + accepted_->closing_cost;
+    model_error_ = std::abs(calcMerit() - *closed_merit_ - calcForeseen());
+  }
   summary_.cost = accepted_->cost;
   summary_.gap = accepted_->gap_max;
   ++summary_.iterations;

@@ -41,6 +41,13 @@ class FddpIterations {
         observer_(observer),
         memory_(memory) {}
 
+  // What the models promise.
+  struct Foreseen {
+    double slope = 0, curvature = 0;  // Eq. (1)
+    double excess = 0;                // of rows held by Eq. (15)
+    double calcChange(double alpha) const { return alpha * slope + 0.5 * alpha * alpha * curvature + excess; }
+  };
+
   // The parts of an iteration, in their order.
   void start();
   End evaluate();
@@ -65,18 +72,24 @@ class FddpIterations {
   bool searchInOnePiece(const RolloutInput& input);
   bool tryClosed(const RolloutInput& input, int segments);
   bool accept(Trial& trial);
+  double findMinimum(const Trial& trial) const;
   bool vanishesNext() const;
+  bool closesTwice(int segments) const;
   bool isRounding() const;
   double calcRounding() const;
 
   bool isInterrupted() const { return observer_.interrupt && observer_.interrupt->load(); }
   // \param shortest  stages
   int getNumSegments(int shortest = 6) const { return std::max(1, std::min(options_.rollout_segments, N_ / shortest)); }
+  bool isDamped() const { return regularization_ > options_.min_regularization; }
   bool isClosed() const { return line_.gap <= options_.gap_tolerance; }
   bool isStationary() const { return isClosed() && (stalled_ || line_.gradient <= options_.gradient_tolerance); }
   const EvaluationList& getIterate() const { return memory_.evaluations.getIterate(); }
   // Decrease by a full step.
-  double calcForeseen() const { return -slope_ - 0.5 * curvature_; }
+  double calcForeseen() const { return -foreseen_.calcChange(1); }
+  double calcReal(const Trial& trial) const { return calcMerit() - trial.merit - trial.closing_cost; }
+  // By how much less than foreseen the merit decreases in a trial.
+  double calcModelError(const Trial& trial) const { return -foreseen_.calcChange(trial.alpha) - calcReal(trial); }
   double calcMerit() const { return line_.cost + memory_.lagrangian.getValue(); }
 
   const IterationOptions& options_;
@@ -94,6 +107,8 @@ class FddpIterations {
   bool stalled_ = false;                                  // the merit cannot be seen to decrease, because of rounding
   Trial* accepted_ = nullptr;                             // the trial that ends a line search
   std::optional<double> closed_merit_;                    // after a full step under the same multipliers, with Eq. (8)
+  std::optional<double> model_error_;                     // of the decrease by the last step, if it was a full one
+  Foreseen foreseen_;                                     // by the sweep
   double first_step_ = 1, last_step_ = 1;  // alpha that the next line search starts with; of the iteration before
   FddpSummary summary_;
 
@@ -102,14 +117,12 @@ class FddpIterations {
   void updateGaps();
   double calcGradient() const;
   void chooseFirstStep();
-  bool closesTwice(int segments) const;
   bool isAcceptable(const Trial& trial) const;
 
   Clock::time_point start_ = Clock::now();
   int threads_ = 1;
   std::optional<Team::Shift> shift_;
   double gap_sum_ = 0, gap_weight_ = 0;  // c, of the gaps that count as open, and nu of Eq. (5)
-  double slope_ = 0, curvature_ = 0;     // Eq. (1)
   double accepted_merit_ = 0, last_gradient_ = 0;
   int failed_node_ = -1;  // where the first failed trial of a line search failed, and why
   std::string failure_;

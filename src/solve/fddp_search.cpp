@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 
 #include "solve/fddp_iterations.h"
 
@@ -36,7 +37,8 @@ double FddpIterations::calcRounding() const {
 }
 
 RolloutInput FddpIterations::startSearch() {
-  const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
+  accepted_ = nullptr;
+  const double penalized = std::max(0.0, foreseen_.slope + 0.5 * std::max(0.0, foreseen_.curvature) + foreseen_.excess);
   gap_weight_ = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
   return {problem_,
           trajectory_,
@@ -69,13 +71,20 @@ bool FddpIterations::searchInOnePiece(const RolloutInput& input) {
 // A full step in segments that closes the gaps, by a second rollout if need be. If it is rejected, one in one piece may
 // still succeed.
 bool FddpIterations::tryClosed(const RolloutInput& input, int segments) {
-  if (!closesTwice(segments)) return false;
   Rollout& rollout = memory_.rollout;
   Trial& trial = rollout.getTrial(0);
+  trial.ok = closesTwice(segments);
+  if (!trial.ok) return false;
   const auto closes = [&] { return trial.gap_max <= options_.gap_tolerance; };
   rollout.cut(input, 1, segments);
   if (trial.ok && !closes()) rollout.close(input);
   return closes() && accept(trial);
+}
+
+// alpha of the least merit on the parabola that has the slope of Eq. (1) and meets the trial.
+double FddpIterations::findMinimum(const Trial& trial) const {
+  const double alpha = trial.alpha, bend = -2 * (calcReal(trial) + alpha * foreseen_.slope);
+  return bend > 0 ? -foreseen_.slope * alpha * alpha / bend : std::numeric_limits<double>::infinity();
 }
 
 bool FddpIterations::accept(Trial& trial) {
@@ -90,8 +99,8 @@ bool FddpIterations::accept(Trial& trial) {
 // Whether the merit of a trial has fallen enough, Eqs. (4) and (8).
 bool FddpIterations::isAcceptable(const Trial& trial) const {
   const double alpha = trial.alpha;
-  const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + gap_weight_ * alpha * gap_sum_;
-  const double real = calcMerit() - trial.merit - trial.closing_cost + gap_weight_ * (gap_sum_ - trial.gap_sum);
+  const double foreseen = -foreseen_.calcChange(alpha) + gap_weight_ * alpha * gap_sum_;
+  const double real = calcReal(trial) + gap_weight_ * (gap_sum_ - trial.gap_sum);
   const double rounding = calcRounding();
   const double decrease = std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation
   return real >= options_.acceptance * decrease - rounding &&

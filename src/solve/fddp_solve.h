@@ -21,12 +21,19 @@ class FddpSolve : private FddpIterations {
   bool isCreeping() const;
   void settle();
   End findStep();
+  bool hasSettledMerit() const;
   bool mustUpdateMultipliers() const;
   End updateMultipliers();
-  bool searchLine();
-  bool tryFullStep(const RolloutInput& input, int segments);
+  End searchLine();
+  bool tryFullStep(int segments);
+  bool tryShorterStep(int segments);
+  bool hasViolatedFreeRows();
+  End tryHolding(int segments);
+  End sweepAgain();
   bool mustClose() const;
   bool isOvershooting(const Trial& trial) const;
+
+  bool renewed_ = false;  // multipliers, by a line search
 
   const double acceptable_decrease_;
   bool closing_ = false;           // the next step must close the gaps, since the constraints are infeasible
