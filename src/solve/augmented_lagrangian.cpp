@@ -92,44 +92,39 @@ void AugmentedLagrangian::visitInequalities(const EvaluationList& iterate, const
       if (node.lower[i] == node.upper[i]) continue;
       const double violation = calcDistance(node, i, c_trial[i]), z = c[i] + node.multipliers[i] / penalty_;
       const double d = z - (violation > 0 ? node.upper : node.lower)[i];
-      visit(node.weights.gradient[i], node.weights.hessian[i], d, violation, calcDistance(node, i, c[i]));
+      visit(Inequality{node.weights.gradient[i], node.weights.hessian[i], d, violation, calcDistance(node, i, c[i]),
+                       c_trial[i] - c[i]});
     }
   }
 }
 
 bool AugmentedLagrangian::holdViolated(const EvaluationList& iterate, const EvaluationList& trial, bool keep) {
-  const auto findShare = [](double d, double violation) { return std::max(0.0, d / (d - violation)); };
+  const auto findShare = [](const Inequality& row) { return std::max(0.0, row.d / (row.d - row.violation)); };
   double first = std::numeric_limits<double>::infinity();
-  visitInequalities(iterate, trial, [&](double&, double& hessian, double d, double violation, double) {
-    if (violation != 0 && hessian == 0) first = std::min(first, findShare(d, violation));
+  visitInequalities(iterate, trial, [&](const Inequality& row) {
+    if (row.violation != 0 && row.hessian == 0) first = std::min(first, findShare(row));
   });
   bool changes = false;
   at_.excess = 0;
-  visitInequalities(iterate, trial, [&](double& gradient, double& hessian, double d, double violation, double before) {
-    const bool held = hessian != 0;
+  visitInequalities(iterate, trial, [&](const Inequality& row) {
+    const bool held = row.hessian != 0;
     if (!keep || !held) {
-      const bool holds = violation != 0 && (!keep || findShare(d, violation) <= kFirst * first);
+      const bool holds = row.violation != 0 && (!keep || findShare(row) <= kFirst * first);
       changes |= holds != held;
-      gradient = holds ? penalty_ * d : 0;
-      hessian = holds ? penalty_ : 0;
+      row.gradient = holds ? penalty_ * row.d : 0;
+      row.hessian = holds ? penalty_ : 0;
     }
-    at_.excess += 0.5 * (gradient * gradient / penalty_ - penalty_ * before * before);
+    at_.excess += 0.5 * (row.gradient * row.gradient / penalty_ - penalty_ * row.before * row.before);
   });
   return changes;
 }
 
-double AugmentedLagrangian::calcKinks(const EvaluationList& iterate, const EvaluationList& trial) const {
+double AugmentedLagrangian::calcKinks(const EvaluationList& iterate, const EvaluationList& trial) {
   double kinks = 0;
-  for (size_t k = 0; k < nodes_.size(); ++k) {
-    const Node& node = nodes_[k];
-    const VectorXd &c = iterate[k]->constraints, &c_trial = trial[k]->constraints;
-    for (Eigen::Index i = 0; i < node.lower.size(); ++i) {
-      if (node.lower[i] == node.upper[i]) continue;
-      const double real = calcDistance(node, i, c_trial[i]);
-      const double held = node.weights.hessian[i] != 0 ? node.weights.gradient[i] / penalty_ + c_trial[i] - c[i] : 0;
-      kinks += 0.5 * penalty_ * (real * real - held * held);
-    }
-  }
+  visitInequalities(iterate, trial, [&](const Inequality& row) {
+    const double held = row.hessian != 0 ? row.gradient / penalty_ + row.move : 0;
+    kinks += 0.5 * penalty_ * (row.violation * row.violation - held * held);
+  });
   return kinks;
 }
 

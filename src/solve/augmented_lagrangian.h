@@ -42,7 +42,7 @@ class AugmentedLagrangian {
   /// \param keep  those that are held, and add only the ones that a step towards the trial violates first
   bool holdViolated(const EvaluationList& iterate, const EvaluationList& trial, bool keep);
   /// What inequalities add to the value of a trial beyond what those that the weights hold add, as if they were equations.
-  double calcKinks(const EvaluationList& iterate, const EvaluationList& trial) const;
+  double calcKinks(const EvaluationList& iterate, const EvaluationList& trial);
   /// What these weights make of the iterate beyond getValue().
   double excess() const { return at_.excess; }
   /// Minimizes the violations alone from now on, as updateMultipliers() does in the end. False if that was so already.
@@ -83,7 +83,12 @@ class AugmentedLagrangian {
   bool isHeld(const Node& node, Eigen::Index row) const { return holds_ && node.multipliers[row] != 0; }
   double calcDistance(const Node& node, Eigen::Index row, double c) const;  // d of Eq. (10) or (14)
   double calcContribution(double d, double multiplier) const;
-  // visit(gradient, Hessian, d of Eq. (15), those of Eq. (10) in the trial and at the iterate) for all inequalities.
+  struct Inequality {
+    double &gradient, &hessian;  // of the weights
+    double d;                    // of Eq. (15)
+    double violation, before;    // d of Eq. (10), in the trial and at the iterate
+    double move;                 // of c, from the iterate to the trial
+  };
   template <class Visit>
   void visitInequalities(const EvaluationList& iterate, const EvaluationList& trial, const Visit& visit);
   void startRestoration(double cost);

@@ -220,9 +220,8 @@ FddpSolve::End FddpSolve::tryHolding(int segments) {
     last_error = error;
     last_foreseen = foreseen;
   }
-  if (renewed_) return updateMultipliers();
-  lagrangian.evaluate(getIterate());
-  return sweepAgain();
+  lagrangian.evaluate(getIterate());  // Eq. (12) is of the d of Eq. (10)
+  return renewed_ ? updateMultipliers() : sweepAgain();
 }
 
 // About the same evaluations, with new weights of constraints.
