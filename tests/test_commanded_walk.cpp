@@ -5,6 +5,8 @@
 #include <fstream>
 
 #include "bielle/motion/commanded_walk.h"
+#include "count_allocations.h"
+#include "dynamics/linkage_workspace.h"
 #include "get_error.h"
 #include "own_robots.h"
 
@@ -127,4 +129,35 @@ TEST_CASE("commanded walk: from step to step its path has no jumps") {
     REQUIRE((next.phase == now.phase) == (next.contacts.size() == now.contacts.size()));
     REQUIRE(now.spec.dt == h);
   }
+}
+
+TEST_CASE("commanded walk: all its steps share the memory of their linkages") {
+  const Walked walked = walk({{0, {0.4, 0, 0}}}, 2);
+  const Model& model = getBipetto();
+  Workspace ws(model);
+  ws.q = makeStandingPosture(model);
+  const ConstraintSet none;
+  const VectorXd nothing;
+  LinkageWorkspaces memory;
+  NodeView node{model, ws, none, nothing, nothing};
+  node.linkages = &memory;
+  const auto calc = [&](const CommandedWalk::Stage& stage) {
+    int linkages = 0;
+    for (const PathConstraint& constraint : stage.spec.path_constraints) {
+      if (constraint.name.rfind("dead points", 0) != 0) continue;
+      VectorXd transmission(1);
+      constraint.residual->calc(node, transmission);
+      CHECK(transmission[0] == Approx(1));
+      ++linkages;
+    }
+    return linkages;
+  };
+  const long before = num_allocations_here;
+  CHECK(calc(walked.stages.front()) == 4);
+  const long made = num_allocations_here;
+  CHECK(calc(walked.stages.back()) == 4);
+  const long with_memory = num_allocations_here - made;
+  calc(walked.stages.back());
+  CHECK(num_allocations_here - made == 2 * with_memory);
+  CHECK(made - before > 2 * with_memory);
 }

@@ -6,14 +6,24 @@
 
 namespace bielle {
 
-/// Effort limits by motor (nu), those of the model or the given replacements. \throws InputError as addLimits() does
+/// Effort limits by motor (nu), those of the model or the given replacements. \throws InputError as Limits does
 VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
 
-/// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
-/// \param q0  configuration of the first node (nq)
-/// \throws InputError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range
-/// has zero width or excludes q0
-bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages);
+/// The limits of a model, as its file and the options give them.
+class Limits {
+ public:
+  /// \param q0  configuration of the first node (nq)
+  /// \throws InputError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range
+  /// has zero width or excludes q0
+  Limits(const Model& model, const LimitOptions& options, const VectorXd& q0);
+  /// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
+  bool addTo(std::vector<StageSpec>& stages) const;
+
+ private:
+  VectorXd efforts_;
+  std::vector<PathConstraint> voltages_, powers_;  // of steps
+  std::vector<PathConstraint> states_;
+};
 
 /// Makes the durations named by the options free, each phase of the schedule separately.
 /// \param stages  those of the schedule, and the terminal one

@@ -48,9 +48,9 @@ CommandedWalk::CommandedWalk(const Model& model, const LocomotionOptions& option
                              CommandSource command, const StandingRobot& standing)
     : model_(model),
       options_(complete(model, options, standing)),
-      limits_(limits),
       command_(std::move(command)),
       standing_(makeStance(model, options_, standing)),
+      limits_(std::make_shared<Limits>(model, limits, standing_.q)),
       feet_(standing_.feet),
       middle_(standing_.middle),
       com_(standing_.com) {
@@ -188,7 +188,7 @@ void CommandedWalk::addLimitsTo(std::vector<StageSpec>& stages) {
   // Those of the first stage and of the last are those of the ends of a motion.
   stages.insert(stages.begin(), StageSpec());
   stages.emplace_back();
-  addLimits(model_, limits_, standing_.q, stages);
+  limits_->addTo(stages);
   stages.erase(stages.begin());
   stages.pop_back();
 }

@@ -8,13 +8,13 @@
 namespace bielle {
 namespace {
 
-// A limit of a coordinate or of a motor's power.
-struct Bound {
-  std::string name;
-  int index = 0;  // dof or motor
-  double lower = 0, upper = 0;
-  double scale = std::isfinite(upper - lower) ? 0.5 * (upper - lower) : 1;
-};
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
+PathConstraint makeBound(const std::string& name, double lower, double upper, std::unique_ptr<Residual> residual) {
+  const auto make = [](double value) { return VectorXd::Constant(1, value); };
+  const double scale = std::isfinite(upper - lower) ? 0.5 * (upper - lower) : 1;
+  return {name, std::move(residual), make(lower), make(upper), make(scale)};
+}
 
 // Values by motor: those given, except where they are replaced by name.
 VectorXd replaceByName(const Model& model, VectorXd values, const std::map<std::string, double>& given,
@@ -43,8 +43,8 @@ VectorXd getEffortLimits(const Model& model, const LimitOptions& options) {
 
 namespace {
 
-std::vector<Bound> listRanges(const Model& model, const VectorXd& q0) {
-  std::vector<Bound> bounds;
+std::vector<PathConstraint> listRanges(const Model& model, const VectorXd& q0) {
+  std::vector<PathConstraint> bounds;
   for (int k = 0; k < model.nv(); ++k) {
     const double lower = model.lowerLimits()[k], upper = model.upperLimits()[k];
     const Joint& joint = model.joints()[model.dofs()[k].joint];
@@ -58,75 +58,82 @@ std::vector<Bound> listRanges(const Model& model, const VectorXd& q0) {
       throw InputError(model.name(), element,
                        "its range excludes the starting posture, where the joint is at " + std::to_string(q),
                        "widen its range, or start elsewhere");
-    bounds.push_back({"range of " + joint.name, k, lower, upper});
+    bounds.push_back(makeBound("range of " + joint.name, lower, upper, makeJointPosition(model, {k})));
   }
   return bounds;
 }
 
-std::vector<Bound> listVelocities(const Model& model, const LimitOptions& options) {
+std::vector<PathConstraint> listVelocities(const Model& model, const LimitOptions& options) {
   VectorXd limits = model.velocityLimits(), of_motors(model.nu());
   for (int m = 0; m < model.nu(); ++m) of_motors[m] = limits[model.motors()[m].dof];
   of_motors = replaceByName(model, of_motors, options.velocities, "velocity");
   for (int m = 0; m < model.nu(); ++m) limits[model.motors()[m].dof] = of_motors[m];
-  std::vector<Bound> bounds;
+  std::vector<PathConstraint> bounds;
   for (int k = 0; k < model.nv(); ++k)
     if (std::isfinite(limits[k]))
-      bounds.push_back({"velocity of " + model.joints()[model.dofs()[k].joint].name, k, -limits[k], limits[k]});
+      bounds.push_back(makeBound("velocity of " + model.joints()[model.dofs()[k].joint].name, -limits[k], limits[k],
+                                 makeJointVelocity({k})));
   return bounds;
 }
 
-std::vector<Bound> listPowers(const Model& model, const LimitOptions& options) {
-  const double none = std::numeric_limits<double>::infinity();
-  const VectorXd limits = replaceByName(model, VectorXd::Constant(model.nu(), none), options.powers, "power");
-  std::vector<Bound> bounds;
+std::vector<PathConstraint> listPowers(const Model& model, const LimitOptions& options) {
+  const VectorXd limits = replaceByName(model, VectorXd::Constant(model.nu(), kNone), options.powers, "power");
+  std::vector<PathConstraint> bounds;
   for (int m = 0; m < model.nu(); ++m)
-    if (std::isfinite(limits[m])) bounds.push_back({"power of " + model.motors()[m].name, m, -limits[m], limits[m]});
+    if (std::isfinite(limits[m]))
+      bounds.push_back(
+          makeBound("power of " + model.motors()[m].name, -limits[m], limits[m], makeMotorPower(model, {m})));
   return bounds;
 }
 
-std::vector<Bound> listVoltages(const Model& model) {
-  std::vector<Bound> bounds;
+std::vector<PathConstraint> listVoltages(const Model& model) {
+  std::vector<PathConstraint> bounds;
   for (int m = 0; m < model.nu(); ++m)
     if (const Motor& motor = model.motors()[m]; motor.hasEnvelope())
-      bounds.push_back({"voltage of " + motor.name, m, -motor.drive.voltage, motor.drive.voltage});
+      bounds.push_back(makeBound("voltage of " + motor.name, -motor.drive.voltage, motor.drive.voltage,
+                                 makeMotorVoltage(model, {m})));
   return bounds;
 }
 
-void addConstraint(const Bound& bound, std::unique_ptr<Residual> residual, StageSpec& stage) {
-  const auto make = [](double value) { return VectorXd::Constant(1, value); };
-  stage.path_constraints.push_back(
-      {bound.name, std::move(residual), make(bound.lower), make(bound.upper), make(bound.scale)});
+std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd& q0, double margin) {
+  std::vector<PathConstraint> bounds;
+  for (const Linkage& linkage : listLinkages(model, q0)) {
+    bounds.push_back(makeBound("dead points of " + linkage.output, margin, 1 / margin, makeTransmission(linkage)));
+    bounds.back().scale[0] = 1;
+  }
+  return bounds;
+}
+
+void append(const std::vector<PathConstraint>& bounds, std::vector<PathConstraint>& all) {
+  all.insert(all.end(), bounds.begin(), bounds.end());
 }
 
 }  // namespace
 
-bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages) {
-  if (!options.enforced) {
-    for (StageSpec& stage : stages)
-      stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
-    return false;
-  }
+Limits::Limits(const Model& model, const LimitOptions& options, const VectorXd& q0)
+    : efforts_(VectorXd::Constant(model.nu(), kNone)) {
+  if (!options.enforced) return;
   const double margin = options.dead_point_margin;
   requireOption(margin >= 0 && margin < 1, "dead_point_margin", "it is outside 0 .. 1", "give a share, e.g. 0.15");
-  const VectorXd efforts = getEffortLimits(model, options);
-  const std::vector<Bound> ranges = listRanges(model, q0), velocities = listVelocities(model, options),
-                           powers = listPowers(model, options), voltages = listVoltages(model);
-  const std::vector<Linkage> linkages = margin > 0 ? listLinkages(model, q0) : std::vector<Linkage>();
+  efforts_ = getEffortLimits(model, options);
+  states_ = listRanges(model, q0);
+  append(listVelocities(model, options), states_);
+  if (margin > 0) append(listTransmissions(model, q0, margin), states_);
+  powers_ = listPowers(model, options);
+  voltages_ = listVoltages(model);
+}
+
+bool Limits::addTo(std::vector<StageSpec>& stages) const {
   for (size_t k = 0; k < stages.size(); ++k) {
     StageSpec& stage = stages[k];
-    stage.effort_limits = efforts;
+    stage.effort_limits = efforts_;
     const bool step = k + 1 < stages.size() && stage.kind == StageKind::Dynamics;
-    for (size_t i = 0; step && i < voltages.size(); ++i)
-      addConstraint(voltages[i], makeMotorVoltage(model, {voltages[i].index}), stage);
+    if (step) append(voltages_, stage.path_constraints);
     if (k == 0) continue;
-    for (const Bound& bound : ranges) addConstraint(bound, makeJointPosition(model, {bound.index}), stage);
-    for (const Bound& bound : velocities) addConstraint(bound, makeJointVelocity({bound.index}), stage);
-    for (const Linkage& linkage : linkages)
-      addConstraint({"dead points of " + linkage.output, 0, margin, 1 / margin, 1}, makeTransmission(linkage), stage);
-    for (size_t i = 0; step && i < powers.size(); ++i)
-      addConstraint(powers[i], makeMotorPower(model, {powers[i].index}), stage);
+    append(states_, stage.path_constraints);
+    if (step) append(powers_, stage.path_constraints);
   }
-  return efforts.array().isFinite().any();
+  return efforts_.array().isFinite().any();
 }
 
 }  // namespace bielle

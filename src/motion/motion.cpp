@@ -36,7 +36,7 @@ void leaveTorquesFree(const Model& model, std::vector<StageSpec>& stages) {
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
   for (StageSpec& stage : plan.stages) stage.step = options.step;
   Motion motion;
-  motion.within_limits = addLimits(model, options.limits, plan.q_start, plan.stages);
+  motion.within_limits = Limits(model, options.limits, plan.q_start).addTo(plan.stages);
   freeTimings(options.timings, plan.schedule, plan.stages);
   for (StageSpec& stage : plan.stages)  // at an impact h vanishes, and gains have no effect
     if (stage.dt > 0) limitGains(options.step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);

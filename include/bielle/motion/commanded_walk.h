@@ -20,6 +20,7 @@
 /// prediction beyond a step counts with a factor exp(-2 T / tau), about 0.06, with tau the pendulum's time constant.
 #include <deque>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -60,6 +61,8 @@ void checkCommand(const Model& model, const StandingRobot& standing, const Locom
 /// increasing times.
 using CommandSource = std::function<VelocityCommand(double)>;
 
+class Limits;
+
 class CommandedWalk {
  public:
   struct Stage {
@@ -96,9 +99,9 @@ class CommandedWalk {
 
   Model model_;
   const LocomotionOptions options_;
-  const LimitOptions limits_;
   const CommandSource command_;
-  const Stance standing_;                   // at the start
+  const Stance standing_;  // at the start
+  const std::shared_ptr<const Limits> limits_;
   std::array<VectorXd, 4> static_torques_;  // by the feet that stand
   enum class State { Standing, Starting, Walking };
   State state_ = State::Standing;
