@@ -2,6 +2,7 @@
 // come late. Feet that do not do as planned: test_predictive_feet.cpp.
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <limits>
 #include <thread>
 
 #include "bielle/control/predictive_controller.h"
@@ -410,6 +411,11 @@ TEST_CASE("predictive control: windows, threads and iterations without sense are
   PredictiveOptions options = makeShortWindow(1);
   options.iterations = 0;
   CHECK_THROWS_WITH(make(options), Catch::Contains("iterations"));
+  for (double time : {-1e-3, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    PredictiveOptions timed = makeShortWindow(1);
+    timed.solve_time = time;
+    CHECK_THROWS_WITH(make(timed), Catch::Contains("solve_time must be finite and not negative"));
+  }
   CHECK_THROWS_AS(makePredictiveMotion(model, MotionPlan(), ProblemOptions(), makeShortWindow(1)), InputError);
 }
 

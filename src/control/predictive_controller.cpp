@@ -1,5 +1,6 @@
 #include "bielle/control/predictive_controller.h"
 
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -24,7 +25,8 @@ class PredictiveController::Loop {
         solution_(planner_.makeEmpty()),
         next_(planner_.makeEmpty()),
         dead_point_stop_(planner_.model(), planner_.startPosture(), options.dead_point_stop) {
-    if (!(solve_time_ >= 0)) throw std::invalid_argument("PredictiveOptions: solve_time must not be negative");
+    if (!(solve_time_ >= 0 && std::isfinite(solve_time_)))
+      throw std::invalid_argument("PredictiveOptions: solve_time must be finite and not negative");
     const Model& model = planner_.model();
     WindowPlanner::Solution first = planner_.makeFirst();
     policy_ = std::make_unique<Policy>(model, std::move(first.stages), first.u_hold);
