@@ -13,7 +13,7 @@ namespace bielle {
 /// [w x], 3x3.
 template <typename V>
 Matrix3<typename V::Scalar> skew(const Eigen::MatrixBase<V>& w_) {
-  const Vector3<typename V::Scalar> w = w_;
+  const Eigen::Ref<const Vector3<typename V::Scalar>> w(w_.derived());
   Matrix3<typename V::Scalar> S;
   S << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
   return S;
@@ -40,7 +40,11 @@ struct SE3Of {
   static SE3Of Identity() { return {}; }
   template <typename U>
   SE3Of operator*(const SE3Of<U>& o) const {
-    return {R * o.R, p + R * o.p};
+    SE3Of out(Unset{});
+    out.R.noalias() = R * o.R;
+    out.p.noalias() = R * o.p;
+    out.p += p;
+    return out;
   }
   SE3Of inverse() const { return {R.transpose(), -(R.transpose() * p)}; }
   /// inverse() * o
@@ -82,13 +86,17 @@ struct SE3Of {
     A.template bottomLeftCorner<3, 3>().setZero();
     return A;
   }
+
+ private:
+  struct Unset {};
+  explicit SE3Of(Unset) {}
 };
 using SE3 = SE3Of<double>;
 
 /// [v x] m
 template <typename A, typename B>
 Vector6<typename A::Scalar> crossMotion(const Eigen::MatrixBase<A>& v_, const Eigen::MatrixBase<B>& m_) {
-  const Vector6<typename A::Scalar> v = v_, m = m_;
+  const Eigen::Ref<const Vector6<typename A::Scalar>> v(v_.derived()), m(m_.derived());
   Vector6<typename A::Scalar> out;
   linear(out) = angular(v).cross(linear(m)) + linear(v).cross(angular(m));
   angular(out) = angular(v).cross(angular(m));
@@ -98,7 +106,7 @@ Vector6<typename A::Scalar> crossMotion(const Eigen::MatrixBase<A>& v_, const Ei
 /// [v x*] f
 template <typename A, typename B>
 Vector6<typename A::Scalar> crossForce(const Eigen::MatrixBase<A>& v_, const Eigen::MatrixBase<B>& f_) {
-  const Vector6<typename A::Scalar> v = v_, f = f_;
+  const Eigen::Ref<const Vector6<typename A::Scalar>> v(v_.derived()), f(f_.derived());
   Vector6<typename A::Scalar> out;
   linear(out) = angular(v).cross(linear(f));
   angular(out) = angular(v).cross(angular(f)) + linear(v).cross(linear(f));
