@@ -230,7 +230,7 @@ TEST_CASE("predictive control: solved in a thread of its own and waited for, pol
 
 TEST_CASE(
     "predictive control: while a solve is held the last policy acts, without waiting; missed stages are counted") {
-  // The first stage after some whose solve asks for the next command.
+  // The first stage after some after whose solve the preparation of the next one asks for a command.
   int asking = 5;
   {
     Standing trial(true);
@@ -254,6 +254,9 @@ TEST_CASE(
   standing.update(tick++);
   for (int i = 0; !standing.gate.holds() && i < 60000; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   REQUIRE(standing.gate.holds());
+  const int held = asking + 1;
+  for (; tick < held * kStageTicks; ++tick) standing.update(tick);
+  standing.update(tick++);
   Policy last = controller.policy();
   VectorXd expected(standing.u.size());
   const long allocations = num_allocations_here;
@@ -267,7 +270,7 @@ TEST_CASE(
   CHECK(num_allocations_here == allocations);
   CHECK(same);
   CHECK(standing.gate.holds());  // all that time
-  CHECK(controller.counts().solves == asking);
+  CHECK(controller.counts().solves == held);
   CHECK(controller.counts().missed == 2);  // the third one may still have a solve
   CHECK(controller.policy().stages().front().start == last.stages().front().start);
 
@@ -275,18 +278,18 @@ TEST_CASE(
   controller.waitForSolve();
   standing.update(tick);  // it comes into force late, but does
   const double stage = 1e-3 * kStageTicks;
-  CHECK(controller.policy().stages().front().start == Approx((asking + 1) * stage));
+  CHECK(controller.policy().stages().front().start == Approx((held + 1) * stage));
   last.update(standing.at, expected);
   CHECK(standing.u != expected);
   const long before = num_allocations_here;
-  for (; tick < (asking + 8) * kStageTicks; ++tick) {
+  for (; tick < (held + 8) * kStageTicks; ++tick) {
     standing.update(tick);
     controller.waitForSolve();
   }
   CHECK(num_allocations_here == before);  // to take solutions and ask for the next, none either
   CHECK(controller.counts().missed == 2);
-  CHECK(controller.counts().solves == asking + 6);  // the late one, and one for each stage from then on
-  CHECK(controller.counts().stages == asking + 8);
+  CHECK(controller.counts().solves == held + 6);  // the late one, and one for each stage from then on
+  CHECK(controller.counts().stages == held + 8);
   const std::vector<PredictiveSolve>& solves = controller.counts().last;
   for (const PredictiveSolve& solve : solves)
     CHECK((solve.latency > 0) == (&solve != &solves.back()));  // not yet in force

@@ -132,3 +132,46 @@ TEST_CASE("in receding horizons a row that binds does not come free and is viola
     if (i > 0) CHECK(calcViolation() < 0.05 * first);  // after the first, rows that had no multipliers are violated
   }
 }
+
+TEST_CASE("a step that was prepared before its initial state was known is the same to the last bit") {
+  auto problem = makeBoundedCartPole();
+  FddpResult solved = solve(problem, makeGuess(problem));
+  RecedingOptions options = makeOptions(GENERATE(1, 2));
+  options.threads = GENERATE(1, 2);
+  options.constraints.initial_penalty = solved.multipliers.penalty;
+  options.constraints.penalty_increase = 1;
+  Receding plain(problem, options), prepared(problem, options);
+  ShootingTrajectory t = solved.trajectory, other = t;
+  plain.setMultipliers(solved.multipliers);
+  prepared.setMultipliers(solved.multipliers);
+  std::vector<NodeSource> stays(t.xs.size());
+  for (size_t k = 0; k < stays.size(); ++k) stays[k] = {static_cast<int>(k), 1, k > 0};
+  const VectorXd nominal = problem.start;
+  double moved = 0;
+  for (int i = 0; i < 6; ++i) {
+    CAPTURE(i, options.iterations, options.threads);
+    prepared.prepare(other);
+    if (i % 3 == 1) {  // for nothing: the window moves on otherwise
+      prepared.move(stays);
+      if (i == 4) prepared.prepare(other);
+    }
+    problem.start = nominal + VectorXd::Constant(nominal.size(), 1e-3 * (i + 1));
+    const FddpSummary whole = plain.step(t), rest = prepared.step(other);
+    CHECK(t.xs == other.xs);
+    CHECK(t.us == other.us);
+    CHECK(whole.cost == rest.cost);
+    CHECK(whole.violation == rest.violation);
+    CHECK(plain.multipliers().values == prepared.multipliers().values);
+    for (size_t k = 0; k < t.us.size(); ++k) {
+      moved = std::max(moved, (t.us[k] - solved.trajectory.us[k]).norm());
+      CHECK(plain.getGains(static_cast<int>(k)).K == prepared.getGains(static_cast<int>(k)).K);
+    }
+    for (Receding* solver : {&plain, &prepared}) solver->move(stays);
+  }
+  CHECK(moved > 1e-3);
+  prepared.prepare(other);
+  other.us[3][0] += 1e-9;
+  CHECK_THROWS_WITH(prepared.step(other), Catch::Contains("node 3"));
+  Receding growing(problem);
+  CHECK_THROWS_WITH(growing.prepare(t), Catch::Contains("constant penalty"));
+}

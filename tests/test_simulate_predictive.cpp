@@ -50,7 +50,7 @@ TEST_CASE("simulate: predictive control survives a push that gains do not") {
   CHECK(readRecord((scratch.path / "gains" / "trajectory.npz").string()).footholds.size() == 0);
   const auto& solves = summary["solves"];
   CHECK(solves["worst_ms"].get<double>() >= solves["median_ms"].get<double>());
-  CHECK(solves["parts"].size() == 6);
+  CHECK(solves["parts"].size() == 7);
   for (const auto& part : solves["parts"]) {
     CHECK(part["median_ms"].get<double>() > 0);
     CHECK(part["p99_ms"].get<double>() >= part["median_ms"].get<double>());

@@ -86,12 +86,15 @@ class PredictiveController::Loop {
     request_.progress = passed > kClockTolerance ? std::min(passed / (end - begin), 1.0) : 0;
     request_.measurement = measurement;
     request_.u = u;
+    request_.made = Clock::now();
     waits_ = false;
     solves_ = true;
     if (thread_) return thread_->begin();
     planner_.solve(request_, solution_);
+    planner_.prepare();
     if (solve_time_ > 0) return;
-    counts_.missed += solution_.took.seconds > end - begin - measurement.delay;
+    const PredictiveSolve& took = solution_.took;
+    counts_.missed += took.prepare + took.seconds > end - begin - measurement.delay;
     receive();
   }
 

@@ -24,7 +24,8 @@ void SolvingThread::begin() {
 }
 
 void SolvingThread::waitUntilDone() const {
-  while (state() == State::Busy) std::this_thread::sleep_for(std::chrono::microseconds(100));
+  while (state() == State::Busy || prepares_.load(std::memory_order_acquire))
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
 }
 
 void SolvingThread::run() {
@@ -33,7 +34,10 @@ void SolvingThread::run() {
     }
     if (ends_.load(std::memory_order_relaxed)) return;
     planner_.solve(request_, solution_);
+    prepares_.store(true, std::memory_order_relaxed);
     state_.store(State::Done, std::memory_order_release);
+    planner_.prepare();
+    prepares_.store(false, std::memory_order_release);
   }
 }
 

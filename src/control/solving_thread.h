@@ -21,12 +21,12 @@ class SolvingThread {
   SolvingThread& operator=(const SolvingThread&) = delete;
 
   // Idle: request and solution are the caller's, who may begin() a solve. Busy: they are the thread's. Done: they are the
-  // caller's again, who takes the solution and calls setIdle().
+  // caller's again, who takes the solution and calls setIdle(); the thread prepares the next solve, which may begin meanwhile.
   enum class State { Idle, Busy, Done };
   State state() const { return state_.load(std::memory_order_acquire); }
   void begin();
   void setIdle() { state_.store(State::Idle, std::memory_order_relaxed); }
-  void waitUntilDone() const;
+  void waitUntilDone() const;  // with all that it prepares
 
  private:
   void run();
@@ -35,7 +35,7 @@ class SolvingThread {
   const WindowPlanner::Request& request_;
   WindowPlanner::Solution& solution_;
   std::atomic<State> state_{State::Idle};
-  std::atomic<bool> ends_{false};
+  std::atomic<bool> ends_{false}, prepares_{false};
   sem_t begins_;
   std::thread thread_;  // last, when all it uses is there
 };

@@ -1,12 +1,13 @@
 #include "control/window_planner.h"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 
 #include "bielle/dynamics/kinematics.h"
 #include "control/clock.h"
 #include "control/policy_stages.h"
 #include "motion/foot_tasks.h"
-#include "solve/stopwatch.h"
 
 namespace bielle {
 namespace {
@@ -57,9 +58,11 @@ WindowPlanner::WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveO
       scratch_(problem_.makeScratch()),
       impact_(model_),
       feet_(model_),
-      solver_(makeSolver(options.iterations)) {
+      solver_(makeSolver(options.iterations)),
+      predicted_(problem_.makeEvaluation()) {
   u_.setZero(model_.nu());
   x_ = problem_.initialState();
+  predicted_->x = VectorXd::Constant(x_.size(), std::numeric_limits<double>::quiet_NaN());  // at none so far
   for (KeptGains& kept : kept_) kept.K.setZero(model_.nu(), 2 * model_.nv());
 }
 
@@ -80,15 +83,18 @@ WindowPlanner::Solution WindowPlanner::makeFirst() {
   Solution solution = makeEmpty();
   makePolicy(first, 0, solution);
   predictFootholds(0, solution);
+  target_ = 0;
+  prepare();
   return solution;
 }
 
 void WindowPlanner::solve(const Request& request, Solution& solution) {
-  const Clock::time_point begin = Clock::now();
   solution.skipped = 0;
   solution.early = solution.late = false;
   solution.took = {};
+  solution.took.prepare = std::exchange(prepare_seconds_, 0);
   try {
+    const Clock::time_point begin = Clock::now();
     const bool predicted = predict(request, solution);
     solution.took.predict = calcSecondsSince(begin);
     solution.solved = predicted && solveWindow(solution);
@@ -99,9 +105,38 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
     solver_ = makeSolver(options_.iterations);
     startFromGuess(request.stage + solution.skipped);
   }
+  target_ = solution.solved ? solution.target : -1;
+  prepared_ = false;
   solution.advance = advance_;
   solution.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;
-  solution.took.seconds = calcSecondsSince(begin);
+  solution.took.seconds = calcSecondsSince(request.made);
+}
+
+// The stage that follows is the next one, unless a foot lands early or late; a stage with several solves has the same again.
+void WindowPlanner::prepare() {
+  if (target_ < 0 || late_.foot >= 0 || options_.solve_time > 0) return;
+  const Clock::time_point begin = Clock::now();
+  const int first = horizon_->getFirst(skipImpacts(target_ + 1));
+  try {
+    solver_.exchangeEvaluation(0, predicted_);
+    horizon_->prepare(first);
+    prepared_ = move(first);
+    if (prepared_) solver_.prepare(trajectory_);
+  } catch (const std::exception&) {
+    prepared_ = false;
+  }
+  if (!prepared_) {
+    solver_ = makeSolver(options_.iterations);
+    startFromGuess(first);
+  }
+  prepare_seconds_ = calcSecondsSince(begin);
+}
+
+bool WindowPlanner::isPrepared(int first) const { return prepared_ && !lowered_ && grid_.begin() == first; }
+
+int WindowPlanner::skipImpacts(int stage) const {
+  while (isImpact(stage)) ++stage;
+  return stage;
 }
 
 Receding WindowPlanner::makeSolver(int iterations) const {
@@ -213,7 +248,7 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   measured_.resize(problem_.stateSize());
   measured_ << request.measurement.q, request.measurement.v;
   // About the state that was predicted: there the last window began.
-  const NodeEvaluation* predicted = solver_.getEvaluation(0);
+  const NodeEvaluation* predicted = prepared_ ? predicted_.get() : solver_.getEvaluation(0);
   if (!predicted || predicted->x != x_) predicted = &evaluator_.evaluate(node, x_, u_);
   if (predicted->status != NumericalStatus::Ok) return false;
   measured_ = interpolate(node, *predicted, measured_, 1);
@@ -260,8 +295,12 @@ VectorXd WindowPlanner::interpolate(int node, const NodeEvaluation& at, const Ve
 
 bool WindowPlanner::solveWindow(Solution& solution) {
   const int first = horizon_->getFirst(solution.target);
-  horizon_->prepare(first);
-  if (!move(first)) return false;
+  if (isPrepared(first)) {
+    window_.move(grid_.stages(), x_);
+  } else {
+    horizon_->prepare(first);
+    if (!move(first)) return false;
+  }
   const FddpSummary summary = solver_.step(trajectory_);
   recordSolve(summary, solution.took);
   if (summary.termination == FddpTermination::Failed) return false;
@@ -277,7 +316,7 @@ bool WindowPlanner::move(int first) {
   for (const WindowGrid::Node& node : grid_.nodes()) {
     if (node.begin >= first) break;
     past_us_.push_back(trajectory_.us[&node - grid_.nodes().data()]);
-    if (past_us_.size() > static_cast<size_t>(kLowering + kLate + 1)) past_us_.pop_front();
+    if (past_us_.size() > static_cast<size_t>(kLowering + kLate + 2)) past_us_.pop_front();
   }
   const int end = grid_.end();
   if (lowered_)

@@ -5,6 +5,7 @@
 #include "bielle/dynamics/impact.h"
 #include "control/window_grid.h"
 #include "solve/receding.h"
+#include "solve/stopwatch.h"
 #include "solve/window.h"
 
 namespace bielle {
@@ -17,7 +18,8 @@ class WindowPlanner {
     double progress = 0;  // the share of the stage that has passed
     bool again = false;   // it is not the first one in this stage
     Measurement measurement;
-    VectorXd u;  // nu, required at this instant
+    VectorXd u;              // nu, required at this instant
+    Clock::time_point made;  // when
   };
   // A policy for the stages that follow.
   struct Solution {
@@ -41,6 +43,8 @@ class WindowPlanner {
   Solution makeEmpty() const;
   // From the state that is predicted for the end of the stage.
   void solve(const Request& request, Solution& solution);
+  // What the solve in the stage that follows can do before its measurement. Without it, the solve does that, too.
+  void prepare();
 
   const Model& model() const { return model_; }
   VectorXd startPosture() const { return problem_.initialState().head(model_.nq()); }
@@ -62,6 +66,8 @@ class WindowPlanner {
   VectorXd findRest(const Request& request, const RobotEvaluation& step);
   bool predict(const Request& request, Solution& solution);
   bool solveWindow(Solution& solution);
+  bool isPrepared(int first) const;
+  int skipImpacts(int stage) const;
   bool move(int first);
   VectorXd interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share);
   bool continueNode(const WindowGrid::Node& node);
@@ -98,6 +104,10 @@ class WindowPlanner {
     int foot = -1, landing = -1;
     double waited = 0;
   } late_;
+  std::unique_ptr<NodeEvaluation> predicted_;  // at x_, if that is its state
+  int target_ = -1;                            // of the last solve; negative: it failed
+  bool prepared_ = false;                      // the window for the stage after it
+  double prepare_seconds_ = 0;
   bool lowered_ = false;  // stages before the landing of the late foot have been replaced since the window last moved
   // Gains of the last stage of a phase that was far enough from its end; of the present phase and the one before, to which a
   // late foot leads back.

@@ -6,6 +6,7 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 namespace bielle {
 
@@ -39,7 +40,8 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
     Node& node = nodes_[k];
     const int rows = problem.constraintSize(k);
     if (!kept_ || node.multipliers.size() != rows) node.multipliers.setZero(rows);
-    for (VectorXd* v : {&node.lower, &node.upper, &node.weights.gradient, &node.weights.hessian}) v->setZero(rows);
+    for (VectorXd* v : {&node.lower, &node.upper, &node.earlier, &node.weights.gradient, &node.weights.hessian})
+      v->setZero(rows);
     problem.getConstraintBounds(k, node.lower, node.upper);
     if (!(node.lower.array() <= node.upper.array()).all())
       throw std::invalid_argument("FDDP: a lower bound of the constraints of node " + std::to_string(k) +
@@ -51,7 +53,7 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
   last_violation_ = std::numeric_limits<double>::infinity();
   at_ = {};
   num_updates_ = 0;
-  kept_ = restoring_ = holds_ = false;
+  kept_ = restoring_ = holds_ = ahead_ = false;
 }
 
 double AugmentedLagrangian::calcDistance(const Node& node, Eigen::Index row, double c) const {
@@ -130,26 +132,27 @@ double AugmentedLagrangian::calcKinks(const EvaluationList& iterate, const Evalu
 
 void AugmentedLagrangian::measure(const EvaluationList& iterate) {
   at_ = {};
-  for (size_t k = 0; k < nodes_.size(); ++k) {
-    Node& node = nodes_[k];
-    const VectorXd& c = iterate[k]->constraints;
-    for (Eigen::Index i = 0; i < node.lower.size(); ++i) {
-      const double violation = std::abs(c[i] - clamp(c[i], node.lower[i], node.upper[i]));
-      at_.squares += violation * violation;
-      if (violation > at_.violation) {
-        at_.violation = violation;
-        at_.worst_node = static_cast<int>(k);
-        at_.worst_row = static_cast<int>(i);
-      }
-      const double d = calcDistance(node, i, c[i]), y = penalty_ * d, change = y - node.multipliers[i];
-      node.weights.gradient[i] = y;
-      node.weights.hessian[i] = d != 0 || isHeld(node, i) || node.lower[i] == node.upper[i] ? penalty_ : 0;
-      at_.value += calcContribution(d, node.multipliers[i]);
-      at_.gain += change * change / (2 * penalty_);
-      if (y != 0)
-        at_.complementarity =
-            std::max(at_.complementarity, std::abs(y * ((y > 0 ? node.upper : node.lower)[i] - c[i])));
+  for (size_t k = 0; k < nodes_.size(); ++k) measure(static_cast<int>(k), iterate[k]->constraints, at_);
+}
+
+// Sets the weights of a node, and adds what it measures.
+void AugmentedLagrangian::measure(int k, const VectorXd& c, Measures& out) {
+  Node& node = nodes_[k];
+  for (Eigen::Index i = 0; i < node.lower.size(); ++i) {
+    const double violation = std::abs(c[i] - clamp(c[i], node.lower[i], node.upper[i]));
+    out.squares += violation * violation;
+    if (violation > out.violation) {
+      out.violation = violation;
+      out.worst_node = k;
+      out.worst_row = static_cast<int>(i);
     }
+    const double d = calcDistance(node, i, c[i]), y = penalty_ * d, change = y - node.multipliers[i];
+    node.weights.gradient[i] = y;
+    node.weights.hessian[i] = d != 0 || isHeld(node, i) || node.lower[i] == node.upper[i] ? penalty_ : 0;
+    out.value += calcContribution(d, node.multipliers[i]);
+    out.gain += change * change / (2 * penalty_);
+    if (y != 0)
+      out.complementarity = std::max(out.complementarity, std::abs(y * ((y > 0 ? node.upper : node.lower)[i] - c[i])));
   }
 }
 
@@ -194,6 +197,33 @@ bool AugmentedLagrangian::restore(const EvaluationList& iterate, double cost) {
   startRestoration(cost);
   evaluate(iterate);
   return true;
+}
+
+void AugmentedLagrangian::renewAhead(const EvaluationList& iterate) {
+  for (size_t k = 1; k < nodes_.size(); ++k) renew(iterate, static_cast<int>(k));
+  ahead_ = true;
+}
+
+void AugmentedLagrangian::renewFirst(const EvaluationList& iterate) {
+  renew(iterate, 0);
+  ahead_ = false;
+  ++num_updates_;
+}
+
+void AugmentedLagrangian::renew(const EvaluationList& iterate, int k) {
+  Node& node = nodes_[k];
+  Measures unused;
+  holds_ = false;
+  measure(k, iterate[k]->constraints, unused);
+  node.earlier = node.multipliers;
+  if (options_.multipliers) node.multipliers = node.weights.gradient;
+  holds_ = true;
+  measure(k, iterate[k]->constraints, unused);
+}
+
+void AugmentedLagrangian::takeBack() {
+  if (!std::exchange(ahead_, false)) return;
+  for (size_t k = 1; k < nodes_.size(); ++k) nodes_[k].multipliers.swap(nodes_[k].earlier);
 }
 
 bool AugmentedLagrangian::settle(const EvaluationList& iterate, bool full) {
@@ -244,6 +274,7 @@ Multipliers AugmentedLagrangian::multipliers() const {
 
 void AugmentedLagrangian::setMultipliers(const Multipliers& multipliers) {
   if (!(multipliers.penalty > 0)) throw std::invalid_argument("FDDP: the penalty of multipliers must be positive");
+  ahead_ = false;
   nodes_.resize(multipliers.values.size());
   for (size_t k = 0; k < nodes_.size(); ++k) nodes_[k].multipliers = multipliers.values[k];
   far_penalty_ = multipliers.penalty;
@@ -253,6 +284,7 @@ void AugmentedLagrangian::setMultipliers(const Multipliers& multipliers) {
 void AugmentedLagrangian::move(const std::vector<NodeSource>& sources) {
   const size_t num_nodes = nodes_.size();
   if (num_nodes != sources.size()) return;  // no solve so far
+  takeBack();
   moved_.resize(num_nodes);
   for (size_t k = 0; k < num_nodes; ++k) moved_[k] = sources[k].share * nodes_.at(sources[k].node).multipliers;
   for (size_t k = 0; k < num_nodes; ++k) nodes_[k].multipliers.swap(moved_[k]);

@@ -49,6 +49,10 @@ class AugmentedLagrangian {
   bool restore(const EvaluationList& iterate, double cost);
   /// Whether settle() makes sense: violations are not minimized on their own.
   bool canSettle() const { return !isEmpty() && !restoring_; }
+  /// Eq. (12) under a constant penalty, of all nodes but the first, which are then held as by hold(); then of the first one. Between
+  /// the two, move() takes back what the former did.
+  void renewAhead(const EvaluationList& iterate);
+  void renewFirst(const EvaluationList& iterate);
   /// Raises the penalty; once it is at its maximum, updates the multipliers if a full step has not halved the violation.
   /// Returns whether the violation has been halved.
   bool settle(const EvaluationList& iterate, bool full);
@@ -69,7 +73,7 @@ class AugmentedLagrangian {
 
  private:
   struct Node {
-    VectorXd lower, upper, multipliers;
+    VectorXd lower, upper, multipliers, earlier;  // the latter before renewAhead()
     ConstraintWeights weights;
     const ConstraintWeights* getWeights() const { return lower.size() > 0 ? &weights : nullptr; }
   };
@@ -93,6 +97,9 @@ class AugmentedLagrangian {
   void visitInequalities(const EvaluationList& iterate, const EvaluationList& trial, const Visit& visit);
   void startRestoration(double cost);
   void measure(const EvaluationList& iterate);
+  void measure(int node, const VectorXd& c, Measures& out);
+  void renew(const EvaluationList& iterate, int node);
+  void takeBack();
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;
@@ -101,6 +108,7 @@ class AugmentedLagrangian {
   bool holds_ = false;      // by Eq. (14)
   bool restoring_ = false;  // minimizes the violations alone
   bool kept_ = false;       // the next resize() keeps multipliers and penalty
+  bool ahead_ = false;      // the first node still has to follow the others
   double penalty_ = 1;
   double far_penalty_ = 1;  // without what was added close to the solution; where the next solve starts
   Measures at_;

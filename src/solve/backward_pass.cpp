@@ -24,6 +24,22 @@ void BackwardPass::resize(const ShootingProblem& problem) {
 }
 
 int BackwardPass::update(const BackwardInput& input) {
+  start(input);
+  updateNodes(input, 0, input.problem.numStages() + 1);
+  return findFailure(input.problem);
+}
+
+void BackwardPass::prepare(const BackwardInput& input) {
+  start(input);
+  updateNodes(input, 1, input.problem.numStages() + 1);
+}
+
+int BackwardPass::finish(const BackwardInput& input) {
+  updateNodes(input, 0, 1);
+  return findFailure(input.problem);
+}
+
+void BackwardPass::start(const BackwardInput& input) {
   const int N = input.problem.numStages();
   const EvaluationList& nodes = input.evaluations.getIterate();
   for (int k = 0; k <= N; ++k) {
@@ -37,8 +53,11 @@ int BackwardPass::update(const BackwardInput& input) {
   }
   sweep_.start(models_, input.regularization);
   sweep_node_ = N;
-  // Batches of nodes, independent of the threads, from the last on.
-  const int size = input.problem.batchSize(), num_batches = N / size + 1;
+}
+
+// In batches, independent of the threads, from the last on.
+void BackwardPass::updateNodes(const BackwardInput& input, int begin, int end) {
+  const int size = input.problem.batchSize(), num_batches = (end - begin + size - 1) / size;
   std::atomic<int> next{num_batches - 1};
   std::atomic_flag sweeping = ATOMIC_FLAG_INIT;
   ParallelErrors errors;
@@ -46,7 +65,8 @@ int BackwardPass::update(const BackwardInput& input) {
   input.team.run(std::min(input.threads, num_batches), [&](int thread) {
     for (int i; (i = next.fetch_sub(1, std::memory_order_relaxed)) >= 0;) {
       const Clock::time_point start = Clock::now();
-      errors.run(i, [&] { linearize(input, thread, i * size, std::min(N + 1, (i + 1) * size)); });
+      const int first = begin + i * size;
+      errors.run(i, [&] { linearize(input, thread, first, std::min(end, first + size)); });
       addSeconds(calcSecondsSince(start), linearize_seconds);
       if (sweeping.test_and_set(std::memory_order_acquire)) continue;
       const Clock::time_point start_sweep = Clock::now();
@@ -60,7 +80,10 @@ int BackwardPass::update(const BackwardInput& input) {
   sweepReadyNodes(input);
   linearize_seconds_ = linearize_seconds;
   sweep_seconds_ = sweep_seconds + calcSecondsSince(start_rest);
-  for (int k = 0; k <= N; ++k)
+}
+
+int BackwardPass::findFailure(const ShootingProblem& problem) const {
+  for (int k = 0; k <= problem.numStages(); ++k)
     if (!failures_[k].empty()) return k;
   return -1;
 }

@@ -28,6 +28,9 @@ class BackwardPass {
 
   /// Returns the first node that could not be linearized, or -1; in either case the sweep may have stopped.
   int update(const BackwardInput& input);
+  /// The same in two parts: all nodes but the first, then that one. The input must be the same but for the first node.
+  void prepare(const BackwardInput& input);
+  int finish(const BackwardInput& input);
   /// Why a node could not be linearized, empty if it could.
   const std::string& getFailure(int node) const { return failures_[node]; }
 
@@ -39,6 +42,9 @@ class BackwardPass {
   double sweepSeconds() const { return sweep_seconds_; }
 
  private:
+  void start(const BackwardInput& input);
+  void updateNodes(const BackwardInput& input, int begin, int end);
+  int findFailure(const ShootingProblem& problem) const;
   void linearize(const BackwardInput& input, int thread, int begin, int end);
   std::string checkModel(const ShootingProblem& problem, int k) const;
   void sweepReadyNodes(const BackwardInput& input);

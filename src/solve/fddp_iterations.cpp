@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "solve/fddp_checks.h"
 
@@ -35,17 +36,26 @@ void FddpMemory::resize(const ShootingProblem& problem, const IterationOptions& 
 }
 
 void FddpIterations::start() {
+  begin();
+  memory_.resize(problem_, options_, threads_);
+  for (size_t k = 0; k < memory_.bounds.size(); ++k) {
+    trajectory_.us[k] = trajectory_.us[k].cwiseMax(memory_.bounds[k].lower).cwiseMin(memory_.bounds[k].upper);
+  }
+}
+
+void FddpIterations::resume() {
+  begin();
+  prepared_ = true;
+}
+
+void FddpIterations::begin() {
   N_ = problem_.numStages();
   checkSizes(problem_, trajectory_);
   // Each has memory of its own, and no more than one a batch of nodes has work.
   const int batches = N_ / problem_.batchSize() + 1;
   threads_ = std::min(options_.threads > 0 ? options_.threads : getDefaultThreads(), batches);
   shift_.emplace(memory_.team, threads_);
-  memory_.resize(problem_, options_, threads_);
   trajectory_.xs[0] = problem_.initialState();
-  for (size_t k = 0; k < memory_.bounds.size(); ++k) {
-    trajectory_.us[k] = trajectory_.us[k].cwiseMax(memory_.bounds[k].lower).cwiseMin(memory_.bounds[k].upper);
-  }
   regularization_ = options_.initial_regularization;
   summary_.log.reserve(std::min(max_iterations_ + 1, 10000));
 }
@@ -60,11 +70,8 @@ FddpIterations::End FddpIterations::evaluate() {
   updated_ = false;
   first_regularization_ = regularization_;
   line_.iteration = summary_.iterations + 1;
-  for (size_t k = 0; k < memory_.boxes.size(); ++k) {
-    memory_.boxes[k].lower = memory_.bounds[k].lower - trajectory_.us[k];
-    memory_.boxes[k].upper = memory_.bounds[k].upper - trajectory_.us[k];
-  }
-  const int failed = memory_.evaluations.update(problem_, trajectory_, memory_.team, threads_);
+  updateBoxes();
+  const int failed = memory_.evaluations.update(problem_, trajectory_, 0, memory_.team, threads_);
   if (failed < 0) {
     for (int k = 0; k <= N_; ++k) line_.cost += getIterate()[k]->cost;
     memory_.lagrangian.evaluate(getIterate());
@@ -76,6 +83,21 @@ FddpIterations::End FddpIterations::evaluate() {
   return FddpTermination::Failed;
 }
 
+// A node that cannot be evaluated or linearized is found again by what follows resume().
+void FddpIterations::prepare() {
+  updateBoxes();
+  if (memory_.evaluations.update(problem_, trajectory_, 1, memory_.team, threads_) >= 0) return;
+  if (!memory_.lagrangian.isEmpty()) memory_.lagrangian.renewAhead(getIterate());
+  memory_.backward.prepare(getBackwardInput());
+}
+
+void FddpIterations::updateBoxes() {
+  for (size_t k = 0; k < memory_.boxes.size(); ++k) {
+    memory_.boxes[k].lower = memory_.bounds[k].lower - trajectory_.us[k];
+    memory_.boxes[k].upper = memory_.bounds[k].upper - trajectory_.us[k];
+  }
+}
+
 FddpIterations::End FddpIterations::updateModels() {
   if (const End end = linearizeAndSweep()) return end;
   updateGaps();
@@ -85,13 +107,23 @@ FddpIterations::End FddpIterations::updateModels() {
   return {};
 }
 
+BackwardInput FddpIterations::getBackwardInput() const {
+  return {problem_,
+          memory_.evaluations,
+          memory_.lagrangian,
+          memory_.boxes,
+          {regularization_, regularization_ * options_.state_regularization_ratio},
+          memory_.team,
+          threads_};
+}
+
 FddpIterations::End FddpIterations::linearizeAndSweep() {
-  const LqRegularization regularization{regularization_, regularization_ * options_.state_regularization_ratio};
-  const int failed = memory_.backward.update(
-      {problem_, memory_.evaluations, memory_.lagrangian, memory_.boxes, regularization, memory_.team, threads_});
+  BackwardPass& backward = memory_.backward;
+  const int failed =
+      std::exchange(prepared_, false) ? backward.finish(getBackwardInput()) : backward.update(getBackwardInput());
   swept_ = true;
   if (failed < 0) return {};
-  summary_.message = "node " + std::to_string(failed) + ": " + memory_.backward.getFailure(failed);
+  summary_.message = "node " + std::to_string(failed) + ": " + backward.getFailure(failed);
   return FddpTermination::Failed;
 }
 

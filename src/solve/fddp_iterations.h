@@ -50,6 +50,9 @@ class FddpIterations {
 
   // The parts of an iteration, in their order.
   void start();
+  // Then, for all nodes but the first: evaluations, multipliers, models and sweep. What follows it begins with resume().
+  void prepare();
+  void resume();
   End evaluate();
   End updateModels();
   End updateStep();
@@ -104,6 +107,7 @@ class FddpIterations {
   double regularization_ = 0, first_regularization_ = 0;  // the latter of the first sweep of an iteration
   bool updated_ = false;                                  // multipliers are new in this iteration
   bool swept_ = false;                                    // a sweep is still to be looked at
+  bool prepared_ = false;                                 // the models of all nodes but the first
   bool stalled_ = false;                                  // the merit cannot be seen to decrease, because of rounding
   Trial* accepted_ = nullptr;                             // the trial that ends a line search
   std::optional<double> closed_merit_;                    // after a full step under the same multipliers, with Eq. (8)
@@ -113,6 +117,9 @@ class FddpIterations {
   FddpSummary summary_;
 
  private:
+  void begin();
+  void updateBoxes();
+  BackwardInput getBackwardInput() const;
   End linearizeAndSweep();
   void updateGaps();
   double calcGradient() const;

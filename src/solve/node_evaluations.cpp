@@ -37,10 +37,11 @@ void NodeEvaluations::resize(const ShootingProblem& problem, int num_rolling, in
   seconds_ = 0;
 }
 
-int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajectory& nodes, Team& team, int threads) {
+int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int first, Team& team,
+                            int threads) {
   const int num_nodes = static_cast<int>(fresh_.size());
   tasks_.clear();
-  for (int k = 0; k < num_nodes; ++k) {
+  for (int k = first; k < num_nodes; ++k) {
     const VectorXd *x = &nodes.xs[k], *u = k + 1 < num_nodes ? &nodes.us[k] : nullptr;
     if (!fresh_[k]) {
       tasks_.push_back({k, x, u, nullptr, iterate_[k].get()});
@@ -48,7 +49,7 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
       throw std::invalid_argument("FDDP: node " + std::to_string(k) + " changed after the horizon advanced");
     }
   }
-  std::fill(fresh_.begin(), fresh_.end(), true);
+  std::fill(fresh_.begin() + first, fresh_.end(), true);
   const int num_tasks = static_cast<int>(tasks_.size()), size = problem.batchSize();
   const int num_batches = (num_tasks + size - 1) / size;
   ParallelErrors errors;
@@ -65,7 +66,7 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
   errors.rethrow();
   seconds_ = seconds;
   const auto isOk = [](const std::unique_ptr<NodeEvaluation>& e) { return e->status == NumericalStatus::Ok; };
-  const auto end = iterate_.begin() + num_nodes, failed = std::find_if_not(iterate_.begin(), end, isOk);
+  const auto end = iterate_.begin() + num_nodes, failed = std::find_if_not(iterate_.begin() + first, end, isOk);
   return failed == end ? -1 : static_cast<int>(failed - iterate_.begin());
 }
 
@@ -92,6 +93,11 @@ void NodeEvaluations::move(const std::vector<NodeSource>& sources) {
   iterate_.swap(moved_);
   fresh_.swap(moved_fresh_);
   advanced_ = true;
+}
+
+void NodeEvaluations::exchange(size_t node, std::unique_ptr<NodeEvaluation>& other) {
+  iterate_.at(node).swap(other);
+  fresh_.at(node) = false;
 }
 
 void NodeEvaluations::swapTrial() {

@@ -15,15 +15,18 @@ class NodeEvaluations {
   /// That of another problem is dropped. The evaluations of the iterate become outdated, unless move() kept them.
   void resize(const ShootingProblem& problem, int num_rolling, int threads);
 
-  /// Evaluates the outdated nodes of the current iterate, in batches shared among the team. Returns the first node whose
-  /// status is not Ok, or -1.
+  /// Evaluates the outdated nodes of the current iterate from a first one on, in batches shared among the team. Returns the first
+  /// of them whose status is not Ok, or -1.
   /// \throws std::invalid_argument when a node that is not outdated has another state or control
-  int update(const ShootingProblem& problem, const ShootingTrajectory& nodes, Team& team, int threads);
+  int update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int first, Team& team, int threads);
   /// Marks all evaluations of the iterate as outdated.
   void outdate() { std::fill(fresh_.begin(), fresh_.end(), false); }
   /// Nodes that are the same as others of the last window keep their evaluations, the others become outdated.
   /// \throws std::invalid_argument as Receding::move() does
   void move(const std::vector<NodeSource>& sources);
+
+  /// Exchanges the evaluation of a node, which becomes outdated, for other memory.
+  void exchange(size_t node, std::unique_ptr<NodeEvaluation>& other);
 
   /// N + 1 each: of the current iterate, and of a trial that may become it by swapTrial().
   const EvaluationList& getIterate() const { return iterate_; }

@@ -17,10 +17,19 @@ class RecedingStep : private FddpIterations {
                const FddpObserver& observer, FddpMemory& memory)
       : FddpIterations(options, options.iterations, problem, trajectory, observer, memory) {}
 
+  void prepare(double regularization) {
+    start();
+    regularization_ = std::max(regularization_, regularization);
+    FddpIterations::prepare();
+  }
+
   /// \param regularization  of the first sweep, if the initial one is less; then what the next step starts with: more after a
   /// search in vain, else less
-  FddpSummary run(double& regularization) {
-    start();
+  FddpSummary run(bool prepared, double& regularization) {
+    if (prepared)
+      resume();
+    else
+      start();
     regularization_ = std::max(regularization_, regularization);
     const FddpSummary summary = iterate();
     regularization = rejected_ > 0 ? regularization_ : regularization / options_.regularization_decrease;
@@ -43,7 +52,10 @@ class RecedingStep : private FddpIterations {
     if (const End end = evaluate()) return end;
     AugmentedLagrangian& lagrangian = memory_.lagrangian;
     if (!lagrangian.isEmpty()) {
-      lagrangian.updateMultipliers(getIterate(), line_.cost);
+      if (prepared_)
+        lagrangian.renewFirst(getIterate());
+      else
+        lagrangian.updateMultipliers(getIterate(), line_.cost);
       lagrangian.hold(getIterate());
     }
     return updateModels();
@@ -107,7 +119,17 @@ Receding& Receding::operator=(Receding&&) noexcept = default;
 
 FddpSummary Receding::step(ShootingTrajectory& trajectory, const FddpObserver& observer) {
   if (!std::exchange(advanced_, false)) regularization_ = 0;
-  return RecedingStep(options_, *problem_, trajectory, observer, *memory_).run(regularization_);
+  const bool prepared = std::exchange(prepared_, false);
+  return RecedingStep(options_, *problem_, trajectory, observer, *memory_).run(prepared, regularization_);
+}
+
+void Receding::prepare(ShootingTrajectory& trajectory) {
+  if (options_.constraints.penalty_increase != 1)
+    throw std::invalid_argument("Receding: only a step with a constant penalty can be prepared");
+  prepared_ = false;
+  const FddpObserver none;
+  RecedingStep(options_, *problem_, trajectory, none, *memory_).prepare(advanced_ ? regularization_ : 0);
+  prepared_ = true;
 }
 
 void Receding::advance(ShootingTrajectory& trajectory) {
@@ -125,17 +147,24 @@ void Receding::advance(ShootingTrajectory& trajectory) {
 
 void Receding::move(const std::vector<NodeSource>& sources) {
   advanced_ = true;
+  prepared_ = false;
   memory_->evaluations.move(sources);
   memory_->lagrangian.move(sources);
 }
 
 Multipliers Receding::multipliers() const { return memory_->lagrangian.multipliers(); }
 void Receding::setMultipliers(const Multipliers& multipliers) {
+  prepared_ = false;
   memory_->lagrangian.setMultipliers(multipliers);
   memory_->evaluations.outdate();
 }
 
 const Gains& Receding::getGains(int stage) const { return memory_->backward.sweep().nodes()[stage]; }
+bool Receding::exchangeEvaluation(int node, std::unique_ptr<NodeEvaluation>& other) {
+  const bool fresh = getEvaluation(node) != nullptr;
+  if (fresh) memory_->evaluations.exchange(static_cast<size_t>(node), other);
+  return fresh;
+}
 const NodeEvaluation* Receding::getEvaluation(int node) const {
   return memory_->evaluations.getFresh(static_cast<size_t>(node));
 }

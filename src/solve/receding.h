@@ -48,6 +48,12 @@ class Receding {
   /// current iterate in the trajectory. \throws std::invalid_argument like solve()
   FddpSummary step(ShootingTrajectory& trajectory, const FddpObserver& observer = {});
 
+  /// All of the next step() for which the initial state of the window need not be known: evaluations of all nodes but the first,
+  /// their multipliers, models and sweep. The step does the rest, with the same result. Until then
+  /// nothing but that state may change; move(), advance() and setMultipliers() discard what was prepared.
+  /// \throws std::invalid_argument like step(), and if the penalty is not constant
+  void prepare(ShootingTrajectory& trajectory);
+
   /// Moves on by one stage: the trajectory of the last step(), its multipliers and the evaluations of its nodes. Node k of
   /// the problem must now be the previous node k + 1; the next step() evaluates only nodes 0, N - 1 and N. Until then no
   /// other node of the trajectory may change, or it throws std::invalid_argument. The last state and control are repeated.
@@ -63,10 +69,12 @@ class Receding {
   Multipliers multipliers() const;
   void setMultipliers(const Multipliers& multipliers);
 
-  /// Of a stage of the last sweep, about the iterate linearized last; valid until the next step().
+  /// Of a stage of the last sweep, about the iterate linearized last; valid until the next step() or prepare().
   const Gains& getGains(int stage) const;
   /// Of a node of the trajectory that the last step() ended with, or null if it was not evaluated last; valid likewise.
   const NodeEvaluation* getEvaluation(int node) const;
+  /// The same to keep, in exchange for one by makeEvaluation() of the problem; false, and none, where it would be null.
+  bool exchangeEvaluation(int node, std::unique_ptr<NodeEvaluation>& other);
 
  private:
   const ShootingProblem* problem_;
@@ -75,6 +83,7 @@ class Receding {
   std::vector<NodeSource> sources_;  // of advance()
   double regularization_ = 0;        // that the last step ended with
   bool advanced_ = false;            // since then
+  bool prepared_ = false;            // the next one
 };
 
 }  // namespace bielle

@@ -13,6 +13,12 @@
 /// first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes effect one stage later, however fast
 /// it is found. If none is found, the previous policy, which extends some stages farther, remains in force.
 ///
+/// Most of a solve needs no measurement: the window moves on, and all nodes but the first are evaluated, linearized and
+/// swept. That is prepared after the solve before, and between a measurement and its policy there is only the rest (the
+/// preparation and the feedback phase of Diehl, Bock, Schloeder, SIAM Journal on Control and Optimization 43, 2005). Where
+/// a foot lands early or late, or a stage has several solves, it is not known in time at which stage the window will
+/// begin, and the solve does all of it.
+///
 /// Either update() waits for the solve at the beginning of a stage: the same measurements then give the same torques, on any
 /// machine. Or, for a robot, solves run in a separate thread, and update() never waits: a solution found after t_{k+1}
 /// takes effect on arrival, and the next solve begins then, from what is measured in the middle of a stage. Eq. (1) is then
@@ -65,8 +71,9 @@ struct PredictiveOptions {
 
 /// What one solve took.
 struct PredictiveSolve {
-  double seconds = 0;  ///< until its policy was ready
-  /// Its parts, s: the state for which it solves, those of the solver (FddpSummary), summed over the threads, and the policy.
+  double seconds = 0;  ///< from its measurement until its policy was ready
+  double prepare = 0;  ///< before its measurement: what needs none of it
+  /// Parts of both, s: the state for which it solves, those of the solver (FddpSummary), summed over the threads, and the policy.
   double predict = 0, evaluate = 0, linearize = 0, sweep = 0, rollout = 0, policy = 0;
   double step = 1;            ///< its shortest, alpha
   double regularization = 0;  ///< the largest of its sweeps
@@ -81,8 +88,9 @@ struct PredictiveCounts {
   int failed = 0;  ///< the last policy stayed in force
   int early = 0;   ///< feet that landed in the second half of their swing
   int late = 0;    ///< feet that had not landed when they should have stood
-  /// Without a separate thread, solves that took longer than their stage: in real time, their policy would be late. With one
-  /// or with PredictiveOptions::solve_time, stages that had no solve, because an earlier one lasted until their end.
+  /// Without a separate thread, solves that took longer than their stage, preparation included: in real time, their policy
+  /// would be late. With one or with PredictiveOptions::solve_time, stages that had no solve, because an earlier one lasted
+  /// until their end.
   int missed = 0;
   std::vector<PredictiveSolve> last;  ///< 100000 solves
 
@@ -114,7 +122,8 @@ class PredictiveController : public Controller {
   const std::vector<PredictedFoothold>& footholds() const override;
   const PredictiveCounts& counts() const;
   const Policy& policy() const;  ///< in force
-  /// Until the solve under way in a thread of its own, if any, has ended; its policy comes into force by update().
+  /// Until the solve under way in a thread of its own, if any, has ended, and the next one is prepared; its policy comes
+  /// into force by update().
   void waitForSolve() const;
 
  private:

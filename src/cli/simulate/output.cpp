@@ -52,7 +52,8 @@ Json listEstimation(const EstimationErrors& e) {
 // Medians, and what 1 % exceed.
 Json listParts(const PredictiveCounts& counts) {
   Json parts;
-  for (const auto& [name, part] : {std::pair("predict", &PredictiveSolve::predict),
+  for (const auto& [name, part] : {std::pair("prepare", &PredictiveSolve::prepare),
+                                   {"predict", &PredictiveSolve::predict},
                                    {"evaluate", &PredictiveSolve::evaluate},
                                    {"linearize", &PredictiveSolve::linearize},
                                    {"sweep", &PredictiveSolve::sweep},
