@@ -160,7 +160,7 @@ std::vector<DeadPointTrace> traceDeadPoints(const Model& model, const RowMatrixX
   for (const Linkage& linkage : linkages) {
     VectorXd rho(qs.rows());
     for (Eigen::Index k = 0; k < qs.rows(); ++k) {
-      const double value = calcTransmission(linkage, memory, model, qs.row(k).transpose(), nullptr);
+      const double value = calcTransmission(linkage, memory, model, qs.row(k).transpose());
       rho[k] = std::isfinite(value) ? value : 0;
     }
     std::set<int> nodes = {0, static_cast<int>(qs.rows()) - 1};

@@ -64,15 +64,17 @@ class LinkageWorkspaces {
   std::vector<std::pair<std::shared_ptr<const ReducedCluster>, std::unique_ptr<LinkageWorkspace>>> all_;
 };
 
-// Eq. (2). \param bases  of that configuration, where they are known already, else null
-double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
+// Eq. (2).
+double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q);
+// The same at the placements of a workspace. \param bases  of that configuration, where they are known already, else null
+double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, const Workspace& robot,
                         const LoopBases* bases);
 // The same with its derivative by the motors (nu), which the other joints follow.
 double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
                         VectorRef gradient);
 // Eq. (3): a row of nv, of which the entries of the linkage are written.
-void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
-                              MatrixRef row, const LoopBases* bases);
+void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model,
+                              const Workspace& robot, MatrixRef row, const LoopBases* bases);
 
 // transmission.cpp, for dead_points.cpp
 // Whether Q_0 is neither zero nor infinite.

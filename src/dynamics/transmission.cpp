@@ -67,12 +67,21 @@ const ReducedCluster& getCluster(const Linkage& linkage, const LoopBases* bases)
   return bases ? bases->getCluster(linkage.index) : *linkage.cluster;
 }
 
-// T and Q of Eq. (2) at s.q, from the given basis of the cluster or a new one.
-bool updateTangent(const Linkage& linkage, LinkageWorkspace& s, const LoopBases* bases) {
+// Positions of the cluster about its root, by those of the robot. \param q  of the cluster
+void loadPositions(const ReducedCluster& cluster, ConstVectorRef q, const Workspace& robot, Workspace& ws) {
+  ws.q = q;
+  const SE3& X_WR = robot.X_WB[cluster.root];
+  for (size_t i = 0; i < cluster.joints.size(); ++i) ws.X_WB[i + 1] = X_WR.inverseTimes(robot.X_WB[cluster.joints[i]]);
+  ws.stage = WorkspaceStage::Placement;
+  updateColumns(cluster.model, ws);
+}
+
+// T and Q of Eq. (2) at s.q: of the robot's positions and the given basis of the cluster, or by itself.
+bool updateTangent(const Linkage& linkage, LinkageWorkspace& s, const Workspace* robot, const LoopBases* bases) {
   const ReducedCluster& cluster = getCluster(linkage, bases);
   if (bases) {
     s.basis = &bases->getBasis(linkage.index);
-    updatePositions(cluster.model, s.point.workspace(), s.q);
+    loadPositions(cluster, s.q, *robot, s.point.workspace());
   } else {
     if (!s.point.update(cluster, s.q)) return false;
     s.basis = &s.point.basis();
@@ -89,17 +98,30 @@ bool updateTangent(const Linkage& linkage, LinkageWorkspace& s, const LoopBases*
   return s.Q.allFinite();
 }
 
-// rho of Eq. (2).
+double calcDeterminant(const LinkageWorkspace::Small& square) {
+  switch (square.rows()) {
+    case 1:
+      return square(0, 0);
+    case 2:
+      return Eigen::Matrix2d(square).determinant();
+    case 3:
+      return Matrix3d(square).determinant();
+    default:
+      return square.determinant();
+  }
+}
+
+// rho of Eq. (2); of O N instead of Q, rho times det N_M.
 double evaluate(const Linkage& linkage, const MatrixXd& Q) {
   LinkageWorkspace::Small square(linkage.size(), linkage.size());
   if (!linkage.joints.empty()) {
     square = Q;
-    return square.determinant() / linkage.reference_volume;
+    return calcDeterminant(square) / linkage.reference_volume;
   }
-  square.noalias() = linkage.reference.transpose() * Q;
-  const double sign = square.determinant() < 0 ? -1 : 1;
-  square.noalias() = Q.transpose() * Q;
-  return sign * std::sqrt(std::max(0.0, square.determinant())) / linkage.reference_volume;
+  square = linkage.reference.transpose().lazyProduct(Q);
+  const double sign = calcDeterminant(square) < 0 ? -1 : 1;
+  square = Q.transpose().lazyProduct(Q);
+  return sign * std::sqrt(std::max(0.0, calcDeterminant(square))) / linkage.reference_volume;
 }
 
 // Eq. (3) at the configuration of the last updateTangent(), by the dofs of the cluster.
@@ -137,7 +159,7 @@ void setReference(const Model& model, ConstVectorRef q_reference, Linkage& linka
   LinkageWorkspace s(linkage);
   gatherConfiguration(model, *linkage.cluster, q_reference, s.q);
   linkage.reference.setZero(s.Q.rows(), s.Q.cols());
-  if (updateTangent(linkage, s, nullptr)) linkage.reference = s.Q;
+  if (updateTangent(linkage, s, nullptr, nullptr)) linkage.reference = s.Q;
   linkage.reference_volume = evaluate(linkage, linkage.reference);
 }
 
@@ -198,18 +220,32 @@ LinkageWorkspace& LinkageWorkspaces::get(const Linkage& linkage) {
   return *all_.emplace_back(linkage.cluster, std::make_unique<LinkageWorkspace>(linkage)).second;
 }
 
-double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
-                        const LoopBases* bases) {
-  if (bases && !linkage.joints.empty()) {  // needs no kinematics
-    const MatrixXd& N = bases->getBasis(linkage.index).N;
-    LinkageWorkspace::Small N_M(linkage.size(), linkage.size()), N_O(N_M);
-    takeRows(N, linkage.motor_dofs, N_M);
-    takeRows(N, linkage.joint_dofs, N_O);
-    return N_O.determinant() / N_M.determinant() / linkage.reference_volume;
-  }
+double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q) {
   LinkageWorkspace& s = memory.get(linkage);
   gatherConfiguration(model, *linkage.cluster, q, s.q);
-  return updateTangent(linkage, s, bases) ? evaluate(linkage, s.Q) : 0;
+  return updateTangent(linkage, s, nullptr, nullptr) ? evaluate(linkage, s.Q) : 0;
+}
+
+// By the volumes of Eq. (1), which need no inverse.
+double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, const Workspace& robot,
+                        const LoopBases* bases) {
+  if (!bases) return calcTransmission(linkage, memory, model, robot.q);
+  const MatrixXd& N = bases->getBasis(linkage.index).N;
+  LinkageWorkspace::Small square(linkage.size(), linkage.size());
+  takeRows(N, linkage.motor_dofs, square);
+  const double volume = calcDeterminant(square);
+  if (!linkage.joints.empty()) {  // needs no kinematics
+    takeRows(N, linkage.joint_dofs, square);
+    return calcDeterminant(square) / volume / linkage.reference_volume;
+  }
+  const ReducedCluster& cluster = bases->getCluster(linkage.index);
+  LinkageWorkspace& s = memory.get(linkage);
+  gatherConfiguration(model, cluster, robot.q, s.q);
+  loadPositions(cluster, s.q, robot, s.point.workspace());
+  updateOutput(linkage, s.point.workspace(), s.O);
+  s.Q = s.O.lazyProduct(N);
+  const double rho = evaluate(linkage, s.Q) / volume;
+  return std::isfinite(rho) ? rho : 0;
 }
 
 double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
@@ -217,7 +253,7 @@ double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const
   LinkageWorkspace& s = memory.get(linkage);
   gatherConfiguration(model, *linkage.cluster, q, s.q);
   gradient.setZero();
-  if (!updateTangent(linkage, s, nullptr)) return 0;
+  if (!updateTangent(linkage, s, nullptr, nullptr)) return 0;
   updateDerivative(linkage, s, *linkage.cluster);
   for (int j = 0; j < linkage.size(); ++j) gradient[linkage.motors[j]] = s.derivative.dot(s.T.col(j));
   return evaluate(linkage, s.Q);
@@ -225,16 +261,16 @@ double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const
 
 double calcTransmission(const Linkage& linkage, const Model& model, ConstVectorRef q) {
   LinkageWorkspaces memory;
-  return calcTransmission(linkage, memory, model, q, nullptr);
+  return calcTransmission(linkage, memory, model, q);
 }
 
-void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
-                              MatrixRef row, const LoopBases* bases) {
+void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model,
+                              const Workspace& robot, MatrixRef row, const LoopBases* bases) {
   LinkageWorkspace& s = memory.get(linkage);
-  gatherConfiguration(model, *linkage.cluster, q, s.q);
+  gatherConfiguration(model, *linkage.cluster, robot.q, s.q);
   const std::vector<int>& dofs = linkage.cluster->dofs;
   for (int dof : dofs) row(0, dof) = 0;
-  if (!updateTangent(linkage, s, bases)) return;
+  if (!updateTangent(linkage, s, &robot, bases)) return;
   updateDerivative(linkage, s, getCluster(linkage, bases));
   for (size_t k = 0; k < dofs.size(); ++k) row(0, dofs[k]) = s.derivative[static_cast<Eigen::Index>(k)];
 }

@@ -134,7 +134,7 @@ class FeetPlacer {
   double calcTransmission(const VectorXd& q) {
     double least = std::numeric_limits<double>::infinity();
     for (const Linkage& linkage : linkages_) {
-      const double value = bielle::calcTransmission(linkage, memory_, model_, q, nullptr);
+      const double value = bielle::calcTransmission(linkage, memory_, model_, q);
       least = std::min({least, value, 1 / value});
     }
     return least;

@@ -11,11 +11,11 @@ class TransmissionResidual : public DescribedResidual {
   int size() const override { return 1; }
   void calc(const NodeView& node, VectorRef r) const override {
     LinkageWorkspaces own;
-    r[0] = calcTransmission(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws.q, node.loops);
+    r[0] = calcTransmission(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws, node.loops);
   }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     LinkageWorkspaces own;
-    calcTransmissionJacobian(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws.q, rows.q, node.loops);
+    calcTransmissionJacobian(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws, rows.q, node.loops);
   }
   ResidualData describe() const override {
     const ReducedCluster& cluster = *linkage_.cluster;
