@@ -105,14 +105,17 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
     solver_ = makeSolver(options_.iterations);
     startFromGuess(request.stage + solution.skipped);
   }
-  target_ = solution.solved ? solution.target : -1;
   prepared_ = false;
   solution.advance = advance_;
   solution.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;
   solution.took.seconds = calcSecondsSince(request.made);
+  const bool late = options_.own_thread &&
+                    request.measurement.time + solution.took.seconds >= horizon_->getStart(solution.target) - advance_;
+  target_ = solution.solved && !late ? solution.target : -1;
 }
 
-// The stage that follows is the next one, unless a foot lands early or late; a stage with several solves has the same again.
+// The stage that follows is the next one, unless a foot lands early or late; a stage with several solves has the same again. A late
+// solve leaves no time: the next one begins at once.
 void WindowPlanner::prepare() {
   if (target_ < 0 || late_.foot >= 0 || options_.solve_time > 0) return;
   const Clock::time_point begin = Clock::now();

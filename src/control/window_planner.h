@@ -105,7 +105,7 @@ class WindowPlanner {
     double waited = 0;
   } late_;
   std::unique_ptr<NodeEvaluation> predicted_;  // at x_, if that is its state
-  int target_ = -1;                            // of the last solve; negative: it failed
+  int target_ = -1;                            // of the last solve; negative: it failed, or came late
   bool prepared_ = false;                      // the window for the stage after it
   double prepare_seconds_ = 0;
   bool lowered_ = false;  // stages before the landing of the late foot have been replaced since the window last moved

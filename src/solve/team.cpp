@@ -10,7 +10,7 @@
 namespace bielle {
 namespace {
 
-constexpr double kPatience = 1e-3;  // after which a helper sleeps although a shift lasts, s
+constexpr double kPatience = 2e-3;  // after which a helper sleeps although a shift lasts, s
 constexpr int kPolite = 10000;      // looks at helpers that still work, after which others may have the processor
 
 void pause() {
