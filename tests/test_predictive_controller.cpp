@@ -251,10 +251,13 @@ TEST_CASE(
     controller.waitForSolve();
   }
   standing.gate.close();
-  for (int stages = 0; stages < 3 && !standing.gate.holds(); ++stages) {
-    do standing.update(tick++);
-    while (tick % kStageTicks != 1);
-    for (int i = 0; !standing.gate.holds() && i < 2000; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  const auto wait = [] { std::this_thread::sleep_for(std::chrono::milliseconds(1)); };
+  for (int stages = 0; stages < 20 && !standing.gate.holds(); ++stages) {
+    for (; tick <= (asking + stages) * kStageTicks; ++tick) standing.update(tick);
+    const int solves = controller.counts().solves;
+    for (int i = 0; i < 20000 && controller.counts().solves == solves && !standing.gate.holds(); ++i, wait())
+      standing.update(tick - 1);
+    for (int i = 0; i < 100 && !standing.gate.holds(); ++i) wait();  // while the next one is prepared
   }
   REQUIRE(standing.gate.holds());
   standing.update(tick++);  // takes a solution if that is ready, and the next one is held
