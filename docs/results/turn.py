@@ -4,7 +4,7 @@
     docs/results/turn.py --other PROGRAM=NAME [--other ...] [--bielle build/bin/bielle] [--repeat 3]
 
 Iterations and costs tell whether a change of the code left the motions alone, ratios of times what it gained. NAME is what the page
-calls the other program, such as its commit. A motion that it does not know is left out. `--quick` solves one motion once and prints
+calls the other program, such as its commit. A motion that it refuses is left out. `--quick` solves one motion once and prints
 the page; without --other, this program takes both turns.
 """
 import statistics
@@ -24,14 +24,14 @@ MOTIONS += [("cleobot", motion) for motion in (
 
 
 def solve(runner, robot, motion, *options):
-    """The summary of a solve on two threads."""
+    """The summary of a solve on two threads; None where the program refuses it."""
     place = runner.place()
-    runner.run("solve", motion, "--robot", robot, *options, "--threads", 2, "--quiet", "--no-report", "--no-check", "-o", place)
+    run = runner.run("solve", motion, "--robot", robot, *options, "--threads", 2, "--quiet", "--no-report", "--no-check", "-o", place,
+                     allowed=(0, 1, 2))
+    if run.returncode == 2:
+        print(runner.bielle, motion, run.stderr, file=sys.stderr, flush=True)
+        return None
     return common.Result(place).summary
-
-
-def knows(runner, motion):
-    return runner.run("solve", motion, "--help", allowed=range(256)).returncode == 0
 
 
 def compare(page, ours, program, name, motions, repeat):
@@ -39,10 +39,10 @@ def compare(page, ours, program, name, motions, repeat):
     runners = [common.Runner(program), ours]
     rows, middles = [], []
     for robot, (motion, *options) in motions:
-        if not knows(runners[0], motion):
-            continue
         turns = [[solve(runner, robot, motion, *options) for runner in runners] for _ in range(repeat)]
         other, now = turns[0]
+        if other is None or now is None:
+            continue
         ratios = [turn[1]["seconds"] / turn[0]["seconds"] for turn in turns]
         middles.append(statistics.median(ratios))
         rows.append((f"{robot}: {motion} {' '.join(map(str, options))}",
