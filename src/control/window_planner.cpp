@@ -4,23 +4,15 @@
 #include <limits>
 #include <utility>
 
-#include "bielle/dynamics/kinematics.h"
 #include "control/clock.h"
 #include "control/policy_stages.h"
-#include "motion/foot_tasks.h"
 
 namespace bielle {
 namespace {
 
-constexpr int kAhead = 3;               // stages of a policy: what is left when solves fail
-constexpr int kAheadIfLate = 8;         // or where they may come late
-constexpr int kEarly = 2;               // stages before its landing at which a foot counts as early
-constexpr double kLandingWay = 0.01;    // that it may then be farther off than where it may land, m
-constexpr int kLate = 1;                // stages after its landing at which a foot counts as late
-constexpr int kLowering = 2;            // stages in which it is then foreseen to land
-constexpr double kLoweringSpeed = 0.3;  // m/s
-constexpr double kDepth = 0.05;         // to which it is lowered, m
-constexpr int kFirstIterations = 10;    // of the solve before the start
+constexpr int kAhead = 3;             // stages of a policy: what is left when solves fail
+constexpr int kAheadIfLate = 8;       // or where they may come late
+constexpr int kFirstIterations = 10;  // of the solve before the start
 
 RecedingOptions makeSolverOptions(const PredictiveOptions& options, int iterations) {
   RecedingOptions out;
@@ -101,10 +93,7 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
   } catch (const std::exception&) {
     solution.solved = false;
   }
-  if (!solution.solved) {
-    solver_ = makeSolver(options_.iterations);
-    startFromGuess(request.stage + solution.skipped);
-  }
+  if (!solution.solved) restart(request.stage + solution.skipped);
   prepared_ = false;
   solution.advance = advance_;
   solution.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;
@@ -119,28 +108,23 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
 void WindowPlanner::prepare() {
   if (target_ < 0 || late_.foot >= 0 || options_.solve_time > 0) return;
   const Clock::time_point begin = Clock::now();
-  const int first = horizon_->getFirst(skipImpacts(target_ + 1));
+  int next = target_ + 1;
+  while (isImpact(next)) ++next;
+  const int first = horizon_->getFirst(next);
   try {
     solver_.exchangeEvaluation(0, predicted_);
     horizon_->prepare(first);
     prepared_ = move(first);
+    window_.move(grid_.stages(), trajectory_.xs[0]);  // as foreseen: the window may yet move back, and keep it
     if (prepared_) solver_.prepare(trajectory_);
   } catch (const std::exception&) {
     prepared_ = false;
   }
-  if (!prepared_) {
-    solver_ = makeSolver(options_.iterations);
-    startFromGuess(first);
-  }
+  if (!prepared_) restart(next);
   prepare_seconds_ = calcSecondsSince(begin);
 }
 
 bool WindowPlanner::isPrepared(int first) const { return prepared_ && !lowered_ && grid_.begin() == first; }
-
-int WindowPlanner::skipImpacts(int stage) const {
-  while (isImpact(stage)) ++stage;
-  return stage;
-}
 
 Receding WindowPlanner::makeSolver(int iterations) const {
   return Receding(window_, makeSolverOptions(options_, iterations));
@@ -152,93 +136,6 @@ void WindowPlanner::solveFromRest() {
   options.threads = options_.threads;
   options.initial_regularization = kGuessRegularization;
   trajectory_ = bielle::solve(window_, std::move(trajectory_), options).trajectory;
-}
-
-bool WindowPlanner::stands(int stage, int contact) const {
-  const std::vector<int>& standing = getSpec(stage).constraints.contacts;
-  return std::find(standing.begin(), standing.end(), contact) != standing.end();
-}
-
-// Where a foot is to stand with a stage.
-const SE3& WindowPlanner::getFoothold(int stage, int contact) const {
-  const ConstraintSet& set = getSpec(stage).constraints;
-  int c = set.num_loops;
-  while (set.getContact(c) != contact) ++c;
-  return set.closures[c].X_B2;
-}
-
-// Near enough to where it should land.
-bool WindowPlanner::isOverFoothold(int landing, int contact, ConstVectorRef q) {
-  const SE3& X_WT = getFoothold(landing, contact);
-  const ContactFrame& foot = model_.contacts()[contact];
-  updatePlacements<double>(model_, feet_, q);
-  const Vector3d off = X_WT.R.transpose() * (getPlacement(feet_, foot.body, foot.X_BF).p - X_WT.p);
-  const double room = getLandingRoom(contact, getSpec(landing)) + kLandingWay;
-  return off.head<2>().cwiseAbs().maxCoeff() <= room;
-}
-
-// The stage with which a foot stands that swings in this one but is on the ground early, or this stage.
-int WindowPlanner::findLanding(int stage, const Measurement& measurement) {
-  const std::vector<char>& contacts = measurement.contacts;
-  const int contacts_of_model = static_cast<int>(contacts.size());
-  for (int contact = 0; contact < contacts_of_model; ++contact) {
-    if (!contacts[contact] || stands(stage, contact)) continue;
-    int begin = stage, end = stage;  // of the swing
-    while (begin > horizon_->begin() && !stands(begin - 1, contact)) --begin;
-    while (end < horizon_->end() && !stands(end, contact)) ++end;
-    if (end < horizon_->end() && stage - begin > (end - begin) / 2 && end - stage >= kEarly &&
-        isOverFoothold(end, contact, measurement.q))
-      return end;
-  }
-  return stage;
-}
-
-// The foot that should stand with a stage and has not found the ground, while another one carries; or -1.
-int WindowPlanner::findLateFoot(int landing, const std::vector<char>& contacts) const {
-  const int begin = landing - kLowering;
-  if (begin < horizon_->begin() || isImpact(landing)) return -1;
-  const int contacts_of_model = static_cast<int>(contacts.size());
-  for (int contact = 0; contact < contacts_of_model; ++contact) {
-    if (contacts[contact] || !stands(landing, contact)) continue;
-    bool swings = true, carried = false;
-    for (int k = begin; k < landing; ++k) swings = swings && !stands(k, contact);
-    for (int other = 0; other < contacts_of_model; ++other)
-      carried = carried || (other != contact && stands(begin, other) && stands(landing, other));
-    if (swings && carried) return contact;
-  }
-  return -1;
-}
-
-void WindowPlanner::lower(int foot, int landing) {
-  late_ = {foot, landing, 0};
-  for (int k = landing - kLowering; k <= landing; ++k) {
-    StageSpec spec = getSpec(k);
-    lowerFoot(model_, foot, kLoweringSpeed, spec);
-    problem_.replaceStage(horizon_->getNode(k), std::move(spec));
-  }
-  lowered_ = true;
-}
-
-// The stage that follows, by the feet that stand: the next one; that with which an early foot stands; or, while a foot is late,
-// that from which on it is foreseen to land, over and over again.
-int WindowPlanner::chooseNext(const Request& request, Solution& solution) {
-  const std::vector<char>& contacts = request.measurement.contacts;
-  const int next = request.stage + 1;
-  if (contacts.empty()) return next;
-  if (late_.foot < 0) {
-    const int landing = findLanding(next, request.measurement);
-    solution.early = landing != next;
-    if (solution.early) return landing;
-    while (late_.foot < 0 && checked_ < request.stage - kLate)
-      if (const int foot = findLateFoot(++checked_, contacts); foot >= 0) lower(foot, checked_);
-    if (late_.foot < 0) return next;
-    solution.late = true;
-  }
-  const int begin = late_.landing - kLowering;
-  if (!request.again) late_.waited += horizon_->getStart(begin + 1) - horizon_->getStart(begin);
-  if (!contacts[late_.foot] && kLoweringSpeed * late_.waited < kDepth) return begin;
-  late_.foot = -1;
-  return late_.landing;
 }
 
 // Eq. (1), and through an impact if one follows: the stage from which the next policy is to be in force, and its state.
@@ -386,6 +283,12 @@ void WindowPlanner::setWindow() {
   problem_.setTerminalReference(end.head(model_.nq()), end.tail(model_.nv()));
 }
 
+// After a failure.
+void WindowPlanner::restart(int stage) {
+  solver_ = makeSolver(options_.iterations);
+  startFromGuess(stage);
+}
+
 // A first guess for the window that begins with a stage.
 void WindowPlanner::startFromGuess(int stage) {
   const int first = horizon_->getFirst(stage);
@@ -452,23 +355,6 @@ const RobotEvaluation& WindowPlanner::getEvaluation(const Receding& solver, int 
   if (const NodeEvaluation* evaluation = solver.getEvaluation(node))
     return static_cast<const RobotEvaluation&>(*evaluation);
   return evaluator_.evaluate(grid_.stages()[node], trajectory_.xs[node], trajectory_.us[node]);
-}
-
-// Where feet that are in the air at some stage of the window, which begins with this one, first stand after it.
-void WindowPlanner::predictFootholds(int stage, Solution& solution) {
-  solution.footholds.clear();
-  const int contacts = static_cast<int>(model_.contacts().size()), shift = stage - grid_.begin();
-  const std::vector<WindowGrid::Node>& nodes = grid_.nodes();
-  for (int contact = 0; contact < contacts; ++contact) {
-    size_t k = 1;
-    const auto standsAt = [&](size_t node) { return stands(nodes[node].begin + shift, contact); };
-    while (k < nodes.size() && (standsAt(k - 1) || !standsAt(k))) ++k;
-    if (k == nodes.size()) continue;
-    const ContactFrame& foot = model_.contacts()[contact];
-    updatePlacements<double>(model_, feet_, trajectory_.xs[k].head(model_.nq()));
-    solution.footholds.push_back(
-        {contact, horizon_->getStart(nodes[k].begin + shift) - advance_, getPlacement(feet_, foot.body, foot.X_BF)});
-  }
 }
 
 }  // namespace bielle

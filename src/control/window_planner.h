@@ -56,18 +56,11 @@ class WindowPlanner {
   bool isImpact(int stage) const { return getSpec(stage).kind == StageKind::Impact; }
   Receding makeSolver(int iterations) const;
   void solveFromRest();
-  bool stands(int stage, int contact) const;
-  int findLanding(int stage, const Measurement& measurement);
-  bool isOverFoothold(int landing, int contact, ConstVectorRef q);
-  const SE3& getFoothold(int stage, int contact) const;
-  int findLateFoot(int landing, const std::vector<char>& contacts) const;
-  void lower(int foot, int landing);
-  int chooseNext(const Request& request, Solution& solution);
   VectorXd findRest(const Request& request, const RobotEvaluation& step);
   bool predict(const Request& request, Solution& solution);
   bool solveWindow(Solution& solution);
   bool isPrepared(int first) const;
-  int skipImpacts(int stage) const;
+  void restart(int stage);
   bool move(int first);
   VectorXd interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share);
   bool continueNode(const WindowGrid::Node& node);
@@ -82,7 +75,18 @@ class WindowPlanner {
   void keepGains(int phase, const RowMatrixXd& K);
   void makePolicy(const Receding& solver, int stage, Solution& solution);
   const RobotEvaluation& getEvaluation(const Receding& solver, int node);
+
+  // window_feet.cpp
+  bool stands(int stage, int contact) const;
+  const SE3& getFoothold(int stage, int contact) const;
+  bool isOverFoothold(int landing, int contact, ConstVectorRef q);
+  int findLanding(int stage, const Measurement& measurement);
+  int findLateFoot(int landing, const std::vector<char>& contacts) const;
+  void lower(int foot, int landing);
+  int chooseNext(const Request& request, Solution& solution);
   void predictFootholds(int stage, Solution& solution);
+  static constexpr int kLate = 1;      // stages after its landing at which a foot counts as late
+  static constexpr int kLowering = 2;  // stages in which it is then foreseen to land
 
   const PredictiveOptions options_;
   const std::unique_ptr<Horizon> horizon_;

@@ -160,10 +160,8 @@ void Receding::setMultipliers(const Multipliers& multipliers) {
 }
 
 const Gains& Receding::getGains(int stage) const { return memory_->backward.sweep().nodes()[stage]; }
-bool Receding::exchangeEvaluation(int node, std::unique_ptr<NodeEvaluation>& other) {
-  const bool fresh = getEvaluation(node) != nullptr;
-  if (fresh) memory_->evaluations.exchange(static_cast<size_t>(node), other);
-  return fresh;
+void Receding::exchangeEvaluation(int node, std::unique_ptr<NodeEvaluation>& other) {
+  if (getEvaluation(node)) memory_->evaluations.exchange(static_cast<size_t>(node), other);
 }
 const NodeEvaluation* Receding::getEvaluation(int node) const {
   return memory_->evaluations.getFresh(static_cast<size_t>(node));

@@ -49,8 +49,8 @@ class Receding {
   FddpSummary step(ShootingTrajectory& trajectory, const FddpObserver& observer = {});
 
   /// All of the next step() for which the initial state of the window need not be known: evaluations of all nodes but the first,
-  /// their multipliers, models and sweep. The step does the rest, with the same result. Until then
-  /// nothing but that state may change; move(), advance() and setMultipliers() discard what was prepared.
+  /// their multipliers, models and sweep. The step does the rest, with the same result. Until then nothing but that state may
+  /// change; move(), advance() and setMultipliers() discard what was prepared.
   /// \throws std::invalid_argument like step(), and if the penalty is not constant
   void prepare(ShootingTrajectory& trajectory);
 
@@ -73,8 +73,8 @@ class Receding {
   const Gains& getGains(int stage) const;
   /// Of a node of the trajectory that the last step() ended with, or null if it was not evaluated last; valid likewise.
   const NodeEvaluation* getEvaluation(int node) const;
-  /// The same to keep, in exchange for one by makeEvaluation() of the problem; false, and none, where it would be null.
-  bool exchangeEvaluation(int node, std::unique_ptr<NodeEvaluation>& other);
+  /// The same to keep, in exchange for one by makeEvaluation() of the problem; nothing happens where it would be null.
+  void exchangeEvaluation(int node, std::unique_ptr<NodeEvaluation>& other);
 
  private:
   const ShootingProblem* problem_;
