@@ -32,9 +32,9 @@ WORLDS = ("bielle", "mujoco", "simbody")
 
 # Tables are files of comma-separated values below comments that say where they are from.
 
-def write_data(name, run, columns, rows, directory=DATA):
+def write_data(name, run, columns, rows, *remarks, directory=DATA):
     with open(pathlib.Path(directory) / f"{name}.csv", "w", encoding="utf-8", newline="") as file:
-        file.write(f"# {run}\n")
+        file.writelines(f"# {comment}\n" for comment in (run, *remarks))
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)
@@ -204,6 +204,28 @@ def run_busily(count):
             process.wait()
 
 
+PAUSES = """
+import time
+pauses, last = [], time.perf_counter()
+end = last + 60
+while last < end:
+    now = time.perf_counter()
+    if now - last > 1e-3:
+        pauses.append(now - last)
+    last = now
+print(len(pauses), max(pauses, default=0))
+"""
+
+
+def tell_pauses():
+    """What the machine takes from programs that do not wait for anything."""
+    loops = [subprocess.Popen([sys.executable, "-c", PAUSES], stdout=subprocess.PIPE, text=True)
+             for _ in range(os.cpu_count())]
+    counts, longest = zip(*(loop.communicate()[0].split() for loop in loops))
+    return (f"in the minute after, loops that only read the clock, one on each core, were interrupted {' and '.join(counts)} "
+            f"times for longer than 1 ms, at worst for {1e3 * max(map(float, longest)):.1f} ms")
+
+
 def measure_real_time(runner):
     unit = 1e-3 * json.loads(runner.run("bench", "--quick", "--json").stdout)["unit [us]"]  # ms
     rows = []
@@ -231,7 +253,7 @@ def measure_real_time(runner):
         add(robot, *walks[0], "beside two busy processes", busy=2)
     add("bipetto", *walks[0], "one thread", "--threads", 1)
     return ["robot", "walk", "on", "outcome", "stages without a solve", "of", "median [ms (units)]",
-            "99 %", "worst", "prepared before", "`update` 99 % [ms]", "to a new policy [ms]", "memory [MB]"], rows
+            "99 %", "worst", "prepared before", "`update` 99 % [ms]", "to a new policy [ms]", "memory [MB]"], rows, tell_pauses()
 
 
 MEASUREMENTS = {"gains": measure_gains, "sensors": measure_sensors, "errors": measure_errors, "delays": measure_delays,
@@ -336,7 +358,7 @@ def run_quick(runner, run):
     pathlib.Path(spec).write_text(QUICK_SPEC, encoding="utf-8")
     runner.run("campaign", spec, "-o", directory, allowed=(0,))
     with tempfile.TemporaryDirectory() as data:
-        write_data("worlds", run, *list_falls(directory), data)
+        write_data("worlds", run, *list_falls(directory), directory=data)
         page = common.Page(__file__, "A small campaign", run)
         add_table(page, "worlds", data)
     page.write(True)
