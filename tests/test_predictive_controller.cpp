@@ -388,6 +388,18 @@ TEST_CASE("estimator: contacts are expected where the controller is in its plan,
   CHECK(carryOut(getShortSquat(), on_time, options).estimation.contact_errors > 0.5);
 }
 
+TEST_CASE("carried out: a world that cannot follow a torque names the motor") {
+  struct Bursting : Controller {
+    void update(const Measurement&, VectorRef u) override {
+      u.setZero();
+      u[2] = -1e8;
+    }
+  } bursting;
+  const Execution execution = carryOut(getShortSquat(), bursting, {});
+  CHECK(execution.outcome == Outcome::BrokeOff);
+  CHECK_THAT(execution.message, Catch::Contains("; motor '" + getBipetto().motors()[2].name + "' was at 1e+08 N m"));
+}
+
 TEST_CASE("predictive control: it refuses a plan that is not one of its motion") {
   const Model& model = getBipetto();
   const PredictiveOptions options = makeShortWindow(1);

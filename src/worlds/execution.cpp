@@ -8,6 +8,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "control/clock.h"
 #include "math/constants.h"
+#include "model/number_text.h"
 #include "worlds/motion_recorder.h"
 #include "worlds/robot_errors.h"
 
@@ -43,6 +44,16 @@ bool advance(World& world, TorqueDelay& delay, double time, double period) {
     if (ends) return true;
     elapsed = next;
   }
+}
+
+// The largest torque often tells why a world cannot go on: most motors of published robots have no limit.
+std::string describeBreak(const Model& model, const World& world) {
+  if (model.nu() == 0) return world.message();
+  Eigen::Index largest = 0;
+  const double torque = world.torques().cwiseAbs().maxCoeff(&largest);
+  const Motor& motor = model.motors()[largest];
+  return world.message() + "; motor '" + motor.name + "' was at " + formatNumber(torque, "%.3g") +
+         (model.joints()[motor.joint].kind == JointKind::Prismatic ? " N" : " N m");
 }
 
 }  // namespace
@@ -161,7 +172,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
                 : !fall.empty()             ? Outcome::Fell
                 : advances && tick == ticks ? Outcome::Stood
                                             : Outcome::Stopped;
-  out.message = breaks ? world.message() : fall;
+  out.message = breaks ? describeBreak(model, world) : fall;
   return out;
 }
 
