@@ -7,7 +7,7 @@
     docs/results/execution.py --record unknown=DIR          takes a table from a campaign: `bielle campaign SPEC -o DIR`
 
 The campaigns are worlds, pushes, pushes_predictive, pushes_felt, solve_times, cleobot, unknown, worlds_real_time and
-pushes_real_time, each from examples/campaign/NAME.yaml; they take hours, those in real time a quarter of one, on a quiet
+pushes_real_time, each from examples/campaign/NAME.yaml; they take hours, those in real time less, but they want a quiet
 machine. Every table keeps the commit, the date and the machine of its figures. `--quick` runs and records a small campaign.
 """
 import contextlib
@@ -15,6 +15,7 @@ import csv
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -96,6 +97,15 @@ def count_impulses(directory):
     columns = list(next(iter(counts.values())))
     return (["given to a solve [ms]", *(f"{impulse} N s" for impulse in columns), "runs of each"],
             [[time, *row.values(), len(runs) // len(counts) // len(columns)] for time, row in counts.items()])
+
+
+def tell_failures(directory):
+    """Of runs that an error ended, if there are any."""
+    runs = read_runs(directory)
+    failed = [re.sub("'.*?'", "…", run["outcome_message"]).split(";")[0] for run in runs if run["outcome"] == "failed"]
+    if not failed:
+        return []
+    return [f"{len(failed)} of {len(runs)} runs were broken off and count as falls: {'; '.join(sorted(set(failed)))}"]
 
 
 CAMPAIGNS = {"worlds": list_falls, "pushes": list_impulses, "pushes_predictive": count_by("push time"),
@@ -316,7 +326,7 @@ stage takes 12 ms and has as many solves as fit into it."""),
 without that margin. It saves one walk of 48 and no climb."""),
     ("Unknown ground", "unknown", lambda: f"""Bipetto walks for 20 s at 0.2 m/s on tiles of 25 cm, up to 2 cm above
 and below the planned ground, with masses off by up to 10 %, rods by up to 0.5 mm, and friction as in the table; its
-plan assumes 0.4. {share("unknown")}. A run takes 15 to 20 s of one core."""),
+plan assumes 0.4. In real time, two runs at once on two cores: {share("unknown")}."""),
     ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
 two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls."""),
     ("Pushes in real time", "pushes_real_time", lambda: f"""Pushes of 10 N s from eight directions at ten instants of one
@@ -385,7 +395,7 @@ def main():
         name, _, directory = entry.partition("=")
         if name not in CAMPAIGNS or not os.path.isdir(directory):
             parser.error(f"--record {entry}: expected one of {', '.join(CAMPAIGNS)}, and the directory of its campaign")
-        write_data(name, run, *CAMPAIGNS[name](directory))
+        write_data(name, run, *CAMPAIGNS[name](directory), *tell_failures(directory))
     make_page().write(False)
 
 
