@@ -206,14 +206,15 @@ std::vector<size_t> listMapped(const CampaignResults& results) {
 
 // Seen from above, x upwards, y to the left. Of several instants the mean.
 Plot makeMap(const CampaignResults& results, const Groups& groups, size_t direction) {
-  const bool of_instants = listMapped(results).size() < listVaried(results).size();
-  Plot plot{
-      std::string("Largest impulse without a fall, N s, by direction") + (of_instants ? ", mean of all instants" : ""),
-      "", "", PlotScale::Polar};
+  const std::vector<size_t> mapped = listMapped(results);
+  std::string title = "Largest impulse without a fall, N s, by direction";
+  for (const size_t i : mapped) title += " and " + results.columns[i];
+  if (mapped.size() < listVaried(results).size()) title += ", mean of all instants";
+  Plot plot{title, "", "", PlotScale::Polar};
   for (const auto& [condition, found] : groups) {
-    std::string title;
-    for (const std::string& value : condition) title += (title.empty() ? "" : ", ") + value;
-    Curve curve{title, getCurveColor(plot.curves.size()), CurveStyle::LinesPoints, false, {}};
+    std::string label;
+    for (const std::string& value : condition) label += (label.empty() ? "" : ", ") + value;
+    Curve curve{label, getCurveColor(plot.curves.size()), CurveStyle::LinesPoints, false, {}};
     std::map<double, std::vector<double>> impulses;
     for (const SurvivedImpulse& one : found) impulses[std::stod(one.values[direction])].push_back(one.impulse);
     for (const auto& [angle, all] : impulses)
