@@ -105,7 +105,7 @@ def tell_failures(directory):
     failed = [re.sub("'.*?'", "…", run["outcome_message"]).split(";")[0] for run in runs if run["outcome"] == "failed"]
     if not failed:
         return []
-    return [f"{len(failed)} of {len(runs)} runs were broken off and count as falls: {'; '.join(sorted(set(failed)))}"]
+    return [f"broken off, and counted as falls: {len(failed)} of {len(runs)} runs ({'; '.join(sorted(set(failed)))})"]
 
 
 CAMPAIGNS = {"worlds": list_falls, "pushes": list_impulses, "pushes_predictive": count_by("push time"),

@@ -9,6 +9,7 @@
 #include "control/clock.h"
 #include "math/constants.h"
 #include "model/number_text.h"
+#include "motion/motor_scale.h"
 #include "worlds/motion_recorder.h"
 #include "worlds/robot_errors.h"
 
@@ -46,14 +47,14 @@ bool advance(World& world, TorqueDelay& delay, double time, double period) {
   }
 }
 
-// The largest torque often tells why a world cannot go on: most motors of published robots have no limit.
+// The largest torque often tells why a world cannot go on: a motor without a limit gives whatever it is asked for.
 std::string describeBreak(const Model& model, const World& world) {
   if (model.nu() == 0) return world.message();
   Eigen::Index largest = 0;
   const double torque = world.torques().cwiseAbs().maxCoeff(&largest);
   const Motor& motor = model.motors()[largest];
   return world.message() + "; motor '" + motor.name + "' was at " + formatNumber(torque, "%.3g") +
-         (model.joints()[motor.joint].kind == JointKind::Prismatic ? " N" : " N m");
+         (isLinear(model, motor) ? " N" : " N m");
 }
 
 }  // namespace

@@ -17,7 +17,7 @@
 /// swept. That is prepared after the solve before, and between a measurement and its policy there is only the rest (the
 /// preparation and the feedback phase of Diehl, Bock, Schloeder, SIAM Journal on Control and Optimization 43, 2005). Where
 /// a foot lands early or late, or a stage has several solves, it is not known in time at which stage the window will
-/// begin; after a late solve the next one begins at once. Then the solve does all of it.
+/// begin; after a late solve the next one begins at once. In these cases the solve does all of it.
 ///
 /// Either update() waits for the solve at the beginning of a stage: the same measurements then give the same torques, on any
 /// machine. Or, for a robot, solves run in a separate thread, and update() never waits: a solution found after t_{k+1}
