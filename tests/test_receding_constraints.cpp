@@ -133,6 +133,49 @@ TEST_CASE("in receding horizons a row that binds does not come free and is viola
   }
 }
 
+TEST_CASE("a receding step without an acceptable trial leaves the trajectory and its multipliers as they are") {
+  using Problem = Constrained<PlantProblem<Linear>>;
+  struct Steep : Problem {
+    explicit Steep(const Problem& problem) : Problem(problem) {}
+    using Problem::linearize;
+    void linearize(LinearizeTask& task, ProblemScratch* scratch) const override {
+      Problem::linearize(task, scratch);
+      task.out->lx *= slope;
+      task.out->lu *= slope;
+    }
+    double slope = 1;
+  };
+  Steep problem{Problem(makeLinear())};
+  problem.rows.push_back(
+      {"speed", 1, problem.stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
+  RecedingOptions options = makeOptions(GENERATE(1, 3));
+  options.threads = 1;
+  options.constraints.penalty_increase = 1;
+  Receding solver(problem, options);
+  ShootingTrajectory t = makeGuess(problem);
+  std::vector<NodeSource> stays(t.xs.size());
+  for (size_t k = 0; k < stays.size(); ++k) stays[k] = {static_cast<int>(k), 1, k > 0};
+  const auto step = [&](bool prepares) {
+    solver.move(stays);
+    if (prepares) solver.prepare(t);
+    return solver.step(t);
+  };
+  solver.step(t);
+  const ShootingTrajectory before = t;
+  const std::vector<VectorXd> multipliers = solver.multipliers().values;
+  problem.slope = 1000;  // steps overshoot, and are rejected
+  for (const bool prepares : {false, true, true}) {
+    const FddpSummary summary = step(prepares);
+    CAPTURE(prepares, options.iterations, summary.message);
+    CHECK_THAT(summary.message, Catch::Contains("no step is acceptable"));
+    CHECK(t.us == before.us);
+    CHECK(solver.multipliers().values == multipliers);
+  }
+  problem.slope = 1;
+  CHECK(step(true).iterations > 0);
+  CHECK(solver.multipliers().values != multipliers);
+}
+
 TEST_CASE("a step that was prepared before its initial state was known is the same to the last bit") {
   auto problem = makeBoundedCartPole();
   FddpResult solved = solve(problem, makeGuess(problem));

@@ -222,8 +222,8 @@ void AugmentedLagrangian::renew(const EvaluationList& iterate, int k) {
 }
 
 void AugmentedLagrangian::takeBack() {
-  if (!std::exchange(ahead_, false)) return;
-  for (size_t k = 1; k < nodes_.size(); ++k) nodes_[k].multipliers.swap(nodes_[k].earlier);
+  for (size_t k = std::exchange(ahead_, false) ? 1 : 0; k < nodes_.size(); ++k)
+    nodes_[k].multipliers.swap(nodes_[k].earlier);
 }
 
 bool AugmentedLagrangian::settle(const EvaluationList& iterate, bool full) {
@@ -255,7 +255,10 @@ void AugmentedLagrangian::startRestoration(double cost) {
 void AugmentedLagrangian::adoptMultipliers(const EvaluationList& iterate) {
   if (!options_.multipliers) return;
   if (holds_) evaluate(iterate);  // Eq. (12) is of the d of Eq. (10)
-  for (Node& node : nodes_) node.multipliers = node.weights.gradient;
+  for (Node& node : nodes_) {
+    node.earlier.swap(node.multipliers);
+    node.multipliers = node.weights.gradient;
+  }
 }
 
 double AugmentedLagrangian::largestMultiplier() const {
@@ -284,7 +287,7 @@ void AugmentedLagrangian::setMultipliers(const Multipliers& multipliers) {
 void AugmentedLagrangian::move(const std::vector<NodeSource>& sources) {
   const size_t num_nodes = nodes_.size();
   if (num_nodes != sources.size()) return;  // no solve so far
-  takeBack();
+  if (ahead_) takeBack();
   moved_.resize(num_nodes);
   for (size_t k = 0; k < num_nodes; ++k) moved_[k] = sources[k].share * nodes_.at(sources[k].node).multipliers;
   for (size_t k = 0; k < num_nodes; ++k) nodes_[k].multipliers.swap(moved_[k]);

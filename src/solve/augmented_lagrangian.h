@@ -53,6 +53,8 @@ class AugmentedLagrangian {
   /// the two, move() takes back what the former did.
   void renewAhead(const EvaluationList& iterate);
   void renewFirst(const EvaluationList& iterate);
+  /// Multipliers before the last Eq. (12).
+  void takeBack();
   /// Raises the penalty; once it is at its maximum, updates the multipliers if a full step has not halved the violation.
   /// Returns whether the violation has been halved.
   bool settle(const EvaluationList& iterate, bool full);
@@ -73,7 +75,7 @@ class AugmentedLagrangian {
 
  private:
   struct Node {
-    VectorXd lower, upper, multipliers, earlier;  // the latter before renewAhead()
+    VectorXd lower, upper, multipliers, earlier;  // the latter before the last Eq. (12)
     ConstraintWeights weights;
     const ConstraintWeights* getWeights() const { return lower.size() > 0 ? &weights : nullptr; }
   };
@@ -99,7 +101,6 @@ class AugmentedLagrangian {
   void measure(const EvaluationList& iterate);
   void measure(int node, const VectorXd& c, Measures& out);
   void renew(const EvaluationList& iterate, int node);
-  void takeBack();
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;

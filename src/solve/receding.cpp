@@ -76,6 +76,7 @@ class RecedingStep : private FddpIterations {
       if (const End end = raiseRegularizationOrStall()) return end;
       // The search took the time of an iteration.
       if (!rounding && summary_.iterations + ++rejected_ >= max_iterations_) {
+        memory_.lagrangian.takeBack();
         summary_.message = "no step is acceptable: the iterate is kept";
         return FddpTermination::MaxIterations;
       }

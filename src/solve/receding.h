@@ -2,12 +2,13 @@
 /// \file FDDP for a receding horizon: a few iterations per step, each about as long as the last, on a window that moves.
 ///
 /// Iterations are those of fddp.h, with four differences. Each tries only a few step lengths, 1, 1/4, ...; if none is
-/// acceptable, the trajectory stays as it is, and the next iteration, in this step() or after advance(), is regularized more.
-/// None closes the gaps for its own sake: steps of all lengths are rolled out in segments, which run at the same time, and
-/// what they leave open is left to the next step. Multipliers are new, fddp.h Eq. (12), before every linearization, which is
-/// made once. And since Eq. (10) is not at its minimum there, rows with y_k != 0 are then held at their bounds, like
-/// equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal on Optimization 13, 2002): in Eq. (10) they
-/// have
+/// acceptable, the trajectory and its multipliers stay as they are, and the next iteration, in this step() or after
+/// advance(), is regularized more. None closes the gaps for its own sake: steps of all lengths are rolled out in segments,
+/// which run at the same time, and what they leave open is left to the next step. Multipliers are new, fddp.h Eq. (12),
+/// before every linearization, which is made once; those of a search in vain are taken back, or the same violations would
+/// count once more with every search. And since Eq. (10) is not at its minimum there, rows with y_k != 0 are then held at
+/// their bounds, like equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal on Optimization 13,
+/// 2002): in Eq. (10) they have
 ///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (14)
 /// With Eq. (10) alone a violated row moves inside by as much as it was violated. There it is free, since it is farther from
 /// its bound than y_k / rho, and is then violated again: in a walk's window, wrench cones by 0.5 in every other iteration.
