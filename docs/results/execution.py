@@ -328,7 +328,8 @@ without that margin. It saves one walk of 48 and no climb."""),
 and below the planned ground, with masses off by up to 10 %, rods by up to 0.5 mm, and friction as in the table; its
 plan assumes 0.4. In real time, two runs at once on two cores: {share("unknown")}."""),
     ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
-two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls."""),
+two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls. The one fall
+does not repeat: the same descent stood in five further runs."""),
     ("Pushes in real time", "pushes_real_time", lambda: f"""Pushes of 10 N s from eight directions at ten instants of one
 step, with `--real-time`, by what the controller knows: the true state, or real sensors.
 {share("pushes_real_time")}."""),
