@@ -104,6 +104,7 @@ class PredictiveController::Loop {
     stage_ += solution_.skipped;
     advance_ = solution_.advance;
     awaited_ = solution_.awaited;
+    solution_.took.time = request_.measurement.time;
     counts_.failed += !solution_.solved;
     counts_.early += solution_.early;
     counts_.late += solution_.late;

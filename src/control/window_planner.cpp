@@ -32,7 +32,7 @@ void recordSolve(const FddpSummary& summary, PredictiveSolve& took) {
   took.sweep = summary.sweep_seconds;
   took.rollout = summary.rollout_seconds;
   for (const FddpIteration& line : summary.log) {
-    if (line.step > 0) took.step = std::min(took.step, line.step);
+    took.step = std::min(took.step, line.step);
     took.regularization = std::max(took.regularization, line.regularization);
   }
 }

@@ -169,8 +169,37 @@ function listPlots(runs) {
       unit: 'N m',
       stairs: true,
       list: run => listClosures(run, true, c => run.closure_wrenches.getColumn(6 * c))
+    },
+    {
+      title: 'Predictive solves',
+      unit: 'ms',
+      stairs: true,
+      list: run => listSolves(run, column => column !== 'time_s' && !SOLVER_COLUMNS.includes(column))
+    },
+    {
+      title: 'Steps of these solves',
+      unit: '0: none',
+      stairs: true,
+      list: run => listSolves(run, column => SOLVER_COLUMNS.includes(column))
     }
   ];
+}
+
+const SOLVER_COLUMNS = ['step', 'regularization'];
+
+// Columns of the log of predictive control at every node, of the solve whose state was measured last. Parts are sums over
+// all threads.
+function listSolves(run, select) {
+  const {log, log_columns} = run.summary.solves || {};
+  if (!log) return [];
+  return log_columns.filter(select).map(name => {
+    const column = log_columns.indexOf(name), values = new Float32Array(run.time.length).fill(NaN);
+    for (let k = 0, next = 0; k < values.length; ++k) {
+      while (next < log.length && log[next][0] <= run.time[k] + 1e-6) ++next;
+      if (next > 0) values[k] = log[next - 1][column];
+    }
+    return {name, values, hidden: !['whole', 'prepare', 'step'].includes(name)};
+  });
 }
 
 // Values of all couplers, or of all other closures.

@@ -77,6 +77,7 @@ class RecedingStep : private FddpIterations {
       // The search took the time of an iteration.
       if (!rounding && summary_.iterations + ++rejected_ >= max_iterations_) {
         memory_.lagrangian.takeBack();
+        summary_.log.push_back(line_);
         summary_.message = "no step is acceptable: the iterate is kept";
         return FddpTermination::MaxIterations;
       }

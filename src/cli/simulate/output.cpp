@@ -1,6 +1,7 @@
 #include "cli/simulate/output.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -49,16 +50,16 @@ Json listEstimation(const EstimationErrors& e) {
           {"contact_errors", e.contact_errors}};
 }
 
+const std::pair<const char*, double PredictiveSolve::*> kParts[] = {
+    {"prepare", &PredictiveSolve::prepare},   {"predict", &PredictiveSolve::predict},
+    {"evaluate", &PredictiveSolve::evaluate}, {"linearize", &PredictiveSolve::linearize},
+    {"sweep", &PredictiveSolve::sweep},       {"rollout", &PredictiveSolve::rollout},
+    {"policy", &PredictiveSolve::policy}};
+
 // Medians, and what 1 % exceed.
 Json listParts(const PredictiveCounts& counts) {
   Json parts;
-  for (const auto& [name, part] : {std::pair("prepare", &PredictiveSolve::prepare),
-                                   {"predict", &PredictiveSolve::predict},
-                                   {"evaluate", &PredictiveSolve::evaluate},
-                                   {"linearize", &PredictiveSolve::linearize},
-                                   {"sweep", &PredictiveSolve::sweep},
-                                   {"rollout", &PredictiveSolve::rollout},
-                                   {"policy", &PredictiveSolve::policy}})
+  for (const auto& [name, part] : kParts)
     parts[name] = {{"median_ms", 1e3 * counts.calcQuantile(0.5, part)},
                    {"p99_ms", 1e3 * counts.calcQuantile(0.99, part)}};
   return parts;
@@ -78,23 +79,41 @@ Quantiles calcPolicyLatencies(const PredictiveCounts& counts) {
           1e3 * counts.calcQuantile(1, kLatency)};
 }
 
+// A row per solve: when its state was measured, s, the milliseconds of the whole and its parts, step and regularization.
+void addLog(const PredictiveCounts& counts, Json& json) {
+  json["log_columns"] = {"time_s", "whole"};
+  for (const auto& [name, part] : kParts) json["log_columns"].push_back(name);
+  for (const char* name : {"step", "regularization"}) json["log_columns"].push_back(name);
+  const auto round = [](double seconds) { return std::round(1e6 * seconds) / 1e3; };
+  json["log"] = Json::array();
+  for (const PredictiveSolve& solve : counts.last) {
+    Json row = {solve.time, round(solve.seconds)};
+    for (const auto& [name, part] : kParts) row.push_back(round(solve.*part));
+    row.push_back(solve.step);
+    row.push_back(solve.regularization);
+    json["log"].push_back(row);
+  }
+}
+
 Json listSolves(const PredictiveCounts& counts) {
-  return {{"stages", counts.stages},
-          {"count", counts.solves},
-          {"missed", counts.missed},
-          {"failed", counts.failed},
-          {"early_landings", counts.early},
-          {"late_landings", counts.late},
-          {"median_ms", 1e3 * counts.calcQuantile(0.5)},
-          {"p99_ms", 1e3 * counts.calcQuantile(0.99)},
-          {"worst_ms", 1e3 * counts.calcQuantile(1)},
-          {"parts", listParts(counts)},
-          {"step",
-           {{"median", counts.calcQuantile(0.5, &PredictiveSolve::step)},
-            {"p1", counts.calcQuantile(0.01, &PredictiveSolve::step)}}},
-          {"regularization",
-           {{"median", counts.calcQuantile(0.5, &PredictiveSolve::regularization)},
-            {"p99", counts.calcQuantile(0.99, &PredictiveSolve::regularization)}}}};
+  Json json = {{"stages", counts.stages},
+               {"count", counts.solves},
+               {"missed", counts.missed},
+               {"failed", counts.failed},
+               {"early_landings", counts.early},
+               {"late_landings", counts.late},
+               {"median_ms", 1e3 * counts.calcQuantile(0.5)},
+               {"p99_ms", 1e3 * counts.calcQuantile(0.99)},
+               {"worst_ms", 1e3 * counts.calcQuantile(1)},
+               {"parts", listParts(counts)},
+               {"step",
+                {{"median", counts.calcQuantile(0.5, &PredictiveSolve::step)},
+                 {"p1", counts.calcQuantile(0.01, &PredictiveSolve::step)}}},
+               {"regularization",
+                {{"median", counts.calcQuantile(0.5, &PredictiveSolve::regularization)},
+                 {"p99", counts.calcQuantile(0.99, &PredictiveSolve::regularization)}}}};
+  addLog(counts, json);
+  return json;
 }
 
 // Of this process alone, MB: that of getrusage() may be that of the process it comes from.
