@@ -16,6 +16,10 @@ RecedingOptions makeOptions(int iterations) {
   return options;
 }
 
+Row makeSpeedRow(int stages) {
+  return {"speed", 1, stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }};
+}
+
 }  // namespace
 
 TEST_CASE("multipliers are worth keeping") {
@@ -80,8 +84,7 @@ TEST_CASE("solves of one iteration, for receding horizons, linearize once each a
     mutable int linearized = 0;
   };
   Counted problem{Problem(makeLinear())};
-  problem.rows.push_back(
-      {"speed", 1, problem.stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
+  problem.rows.push_back(makeSpeedRow(problem.stages));
   ShootingTrajectory t = makeGuess(problem), optimum = t;
   REQUIRE(solveInPlace(problem, optimum).termination == FddpTermination::Converged);
   RecedingOptions options;
@@ -111,8 +114,7 @@ TEST_CASE("in receding horizons a row that binds does not come free and is viola
   Constrained<PlantProblem<Linear>> problem(makeLinear());
   ShootingTrajectory t = makeGuess(problem);
   REQUIRE(solveInPlace(problem, t).termination == FddpTermination::Converged);  // violates what now comes
-  problem.rows.push_back(
-      {"speed", 1, problem.stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
+  problem.rows.push_back(makeSpeedRow(problem.stages));
   const auto calcViolation = [&] {
     double violation = 0;
     for (int k = 1; k <= problem.stages; ++k) violation = std::max(violation, -0.4 - (t.xs[k][1] + t.xs[k][2]));
@@ -146,8 +148,7 @@ TEST_CASE("a receding step without an acceptable trial leaves the trajectory and
     double slope = 1;
   };
   Steep problem{Problem(makeLinear())};
-  problem.rows.push_back(
-      {"speed", 1, problem.stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
+  problem.rows.push_back(makeSpeedRow(problem.stages));
   RecedingOptions options = makeOptions(GENERATE(1, 3));
   options.threads = 1;
   options.constraints.penalty_increase = 1;

@@ -328,8 +328,8 @@ without that margin. It saves one walk of 48 and no climb."""),
 and below the planned ground, with masses off by up to 10 %, rods by up to 0.5 mm, and friction as in the table; its
 plan assumes 0.4. In real time, two runs at once on two cores: {share("unknown")}."""),
     ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
-two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls. The one fall
-does not repeat: the same descent stood in five further runs."""),
+two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls. Bipetto's
+fall did not recur: the same descent stood in five further runs."""),
     ("Pushes in real time", "pushes_real_time", lambda: f"""Pushes of 10 N s from eight directions at ten instants of one
 step, with `--real-time`, by what the controller knows: the true state, or real sensors.
 {share("pushes_real_time")}."""),
@@ -342,8 +342,8 @@ policy. What needs no measurement is *prepared before*, median; where that is la
 wait. Units are those of [`bielle bench`](../speed.md). `update` is what computes torques every millisecond; the time to a
 new policy counts from the measurement that it was solved for. The goal is missed where a figure exceeds it. 99 %, the worst
 and the stages without a solve depend on how often the machine takes a core away, which is told below the table. At commit
-2ae571a6 the same machine took them longer and more often: medians of 42 to 78 units, up to 244 at 99 %, 638 at worst, and
-up to 13 stages without a solve."""),
+2ae571a6, when the same machine did so longer and more often, medians were 42 to 78 units, 99 % up to 244, the worst 638, and
+up to 13 stages had no solve."""),
 ]
 
 

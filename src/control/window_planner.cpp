@@ -93,7 +93,10 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
   } catch (const std::exception&) {
     solution.solved = false;
   }
-  if (!solution.solved) restart(request.stage + solution.skipped);
+  if (!solution.solved) {
+    solution.took.step = 0;
+    restart(request.stage + solution.skipped);
+  }
   prepared_ = false;
   solution.advance = advance_;
   solution.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;

@@ -253,12 +253,10 @@ void AugmentedLagrangian::startRestoration(double cost) {
 }
 
 void AugmentedLagrangian::adoptMultipliers(const EvaluationList& iterate) {
+  for (Node& node : nodes_) node.earlier = node.multipliers;
   if (!options_.multipliers) return;
   if (holds_) evaluate(iterate);  // Eq. (12) is of the d of Eq. (10)
-  for (Node& node : nodes_) {
-    node.earlier.swap(node.multipliers);
-    node.multipliers = node.weights.gradient;
-  }
+  for (Node& node : nodes_) node.multipliers = node.weights.gradient;
 }
 
 double AugmentedLagrangian::largestMultiplier() const {

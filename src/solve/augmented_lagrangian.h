@@ -53,7 +53,7 @@ class AugmentedLagrangian {
   /// the two, move() takes back what the former did.
   void renewAhead(const EvaluationList& iterate);
   void renewFirst(const EvaluationList& iterate);
-  /// Multipliers before the last Eq. (12).
+  /// Back to the multipliers before the last Eq. (12).
   void takeBack();
   /// Raises the penalty; once it is at its maximum, updates the multipliers if a full step has not halved the violation.
   /// Returns whether the violation has been halved.

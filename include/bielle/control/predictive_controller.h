@@ -76,7 +76,7 @@ struct PredictiveSolve {
   double prepare = 0;  ///< before its measurement: what needs none of it
   /// Parts of both, s: the state for which it solves, those of the solver (FddpSummary), summed over the threads, and the policy.
   double predict = 0, evaluate = 0, linearize = 0, sweep = 0, rollout = 0, policy = 0;
-  double step = 1;            ///< its shortest, alpha; 0: none was acceptable, the last solution was kept
+  double step = 1;  ///< its shortest, alpha; 0: none was acceptable (the last solution was kept), or it failed
   double regularization = 0;  ///< the largest of its sweeps
   /// From its measurement to the one at which its policy came into force, s; negative: it did not, or not yet.
   double latency = -1;

@@ -86,7 +86,9 @@ void addLog(const PredictiveCounts& counts, Json& json) {
   for (const char* name : {"step", "regularization"}) json["log_columns"].push_back(name);
   const auto round = [](double seconds) { return std::round(1e6 * seconds) / 1e3; };
   json["log"] = Json::array();
-  for (const PredictiveSolve& solve : counts.last) {
+  const size_t solves = counts.last.size();
+  for (size_t i = 0; i < solves; ++i) {
+    const PredictiveSolve& solve = counts.last[(static_cast<size_t>(counts.solves) + i) % solves];  // the oldest first
     Json row = {solve.time, round(solve.seconds)};
     for (const auto& [name, part] : kParts) row.push_back(round(solve.*part));
     row.push_back(solve.step);
