@@ -5,10 +5,13 @@ Ends with status 77 where there is no `bielle-check`.
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import zipfile
+
+from browser import Browser
 
 BIELLE = os.path.abspath(sys.argv[1])
 SHORT = "duration: 0.6, settle: 0, time_step: 0.02"
@@ -79,6 +82,33 @@ def check_entries(place):
     assert "3 motions were asked for, 2 are good" in card and "CC0-1.0" in card and SPEC in card
 
 
+def check_page(place):
+    """A card per motion, with its picture, its values and files that exist; lists of the header leave some of them."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if not chromium:
+        print("no Chromium: the page was not opened")
+        return
+    browser = Browser(chromium, 1200, 800)
+    browser.open(os.path.join(place, "squats", "index.html"))
+    assert browser.complaints == [], browser.complaints
+    entries = read_index(place)
+    cards = browser.evaluate("[...document.querySelectorAll('.motion')].map(c => [c.id, c.innerText, c.querySelectorAll('svg svg').length,"
+                             " [...c.querySelectorAll('a')].map(a => a.getAttribute('href'))])")
+    assert [card[0] for card in cards] == [entry["name"] for entry in entries]
+    for (_, text, pictures, links), entry in zip(cards, entries):
+        assert pictures == 6 and links == list(entry["files"].values()), (pictures, links)
+        assert all(os.path.exists(os.path.join(place, "squats", link)) for link in links)
+        assert f"depth {entry['set']['depth']}" in text and f"depth {entry['goals'][0]['achieved']:.4g}" in text, text
+        assert ("a goal was missed" in text) == (not entry["good"])
+    heights = browser.evaluate("[...document.querySelectorAll('.motion')].map(c => [...c.querySelectorAll('circle')].map(e => e.getAttribute('cy')))")
+    assert all(int(row[0]) + 10 < int(row[3]) for row in heights[:2]), heights  # squats, downwards
+    count = "[document.getElementById('title').textContent, document.querySelectorAll('.motion:not([hidden])').length]"
+    choose = "const list = document.querySelector('[title=%s]'); list.value = '%s'; list.onchange(); "
+    assert browser.evaluate(count) == ["squats: 2 of 3 motions are good", 3]
+    assert browser.evaluate("(() => {" + choose % ("payload", "3 kg") + "return " + count + "})()") == ["squats: 1 of 1 motions are good", 1]
+    browser.close()
+
+
 def check_pushes(place):
     """What was carried out is exported as it happened, and good only if the robot stood."""
     result = run(place, PUSHED)
@@ -103,6 +133,7 @@ def main():
         first = run(place, SPEC)
         assert "2 of 3 motions are good" in first.stdout and "a goal was missed" in first.stderr
         check_entries(place)
+        check_page(place)
         index = read(place, "index.jsonl")
         assert run(place, SPEC).stdout.count("kept") == 3 and read(place, "index.jsonl") == index
         # Another value is another motion; the others stay.

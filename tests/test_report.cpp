@@ -4,12 +4,14 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "bielle/model/error.h"
 #include "bielle/motion/squat.h"
 #include "bielle/report/report.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
+#include "results/motion_strip.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;
@@ -268,4 +270,60 @@ TEST_CASE("a directory that is none of ours is refused with the file and the rem
   refuse("trajectory.npz: file: it cannot be read");
   CHECK_THROWS_AS(makeReport({}), InputError);
   CHECK_THROWS_WITH(writeReport("/nonexistent/report.html", {place}), Catch::Contains("trajectory.npz"));
+}
+
+namespace {
+
+// Numbers of the first element of each picture that the pattern finds: rows of its groups.
+std::vector<std::vector<double>> findNumbers(const std::string& svg, const std::string& pattern) {
+  std::vector<std::vector<double>> rows;
+  const std::regex element(pattern);
+  for (auto it = std::sregex_iterator(svg.begin(), svg.end(), element); it != std::sregex_iterator(); ++it) {
+    rows.emplace_back();
+    for (size_t i = 1; i < it->size(); ++i) rows.back().push_back(std::stod((*it)[i]));
+  }
+  return rows;
+}
+
+}  // namespace
+
+TEST_CASE("in a strip links and steps have the direction and the length of their orthographic projection") {
+  const RobotDirectory directory;
+  const Model model = loadRobot(directory.write("arm.urdf", kArm)).model;
+  MotionRecord record = getArmNames();
+  record.time = VectorXd::LinSpaced(2, 0, 1);
+  record.q = RowMatrixXd(2, 1);
+  record.q << 0, M_PI / 2;  // along x, then hanging
+  record.com = RowMatrixXd(2, 3);
+  record.com << 0.5, 0, 0, 0, 0, -0.5;
+  Ground ground;
+  ground.height = -1;
+  ground.steps.push_back({Vector3d(0.5, 0.1, -0.5), 0.2, 0.1, 0, 0, 0});
+  ground.steps.push_back({Vector3d(50, 0, -0.5), 0.2, 0.1, 0, 0, 0});  // far away
+  const std::string svg = drawMotionStrip(model, record, ground, 2);
+  const auto rods = findNumbers(svg, "stroke-width=\"14\" d=\"M(-?\\d+) (-?\\d+)L(-?\\d+) (-?\\d+)\"");
+  const auto coms = findNumbers(svg, "cx=\"(-?\\d+)\" cy=\"(-?\\d+)\"");
+  const auto steps =
+      findNumbers(svg, "fill=\"#cfd6df\"[^>]* d=\"M(-?\\d+) (-?\\d+)L(-?\\d+) (-?\\d+)L(-?\\d+) (-?\\d+)L");
+  REQUIRE((rods.size() == 2 && coms.size() == 2 && steps.size() == 2));
+  // The eye is at (0.5, -1, 0.35) from what it sees: by hand, what a unit vector becomes, downwards positive.
+  const double n = std::sqrt(1.25), m = std::sqrt(1.3725);
+  const Eigen::Vector2d x(1 / n, 0.175 / (n * m)), y(0.5 / n, -0.35 / (n * m)), z(0, -1.25 / (n * m));
+  const auto subtract = [](const std::vector<double>& row, int i, int j) {
+    return Eigen::Vector2d(row[2 * i] - row[2 * j], row[2 * i + 1] - row[2 * j + 1]);
+  };
+  const double scale = subtract(rods[1], 1, 0).norm() / (0.5 * z.norm());  // of the hanging link
+  REQUIRE(scale > 500);
+  CHECK((subtract(rods[1], 1, 0) + 0.5 * scale * z).norm() < 1.5);
+  CHECK((subtract(rods[0], 1, 0) - 0.5 * scale * x).norm() < 1.5);
+  for (size_t i = 0; i < 2; ++i) {
+    CHECK(rods[i][2] == coms[i][0]);
+    CHECK(rods[i][3] == coms[i][1]);
+    CHECK((subtract(steps[i], 0, 1) - 0.2 * scale * x).norm() < 1.5);
+    CHECK((subtract(steps[i], 1, 2) - 0.1 * scale * y).norm() < 1.5);
+  }
+  // The eye has gone along: the step is elsewhere in the second picture, by as much as the centre of mass has moved.
+  CHECK((subtract(steps[1], 0, 1) - subtract(steps[0], 0, 1)).norm() < 1.5);
+  const Eigen::Vector2d first(steps[0][0], steps[0][1]), second(steps[1][0], steps[1][1]);
+  CHECK((second - first - 0.5 * scale * x).norm() < 1.5);
 }

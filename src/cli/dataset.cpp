@@ -13,7 +13,11 @@
 #include "cli/commands.h"
 #include "cli/export.h"
 #include "formats/process.h"
+#include "formats/text_file.h"
 #include "model/payload.h"
+#include "report/page.h"
+#include "report/run.h"
+#include "results/motion_strip.h"
 #include "tasks/dataset_index.h"
 
 namespace fs = std::filesystem;
@@ -69,6 +73,18 @@ std::string describeShortfall(const DatasetEntry& entry) {
   return entry.outcome == "fell" ? "it fell in simulation" : "the simulation failed";
 }
 
+// What the page shows of a motion (dataset.js).
+Json describeForPage(const DatasetEntry& entry) {
+  Json json = describeEntry(entry);
+  json["shortfall"] = entry.is_good() ? "" : describeShortfall(entry);
+  json["picture"] = "";
+  if (!entry.result.empty()) {
+    const ReportRun run = readRun(entry.result);
+    json["picture"] = drawMotionStrip(run.robot.model, run.record, entry.ground);
+  }
+  return json;
+}
+
 int run(const DatasetArguments& arguments) {
   const DatasetSpec spec = readDatasetSpec(arguments.spec);
   makeOutputDirectory(arguments.directory);
@@ -82,6 +98,7 @@ int run(const DatasetArguments& arguments) {
   for (const auto& [body, robot] : robots) cases.robots.push_back(loadRobot(robot).directory);
   return runAndWrite(cases, [&](const CaseOutcomes& outcomes) {
     std::vector<DatasetEntry> entries;
+    Json shown = Json::array();
     std::vector<std::string> notes;
     for (const DatasetMotion& motion : spec.motions) {
       entries.push_back(readDatasetEntry(motion, outcomes.at(motion.name), cases.directory + "/" + motion.name));
@@ -90,10 +107,16 @@ int run(const DatasetArguments& arguments) {
         exportMotion(spec, arguments.directory, entry, notes);
       else
         notes.push_back(motion.name + ": " + describeShortfall(entry));
+      shown.push_back(describeForPage(entry));
     }
     const auto good = std::count_if(entries.begin(), entries.end(), [](const DatasetEntry& e) { return e.is_good(); });
     std::cout << good << " of " << entries.size() << " motions are good\n";
-    printPaths(writeDatasetIndex(arguments.directory, spec, entries), notes);
+    std::vector<std::string> paths = writeDatasetIndex(arguments.directory, spec, entries);
+    paths.push_back(arguments.directory + "/index.html");
+    writeTextFile(paths.back(), makeDatasetPage({{"title", fs::path(spec.path).stem().string()},
+                                                 {"about", describeDataset(spec)},
+                                                 {"motions", shown}}));
+    printPaths(paths, notes);
   });
 }
 
@@ -105,7 +128,9 @@ void addDataset(CLI::App& app, Action& action) {
   command.add_option("SPEC", arguments->spec, "YAML file: motions, robots, payloads, options, formats")->required();
   command
       .add_option("-o,--output", arguments->directory,
-                  "directory for index.jsonl, README.md, a directory per format, and motions/; created if necessary")
+                  "directory for index.jsonl, index.html with pictures, README.md, a directory per format, and "
+                  "motions/; created "
+                  "if necessary")
       ->required();
   addTaskOptions(command, "motions at a time, each in its own process; results do not depend on it", arguments->tasks);
   command.footer(

@@ -67,4 +67,10 @@ std::string makeDesignPage(Json data) {
                                              {"scripts", joinScripts({"data.js", "tables.js", "designs.js"})}});
 }
 
+std::string makeDatasetPage(const Json& data) {
+  return fillPage(getAsset("dataset.html"), {{"style", getAsset("style.css")},
+                                             {"data", formatInline(data)},
+                                             {"scripts", joinScripts({"data.js", "dataset.js"})}});
+}
+
 }  // namespace bielle

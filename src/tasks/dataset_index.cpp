@@ -29,33 +29,13 @@ Json listValues(const Pairs& pairs) {
   return json;
 }
 
-std::string formatLine(const DatasetEntry& entry) {
-  const DatasetMotion& motion = *entry.motion;
-  Json json = {{"name", motion.name},
-               {"robot", motion.robot_name},
-               {"payload_kg", motion.payload},
-               {"motion", motion.motion},
-               {"set", listValues(motion.set)},
-               {"options", listValues(motion.options)},
-               {"simulate", listValues(motion.simulate)},
-               {"good", entry.is_good()},
-               {"converged", entry.converged},
-               {"check_passed", entry.passed},
-               {"goals_met", entry.met},
-               {"outcome", entry.outcome},
-               {"goals", entry.goals},
-               {"duration_s", entry.duration},
-               {"files", listTexts(entry.files)}};
-  if (!entry.error.empty()) json["error"] = entry.error;
-  return json.dump() + "\n";
-}
-
 constexpr const char* kCard = R"(
 ## Files
 
 - `index.jsonl`: one JSON object per motion: what was asked (`robot`, `payload_kg`, `motion`, `set`, `options`), what was
   achieved (`goals` with requested and achieved values, `converged`, `check_passed`, `goals_met`; `good` if all three hold),
   `duration_s`, and `files` by format. Motions that are not good are listed, too, and have no files but their result.
+  `index.html`: the same with a picture of each motion, for any browser.
   A motion with an `outcome` was carried out in a physics simulation with the options in `simulate`, and its files hold what
   happened there; it is good only if it `stood`.
 - `mjlab/NAME.npz`, `amp/NAME.npz`: joints and bodies at a uniform rate, with the robots as files of MuJoCo beside them;
@@ -78,17 +58,42 @@ std::string formatCard(const DatasetSpec& spec, const std::vector<DatasetEntry>&
   const auto good = std::count_if(entries.begin(), entries.end(), [](const DatasetEntry& e) { return e.is_good(); });
   double duration = 0;
   for (const DatasetEntry& entry : entries) duration += entry.is_good() ? entry.duration : 0;
-  std::string formats;
-  for (const std::string& format : spec.formats) formats += (formats.empty() ? "" : ", ") + format;
   return "# " + fs::path(spec.path).stem().string() + "\n\n" + std::to_string(entries.size()) +
          " motions were asked for, " + std::to_string(good) + " are good, " + formatNumber(duration, "%.1f") +
-         " s together. Formats: " + formats + "; " + formatNumber(spec.rate) +
-         " frames per second. Licence: " + (spec.licence.empty() ? "not stated" : spec.licence) + ". Made by Bielle " +
-         getBuildInfo().bielle + ", `bielle dataset`.\n" + kCard + "\n## Specification\n\n```yaml\n" + spec.text +
+         " s together. " + describeDataset(spec) + "\n" + kCard + "\n## Specification\n\n```yaml\n" + spec.text +
          (spec.text.empty() || spec.text.back() == '\n' ? "" : "\n") + "```\n";
 }
 
 }  // namespace
+
+std::string describeDataset(const DatasetSpec& spec) {
+  std::string formats;
+  for (const std::string& format : spec.formats) formats += (formats.empty() ? "" : ", ") + format;
+  return "Formats: " + formats + "; " + formatNumber(spec.rate) +
+         " frames per second. Licence: " + (spec.licence.empty() ? "not stated" : spec.licence) + ". Made by Bielle " +
+         getBuildInfo().bielle + ".";
+}
+
+Json describeEntry(const DatasetEntry& entry) {
+  const DatasetMotion& motion = *entry.motion;
+  Json json = {{"name", motion.name},
+               {"robot", motion.robot_name},
+               {"payload_kg", motion.payload},
+               {"motion", motion.motion},
+               {"set", listValues(motion.set)},
+               {"options", listValues(motion.options)},
+               {"simulate", listValues(motion.simulate)},
+               {"good", entry.is_good()},
+               {"converged", entry.converged},
+               {"check_passed", entry.passed},
+               {"goals_met", entry.met},
+               {"outcome", entry.outcome},
+               {"goals", entry.goals},
+               {"duration_s", entry.duration},
+               {"files", listTexts(entry.files)}};
+  if (!entry.error.empty()) json["error"] = entry.error;
+  return json;
+}
 
 DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& outcome, const std::string& directory) {
   DatasetEntry entry;
@@ -105,6 +110,7 @@ DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& ou
   entry.result = result.string();
   const MotionSummary summary = readSummary(entry.result);
   entry.converged = summary.converged;
+  entry.ground = summary.ground;
   entry.met = std::all_of(summary.goals.begin(), summary.goals.end(), [](const GoalOutcome& g) { return g.met(); });
   for (const GoalOutcome& goal : summary.goals)
     entry.goals.push_back({{"name", goal.goal.name},
@@ -128,7 +134,7 @@ DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& ou
 std::vector<std::string> writeDatasetIndex(const std::string& directory, const DatasetSpec& spec,
                                            const std::vector<DatasetEntry>& entries) {
   std::string lines;
-  for (const DatasetEntry& entry : entries) lines += formatLine(entry);
+  for (const DatasetEntry& entry : entries) lines += describeEntry(entry).dump() + "\n";
   const std::vector<std::string> paths = {directory + "/index.jsonl", directory + "/README.md"};
   writeTextFile(paths[0], lines);
   writeTextFile(paths[1], formatCard(spec, entries));

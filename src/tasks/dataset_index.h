@@ -1,11 +1,12 @@
 #pragma once
 /// \file The index of a data set, and its card.
+#include "bielle/dynamics/ground.h"
 #include "results/json_text.h"
 #include "tasks/dataset_spec.h"
 
 namespace bielle::tasks {
 
-/// One line of index.jsonl.
+/// What became of a motion.
 struct DatasetEntry {
   const DatasetMotion* motion = nullptr;
   std::string
@@ -16,11 +17,18 @@ struct DatasetEntry {
   bool is_good() const { return converged && passed && met && outcome == (motion->carried_out ? "stood" : ""); }
   Json goals = Json::array();
   double duration = 0;                                     ///< s, of the result
+  Ground ground;                                           ///< of the motion
   std::vector<std::pair<std::string, std::string>> files;  ///< by format, from the directory of the data set
 };
 
 /// What a finished case has achieved. \param directory  of the case
 DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& outcome, const std::string& directory);
+
+/// Formats, rate, licence and the program, in one sentence each.
+std::string describeDataset(const DatasetSpec& spec);
+
+/// A line of index.jsonl.
+Json describeEntry(const DatasetEntry& entry);
 
 /// Paths are relative to the directory of the data set. \throws InputError when a file cannot be written
 std::vector<std::string> writeDatasetIndex(const std::string& directory, const DatasetSpec& spec,
