@@ -49,10 +49,12 @@ std::string joinScripts(const std::vector<const char*>& names) {
   return out;
 }
 
+std::string makeHead(const std::string& style) { return fillPage(getAsset("head.html"), {{"style", style}}); }
+
 }  // namespace
 
 std::string makePage(const Json& data) {
-  std::map<std::string, std::string> texts = {{"style", getAsset("style.css")}, {"data", formatInline(data)}};
+  std::map<std::string, std::string> texts = {{"head", makeHead(getAsset("style.css"))}, {"data", formatInline(data)}};
   texts["libraries"] = joinScripts({"three.min.js", "OrbitControls.js", "STLLoader.js", "dygraph.min.js"});
   texts["scripts"] =
       joinScripts({"data.js", "shapes.js", "robot.js", "scene.js", "camera.js", "transport.js", "plot.js", "plots.js",
@@ -62,13 +64,13 @@ std::string makePage(const Json& data) {
 
 std::string makeDesignPage(Json data) {
   data["bielle"] = getBuildInfo().bielle;
-  return fillPage(getAsset("designs.html"), {{"style", getAsset("style.css") + getAsset("designs.css")},
+  return fillPage(getAsset("designs.html"), {{"head", makeHead(getAsset("style.css") + getAsset("designs.css"))},
                                              {"data", formatInline(data)},
                                              {"scripts", joinScripts({"data.js", "tables.js", "designs.js"})}});
 }
 
 std::string makeDatasetPage(const Json& data) {
-  return fillPage(getAsset("dataset.html"), {{"style", getAsset("style.css")},
+  return fillPage(getAsset("dataset.html"), {{"head", makeHead(getAsset("style.css") + getAsset("dataset.css"))},
                                              {"data", formatInline(data)},
                                              {"scripts", joinScripts({"data.js", "dataset.js"})}});
 }
