@@ -54,4 +54,6 @@ set_tests_properties(problem PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 # Motions as MCAP files, read by a reader of our own and, where it is found, by @mcap/core.
 add_test(NAME mcap COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command>)
 add_test(NAME mcap_core COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command> core)
-set_tests_properties(mcap mcap_core PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+# References for learning and robots, read by today's MuJoCo where it is found.
+add_test(NAME mujoco_3 COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mujoco_3.py $<TARGET_FILE:bielle_command>)
+set_tests_properties(mcap mcap_core mujoco_3 PROPERTIES LABELS system SKIP_RETURN_CODE 77)
