@@ -344,6 +344,23 @@ def check_mesh(place_of_files):
         [(2 * corners[i][0], 3 * corners[i][1], 4 * corners[i][2]) for i in face] for face in faces]
 
 
+def check_joints(place_of_files):
+    """Limits do not keep a robot from being described; of axes that no URDF with a YAML file can say, the user is told."""
+    for ranges, axis, problem in (('range="-40 1e20"', "0 1 0", ""), ("", "0 0.6 0.8", "/robot_description is left out")):
+        with open(os.path.join(place_of_files, "stick.xml"), "w", encoding="utf-8") as file:
+            file.write(f"""<mujoco><worldbody><body name="stick"><joint name="swing.angle1" axis="1 0 0" {ranges}/>
+              <joint name="swing.angle2" axis="{axis}" {ranges}/><geom type="capsule" size="0.1" fromto="0 0 0 0 0 -1"/></body>
+              </worldbody></mujoco>""")
+        output = os.path.join(place_of_files, "stick")
+        run("simulate", os.path.join(place_of_files, "stick.xml"), "-o", output, "--duration", "0.1", "--no-report")
+        told = [line for line in run("export", output, "--format", "mcap").stderr.splitlines() if "description" in line]
+        file = read_mcap.read(os.path.join(output, "trajectory.mcap"))
+        assert len(told) == bool(problem) and problem in "".join(told), told
+        assert ("/robot_description" in file["topics"]) == (not problem)
+        if not problem:
+            check_description(file)
+
+
 def main():
     if REST == ["core"]:
         modules = os.environ.get("BIELLE_NODE_MODULES", "")
@@ -368,6 +385,7 @@ def main():
             run("export", squat, "--format", *arguments, status=2)
         check_told(squat, os.path.join(scratch, "told"))
         check_mesh(scratch)
+        check_joints(scratch)
         refused = run("export", os.path.join(scratch, "nothing"), "--format", "mcap", status=2)
         assert "summary.json" in refused.stderr, refused.stderr
     print("MCAP files say what the results say")

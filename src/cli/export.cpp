@@ -92,8 +92,9 @@ std::vector<std::string> writeExport(const ExportRequest& request) {
   }
   const ReportRun run = readRun(request.directory);
   if (request.format == "mcap") {
-    writeTextFile(request.path, formatMotionMcap(run.robot, run.record, run.plan, run.summary));
-    return {};
+    const MotionMcap text = formatMotionMcap(run.robot, run.record, run.plan, run.summary);
+    writeTextFile(request.path, text.mcap);
+    return text.warnings;
   }
   requireApart(request.robot, {run.robot.file});
   if (request.format == "problem") return writeProblem(request, run);

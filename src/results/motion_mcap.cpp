@@ -33,9 +33,9 @@ void addDescription(const google::protobuf::FileDescriptor& file, std::set<std::
   file.CopyTo(set.add_file());
 }
 
-class MotionMcap {
+class MotionMcapWriter {
  public:
-  MotionMcap(const LoadedRobot& robot, const MotionRecord& record, const Json& summary)
+  MotionMcapWriter(const LoadedRobot& robot, const MotionRecord& record, const Json& summary)
       : robot_(robot), model_(robot.model), record_(record), summary_(summary), ws_(robot.model) {
     file_.library = "bielle " + getBuildInfo().bielle;
     for (const Joint& joint : model_.joints())
@@ -43,7 +43,7 @@ class MotionMcap {
         for (int k = 0; k < joint.nv; ++k) coordinates_.emplace_back(joint.idx_q + k, joint.idx_v + k);
   }
 
-  std::string write(const std::optional<MotionRecord>& plan) {
+  MotionMcap write(const std::optional<MotionRecord>& plan) {
     writeScene(plan.has_value());
     writeDescription();
     writeNodes(record_, "");
@@ -54,7 +54,7 @@ class MotionMcap {
     std::map<std::string, std::string>& about = file_.metadata["bielle"];
     for (const char* key : {"motion", "robot", "world", "control", "outcome"})
       if (summary_.contains(key) && summary_[key].is_string()) about[key] = summary_[key].get<std::string>();
-    return formatMcapFile(std::move(file_));
+    return {formatMcapFile(std::move(file_)), std::move(warnings_)};
   }
 
  private:
@@ -84,7 +84,7 @@ class MotionMcap {
   }
 
   // The robot as a URDF in a message of ROS 2, whose shapes Rerun draws at the frames of /tf. It does not find the files of
-  // meshes: bodies that have nothing else get rods.
+  // meshes: bodies that have nothing else get rods. Limits of joints are left out: they matter to no drawing, and not all can be said.
   void writeDescription() {
     ModelParts parts = takeParts(model_);
     std::vector<Visual>& visuals = parts.visuals;
@@ -93,11 +93,14 @@ class MotionMcap {
     std::vector<bool> is_drawn(model_.numBodies(), false);
     for (const Visual& visual : visuals) is_drawn[visual.body] = true;
     for (const Visual& rod : listSkeleton(model_, is_drawn)) visuals.push_back(rod);
+    parts.lower_limits.setConstant(-HUGE_VAL);
+    for (VectorXd* limits : {&parts.upper_limits, &parts.velocity_limits}) limits->setConstant(HUGE_VAL);
     std::string urdf;
     try {
       urdf = formatRobot(ModelBuilder::restore(std::move(parts))).urdf;
-    } catch (const InputError&) {
-      return;  // no file of ours can express this robot
+    } catch (const InputError& error) {
+      warnings_.push_back(std::string("topic /robot_description is left out: ") + error.what());
+      return;
     }
     const auto size = static_cast<std::uint32_t>(urdf.size() + 1);  // with the zero at its end
     std::string message("\0\1\0\0", 4);                             // CDR, little-endian
@@ -350,13 +353,14 @@ class MotionMcap {
   Coordinates coordinates_;
   double force_scale_ = 0;       // m/N
   std::set<std::string> shown_;  // entities that are in the scene
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace
 
-std::string formatMotionMcap(const LoadedRobot& robot, const MotionRecord& record,
-                             const std::optional<MotionRecord>& plan, const Json& summary) {
-  return MotionMcap(robot, record, summary).write(plan);
+MotionMcap formatMotionMcap(const LoadedRobot& robot, const MotionRecord& record,
+                            const std::optional<MotionRecord>& plan, const Json& summary) {
+  return MotionMcapWriter(robot, record, summary).write(plan);
 }
 
 }  // namespace bielle

@@ -19,6 +19,7 @@
 /// A stage is written at the time of its node; an impact, which has no forces, is left out.
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "bielle/formats/reader.h"
 #include "bielle/motion/record.h"
@@ -26,10 +27,15 @@
 
 namespace bielle {
 
+struct MotionMcap {
+  std::string mcap;
+  std::vector<std::string> warnings;  ///< what the file lacks
+};
+
 /// \param plan     at the same times, of a motion that was carried out
 /// \param summary  of the result
 /// \throws InputError in a build without protobuf
-std::string formatMotionMcap(const LoadedRobot& robot, const MotionRecord& record,
-                             const std::optional<MotionRecord>& plan, const Json& summary);
+MotionMcap formatMotionMcap(const LoadedRobot& robot, const MotionRecord& record,
+                            const std::optional<MotionRecord>& plan, const Json& summary);
 
 }  // namespace bielle

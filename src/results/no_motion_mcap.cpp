@@ -4,7 +4,7 @@
 
 namespace bielle {
 
-std::string formatMotionMcap(const LoadedRobot&, const MotionRecord&, const std::optional<MotionRecord>&, const Json&) {
+MotionMcap formatMotionMcap(const LoadedRobot&, const MotionRecord&, const std::optional<MotionRecord>&, const Json&) {
   throw InputError("", "--format mcap", "its messages are written by protobuf, without which this program was built",
                    "install libprotobuf-dev and protobuf-compiler and build again, or take another format");
 }
