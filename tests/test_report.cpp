@@ -298,7 +298,8 @@ TEST_CASE("in a strip links and steps have the direction and the length of their
   record.com << 0.5, 0, 0, 0, 0, -0.5;
   Ground ground;
   ground.height = -1;
-  ground.steps.push_back({Vector3d(0.5, 0.1, -0.5), 0.2, 0.1, 0, 0, 0});
+  const double pitch = 0.3;
+  ground.steps.push_back({Vector3d(0.5, 0.1, -0.5), 0.2, 0.1, 0, pitch, 0});
   ground.steps.push_back({Vector3d(50, 0, -0.5), 0.2, 0.1, 0, 0, 0});  // far away
   const std::string svg = drawMotionStrip(model, record, ground, 2);
   const auto rods = findNumbers(svg, "stroke-width=\"14\" d=\"M(-?\\d+) (-?\\d+)L(-?\\d+) (-?\\d+)\"");
@@ -319,7 +320,7 @@ TEST_CASE("in a strip links and steps have the direction and the length of their
   for (size_t i = 0; i < 2; ++i) {
     CHECK(rods[i][2] == coms[i][0]);
     CHECK(rods[i][3] == coms[i][1]);
-    CHECK((subtract(steps[i], 0, 1) - 0.2 * scale * x).norm() < 1.5);
+    CHECK((subtract(steps[i], 0, 1) - 0.2 * scale * (x - std::tan(pitch) * z)).norm() < 1.5);
     CHECK((subtract(steps[i], 1, 2) - 0.1 * scale * y).norm() < 1.5);
   }
   // The eye has gone along: the step is elsewhere in the second picture, by as much as the centre of mass has moved.

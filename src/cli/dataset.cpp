@@ -17,6 +17,7 @@
 #include "model/payload.h"
 #include "report/page.h"
 #include "report/run.h"
+#include "results/ground_json.h"
 #include "results/motion_strip.h"
 #include "tasks/dataset_index.h"
 
@@ -80,7 +81,7 @@ Json describeForPage(const DatasetEntry& entry) {
   json["picture"] = "";
   if (!entry.result.empty()) {
     const ReportRun run = readRun(entry.result);
-    json["picture"] = drawMotionStrip(run.robot.model, run.record, entry.ground);
+    json["picture"] = drawMotionStrip(run.robot.model, run.record, readGround(run.summary.at("ground")));
   }
   return json;
 }

@@ -1,6 +1,7 @@
 #include "bielle/dynamics/ground.h"
 
 #include "dynamics/cell.h"
+#include "dynamics/ground_step.h"
 
 namespace bielle {
 namespace {
@@ -8,10 +9,9 @@ namespace {
 // With a top that may be inclined, vertical sides, and a bottom so deep that nothing leaves through it.
 Cell makeCell(const GroundStep& step, double floor) {
   constexpr double kBelow = 10;  // m
-  const double c = std::cos(step.yaw), s = std::sin(step.yaw), depth = step.top.z() - floor + kBelow;
+  const double depth = step.top.z() - floor + kBelow;
   Matrix3d edges;
-  edges << Vector3d(c, s, -std::tan(step.pitch)) * step.length / 2,
-      Vector3d(-s, c, std::tan(step.roll) / std::cos(step.pitch)) * step.width / 2, Vector3d(0, 0, depth / 2);
+  edges << calcHalfEdges(step), Vector3d(0, 0, depth / 2);
   return {step.top - Vector3d(0, 0, depth / 2), edges, 0};
 }
 

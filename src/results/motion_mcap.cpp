@@ -11,9 +11,11 @@
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/results/result.h"
+#include "dynamics/ground_step.h"
 #include "model/number_text.h"
 #include "motion.pb.h"
 #include "results/foxglove_scene.h"
+#include "results/ground_json.h"
 #include "results/mcap_file.h"
 #include "results/skeleton.h"
 
@@ -84,7 +86,7 @@ class MotionMcapWriter {
   }
 
   // The robot as a URDF in a message of ROS 2, whose shapes Rerun draws at the frames of /tf. It does not find the files of
-  // meshes: bodies that have nothing else get rods. Limits of joints are left out: they matter to no drawing, and not all can be said.
+  // meshes: bodies that have nothing else get rods. Limits of joints are left out, since not all can be said.
   void writeDescription() {
     ModelParts parts = takeParts(model_);
     std::vector<Visual>& visuals = parts.visuals;
@@ -114,18 +116,13 @@ class MotionMcapWriter {
   // The steps of the ground as plates; viewers have a grid of their own for the plane.
   void addGround(foxglove::SceneUpdate& scene) const {
     constexpr double kThickness = 0.02;  // m
-    if (!summary_.contains("ground") || !summary_["ground"].contains("steps")) return;
+    if (!summary_.contains("ground")) return;
     foxglove::SceneEntity& entity = addEntity("ground", kWorldFrame, scene);
-    for (const Json& step : summary_["ground"]["steps"]) {
-      const std::vector<double> top = step.at("top");
-      const auto angle = [&step](const char* name, const Vector3d& axis) {
-        return Eigen::AngleAxisd(step.at(name).get<double>(), axis).toRotationMatrix();
-      };
-      const Matrix3d R =
-          angle("yaw", Vector3d::UnitZ()) * angle("pitch", Vector3d::UnitY()) * angle("roll", Vector3d::UnitX());
-      const Vector3d p = Vector3d(top.at(0), top.at(1), top.at(2)) - kThickness / 2 * R.col(2);
-      addCube({R, p}, {step.at("length").get<double>(), step.at("width").get<double>(), kThickness}, kGroundColor,
-              entity);
+    for (const GroundStep& step : readGround(summary_["ground"]).steps) {
+      const Matrix3d R = calcRotation(step);
+      // Lengths are given as seen from above.
+      const double length = step.length / std::cos(step.pitch), width = step.width / std::cos(step.roll);
+      addCube({R, step.top - kThickness / 2 * R.col(2)}, {length, width, kThickness}, kGroundColor, entity);
     }
   }
 

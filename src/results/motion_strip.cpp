@@ -1,9 +1,12 @@
 #include "results/motion_strip.h"
 
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/ground_step.h"
 #include "model/number_text.h"
 #include "results/skeleton.h"
 
@@ -67,17 +70,15 @@ class StripWriter {
       const Vector3d half = rod.size[1] / 2 * X.R.col(2);
       (to_eye.dot(X.p - com) < 0 ? picture.behind : picture.front).push_back({look(X.p - half), look(X.p + half)});
     }
-    for (const ContactFrame& contact : model_.contacts())
-      picture.soles.push_back(
-          makeRectangle(ws_.X_WB[contact.body] * contact.X_BF, contact.half_length, contact.half_width));
-    for (const GroundStep& step : ground_.steps) {
-      const Matrix3d R =
-          (Eigen::AngleAxisd(step.yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(step.pitch, Vector3d::UnitY()) *
-           Eigen::AngleAxisd(step.roll, Vector3d::UnitX()))
-              .toRotationMatrix();
-      if (step.calcDistance(com.x(), com.y()) < kStepReach)
-        picture.steps.push_back(makeRectangle({R, step.top}, step.length / 2, step.width / 2));
+    for (const ContactFrame& contact : model_.contacts()) {
+      const SE3 X = ws_.X_WB[contact.body] * contact.X_BF;
+      Eigen::Matrix<double, 3, 2> half_edges;
+      half_edges << contact.half_length * X.R.col(0), contact.half_width * X.R.col(1);
+      picture.soles.push_back(makeParallelogram(X.p, half_edges));
     }
+    for (const GroundStep& step : ground_.steps)
+      if (step.calcDistance(com.x(), com.y()) < kStepReach)
+        picture.steps.push_back(makeParallelogram(step.top, calcHalfEdges(step)));
     addFloor(picture);
     pictures_.push_back(std::move(picture));
   }
@@ -96,10 +97,10 @@ class StripWriter {
 
   Point look(const Vector3d& p) const { return view_ * (p - focus_); }
 
-  Line makeRectangle(const SE3& X, double half_length, double half_width) const {
+  Line makeParallelogram(const Vector3d& centre, const Eigen::Matrix<double, 3, 2>& half_edges) const {
     Line corners;
     for (const auto& [x, y] : {std::pair(1, 1), {-1, 1}, {-1, -1}, {1, -1}, {1, 1}})
-      corners.push_back(look(X.p + X.R * Vector3d(x * half_length, y * half_width, 0)));
+      corners.push_back(look(centre + half_edges * Eigen::Vector2d(x, y)));
     return corners;
   }
 

@@ -11,6 +11,7 @@
 #include "bielle/model/error.h"
 #include "formats/aside_file.h"
 #include "formats/text_file.h"
+#include "results/ground_json.h"
 #include "results/json_text.h"
 #include "results/result_files.h"
 
@@ -77,18 +78,6 @@ Json makeTimings(const MotionResult& result) {
                        {"lower_s", timing.lower},
                        {"upper_s", timing.upper}});
   return timings;
-}
-
-Json makeGround(const Ground& ground) {
-  Json steps = Json::array();
-  for (const GroundStep& step : ground.steps)
-    steps.push_back({{"top", {step.top.x(), step.top.y(), step.top.z()}},
-                     {"length", step.length},
-                     {"width", step.width},
-                     {"yaw", step.yaw},
-                     {"pitch", step.pitch},
-                     {"roll", step.roll}});
-  return {{"height", ground.height}, {"friction", ground.friction}, {"steps", steps}};
 }
 
 Json makeGoals(const MotionResult& result) {
@@ -176,7 +165,7 @@ Json makeSummary(const MotionResult& result) {
           {"electrical_energy", makeEnergy(result)},
           {"phases", makePhases(result)},
           {"free_timings", makeTimings(result)},
-          {"ground", makeGround(result.ground)},
+          {"ground", describeGround(result.ground)},
           {"log_columns", {"iteration", "cost", "gap", "violation", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
 }

@@ -6,6 +6,7 @@
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "formats/text_file.h"
+#include "results/ground_json.h"
 #include "results/json_text.h"
 
 namespace bielle {
@@ -35,16 +36,6 @@ SE3 readPlacement(const Json& json) {
   const Eigen::Quaterniond quaternion(r.at(3), r.at(0), r.at(1), r.at(2));
   if (!(std::abs(quaternion.norm() - 1) < 1e-6)) throw std::runtime_error("a quaternion is not of unit length");
   return {quaternion.normalized().toRotationMatrix(), readVector(json.at("position"))};
-}
-
-Ground readGround(const Json& json) {
-  Ground ground;
-  ground.height = json.at("height");
-  ground.friction = json.at("friction");
-  for (const Json& step : json.at("steps"))
-    ground.steps.push_back({readVector(step.at("top")), step.at("length"), step.at("width"), step.at("yaw"),
-                            step.at("pitch"), step.at("roll")});
-  return ground;
 }
 
 GoalOutcome readGoal(const Json& json) {

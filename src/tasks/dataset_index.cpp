@@ -110,7 +110,6 @@ DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& ou
   entry.result = result.string();
   const MotionSummary summary = readSummary(entry.result);
   entry.converged = summary.converged;
-  entry.ground = summary.ground;
   entry.met = std::all_of(summary.goals.begin(), summary.goals.end(), [](const GoalOutcome& g) { return g.met(); });
   for (const GoalOutcome& goal : summary.goals)
     entry.goals.push_back({{"name", goal.goal.name},

@@ -1,6 +1,5 @@
 #pragma once
 /// \file The index of a data set, and its card.
-#include "bielle/dynamics/ground.h"
 #include "results/json_text.h"
 #include "tasks/dataset_spec.h"
 
@@ -17,7 +16,6 @@ struct DatasetEntry {
   bool is_good() const { return converged && passed && met && outcome == (motion->carried_out ? "stood" : ""); }
   Json goals = Json::array();
   double duration = 0;                                     ///< s, of the result
-  Ground ground;                                           ///< of the motion
   std::vector<std::pair<std::string, std::string>> files;  ///< by format, from the directory of the data set
 };
 

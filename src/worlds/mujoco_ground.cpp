@@ -1,9 +1,10 @@
 #include "worlds/mujoco_ground.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <string>
+
+#include "dynamics/ground_step.h"
 
 namespace bielle::worlds {
 namespace {
@@ -16,8 +17,7 @@ constexpr double kDepth = 1;       // boxes reach this far below their tops, m
 MujocoGround::MujocoGround(const Model& model, const Ground& ground) : model_(model), height_(ground.height) {
   for (const GroundStep& step : ground.steps) {
     Box box{step, {}, {}, {}};
-    box.attitude = Eigen::AngleAxisd(step.yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(step.pitch, Vector3d::UnitY()) *
-                   Eigen::AngleAxisd(step.roll, Vector3d::UnitX());
+    box.attitude = calcRotation(step);
     box.centre = step.top - box.attitude * Vector3d(0, 0, kDepth / 2);
     // Lengths are given as seen from above.
     box.half_size = {step.length / 2 / std::cos(step.pitch), step.width / 2 / std::cos(step.roll), kDepth / 2};
