@@ -313,7 +313,7 @@ def check_told(squat, output):
     along = [math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)]
     assert distance(rotate(frame["rotation"], [1, 0, 0]), along) < 1e-12
     assert abs(rotate(frame["rotation"], [0, 1, 0])[2] - math.cos(pitch) * math.sin(roll)) < 1e-12
-    # Its sides are as long as asked, seen from above: those in the planes of the axes of the step.
+    # Seen from above, its sides are as long as asked.
     assert abs(cube["size"]["x"] * math.cos(pitch) - step["length"]) < 1e-12
     assert abs(cube["size"]["y"] * math.cos(roll) - step["width"]) < 1e-12
 

@@ -40,7 +40,7 @@ const results = JSON.parse(fs.readFileSync(process.argv[3])).map(({file, frames}
     worst.loops = Math.max(0, ...getLoops());
     for (let i = 0; i < 100; ++i) M.mj_step(model, data);
   }
-  return {...worst, finite: data.qpos.every(Number.isFinite) && data.time > 0 === !frames.length};
+  return {...worst, finite: data.qpos.every(Number.isFinite) && (data.time > 0) === !frames.length};
 });
 console.log(JSON.stringify({version: M.mj_versionString(), results}));
 """

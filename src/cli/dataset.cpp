@@ -128,10 +128,10 @@ void addDataset(CLI::App& app, Action& action) {
   const auto arguments = std::make_shared<DatasetArguments>();
   command.add_option("SPEC", arguments->spec, "YAML file: motions, robots, payloads, options, formats")->required();
   command
-      .add_option("-o,--output", arguments->directory,
-                  "directory for index.jsonl, index.html with pictures, README.md, a directory per format, and "
-                  "motions/; created "
-                  "if necessary")
+      .add_option(
+          "-o,--output", arguments->directory,
+          "directory for index.jsonl, index.html with pictures, README.md, a directory per format, and motions/; "
+          "created if necessary")
       ->required();
   addTaskOptions(command, "motions at a time, each in its own process; results do not depend on it", arguments->tasks);
   command.footer(

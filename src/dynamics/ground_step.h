@@ -1,16 +1,16 @@
 #pragma once
 // The top of a step of the ground in space.
-#include <Eigen/Geometry>
-
 #include "bielle/dynamics/ground.h"
+#include "math/direction.h"
 
 namespace bielle {
 
-// Rz(yaw) Ry(pitch) Rx(roll): its z is normal to the top.
-inline Matrix3d calcRotation(const GroundStep& step) {
-  return (Eigen::AngleAxisd(step.yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(step.pitch, Vector3d::UnitY()) *
-          Eigen::AngleAxisd(step.roll, Vector3d::UnitX()))
-      .toRotationMatrix();
+// Its z is normal to the top.
+inline Matrix3d calcRotation(const GroundStep& step) { return makeRotation({step.roll, step.pitch, step.yaw}); }
+
+// Of a rectangle in the plane of the top: sides that are as long as those of the step, seen from above, m.
+inline Eigen::Vector2d calcTopSize(const GroundStep& step) {
+  return {step.length / std::cos(step.pitch), step.width / std::cos(step.roll)};
 }
 
 // Columns: halves of the edges of the top, along x and y of the step as seen from above, m (world).

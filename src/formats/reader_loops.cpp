@@ -5,6 +5,7 @@
 #include <set>
 
 #include "bielle/model/error.h"
+#include "math/direction.h"
 #include "model/number_text.h"
 
 namespace fs = std::filesystem;
@@ -29,10 +30,7 @@ Vector3d readTriple(const XMLElement& e, const char* attribute, const Vector3d& 
 }
 
 SE3 readEnd(const XMLElement& e, const std::string& path) {
-  const Vector3d rpy = readTriple(e, "rpy", Vector3d::Zero(), path);
-  const Matrix3d R = (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
-                      Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
-                         .toRotationMatrix();
+  const Matrix3d R = makeRotation(readTriple(e, "rpy", Vector3d::Zero(), path));
   return {R, readTriple(e, "xyz", Vector3d::Zero(), path)};
 }
 

@@ -9,6 +9,7 @@
 #include "formats/robot_files.h"
 #include "formats/robot_text.h"
 #include "formats/yaml_entry.h"
+#include "math/direction.h"
 
 namespace bielle {
 namespace {

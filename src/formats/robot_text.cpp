@@ -34,12 +34,6 @@ Vector3d calcRollPitchYaw(const Matrix3d& R) {
   return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
 }
 
-Matrix3d makeRotation(const Vector3d& rpy) {
-  return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
-          Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
-      .toRotationMatrix();
-}
-
 bool hasImpliedFreeFlyer(const Model& model) {
   const Joint& first = model.joints()[1];
   bool ground = false;  // any other element on the ground requires a separate link

@@ -23,4 +23,10 @@ Matrix3d calcRotationOfZ(const Vector3d& direction) {
   return q.toRotationMatrix();
 }
 
+Matrix3d makeRotation(const Vector3d& rpy) {
+  return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
+          Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
 }  // namespace bielle

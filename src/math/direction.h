@@ -1,5 +1,5 @@
 #pragma once
-/// \file Rotations that are given by a direction alone.
+/// \file Rotations that are given by a direction alone, or by three angles.
 #include "bielle/math/types.h"
 
 namespace bielle {
@@ -8,5 +8,8 @@ namespace bielle {
 /// Quaternion::FromTwoVectors, too, but this decomposes two rows where they are opposite, and takes every file that calls it a
 /// third of a minute to compile.
 Matrix3d calcRotationOfZ(const Vector3d& direction);
+
+/// Rz(yaw) Ry(pitch) Rx(roll). \param rpy  roll, pitch and yaw, rad
+Matrix3d makeRotation(const Vector3d& rpy);
 
 }  // namespace bielle

@@ -120,9 +120,8 @@ class MotionMcapWriter {
     foxglove::SceneEntity& entity = addEntity("ground", kWorldFrame, scene);
     for (const GroundStep& step : readGround(summary_["ground"]).steps) {
       const Matrix3d R = calcRotation(step);
-      // Lengths are given as seen from above.
-      const double length = step.length / std::cos(step.pitch), width = step.width / std::cos(step.roll);
-      addCube({R, step.top - kThickness / 2 * R.col(2)}, {length, width, kThickness}, kGroundColor, entity);
+      const Eigen::Vector2d size = calcTopSize(step);
+      addCube({R, step.top - kThickness / 2 * R.col(2)}, {size.x(), size.y(), kThickness}, kGroundColor, entity);
     }
   }
 

@@ -1,5 +1,6 @@
 #include "results/motion_strip.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <utility>

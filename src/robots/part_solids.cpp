@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "math/direction.h"
 #include "model/listing.h"
 
 namespace bielle {
@@ -101,9 +102,7 @@ Vector3d readPlace(const YamlEntry& entry, double side) {
 }
 
 Matrix3d readAttitude(const YamlEntry& entry, double side) {
-  const Vector3d rpy = Vector3d(side, 1, side).cwiseProduct(entry.getVector3());
-  return (Eigen::AngleAxisd(rpy.z(), kZ) * Eigen::AngleAxisd(rpy.y(), kY) * Eigen::AngleAxisd(rpy.x(), kX))
-      .toRotationMatrix();
+  return makeRotation(Vector3d(side, 1, side).cwiseProduct(entry.getVector3()));
 }
 
 Vector3d readAxis(const YamlEntry& entry) {

@@ -19,8 +19,7 @@ MujocoGround::MujocoGround(const Model& model, const Ground& ground) : model_(mo
     Box box{step, {}, {}, {}};
     box.attitude = calcRotation(step);
     box.centre = step.top - box.attitude * Vector3d(0, 0, kDepth / 2);
-    // Lengths are given as seen from above.
-    box.half_size = {step.length / 2 / std::cos(step.pitch), step.width / 2 / std::cos(step.roll), kDepth / 2};
+    box.half_size << calcTopSize(step) / 2, kDepth / 2;
     boxes_.push_back(box);
   }
 }
