@@ -64,7 +64,7 @@ def record(directory, runs, run):
     lines = [[show_entry(json.loads(line)[key]) for key in RUNS]
              for path in runs for line in pathlib.Path(path).read_text(encoding="utf-8").splitlines()]
     lines = {tuple(map(str, line[:4])): line for line in [*([row[key] for key in RUNS] for row in known), *lines]}
-    write_table("suite_runs", run if run in before else f"{before}; {run}", RUNS, lines.values())
+    write_table("suite_runs", before if run in before else f"{before}; {run}", RUNS, lines.values())
 
 
 def show_entry(value):
@@ -72,12 +72,14 @@ def show_entry(value):
 
 
 def keep_complete(runs):
-    """As many guesses of every problem by every variant that has tried all problems."""
-    counts = collections.Counter((run["problem"], run["variant"]) for run in runs)
-    problems = {problem for problem, _ in counts}
-    tried = {variant: min(counts[problem, variant] for problem in problems) for _, variant in counts}
-    least = min(count for count in tried.values() if count)
-    return [run for run in runs if tried[run["variant"]] and int(run["guess"]) < least]
+    """The guesses from which every variant has tried all problems; variants that have done so from none do not count."""
+    problems = {run["problem"] for run in runs}
+    complete = collections.defaultdict(set)
+    for (variant, guess), count in collections.Counter((run["variant"], run["guess"]) for run in runs).items():
+        if count == len(problems):
+            complete[variant].add(guess)
+    common_guesses = set.intersection(*complete.values())
+    return [run for run in runs if run["variant"] in complete and run["guess"] in common_guesses]
 
 
 def judge(runs):
