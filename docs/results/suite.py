@@ -153,7 +153,7 @@ in the files, of costs, constraints, equations of motion, steps, loops and URDF;
     guesses = len({run["guess"] for run in runs})
     page.heading("From perturbed guesses")
     page.add(f"""{guesses} guesses of seed 0 for each problem, one thread, ended after 20 s of processor time at the latest
-({origin}). Times are processor times of the command, reading and writing included. The protocol asks for 100 guesses. A run
+({origin}). Times are processor times of the command, reading and writing included. A run
 succeeds if it converges, holds its constraints and costs at most one per cent more than the best one of its variant. *Solved within
 twice the time*: of the fastest variant for the same problem and guess, with success. *Failed*: the dynamics cannot be computed; with Euler
 steps, some guesses have no first iteration, because a loop does not close.""")
