@@ -78,8 +78,8 @@ def keep_complete(runs):
     for (variant, guess), count in collections.Counter((run["variant"], run["guess"]) for run in runs).items():
         if count == len(problems):
             complete[variant].add(guess)
-    common_guesses = set.intersection(*complete.values())
-    return [run for run in runs if run["variant"] in complete and run["guess"] in common_guesses]
+    shared = set.intersection(*complete.values())
+    return [run for run in runs if run["variant"] in complete and run["guess"] in shared]
 
 
 def judge(runs):
@@ -153,10 +153,10 @@ in the files, of costs, constraints, equations of motion, steps, loops and URDF;
     guesses = len({run["guess"] for run in runs})
     page.heading("From perturbed guesses")
     page.add(f"""{guesses} guesses of seed 0 for each problem, one thread, ended after 20 s of processor time at the latest
-({origin}). Times are processor times of the command, reading and writing included. A run
-succeeds if it converges, holds its constraints and costs at most one per cent more than the best one of its variant. *Solved within
-twice the time*: of the fastest variant for the same problem and guess, with success. *Failed*: the dynamics cannot be computed; with Euler
-steps, some guesses have no first iteration, because a loop does not close.""")
+({origin}). Times are processor times of the command, reading and writing included. A run succeeds if it converges, holds its
+constraints and costs at most one per cent more than the best one of its variant. *Solved within twice the time*: of the fastest
+variant for the same problem and guess, with success. *Failed*: the dynamics cannot be computed; with Euler steps, some guesses
+have no first iteration, because a loop does not close.""")
     rows = []
     for variant, ratios in profiles.items():
         ours = [run for run in runs if run["variant"] == variant]
