@@ -110,10 +110,11 @@ function(bielle_tune target fast)
   endif()
 endfunction()
 
-# bielle_layer(NAME [FAST] SOURCES... PLAIN SOURCES... INCLUDE DIRECTORIES... PUBLIC LIBRARIES... PRIVATE LIBRARIES...): the
-# target bielle_NAME. PLAIN are the sources of a fast room that no benchmark shows.
+# bielle_layer(NAME [FAST] [ENTERED] SOURCES... PLAIN SOURCES... INCLUDE DIRECTORIES... PUBLIC LIBRARIES... PRIVATE LIBRARIES...): the
+# target bielle_NAME. PLAIN are the sources of a fast room that no benchmark shows. A layer that is ENTERED in tables when a program
+# starts (model/missing_part.h) defines the symbol bielle_NAME, for which the linker takes its object out of the static library.
 function(bielle_layer name)
-  cmake_parse_arguments(ARG "FAST" "" "SOURCES;PLAIN;INCLUDE;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "FAST;ENTERED" "" "SOURCES;PLAIN;INCLUDE;PUBLIC;PRIVATE" ${ARGN})
   set_property(GLOBAL APPEND PROPERTY BIELLE_LAYERS bielle_${name})
   if(BUILD_SHARED_LIBS)
     add_library(bielle_${name} INTERFACE)
@@ -141,6 +142,10 @@ function(bielle_layer name)
     target_include_directories(bielle_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
     target_link_libraries(bielle_${name}
       PUBLIC bielle_headers ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:bielle_warnings>)
+    if(ARG_ENTERED)
+      target_link_options(bielle_${name} INTERFACE LINKER:--undefined=bielle_${name})
+      set_property(GLOBAL APPEND PROPERTY BIELLE_ENTERED bielle_${name})
+    endif()
     bielle_tune(bielle_${name} ${ARG_FAST})
     if(ARG_PLAIN)
       add_library(bielle_${name}_plain OBJECT ${ARG_PLAIN})

@@ -1,4 +1,4 @@
-bielle_test(report SOURCES test_report.cpp LIBS bielle_report)
+bielle_test(report SOURCES test_report.cpp LIBS bielle_views)
 # In a browser; skipped where there is no Chromium.
 if(TARGET bielle_command)
   add_test(NAME report_page COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_report_page.py

@@ -8,7 +8,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/serial_model.h"
-#include "bielle/robots/robot_loader.h"
+#include "bielle/formats/reader.h"
 
 namespace bielle::validation {
 namespace {

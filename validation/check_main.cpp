@@ -1,11 +1,15 @@
-// bielle-check: checks a motion from its files with Simbody.
+// bielle-check: checks a motion from its files with Simbody. Where it misses a reader of robots, it becomes bielle-check-complete.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
 
 #include "bielle/model/error.h"
 #include "check.h"
+#include "formats/companion.h"
 #include "formats/text_file.h"
+#include "model/missing_part.h"
 #include "results/standard_output.h"
 
 using namespace bielle;
@@ -44,6 +48,10 @@ int main(int argc, char** argv) {
       printReport(std::cout, report, brief ? CheckPrint::Failures : CheckPrint::All);
     finishStandardOutput();
     return report.passed() ? kPasses : kFails;
+  } catch (const MissingPart&) {
+    const std::string program = "bielle-check-complete", path = obtainCompanion(program);
+    if (!path.empty()) execvp(path.c_str(), argv);
+    std::cerr << "bielle: error: " << describeMissingCompanion(program) << std::endl;
   } catch (const InputError& error) {
     std::cerr << "bielle: error: " << error.what() << std::endl;
   } catch (const std::exception& error) {  // of Simbody, for a robot it does not support

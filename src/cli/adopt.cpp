@@ -37,8 +37,7 @@ int adopt(const RobotArgument& argument, const std::string& directory) {
 
 }  // namespace
 
-void addAdopt(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("adopt", "Complete a published robot: feet, soles, posture, motors");
+void addAdopt(CLI::App& command, Action& action) {
   const auto robot = std::make_shared<RobotArgument>();
   const auto directory = std::make_shared<std::string>();
   command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")->required();

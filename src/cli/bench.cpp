@@ -131,13 +131,12 @@ void printReport(const Json& json) {
 
 }  // namespace
 
-void addBench(CLI::App& app, Action& action) {
+void addBench(CLI::App& command, Action& action) {
   struct Arguments {
     RobotArgument robot;
     BenchOptions options;
     bool as_json = false, quick = false;
   };
-  CLI::App& command = *app.add_subcommand("bench", "Measure speed: per node, whole solves, receding horizon, scaling");
   const auto arguments = std::make_shared<Arguments>();
   arguments->robot.name = "bipetto";
   command

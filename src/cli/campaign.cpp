@@ -6,7 +6,7 @@
 #include "cli/case_run.h"
 #include "cli/commands.h"
 #include "cli/task_options.h"
-#include "formats/process.h"
+#include "formats/companion.h"
 #include "results/output_place.h"
 #include "tasks/campaign_report.h"
 
@@ -24,11 +24,8 @@ int run(const CampaignArguments& arguments) {
   const CampaignSpec spec = readCampaignSpec(arguments.spec);
   for (const CampaignMotion& motion : spec.motions) requireApart(arguments.directory, {motion.directory});
   CampaignOptions options;
-  options.bielle = std::filesystem::read_symlink("/proc/self/exe");
-  options.simulate = findCompanion("bielle-simulate");
-  if (options.simulate.find('/') == std::string::npos)
-    throw InputError("", options.simulate, "it is not installed beside this program",
-                     "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody)");
+  options.bielle = requireCompanion("bielle-complete");
+  options.simulate = requireCompanion("bielle-simulate");
   auto engine = makeTaskEngine(arguments.tasks);
   options.engine = engine.get();
   options.progress = [](const std::string& line) { std::cerr << line << std::endl; };
@@ -46,8 +43,7 @@ int run(const CampaignArguments& arguments) {
 
 }  // namespace
 
-void addCampaign(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("campaign", "Execute motions many times: pushes, grounds, worlds, seeds");
+void addCampaign(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<CampaignArguments>();
   command.add_option("SPEC", arguments->spec, "YAML file: motions, options of `bielle simulate`, pushes")->required();
   command

@@ -1,10 +1,10 @@
 #include "cli/case_run.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <iostream>
 
 #include "cli/commands.h"
+#include "formats/companion.h"
 
 namespace bielle::cli {
 
@@ -16,7 +16,7 @@ int runAndWrite(const CaseRun& run, const std::function<void(const CaseOutcomes&
     if (std::none_of(cases.begin(), cases.end(), [&](const Case& other) { return other.name == one.name; }))
       cases.push_back(one);
   RunOptions options;
-  options.program = std::filesystem::read_symlink("/proc/self/exe");
+  options.program = requireCompanion("bielle-complete");
   options.identity = makeIdentity(options.program, run.robots);
   auto engine = makeTaskEngine(run.tasks);
   options.engine = engine.get();

@@ -1,5 +1,5 @@
 #pragma once
-// The subcommands of `bielle`, one per file. Each adds itself to the parser and, if it is called, sets the action.
+// The commands of `bielle`, one per file. Each declares its arguments and, if it is called, sets the action.
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <optional>
@@ -16,33 +16,28 @@ constexpr int kOk = 0, kFailed = 1, kBadInput = 2;
 
 using Action = std::function<int()>;  // returns the exit status
 
-void addSolve(CLI::App& app, Action& action);
-void addReport(CLI::App& app, Action& action);
-void addView(CLI::App& app, Action& action);
-void addExport(CLI::App& app, Action& action);
-void addConvert(CLI::App& app, Action& action);
-void addAdopt(CLI::App& app, Action& action);
-void addInfo(CLI::App& app, Action& action);
-void addEval(CLI::App& app, Action& action);
-void addDesign(CLI::App& app, Action& action);
-void addCompare(CLI::App& app, Action& action);
-void addGenerate(CLI::App& app, Action& action);
-void addRobots(CLI::App& app, Action& action);
-void addBench(CLI::App& app, Action& action);
-void addRatio(CLI::App& app, Action& action);
-void addModes(CLI::App& app, Action& action);
-void addSynthesize(CLI::App& app, Action& action);
-void addLift(CLI::App& app, Action& action);
-void addCampaign(CLI::App& app, Action& action);
-void addDataset(CLI::App& app, Action& action);
+void addSolve(CLI::App& command, Action& action);
+void addReport(CLI::App& command, Action& action);
+void addView(CLI::App& command, Action& action);
+void addExport(CLI::App& command, Action& action);
+void addConvert(CLI::App& command, Action& action);
+void addAdopt(CLI::App& command, Action& action);
+void addInfo(CLI::App& command, Action& action);
+void addEval(CLI::App& command, Action& action);
+void addDesign(CLI::App& command, Action& action);
+void addCompare(CLI::App& command, Action& action);
+void addGenerate(CLI::App& command, Action& action);
+void addRobots(CLI::App& command, Action& action);
+void addBench(CLI::App& command, Action& action);
+void addRatio(CLI::App& command, Action& action);
+void addModes(CLI::App& command, Action& action);
+void addSynthesize(CLI::App& command, Action& action);
+void addLift(CLI::App& command, Action& action);
+void addCampaign(CLI::App& command, Action& action);
+void addDataset(CLI::App& command, Action& action);
 
-// bielle validate, bielle check and bielle simulate: only their help lines; their arguments are those of other programs.
-void addCompanions(CLI::App& app);
-// Replaces this process by that program; returns only on failure. `arguments` begins with a name and ends with a null
-// pointer.
-int becomeCompanion(const std::string& name, char** arguments);
-// Runs it to its end. Returns its exit status; kFailed with an error line if a signal ended it or it cannot be started;
-// empty if it does not exist.
+// Runs a companion (formats/companion.h) to its end. Returns its exit status; kFailed with an error line if a signal ended it or it
+// cannot be started; empty if it is not to be had.
 std::optional<int> runCompanion(const std::string& name, std::vector<std::string> arguments);
 
 // Arguments of every command with a robot.

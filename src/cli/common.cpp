@@ -3,7 +3,7 @@
 #include <iostream>
 
 #include "bielle/results/robot_info.h"
-#include "bielle/robots/robot_loader.h"
+#include "bielle/formats/reader.h"
 #include "cli/commands.h"
 #include "dynamics/loop_conflict.h"
 

@@ -57,8 +57,7 @@ int run(const CompareArguments& arguments) {
 
 }  // namespace
 
-void addCompare(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("compare", "Compare robots that make the same motions, side by side");
+void addCompare(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<CompareArguments>();
   command.add_option("SPEC", arguments->spec, "YAML file: robots, their mass, motions, speeds, groups of motors")
       ->required();

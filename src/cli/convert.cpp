@@ -9,6 +9,7 @@
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "formats/aside_file.h"
+#include "formats/companion.h"
 #include "formats/drake.h"
 #include "formats/dxf.h"
 #include "formats/mjcf.h"
@@ -37,11 +38,7 @@ void warn(const std::vector<std::string>& warnings) {
 
 // By a program of its own, which reads the solids.
 void writeStep(const std::string& solids, const std::string& path) {
-  const std::string program = findCompanion("bielle-step");
-  if (program.find('/') == std::string::npos && !isOnPath(program))
-    throw InputError("", "--to step", "bielle-step is neither beside this program nor on the PATH",
-                     "build Bielle where OpenCASCADE is (Debian: libocct-data-exchange-dev, "
-                     "libocct-modeling-algorithms-dev, libocct-ocaf-dev)");
+  const std::string program = requireCompanion("bielle-step");
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
   if (!file || std::fputs(solids.c_str(), file.get()) < 0 || std::fflush(file.get()) != 0)
     throw InputError("", "--to step", "the solids cannot be written to a temporary file", "make room in /tmp");
@@ -107,8 +104,7 @@ int convert(const ConvertArguments& arguments) {
 
 }  // namespace
 
-void addConvert(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("convert", "Write a robot in another format");
+void addConvert(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ConvertArguments>();
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
       ->required();

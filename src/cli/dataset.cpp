@@ -12,7 +12,7 @@
 #include "cli/case_run.h"
 #include "cli/commands.h"
 #include "cli/export.h"
-#include "formats/process.h"
+#include "formats/companion.h"
 #include "formats/text_file.h"
 #include "model/payload.h"
 #include "report/page.h"
@@ -89,9 +89,7 @@ Json describeForPage(const DatasetEntry& entry) {
 int run(const DatasetArguments& arguments) {
   const DatasetSpec spec = readDatasetSpec(arguments.spec);
   makeOutputDirectory(arguments.directory);
-  if (findCompanion("bielle-check").find('/') == std::string::npos)
-    throw InputError("", "bielle-check", "it is not installed beside this program, and motions have to be checked",
-                     "build Bielle with -DBIELLE_BUILD_VALIDATION=ON (it needs Simbody)");
+  requireCompanion("bielle-check");  // motions have to be checked
   const std::map<std::string, std::string> robots = makeRobots(spec, arguments.directory);
   CaseRun cases{arguments.directory + "/motions", {}, {}, arguments.tasks};
   for (const DatasetMotion& motion : spec.motions)
@@ -123,8 +121,7 @@ int run(const DatasetArguments& arguments) {
 
 }  // namespace
 
-void addDataset(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("dataset", "Make many motions, checked and exported, with an index");
+void addDataset(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<DatasetArguments>();
   command.add_option("SPEC", arguments->spec, "YAML file: motions, robots, payloads, options, formats")->required();
   command

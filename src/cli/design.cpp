@@ -151,8 +151,7 @@ int run(const DesignArguments& arguments) {
 
 }  // namespace
 
-void addDesign(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("design", "Choose lengths of a robot by optimization over its motions");
+void addDesign(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<DesignArguments>();
   command.add_option("SPEC", arguments->spec, "YAML file: robot, variables with bounds, motions, objective, search")
       ->required();

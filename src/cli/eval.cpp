@@ -115,8 +115,7 @@ int evaluate(const EvalArguments& arguments) {
 
 }  // namespace
 
-void addEval(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("eval", "Compute accelerations, forces and derivatives at one state");
+void addEval(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<EvalArguments>();
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
       ->required();

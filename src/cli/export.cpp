@@ -5,20 +5,10 @@
 #include <iostream>
 #include <memory>
 
-#include "bielle/dynamics/assembly.h"
 #include "bielle/model/error.h"
-#include "bielle/results/result.h"
 #include "cli/commands.h"
-#include "formats/drake.h"
-#include "formats/mjcf.h"
-#include "formats/text_file.h"
-#include "report/run.h"
-#include "results/motion_mcap.h"
 #include "results/number_option.h"
-#include "results/opensim.h"
 #include "results/output_place.h"
-#include "results/problem_file.h"
-#include "results/reference_motion.h"
 #include "results/result_files.h"
 
 namespace fs = std::filesystem;
@@ -60,56 +50,7 @@ int exportTrajectory(const ExportArguments& arguments) {
 
 }  // namespace
 
-bool isReference(const std::string& format) { return format == "amp" || format == "mjlab"; }
-
-bool hasRobot(const std::string& format) { return isReference(format) || format == "problem"; }
-
-namespace {
-
-// The problem, its optimum, and the robot for Drake and MuJoCo. Returns what these lose.
-std::vector<std::string> writeProblem(const ExportRequest& request, const ReportRun& run) {
-  const Model& model = run.robot.model;
-  const fs::path path = request.path, mjcf = request.robot;
-  const fs::path urdf = fs::path(mjcf).replace_extension(".urdf"), npz = fs::path(path).replace_extension(".npz");
-  requireApart(urdf.string(), {run.robot.file});
-  const ProblemText text = formatProblem(model, readSummary(request.directory), run.record,
-                                         {{"urdf", urdf.filename().string()}, {"mjcf", mjcf.filename().string()}});
-  const UrdfText robot = formatDrake(model);
-  writeTextFile(urdf.string(), robot.urdf);
-  writeTextFile(mjcf.string(), formatMjcf(model, findClosedConfiguration(model).q, {}).xml);
-  writeTextFile(npz.string(), text.npz);
-  writeTextFile(path.string(), text.json);
-  return robot.warnings;
-}
-
-}  // namespace
-
-std::vector<std::string> writeExport(const ExportRequest& request) {
-  if (request.format == "mot" || request.format == "sto") {
-    const MotionRecord record = readResultRecord(request.directory);
-    writeTextFile(request.path, request.format == "mot" ? formatMot(record) : formatSto(record));
-    return {};
-  }
-  const ReportRun run = readRun(request.directory);
-  if (request.format == "mcap") {
-    const MotionMcap text = formatMotionMcap(run.robot, run.record, run.plan, run.summary);
-    writeTextFile(request.path, text.mcap);
-    return text.warnings;
-  }
-  requireApart(request.robot, {run.robot.file});
-  if (request.format == "problem") return writeProblem(request, run);
-  const VectorXd q_ref = findClosedConfiguration(run.robot.model).q;
-  MjcfOptions options;
-  options.rotations = MjcfRotations::Hinges;
-  const ReferenceMotion motion = makeReferenceMotion(run.robot.model, q_ref, run.record, request.rate);
-  writeTextFile(request.path,
-                formatReferenceMotion(motion, request.format == "amp" ? ReferenceFormat::Amp : ReferenceFormat::Mjlab));
-  writeTextFile(request.robot, formatMjcf(run.robot.model, q_ref, options).xml);
-  return motion.warnings;
-}
-
-void addExport(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("export", "Write a trajectory in another program's format");
+void addExport(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ExportArguments>();
   command.add_option("DIR", arguments->directory, "result of `bielle solve` or `bielle simulate`")->required();
   command

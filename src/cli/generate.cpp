@@ -78,8 +78,7 @@ std::string formatHelp(const GenerateArguments& arguments) {
 
 }  // namespace
 
-void addGenerate(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("generate", "Generate a robot from named lengths, angles and masses");
+void addGenerate(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<GenerateArguments>();
   command.add_option("ROBOT", arguments->robot, "one of those below, or a file that composes a robot of parts")
       ->required();

@@ -57,8 +57,7 @@ void printInfo(const Json& robot) {
 
 }  // namespace
 
-void addInfo(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("info", "Describe a robot: joints, closures, motors, feet, mobility");
+void addInfo(CLI::App& command, Action& action) {
   const auto robot = std::make_shared<RobotArgument>();
   const auto as_json = std::make_shared<bool>(false);
   command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")->required();

@@ -100,8 +100,7 @@ int run(const LiftArguments& arguments) {
 
 }  // namespace
 
-void addLift(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("lift", "Lift a motion of the serial model to the closed robot");
+void addLift(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<LiftArguments>();
   command.add_option("DIR", arguments->serial_directory, "result of `bielle solve MOTION --model serial`")->required();
   command

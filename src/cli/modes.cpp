@@ -184,8 +184,7 @@ int run(const ModesArguments& arguments) {
 
 }  // namespace
 
-void addModes(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("modes", "Frequencies, damping and shapes of small motions about a posture");
+void addModes(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ModesArguments>();
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
   command.add_option("--reference", arguments->reference,

@@ -72,8 +72,7 @@ int run(const RatioArguments& arguments) {
 
 }  // namespace
 
-void addRatio(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("ratio", "Reduction ratio between motors and a joint along its range");
+void addRatio(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<RatioArguments>();
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
       ->required();

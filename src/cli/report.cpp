@@ -104,8 +104,7 @@ void addFilmOptions(CLI::App& command, ReportArguments& arguments) {
 
 }  // namespace
 
-void addReport(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("report", "Show results as a page: replay in 3D, plots, tables");
+void addReport(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ReportArguments>();
   command.add_option("directories", arguments->directories, "results of `bielle solve`; several are compared")
       ->required();

@@ -20,8 +20,7 @@ int listKnownRobots() {
 
 }  // namespace
 
-void addRobots(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("robots", "List the robots known by name");
+void addRobots(CLI::App& command, Action& action) {
   command.footer(
       "Robots are sought in the directories of $BIELLE_ROBOTS (separated by colons), then in those of Bielle.\n"
       "Examples:\n"

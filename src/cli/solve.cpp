@@ -366,8 +366,7 @@ void addSequence(CLI::App& command, Action& action) {
 
 }  // namespace
 
-void addSolve(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("solve", "Make a motion by optimal control");
+void addSolve(CLI::App& command, Action& action) {
   command.callback([&action] {
     if (!action) throw CLI::RequiredError("A motion");
   });

@@ -195,8 +195,7 @@ int synthesize(const SynthesizeArguments& arguments) {
 
 }  // namespace
 
-void addSynthesize(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("synthesize", "Find linkages that move a joint as requested");
+void addSynthesize(CLI::App& command, Action& action) {
   const auto a = std::make_shared<SynthesizeArguments>();
   const auto add_pair = [&command](const char* flag, std::vector<double>& pair, const char* help) {
     return command.add_option(flag, pair, help)->expected(2)->delimiter(':')->type_name("LOW:HIGH");

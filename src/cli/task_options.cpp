@@ -9,7 +9,7 @@
 
 #include "bielle/model/error.h"
 #include "cli/commands.h"
-#include "formats/process.h"
+#include "formats/companion.h"
 #include "formats/text_file.h"
 #include "tasks/local_tasks.h"
 #include "tasks/worker_tasks.h"
@@ -52,10 +52,7 @@ std::unique_ptr<tasks::TaskEngine> makeTaskEngine(const TaskArguments& arguments
   const int port = readPort(arguments.workers);
   if (!arguments.password.empty() && readTextFile(arguments.password).find_first_not_of(" \n") == std::string::npos)
     throw InputError(arguments.password, "file", "it is empty", "write a password into it");
-  const std::string program = findCompanion("bielle-workers");
-  if (program.find('/') == std::string::npos)
-    throw InputError("", program, "it is not installed beside this program",
-                     "install the packages coop-computing-tools and coop-computing-tools-dev, and build Bielle again");
+  const std::string program = requireCompanion("bielle-workers");
   auto engine = std::make_unique<tasks::WorkerTasks>(tasks::WorkerOptions{program, port, arguments.password});
   std::cerr << "start workers with: work_queue_worker " << (arguments.password.empty() ? "" : "--password FILE ")
             << getHost() << " " << engine->port() << std::endl;

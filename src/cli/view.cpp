@@ -70,8 +70,7 @@ int view(const ViewArguments& arguments) {
 
 }  // namespace
 
-void addView(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("view", "Show a robot as a page, with a slider for each motor");
+void addView(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ViewArguments>();
   command.add_option("robot", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
       ->required();

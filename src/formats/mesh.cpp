@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "formats/collada.h"
+#include "formats/companion.h"
 #include "formats/process.h"
 #include "math/decompositions.h"
 
@@ -77,7 +78,7 @@ struct MeshFile {
 std::string convertToStl(const fs::path& file, std::uintmax_t size) {
   constexpr double kLeast = 4, kPerByte = 2e-6;  // s
   const double longest = kLeast + kPerByte * static_cast<double>(size);
-  const ProcessOutput run = runProcess({findCompanion("bielle-mesh"), file.string()}, longest);
+  const ProcessOutput run = runProcess({obtainCompanion("bielle-mesh"), file.string()}, longest);
   return run.status == 0 ? run.out : "";
 }
 

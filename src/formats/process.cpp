@@ -54,13 +54,6 @@ bool readAll(int file, Clock::time_point deadline, std::string& out) {
 
 }  // namespace
 
-std::string findCompanion(const std::string& program) {
-  std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path beside = self.parent_path() / program;
-  return !error && access(beside.c_str(), X_OK) == 0 ? beside.string() : program;
-}
-
 bool isOnPath(const std::string& program) {
   const char* variable = std::getenv("PATH");
   std::istringstream directories(variable ? variable : "");

@@ -10,9 +10,6 @@ namespace bielle {
 // Whether a program of this name is on the PATH.
 bool isOnPath(const std::string& program);
 
-// The path of a program beside this one, or else the bare name, which is searched on the PATH.
-std::string findCompanion(const std::string& program);
-
 struct ProcessOptions {
   int in = 0, out = 1, error = 2;  // what become its standard files
   // In a separate process group, so that Ctrl-C does not reach it, with no signal blocked; it dies with its parent,

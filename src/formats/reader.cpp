@@ -1,4 +1,4 @@
-// Combines the two files of a robot, or the contents of one of MuJoCo.
+// Combines the two files of a robot, or what stands for them.
 #include "bielle/formats/reader.h"
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include "bielle/model/error.h"
 #include "formats/reader_loops.h"
 #include "formats/robot_files.h"
+#include "model/missing_part.h"
 
 namespace bielle {
 namespace {
@@ -131,11 +132,11 @@ void complete(const YamlFile& own, YamlFile& yaml) {
 
 RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   if (path.extension() == ".xacro") refuseXacro(path.string(), "file");
-  if (path.extension() == ".sdf") return readSdf(path.string());
-  if (path.extension() == ".xml") {
-    MjcfFile file = readMjcf(path.string());
-    return {std::move(file.tree), std::move(file.settings)};
-  }
+  const auto& readers = getRobotSources().readers;
+  if (const auto reader = readers.find(path.extension().string()); reader != readers.end())
+    return reader->second(path.string());
+  if (path.extension() == ".xml" || path.extension() == ".sdf")
+    throw MissingPart("the reader of " + path.extension().string() + " files");
   RobotFiles files;
   files.urdf = parseUrdf(readRobotText(path.string()), path.string(), files.yaml);
   std::filesystem::path settings = path;
@@ -157,11 +158,14 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   return files;
 }
 
-using Generate = std::function<RobotFiles(const YamlFile&)>;
+RobotFiles generate(const YamlFile& yaml) {
+  if (!getRobotSources().generate) throw MissingPart("the generators of robots");
+  return getRobotSources().generate(yaml);
+}
 
-RobotFiles readRobotFiles(const std::filesystem::path& path, const Generate& generate);
+RobotFiles readRobotFiles(const std::filesystem::path& path);
 
-RobotFiles readCompleted(const YamlFile& own, const Generate& generate) {
+RobotFiles readCompleted(const YamlFile& own) {
   const std::string model = findModel(own);
   if (model.empty()) {
     std::string models;
@@ -171,14 +175,14 @@ RobotFiles readCompleted(const YamlFile& own, const Generate& generate) {
                                     : "the robot that this file completes was not found: " + models,
                      "put its directory into one of those in BIELLE_ROBOTS, or correct the key");
   }
-  return readRobotFiles(model, generate);
+  return readRobotFiles(model);
 }
 
-RobotFiles readRobotFiles(const std::filesystem::path& path, const Generate& generate) {
+RobotFiles readRobotFiles(const std::filesystem::path& path) {
   if (path.extension() != ".yaml") return readUrdfAndYaml(path);
   const YamlFile own = readYaml(path.string());
   if (own.composed) return generate(own);
-  RobotFiles files = own.generator ? generate(own) : readCompleted(own, generate);
+  RobotFiles files = own.generator ? generate(own) : readCompleted(own);
   complete(own, files.yaml);
   return files;
 }
@@ -337,10 +341,15 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
   return builder.build(warnings);
 }
 
-LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options, const Generate& generate) {
+RobotSources& getRobotSources() {
+  static RobotSources sources;
+  return sources;
+}
+
+LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {
   const std::filesystem::path path = findRobotFile(name_or_path);
   LoadedRobot robot;
-  robot.model = combineFiles(readRobotFiles(path, generate), options.base, &robot.warnings);
+  robot.model = combineFiles(readRobotFiles(path), options.base, &robot.warnings);
   robot.file = std::filesystem::absolute(path).lexically_normal().string();
   robot.directory = path.has_parent_path() ? path.parent_path().string() : ".";
   return robot;

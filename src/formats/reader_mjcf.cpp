@@ -25,7 +25,7 @@ MjcfReader::MjcfReader(const std::string& path) : settings_(path) {
   taken_ = {"world"};
 }
 
-MjcfFile MjcfReader::read() {
+RobotFiles MjcfReader::read() {
   readModel();
   readSettings();
   forEachSection("default", [this](const XMLElement& e) { readMjcfDefaults(e, "", settings_); });
@@ -201,6 +201,6 @@ std::string MjcfReader::findFrame(const std::string& link, const SE3& X, bool is
   return name;
 }
 
-MjcfFile readMjcf(const std::string& path) { return MjcfReader(path).read(); }
+RobotFiles readMjcf(const std::string& path) { return MjcfReader(path).read(); }
 
 }  // namespace bielle

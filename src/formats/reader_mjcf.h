@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "formats/exchange_readers.h"
 #include "formats/mjcf_element.h"
-#include "formats/robot_files.h"
 
 namespace bielle {
 
@@ -26,7 +26,7 @@ inline SE3 translate(const Vector3d& p) { return {Matrix3d::Identity(), p}; }
 class MjcfReader {
  public:
   explicit MjcfReader(const std::string& path);
-  MjcfFile read();
+  RobotFiles read();
 
  private:
   // A body of the file: the link that carries it, its frame there and, with all joints at `ref`, in the world.

@@ -1,6 +1,6 @@
 // In place of the reader of SDF files where libsdformat is not installed.
 #include "bielle/model/error.h"
-#include "formats/robot_files.h"
+#include "formats/exchange_readers.h"
 
 namespace bielle {
 

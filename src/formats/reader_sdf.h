@@ -8,8 +8,8 @@
 #include <sdf/sdf.hh>
 #include <set>
 
+#include "formats/exchange_readers.h"
 #include "formats/mjcf_element.h"
-#include "formats/robot_files.h"
 #include "formats/xml_document.h"
 
 namespace bielle {

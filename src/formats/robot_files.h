@@ -1,7 +1,6 @@
 #pragma once
 /// \file The contents of the two files of a robot before they are combined (for the readers).
 #include <array>
-#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -125,20 +124,6 @@ YamlFile readYaml(const std::string& path);
 const std::vector<std::string>& listSharedKeys();
 void readSharedKeys(const YamlFields& fields, YamlFile& file);
 
-/// A file of MuJoCo as the contents of both files.
-struct MjcfFile {
-  UrdfFile tree;
-  YamlFile settings;
-};
-
-/// \throws InputError for what is not MJCF, or cannot be read as a robot
-MjcfFile readMjcf(const std::string& path);
-
-struct RobotFiles;
-/// A file of Gazebo (SDF) as the contents of both files. \throws InputError for what libsdformat refuses, what cannot be read as a
-/// robot, and where libsdformat is not installed
-RobotFiles readSdf(const std::string& path);
-
 /// The whole content of a file. \throws InputError when it cannot be read, or is too large
 std::string readRobotText(const std::string& path);
 
@@ -156,9 +141,13 @@ struct RobotFiles {
 /// \param base  overrides the file's key   \param warnings  receives what is valid but suspicious; null for none
 Model combineFiles(RobotFiles files, std::optional<BaseKind> base, std::vector<std::string>* warnings);
 
-/// A robot as loadRobot (robots/robot_loader.h) describes.
-/// \param generate  the files of the robot that a YAML file with the key `generator`, or one composed of parts, describes
-LoadedRobot readRobot(const std::string& name_or_path, const LoadOptions& options,
-                      const std::function<RobotFiles(const YamlFile&)>& generate);
+/// What other libraries add to loadRobot() when a program that links them starts (model/missing_part.h).
+struct RobotSources {
+  /// Readers of other formats by the extension of their files. They throw InputError for what cannot be read as a robot.
+  std::map<std::string, RobotFiles (*)(const std::string& path)> readers;
+  /// The files of the robot that a YAML file with the key `generator`, or one composed of parts, describes.
+  RobotFiles (*generate)(const YamlFile&) = nullptr;
+};
+RobotSources& getRobotSources();
 
 }  // namespace bielle

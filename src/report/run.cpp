@@ -8,7 +8,7 @@
 #include "bielle/motion/motion.h"
 #include "bielle/motion/serial_model.h"
 #include "bielle/results/result.h"
-#include "bielle/robots/robot_loader.h"
+#include "bielle/formats/reader.h"
 
 namespace fs = std::filesystem;
 

@@ -1,4 +1,4 @@
-// The generators are above the reader, which gets them from here.
+// The generators are above the reader, which gets them from here when a program that links them starts (model/missing_part.h).
 #include "bielle/robots/robot_loader.h"
 
 #include "bielle/formats/robot_writer.h"
@@ -39,8 +39,9 @@ RobotFiles generate(const YamlFile& yaml) {
 
 }  // namespace
 
-LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {
-  return readRobot(name_or_path, options, &generate);
-}
-
 }  // namespace bielle
+
+extern "C" const bool bielle_robots = [] {
+  bielle::getRobotSources().generate = &bielle::generate;
+  return true;
+}();

@@ -23,8 +23,9 @@ std::string getPath(const std::string& directory, const std::string& argument) {
 // Programs beside the command that it may start, here those that there are.
 std::vector<std::string> listPrograms(const std::string& program) {
   std::vector<std::string> programs = {program};
-  if (const fs::path check = fs::path(program).parent_path() / "bielle-check"; fs::exists(check))
-    programs.push_back(check.string());
+  for (const char* name : {"bielle-check", "bielle-check-complete"})
+    if (const fs::path check = fs::path(program).parent_path() / name; fs::exists(check))
+      programs.push_back(check.string());
   return programs;
 }
 

@@ -108,7 +108,14 @@ struct LoadedRobot {
   std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
 };
 
-/// The file of a robot by name or path, as loadRobot (robots/robot_loader.h) finds it. \throws InputError listing the places searched
+/// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf, bipetto.yaml or .xml in the directories of
+/// getRobotDirectories()), by directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf,
+/// else the .yaml or .xml named as the directory), by .urdf file, by .xml file of MuJoCo or by .yaml file with the key
+/// `generator` or `model`.
+/// \throws InputError naming the file, the element and the remedy, and no other exception, whatever the files contain
+LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options = {});
+
+/// The file of a robot by name or path, as loadRobot() finds it. \throws InputError listing the places searched
 std::string findRobotFile(const std::string& name_or_path);
 
 /// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),

@@ -1,5 +1,5 @@
 #pragma once
-/// \file Robots by name or from files, given or generated; generators and their parameters. formats/reader.h describes the files.
+/// \file Generators of robots and their parameters.
 #include <functional>
 #include <string>
 #include <vector>
@@ -9,13 +9,6 @@
 #include "bielle/model/options.h"
 
 namespace bielle {
-
-/// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf, bipetto.yaml or .xml in the directories of
-/// getRobotDirectories()), by directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf,
-/// else the .yaml or .xml named as the directory), by .urdf file, by .xml file of MuJoCo or by .yaml file with the key
-/// `generator` or `model`.
-/// \throws InputError naming the file, the element and the remedy, and no other exception, whatever the files contain
-LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options = {});
 
 struct Generator {
   std::string name, help;
