@@ -6,11 +6,14 @@ The code is tuned to the processor of this machine; Debian packages (scripts/pac
 import base64
 import hashlib
 import os
+import re
 import subprocess
 import sys
 import sysconfig
 import tarfile
 import tempfile
+import threading
+import time
 import zipfile
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
@@ -40,6 +43,40 @@ def get_tag() -> str:
     return f"{python}-{python}-{platform}"
 
 
+def tell(line: str) -> None:
+    """Shows a line to whoever waits: pip keeps to itself what a backend prints, so the terminal, or else pip's own standard error."""
+    for place in ("/dev/tty", f"/proc/{os.getppid()}/fd/2"):
+        try:
+            with open(place, "a") as shown:
+                shown.write(line + "\n")
+            return
+        except OSError:
+            continue
+
+
+def run_build(command: List[str]) -> None:
+    """Runs the build, and tells every ten seconds how far it is."""
+    start, state, ended = time.monotonic(), "configuring", threading.Event()
+
+    def report() -> None:
+        while not ended.wait(10):
+            tell(f"bielle: {state}, {time.monotonic() - start:.0f} s")
+
+    reporter = threading.Thread(target=report, daemon=True)
+    reporter.start()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            sys.stdout.write(line)
+            step = re.match(r"\[(\d+)/(\d+)\]", line)
+            if step:
+                state = f"built {step[1]} of {step[2]} parts"
+    ended.set()
+    reporter.join()
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+
+
 def build_package(target: Path) -> None:
     """Builds the module and installs the package into a directory."""
     build = ROOT / "build" / "wheel"
@@ -48,7 +85,7 @@ def build_package(target: Path) -> None:
     options = [f"-DBIELLE_BUILD_{part}={value}" for part, value in parts.items()]
     options += ["-DCMAKE_BUILD_TYPE=Release", f"-DPython3_EXECUTABLE={sys.executable}", "-DBIELLE_PYTHON_DIR=."]
     program = 'set -euo pipefail; source "$0"; bielle_targets=(bielle_stubs); build "$@"'
-    subprocess.run(["bash", "-c", program, str(ROOT / "scripts" / "setup.sh"), str(build), *options], check=True)
+    run_build(["bash", "-c", program, str(ROOT / "scripts" / "setup.sh"), str(build), *options])
     install = ["cmake", "--install", str(build), "--component", "python", "--strip"]
     subprocess.run(install + ["--prefix", str(target)], check=True)
 
