@@ -24,7 +24,7 @@ endforeach()
 
 # Companions are built at their first use; their help is in the core.
 add_test(NAME companions COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_companions.py
-  ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR})
+  $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(companions PROPERTIES LABELS system)
 
 # Packages run everywhere: a build that is tuned to its machine is refused, and the preset tunes nothing but the copies of

@@ -51,6 +51,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Compares the dynamics of robots with Simbody's or MuJoCo's at random closed states. Exit status: 0 all agree, 1 "
       "a row failed, 2 bad input."};
+  app.name("bielle validate");
   std::vector<std::string> robots;
   ValidationOptions options;
   std::string base, engine = "simbody";
