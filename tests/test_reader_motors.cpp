@@ -79,6 +79,7 @@ TEST_CASE("winding and gear of a motor: limits, armature, loss and thermal torqu
   CHECK(motor.getEffortFactor(1) == 1 / 0.8);
   CHECK(motor.getEffortFactor(-1) == 0.7);
   // What is given holds; of two limits the smaller.
+  CHECK(loadMotor(", effort: 010").effort_limit == Approx(10));  // never in octal
   CHECK(loadMotor(", effort: .inf").effort_limit == Approx(0.8 * 0.9 * 30));
   CHECK(loadMotor(", effort: 12").effort_limit == 12);
   CHECK(loadMotor(", effort: 100").effort_limit == Approx(0.8 * 0.9 * 30));
