@@ -20,7 +20,7 @@ set(CPACK_DEBIAN_COMMAND_PACKAGE_NAME bielle)
 set(CPACK_COMPONENT_COMMAND_DESCRIPTION
   "The command: it models legged robots whose joints are driven through linkages, generates motions by
  optimal control and checks them. Robots, manual pages and completion included.")
-set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "bielle-workers, gnuplot-nox, chromium, ffmpeg, bash-completion")
+set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "bielle-workers, gnuplot-nox, python3-ezdxf, chromium, ffmpeg, bash-completion")
 
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libbielle${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
 set(CPACK_COMPONENT_LIBRARY_DESCRIPTION

@@ -22,6 +22,8 @@ bielle_mcap_packages=(libprotobuf-dev protobuf-compiler)
 bielle_step_packages=(libocct-data-exchange-dev libocct-modeling-algorithms-dev libocct-ocaf-dev)
 # assimp, which reads meshes of further kinds. Without it everything else is built.
 bielle_mesh_packages=(libassimp-dev)
+# ezdxf, which writes DXF files (bielle convert) when it is there. Without it everything else works.
+bielle_dxf_packages=(python3-ezdxf)
 # Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, what tests the Python
 # package.
 bielle_test_packages=(catch2 python3 chromium pkg-config python3-pytest

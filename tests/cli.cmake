@@ -15,6 +15,10 @@ if(TARGET bielle-step)
   set(area command)
 endif()
 
+# Read back by the library that writes them.
+add_test(NAME dxf COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_dxf.py $<TARGET_FILE:bielle_command>)
+set_tests_properties(dxf PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+
 # Manual pages and completion follow the help of the command.
 foreach(name man completion)
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_${name}.py

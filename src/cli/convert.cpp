@@ -11,7 +11,6 @@
 #include "formats/aside_file.h"
 #include "formats/companion.h"
 #include "formats/drake.h"
-#include "formats/dxf.h"
 #include "formats/mjcf.h"
 #include "formats/process.h"
 #include "formats/sdf.h"
@@ -36,19 +35,22 @@ void warn(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) std::cerr << "bielle: warning: " << warning << "\n";
 }
 
-// By a program of its own, which reads the solids.
-void writeStep(const std::string& solids, const std::string& path) {
-  const std::string program = requireCompanion("bielle-step");
+// By a program of its own, which reads JSON and says what it cannot do. Returns its exit status.
+int writeBy(const std::string& name, const std::string& json, const std::string& path) {
+  const std::string program = requireCompanion(name);
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
-  if (!file || std::fputs(solids.c_str(), file.get()) < 0 || std::fflush(file.get()) != 0)
-    throw InputError("", "--to step", "the solids cannot be written to a temporary file", "make room in /tmp");
+  if (!file || std::fputs(json.c_str(), file.get()) < 0 || std::fflush(file.get()) != 0)
+    throw InputError(path, name, "what it reads cannot be written to a temporary file", "make room in /tmp");
   std::rewind(file.get());
   ProcessOptions options;
   options.in = fileno(file.get());
-  AsideFile step(path);
-  if (waitForProcess(startProcess({program, step.aside()}, options)) != 0)
-    throw InputError(path, "--to step", "bielle-step could not write it", "see its message above");
-  step.commit();
+  AsideFile written(path);
+  if (written.aside() != path) written.write("");  // which says what is wrong with the place
+  const int status = waitForProcess(startProcess({program, written.aside()}, options));
+  if (status != kOk && status != kBadInput)
+    throw InputError(path, name, "it could not write the file", "see its message above");
+  if (status == kOk) written.commit();
+  return status;
 }
 
 int convert(const ConvertArguments& arguments) {
@@ -71,9 +73,8 @@ int convert(const ConvertArguments& arguments) {
     warn(text.warnings);
     writeTextFile(arguments.output, text.urdf);
   } else if (arguments.format == "dxf") {
-    const DxfText text = formatDxf(robot.model, 1e-3 * arguments.hole);
-    warn(text.warnings);
-    writeTextFile(arguments.output, text.text);
+    const int status = writeBy("bielle-dxf", formatLinks(robot.model, 1e-3 * arguments.hole), arguments.output);
+    if (status != kOk) return status;
   } else if (arguments.format == "sheet") {
     const std::filesystem::path table = std::filesystem::path(arguments.output).replace_extension(".csv");
     if (table == arguments.output)
@@ -86,7 +87,8 @@ int convert(const ConvertArguments& arguments) {
   } else if (arguments.format == "step") {
     const WorkshopSolids solids = formatSolids(robot.model, findClosedConfiguration(robot.model).q);
     warn(solids.warnings);
-    writeStep(solids.json, arguments.output);
+    const int status = writeBy("bielle-step", solids.json, arguments.output);
+    if (status != kOk) return status;
   } else if (arguments.format == "sdf") {
     const SdfText text = formatSdf(robot.model, findClosedConfiguration(robot.model).q);
     warn(text.warnings);

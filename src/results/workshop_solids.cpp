@@ -5,6 +5,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "formats/pivots.h"
 #include "results/json_text.h"
 
 namespace bielle {
@@ -66,6 +67,20 @@ WorkshopSolids formatSolids(const Model& model, const VectorXd& q) {
                      {"solids", std::move(list)}});
   out.json = formatJson({{"robot", model.name()}, {"links", std::move(links)}});
   return out;
+}
+
+std::string formatLinks(const Model& model, double hole) {
+  const auto list = [](const Vector3d& v) { return Json{v.x(), v.y(), v.z()}; };
+  Json links = Json::array();
+  for (const RigidLink& link : listRigidLinks(model)) {
+    Json pivots = Json::array();
+    for (const Pivot& pivot : link.pivots)
+      pivots.push_back({{"name", pivot.name},
+                        {"at", list(kMm * pivot.p)},
+                        {"axis", pivot.axis.isZero() ? Json() : list(pivot.axis)}});
+    links.push_back({{"name", link.name}, {"pivots", std::move(pivots)}});
+  }
+  return formatJson({{"robot", model.name()}, {"hole", kMm * hole}, {"links", std::move(links)}});
 }
 
 }  // namespace bielle

@@ -1,5 +1,5 @@
 #pragma once
-// What a robot is drawn of, as solids for a workshop.
+// What a workshop needs of a robot, as JSON for the programs that write CAD files.
 #include <string>
 #include <vector>
 
@@ -18,5 +18,11 @@ struct WorkshopSolids {
 // Links that are drawn, each where it is at q.
 // \throws InputError when nothing but meshes is drawn
 WorkshopSolids formatSolids(const Model& model, const VectorXd& q);
+
+// {"robot": name, "hole": diameter, "links": [{"name", "pivots": [{"name", "at", "axis"}]}]}: what `bielle-dxf` reads.
+// `at` is a point in the frame of the link, `axis` the direction of a hinge there, null of anything else. Lengths are
+// in mm.
+// \param hole  m
+std::string formatLinks(const Model& model, double hole);
 
 }  // namespace bielle
