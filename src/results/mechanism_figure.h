@@ -5,15 +5,15 @@
 #include <vector>
 
 #include "bielle/model/model.h"
+#include "results/drawing.h"
 
 namespace bielle {
 
-using Point2 = Eigen::Vector2d;  // m, to the right and up
-
+// Points in m, to the right and up.
 struct FigureLink {
   std::string name;
-  std::vector<Point2> outline;  // two ends of a bar, or the corners of a plate
-  bool in_loop = false;         // else part of a chain
+  Polyline outline;      // two ends of a bar, or the corners of a plate
+  bool in_loop = false;  // else part of a chain
 };
 
 struct FigurePivot {

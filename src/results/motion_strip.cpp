@@ -4,18 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/ground_step.h"
 #include "model/number_text.h"
+#include "results/drawing.h"
 #include "results/skeleton.h"
 
 namespace bielle {
 namespace {
-
-using Point = Eigen::Vector2d;
-using Line = std::vector<Point>;
 
 constexpr double kHeight = 1000;                      // of a picture, units of the drawing
 constexpr double kMargin = 0.06;                      // around the robot, over its height
@@ -32,8 +29,8 @@ Eigen::Matrix<double, 2, 3> makeView() {
 
 struct Picture {
   double time = 0;
-  Point com = Point::Zero();
-  std::vector<Line> front, behind, soles, steps, floor;
+  Point2 com = Point2::Zero();
+  std::vector<Polyline> front, behind, soles, steps, floor;
 };
 
 class StripWriter {
@@ -47,12 +44,10 @@ class StripWriter {
     measure();
   }
 
-  std::string write() {
-    std::string body;
-    for (size_t i = 0; i < pictures_.size(); ++i) body += writePicture(pictures_[i], static_cast<double>(i) * width_);
-    return "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " +
-           format(width_ * static_cast<double>(pictures_.size())) + " " + format(kHeight) +
-           "\" fill=\"none\" stroke-linecap=\"round\" stroke-linejoin=\"round\">" + body + "</svg>";
+  std::string write() const {
+    Drawing drawing(0);
+    for (size_t i = 0; i < pictures_.size(); ++i) draw(pictures_[i], static_cast<double>(i) * size_.x(), drawing);
+    return drawing.write({size_.x() * static_cast<double>(pictures_.size()), size_.y()});
   }
 
  private:
@@ -96,11 +91,11 @@ class StripWriter {
     }
   }
 
-  Point look(const Vector3d& p) const { return view_ * (p - focus_); }
+  Point2 look(const Vector3d& p) const { return view_ * (p - focus_); }
 
-  Line makeParallelogram(const Vector3d& centre, const Eigen::Matrix<double, 3, 2>& half_edges) const {
-    Line corners;
-    for (const auto& [x, y] : {std::pair(1, 1), {-1, 1}, {-1, -1}, {1, -1}, {1, 1}})
+  Polyline makeParallelogram(const Vector3d& centre, const Eigen::Matrix<double, 3, 2>& half_edges) const {
+    Polyline corners;
+    for (const auto& [x, y] : {std::pair(1, 1), {-1, 1}, {-1, -1}, {1, -1}})
       corners.push_back(look(centre + half_edges * Eigen::Vector2d(x, y)));
     return corners;
   }
@@ -109,40 +104,28 @@ class StripWriter {
   void measure() {
     Eigen::AlignedBox2d box(pictures_.front().com);
     for (const Picture& picture : pictures_)
-      for (const std::vector<Line>* lines : {&picture.front, &picture.behind, &picture.soles})
-        for (const Line& line : *lines)
-          for (const Point& p : line) box.extend(p);
+      for (const std::vector<Polyline>* lines : {&picture.front, &picture.behind, &picture.soles})
+        for (const Polyline& line : *lines)
+          for (const Point2& p : line) box.extend(p);
     const double margin = kMargin * std::max(1e-3, box.sizes().y());
-    low_ = box.min() - Point(margin, margin), high_ = box.max() + Point(margin, 2.5 * margin);  // a line of text on top
-    scale_ = kHeight / (high_.y() - low_.y());
-    width_ = std::round(scale_ * (high_.x() - low_.x()));
+    box.extend(box.min() - Point2(margin, margin));
+    box.extend(box.max() + Point2(margin, 2.5 * margin));  // a line of text on top
+    const double scale = kHeight / box.sizes().y();
+    size_ = {std::round(scale * box.sizes().x()), kHeight};
+    metres_ = {{scale, -scale}, {-scale * box.min().x(), scale * box.max().y()}};
   }
 
-  static std::string format(double value) { return formatNumber(std::round(value), "%.0f"); }
-
-  std::string writePath(const std::vector<Line>& lines, const std::string& style) const {
-    if (lines.empty()) return "";
-    std::string path;
-    for (const Line& line : lines) {
-      const char* separator = "M";
-      for (const Point& p : line) {
-        path += separator + format(scale_ * (p.x() - low_.x())) + " " + format(scale_ * (high_.y() - p.y()));
-        separator = "L";
-      }
-    }
-    return "<path " + style + " d=\"" + path + "\"/>";
-  }
-
-  std::string writePicture(const Picture& picture, double left) const {
-    const Point com = scale_ * Point(picture.com.x() - low_.x(), high_.y() - picture.com.y());
-    return "<svg x=\"" + format(left) + "\" width=\"" + format(width_) + "\" height=\"" + format(kHeight) + "\">" +
-           writePath(picture.floor, "stroke=\"#ced5de\" stroke-width=\"4\"") +
-           writePath(picture.steps, "fill=\"#cfd6df\" stroke=\"#8d99a8\" stroke-width=\"4\"") +
-           writePath(picture.behind, "stroke=\"#b3bcc8\" stroke-width=\"14\"") +
-           writePath(picture.soles, "fill=\"#1f5fbf\" stroke=\"#1f5fbf\" stroke-width=\"8\"") +
-           writePath(picture.front, "stroke=\"#3a4554\" stroke-width=\"14\"") + "<circle cx=\"" + format(com.x()) +
-           "\" cy=\"" + format(com.y()) + "\" r=\"18\" fill=\"#e8590c\"/><text x=\"12\" y=\"70\" font-size=\"70\" " +
-           "font-family=\"sans-serif\" fill=\"#66707f\">" + formatNumber(picture.time, "%.2f") + " s</text></svg>";
+  void draw(const Picture& picture, double left, Drawing& drawing) const {
+    drawing.openWindow(left, size_);
+    drawing.projection = metres_;
+    drawing.addLines(picture.floor, {"#ced5de", 4});
+    drawing.addLines(picture.steps, {"#8d99a8", 4, "#cfd6df"}, true);
+    drawing.addLines(picture.behind, {"#b3bcc8", 14});
+    drawing.addLines(picture.soles, {"#1f5fbf", 8, "#1f5fbf"}, true);
+    drawing.addLines(picture.front, {"#3a4554", 14});
+    drawing.addDisc(picture.com, 18, {"none", 0, "#e8590c"});
+    drawing.projection = {};
+    drawing.addText({12, 70}, formatNumber(picture.time, "%.2f") + " s", {70, "#66707f"});
   }
 
   const Model& model_;
@@ -153,8 +136,8 @@ class StripWriter {
   std::vector<Visual> rods_;
   Vector3d focus_ = Vector3d::Zero();  // on the ground
   std::vector<Picture> pictures_;
-  Point low_, high_;  // of a picture, m
-  double scale_ = 1, width_ = 0;
+  Projection metres_;
+  Point2 size_ = Point2::Zero();  // of a picture
 };
 
 }  // namespace
