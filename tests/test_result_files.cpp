@@ -122,12 +122,11 @@ TEST_CASE("the slip is zero for feet that stand still") {
 TEST_CASE("figures of values that are all the same are drawn without a complaint of gnuplot") {
   const TemporaryDirectory directory;
   std::vector<Plot> plots;
-  for (const PlotScale scale : {PlotScale::Free, PlotScale::Logarithmic, PlotScale::Equal, PlotScale::Polar})
-    plots.push_back({"it's flat", "x", "y", scale, {{"curve", "#000000", CurveStyle::Lines, false, {{0, 2}, {1, 2}}}}});
-  plots.push_back({"point", "x", "y", PlotScale::Free, {{"", "#000000", CurveStyle::Crosses, false, {{0, 0}}}}});
-  plots.push_back(
-      {"", "x", "y", PlotScale::Polar, {{"", "#000000", CurveStyle::LinesPoints, false, {{0, 0}, {90, 0}}}}});
-  plots.push_back({"shades", "x", "y", PlotScale::Free, {}, {}, {"value", 0.1, {{0, 0, 3}, {0, 0.1, 3}}}});
+  for (const PlotScale scale : {PlotScale::Free, PlotScale::Logarithmic, PlotScale::Polar})
+    plots.push_back({"it's flat", "x", "y", {{"curve", "#000000", {{0, 2}, {1, 2}}}}, scale});
+  plots.push_back({"point", "x", "y", {{"", "#000000", {{0, 0}}, CurveStyle::Crosses}}});
+  plots.push_back({"", "x", "y", {{"", "#000000", {{0, 0}, {90, 0}}, CurveStyle::LinesPoints}}, PlotScale::Polar});
+  plots.push_back({"shades", "x", "y", {}, PlotScale::Free, {}, {"value", 0.1, {{0, 0, 3}, {0, 0.1, 3}}}});
   plots.push_back({"nothing", "x", "y"});
   const std::string errors = directory / "errors";
   const int before = dup(STDERR_FILENO), file = open(errors.c_str(), O_WRONLY | O_CREAT, 0600);

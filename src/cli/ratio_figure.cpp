@@ -19,7 +19,7 @@ double calcMedianRatio(const RatioReport& report) {
 // R of the samples that `keep` accepts; a line stops between branches.
 Curve makeCurve(const RatioReport& report, const std::string& title, const std::string& color, CurveStyle style,
                 const std::function<bool(const RatioSample&)>& keep) {
-  Curve curve{title, color, style, false, {}};
+  Curve curve{title, color, {}, style};
   int branch = 0;
   for (const RatioSample& sample : report.sweep.samples) {
     if (sample.dead != DeadPointKind::None || !keep(sample)) continue;
@@ -45,7 +45,7 @@ Plot makeCurvePlot(const RatioReport& report) {
   plot.y_range = {negative ? -top : 0, top};
   for (const DeadPointKind kind : {DeadPointKind::Output, DeadPointKind::Motors}) {
     const bool joint = kind == DeadPointKind::Output;
-    Curve dead{joint ? "dead (joint)" : "dead (motor)", joint ? "#b02020" : "#2060b0", CurveStyle::Lines, true, {}};
+    Curve dead{joint ? "dead (joint)" : "dead (motor)", joint ? "#b02020" : "#2060b0", {}, CurveStyle::Lines, true};
     for (const RatioSample& sample : report.sweep.deadPoints())
       if ((sample.dead == DeadPointKind::Output) == joint)
         dead.points.insert(
@@ -58,7 +58,7 @@ Plot makeCurvePlot(const RatioReport& report) {
 
 Plot makeDistancePlot(const RatioReport& report) {
   Plot plot{"", report.linkage.joint_names[0] + " [rad]", "distance from the nearest dead point [rad]"};
-  Curve curve{"up to 0.5 rad, from the start", kClosedColor, CurveStyle::Lines, false, {}};
+  Curve curve{"up to 0.5 rad, from the start", kClosedColor};
   for (const RatioSample& sample : report.sweep.samples)
     if (sample.branch == 0 && sample.nearest)
       curve.points.emplace_back(sample.joints[0],
@@ -74,7 +74,7 @@ Plot makeMapPlot(const RatioReport& report) {
   for (const std::vector<RatioSample>& row : map.rows)
     for (const RatioSample& sample : row)
       plot.shades.squares.push_back({sample.joints[0], sample.joints[1], sample.ratio.condition});
-  Curve dead{"dead points", "#b02020", CurveStyle::Crosses, false, {}};
+  Curve dead{"dead points", "#b02020", {}, CurveStyle::Crosses};
   for (const RatioSample& sample : map.dead_points) dead.points.emplace_back(sample.joints[0], sample.joints[1]);
   plot.curves = {dead};
   return plot;

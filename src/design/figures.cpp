@@ -16,11 +16,11 @@ constexpr size_t kMostMotors = 4;                                  // of one plo
 // Values of feasible designs as points, the least so far as a line, one colour per search. Outliers are left out.
 Plot makeCourse(const DesignEvaluator& evaluator, const DesignRun& run) {
   const double start = evaluator.start().value;
-  Plot plot{"Value of the designs", "evaluation", "value", PlotScale::Free, {}};
+  Plot plot{"Value of the designs", "evaluation", "value"};
   for (size_t i = 0; i < run.searches.size(); ++i) {
     const char* color = getCurveColor(i);
-    Curve values{"", color, CurveStyle::Points, false, {}};
-    Curve best{"best of search " + std::to_string(i + 1), color, CurveStyle::Lines, false, {}};
+    Curve values{"", color, {}, CurveStyle::Points};
+    Curve best{"best of search " + std::to_string(i + 1), color};
     double least = start;
     for (const LoggedEvaluation& e : run.searches[i]) {
       const bool feasible = e.status == DesignStatus::Feasible;
@@ -43,8 +43,8 @@ std::string describeAxis(const ObjectiveTerm& term) {
 // Two objectives: all feasible designs, the start and the front.
 Plot makeFrontPlot(const DesignEvaluator& evaluator, const DesignRun& run, size_t x, size_t y) {
   const std::vector<ObjectiveTerm>& terms = evaluator.objective();
-  Plot plot{"Front", describeAxis(terms[x]), describeAxis(terms[y]), PlotScale::Free, {}};
-  Curve designs{"designs", kSerialColor, CurveStyle::Points, false, {}};
+  Plot plot{"Front", describeAxis(terms[x]), describeAxis(terms[y])};
+  Curve designs{"designs", kSerialColor, {}, CurveStyle::Points};
   const auto& front = run.front;
   const auto calcMost = [&](size_t k) {
     double most = evaluator.start().terms[k];
@@ -57,10 +57,10 @@ Plot makeFrontPlot(const DesignEvaluator& evaluator, const DesignRun& run, size_
       designs.points.emplace_back(e.measures[x], e.measures[y]);
   // Of more than two objectives, the front is no line.
   const bool line = terms.size() == 2;
-  Curve best{"front", kLiftedColor, line ? CurveStyle::LinesPoints : CurveStyle::Points, false, {}};
+  Curve best{"front", kLiftedColor, {}, line ? CurveStyle::LinesPoints : CurveStyle::Points};
   for (const FrontDesign& design : front) best.points.emplace_back(design.measures[x], design.measures[y]);
-  Curve start{
-      "start", kClosedColor, CurveStyle::Crosses, false, {{evaluator.start().terms[x], evaluator.start().terms[y]}}};
+  const std::vector<double>& from = evaluator.start().terms;
+  Curve start{"start", kClosedColor, {{from[x], from[y]}}, CurveStyle::Crosses};
   plot.curves = {designs, best, start};
   return plot;
 }
@@ -85,7 +85,7 @@ std::vector<int> chooseMotors(const DesignEvaluator& evaluator, const MotionMeas
 
 Curve makeCurve(const MotorTrace& trace, const MatrixXd& values, int motor, const std::string& title, size_t color,
                 bool dashed) {
-  Curve curve{title, getCurveColor(color), CurveStyle::Lines, dashed, {}};
+  Curve curve{title, getCurveColor(color), {}, CurveStyle::Lines, dashed};
   for (size_t k = 0; k < trace.time.size(); ++k)
     if (trace.dt[k] > 0) curve.points.emplace_back(trace.time[k], values(motor, static_cast<Eigen::Index>(k)));
   return curve;
@@ -93,8 +93,8 @@ Curve makeCurve(const MotorTrace& trace, const MatrixXd& values, int motor, cons
 
 DesignFigure makeMotionFigure(const DesignEvaluator& evaluator, const std::string& name, const MotionMeasures& before,
                               const MotionMeasures& after) {
-  Plot torque{"Motor torques", "time [s]", "torque [N m]", PlotScale::Free, {}};
-  Plot speed{"Motor speeds", "time [s]", "speed [rad/s]", PlotScale::Free, {}};
+  Plot torque{"Motor torques", "time [s]", "torque [N m]"};
+  Plot speed{"Motor speeds", "time [s]", "speed [rad/s]"};
   const std::vector<int> motors = chooseMotors(evaluator, before, after);
   for (size_t i = 0; i < motors.size(); ++i) {
     const std::string& motor = evaluator.robot().startModel().motors()[motors[i]].name;

@@ -39,18 +39,10 @@ void writePoints(std::ostream& script, const Curve& curve, const std::string& na
 }
 
 std::string describeStyle(const Curve& curve) {
-  const std::string color = " lc rgb '" + curve.color + "'";
-  switch (curve.style) {
-    case CurveStyle::Points:
-      return "with points pt 7 ps 0.3" + color;
-    case CurveStyle::Crosses:
-      return "with points pt 2 ps 1.2 lw 2" + color;
-    case CurveStyle::LinesPoints:
-      return std::string("with linespoints pt 7 ps 0.5 lw 2") + (curve.dashed ? " dashtype 2" : "") + color;
-    case CurveStyle::Lines:
-      break;
-  }
-  return std::string("with lines lw 2") + (curve.dashed ? " dashtype 2" : "") + color;
+  static const char* const kStyles[] = {"lines lw 2", "linespoints pt 7 ps 0.5 lw 2", "points pt 7 ps 0.3",
+                                        "points pt 2 ps 1.2 lw 2"};
+  return std::string("with ") + kStyles[static_cast<int>(curve.style)] + (curve.dashed ? " dashtype 2" : "") +
+         " lc rgb '" + curve.color + "'";
 }
 
 // Only curves with a finite point: gnuplot stops at an empty plot.
@@ -101,20 +93,10 @@ void writeRanges(std::ostream& script, const Plot& plot, const std::vector<const
 void writeAxes(std::ostream& script, const Plot& plot) {
   script << "reset\nset grid\nset key outside right top\nset title " << quoteLabel(plot.title) << "\nset xlabel "
          << quoteLabel(plot.x_label) << "\nset ylabel " << quoteLabel(plot.y_label) << "\n";
-  switch (plot.scale) {
-    case PlotScale::Free:
-      break;
-    case PlotScale::Logarithmic:
-      script << "set logscale y\n";
-      break;
-    case PlotScale::Equal:
-      script << "set size ratio -1\nset xtics 0.1\nset ytics 0.1\n";
-      break;
-    case PlotScale::Polar:
-      script << "set polar\nset angles degrees\nset theta top ccw\nset grid polar 45\nunset border\nunset xtics\nunset "
-                "ytics\n"
-                "set rtics\nset size square\nset lmargin 8\nset ttics 0, 45 format '%g°'\n";
-  }
+  if (plot.scale == PlotScale::Logarithmic) script << "set logscale y\n";
+  if (plot.scale == PlotScale::Polar)
+    script << "set polar\nset angles degrees\nset theta top ccw\nset grid polar 45\nunset border\nunset xtics\nunset "
+              "ytics\nset rtics\nset size square\nset lmargin 8\nset ttics 0, 45 format '%g°'\n";
 }
 
 void writePlot(std::ostream& script, const Plot& plot, int index) {
@@ -145,10 +127,6 @@ void writePlot(std::ostream& script, const Plot& plot, int index) {
   script << "\n";
 }
 
-bool isTall(const Plot& plot) {
-  return plot.scale == PlotScale::Equal || plot.scale == PlotScale::Polar || !plot.shades.squares.empty();
-}
-
 }  // namespace
 
 const char* getCurveColor(size_t index) {
@@ -160,7 +138,7 @@ const char* getCurveColor(size_t index) {
 bool drawPlots(const std::string& path, const std::vector<Plot>& plots) {
   if (!isOnPath("gnuplot")) return false;
   AsideFile figure(path), source(path + ".gnuplot");  // the script is never committed and thus removed
-  const bool tall = !plots.empty() && isTall(plots[0]);
+  const bool tall = !plots.empty() && (plots[0].scale == PlotScale::Polar || !plots[0].shades.squares.empty());
   const int height = (tall ? kTallHeight : kPlotHeight) * static_cast<int>(plots.size());
   std::ostringstream script;
   script.precision(kDigits);

@@ -1,6 +1,8 @@
 #pragma once
 // Figures, drawn by gnuplot.
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,18 +12,19 @@ namespace bielle {
 
 enum class CurveStyle { Lines, LinesPoints, Points, Crosses };
 
+using PlotPoints = std::vector<std::pair<double, double>>;
+
 struct Curve {
-  std::string title;  // empty: not in the legend
-  std::string color;  // "#rrggbb"
+  std::string title;       // empty: not in the legend
+  std::string color;       // "#rrggbb"
+  PlotPoints points = {};  // those that are not finite interrupt the line
   CurveStyle style = CurveStyle::Lines;
   bool dashed = false;
-  std::vector<std::pair<double, double>> points;  // points that are not finite interrupt the line
 };
 
 enum class PlotScale {
   Free,
   Logarithmic,  // y
-  Equal,        // a metre is a metre in x and y
   Polar         // x: angle in degrees, 0 upwards and 90 to the left; y: radius. No labels of axes
 };
 
@@ -34,14 +37,23 @@ struct Shades {
 
 struct Plot {
   std::string title, x_label, y_label;  // free text
-  PlotScale scale = PlotScale::Free;
   std::vector<Curve> curves = {};
+  PlotScale scale = PlotScale::Free;
   std::optional<std::pair<double, double>> y_range = std::nullopt;  // empty: that of the curves
   Shades shades = {};                                               // behind the curves
 };
 
 // The colours of the models, the same in all figures.
 constexpr const char *kClosedColor = "#1f77b4", *kLiftedColor = "#d62728", *kSerialColor = "#7f7f7f";
+// y over x, as far as there are both.
+template <typename X, typename Y>
+PlotPoints pairUp(const X& x, const Y& y) {
+  PlotPoints points;
+  const std::ptrdiff_t count = std::min<std::ptrdiff_t>(x.size(), y.size());
+  for (std::ptrdiff_t k = 0; k < count; ++k) points.emplace_back(x[k], y[k]);
+  return points;
+}
+
 // Of one of several curves.
 const char* getCurveColor(size_t index);
 

@@ -155,13 +155,12 @@ std::string formatCsv(const ArchitectureSpec& spec, const std::vector<Contender>
 // Over time, of every robot: the largest torque of any motor, the power of all, the height of the centre of mass.
 std::vector<Plot> makeMotionPlots(const std::vector<Contender>& contenders, const ArchitectureResults& results,
                                   size_t motion) {
-  std::vector<Plot> plots = {{"Largest torque of a motor", "time [s]", "torque [N m]", PlotScale::Free, {}},
-                             {"Mechanical power of all motors", "time [s]", "power [W]", PlotScale::Free, {}},
-                             {"Height of the centre of mass", "time [s]", "height [m]", PlotScale::Free, {}}};
+  std::vector<Plot> plots = {{"Largest torque of a motor", "time [s]", "torque [N m]"},
+                             {"Mechanical power of all motors", "time [s]", "power [W]"},
+                             {"Height of the centre of mass", "time [s]", "height [m]"}};
   for (size_t r = 0; r < contenders.size(); ++r) {
     const Feat& feat = results.motions[r][motion];
-    for (Plot& plot : plots)
-      plot.curves.push_back({contenders[r].name, getCurveColor(r), CurveStyle::Lines, false, {}});
+    for (Plot& plot : plots) plot.curves.push_back({contenders[r].name, getCurveColor(r)});
     for (size_t k = 0; k < feat.trace.time.size(); ++k) {
       const Eigen::Index stage = static_cast<Eigen::Index>(k);
       plots[0].curves.back().points.emplace_back(feat.trace.time[k],
@@ -177,12 +176,11 @@ std::vector<Plot> makeMotionPlots(const std::vector<Contender>& contenders, cons
 std::vector<Plot> makeSpeedPlots(const ArchitectureSpec& spec, const std::vector<Contender>& contenders,
                                  const ArchitectureResults& results) {
   const std::string label = spec.speeds[0].motion + ": " + spec.speeds[0].settings[0].first;
-  std::vector<Plot> plots = {{"Peak torque of all motors", label, "torque [N m]", PlotScale::Free, {}},
-                             {"Rms torque over all motors", label, "torque [N m]", PlotScale::Free, {}},
-                             {"Electrical cost of transport", label, "cost of transport", PlotScale::Free, {}}};
+  std::vector<Plot> plots = {{"Peak torque of all motors", label, "torque [N m]"},
+                             {"Rms torque over all motors", label, "torque [N m]"},
+                             {"Electrical cost of transport", label, "cost of transport"}};
   for (size_t r = 0; r < contenders.size(); ++r) {
-    for (Plot& plot : plots)
-      plot.curves.push_back({contenders[r].name, getCurveColor(r), CurveStyle::LinesPoints, false, {}});
+    for (Plot& plot : plots) plot.curves.push_back({contenders[r].name, getCurveColor(r), {}, CurveStyle::LinesPoints});
     for (size_t i = 0; i < spec.speeds.size(); ++i) {
       const Feat& feat = results.speeds[r][i];
       if (!feat.done) continue;

@@ -210,11 +210,11 @@ Plot makeMap(const CampaignResults& results, const Groups& groups, size_t direct
   std::string title = "Largest impulse without a fall, N s, by direction";
   for (const size_t i : mapped) title += " and " + results.columns[i];
   if (mapped.size() < listVaried(results).size()) title += ", mean of all instants";
-  Plot plot{title, "", "", PlotScale::Polar};
+  Plot plot{title, "", "", {}, PlotScale::Polar};
   for (const auto& [condition, found] : groups) {
     std::string label;
     for (const std::string& value : condition) label += (label.empty() ? "" : ", ") + value;
-    Curve curve{label, getCurveColor(plot.curves.size()), CurveStyle::LinesPoints, false, {}};
+    Curve curve{label, getCurveColor(plot.curves.size()), {}, CurveStyle::LinesPoints};
     std::map<double, std::vector<double>> impulses;
     for (const SurvivedImpulse& one : found) impulses[std::stod(one.values[direction])].push_back(one.impulse);
     for (const auto& [angle, all] : impulses)

@@ -2,31 +2,23 @@
 
 #include <cmath>
 #include <functional>
+#include <tuple>
 
 #include "bielle/model/names.h"
 
 namespace bielle::paper {
 namespace {
 
-using Getter = std::function<double(const Comparison&)>;
+// A model of the comparison, with one name and colour in all figures.
+struct Compared {
+  const Performance Comparison::*motion;
+  const char *title, *color;
+};
+constexpr Compared kClosedMotion = {&Comparison::closed, "closed", kClosedColor},
+                   kLiftedMotion = {&Comparison::lifted, "serial, lifted", kLiftedColor},
+                   kSerialMotion = {&Comparison::serial, "serial", kSerialColor};
 
-Curve makeSweep(const StudyResult& result, const char* title, const char* color, const Getter& get,
-                bool dashed = false) {
-  Curve curve{title, color, CurveStyle::LinesPoints, dashed, {}};
-  for (const Comparison& entry : result.comparisons) curve.points.emplace_back(entry.value, get(entry));
-  return curve;
-}
-
-// A case that did not converge or was not lifted entirely interrupts the curve.
-double drawn(const Performance& motion, double value) { return motion.success ? value : kMissing; }
-
-// Marks where the lift failed, at the value of its partial result.
-Curve markFailures(const StudyResult& result, const Getter& get) {
-  Curve curve{"lift failed: until then", "#000000", CurveStyle::Crosses, false, {}};
-  for (const Comparison& entry : result.comparisons)
-    if (entry.serial.success && !entry.lifted.success) curve.points.emplace_back(entry.value, get(entry));
-  return curve;
-}
+using Number = std::function<double(const Performance&)>;
 
 bool isWide(const std::vector<Curve>& curves) {
   double least = INFINITY, most = 0;
@@ -36,101 +28,73 @@ bool isWide(const std::vector<Curve>& curves) {
   return least > 0 && most > 20 * least;
 }
 
+// Over the values of the study. Cases that did not converge or were not lifted entirely interrupt the curves.
+Plot makeSweeps(const StudyResult& result, const char* title, const char* label, const Number& get) {
+  Plot plot{title, result.study.label, label};
+  for (const Compared& model : {kClosedMotion, kLiftedMotion}) {
+    Curve curve{model.title, model.color, {}, CurveStyle::LinesPoints};
+    for (const Comparison& entry : result.comparisons) {
+      const Performance& motion = entry.*model.motion;
+      curve.points.emplace_back(entry.value, motion.success ? get(motion) : kMissing);
+    }
+    plot.curves.push_back(curve);
+  }
+  // Where the lift failed, the value of its partial result.
+  Curve failed{"lift failed: until then", "#000000", {}, CurveStyle::Crosses};
+  for (const Comparison& entry : result.comparisons)
+    if (entry.serial.success && !entry.lifted.success) failed.points.emplace_back(entry.value, get(entry.lifted));
+  plot.curves.push_back(failed);
+  return plot;
+}
+
 Plot makeTorquePlot(const StudyResult& result, const char* title, double Load::*number) {
-  const Getter closed = [number](const Comparison& e) { return drawn(e.closed, e.closed.knee.*number); };
-  const Getter partial = [number](const Comparison& e) { return e.lifted.knee.*number; };
-  const Getter lifted = [&partial](const Comparison& e) { return drawn(e.lifted, partial(e)); };
-  const Getter serial = [number](const Comparison& e) { return e.serial.knee.*number; };
-  Plot plot{
-      title,
-      result.study.label,
-      "torque [N m]",
-      PlotScale::Free,
-      {makeSweep(result, "closed", kClosedColor, closed), makeSweep(result, "serial, lifted", kLiftedColor, lifted),
-       makeSweep(result, "serial, knee joint", kSerialColor, serial, true), markFailures(result, partial)}};
+  const Number get = [number](const Performance& motion) { return motion.knee.*number; };
+  Plot plot = makeSweeps(result, title, "torque [N m]", get);
+  Curve serial{"serial, knee joint", kSerialColor, {}, CurveStyle::LinesPoints, true};
+  for (const Comparison& entry : result.comparisons) serial.points.emplace_back(entry.value, get(entry.serial));
+  plot.curves.insert(plot.curves.end() - 1, serial);
   if (isWide(plot.curves)) plot.scale = PlotScale::Logarithmic;
   return plot;
 }
 
-Plot makeHeightPlot(const StudyResult& result) {
-  const Getter lifted = [](const Comparison& e) { return drawn(e.lifted, e.lifted.com_mean); };
-  return {"Mean height of the centre of mass",
-          result.study.label,
-          "height [m]",
-          PlotScale::Free,
-          {makeSweep(result, "closed", kClosedColor,
-                     [](const Comparison& e) { return drawn(e.closed, e.closed.com_mean); }),
-           makeSweep(result, "serial, lifted", kLiftedColor, lifted),
-           markFailures(result, [](const Comparison& e) { return e.lifted.com_mean; })}};
-}
-
-// Largest absolute value over the motors at every stage.
-Curve makeTorqueCurve(const Performance& motion, const std::vector<std::string>& motors, const char* title,
-                      const char* color) {
-  Curve curve{title, color, CurveStyle::Lines, false, {}};
-  if (!motion.record) return curve;
-  for (int k = 0; k < motion.record->u.rows(); ++k) {
-    double torque = kMissing;
-    for (const std::string& motor : motors)
-      torque = std::fmax(torque, std::abs(motion.record->u(k, findColumn(motion.record->u_names, motor))));
-    curve.points.emplace_back(motion.record->time[k], torque);
-  }
-  return curve;
+// One motion over time. \param read  a value of each node
+Plot makeHistory(const Comparison& entry, const std::string& title, const char* label,
+                 std::initializer_list<Compared> models, const std::function<VectorXd(const MotionRecord&)>& read) {
+  Plot plot{title, "time [s]", label};
+  for (const Compared& model : models)
+    if (const auto& record = (entry.*model.motion).record)
+      plot.curves.push_back({model.title, model.color, pairUp(record->time, read(*record))});
+  return plot;
 }
 
 Plot makeTorqueHistory(const Comparison& entry, const std::vector<std::string>& motors, const char* title) {
-  return {title,
-          "time [s]",
-          "torque [N m]",
-          PlotScale::Free,
-          {makeTorqueCurve(entry.closed, motors, "closed", kClosedColor),
-           makeTorqueCurve(entry.lifted, motors, "serial, lifted", kLiftedColor)}};
+  return makeHistory(entry, title, "torque [N m]", {kClosedMotion, kLiftedMotion}, [&](const MotionRecord& record) {
+    VectorXd largest = VectorXd::Zero(record.u.rows());
+    for (const std::string& motor : motors)
+      largest = largest.cwiseMax(record.u.col(findColumn(record.u_names, motor)).cwiseAbs());
+    return largest;
+  });
 }
 
-Curve makeAngleCurve(const Performance& motion, const std::string& joint, const char* title, const char* color) {
-  Curve curve{title, color, CurveStyle::Lines, false, {}};
-  if (!motion.record) return curve;
-  const int column = findColumn(motion.record->q_names, joint);
-  for (int k = 0; k < motion.record->q.rows(); ++k)
-    curve.points.emplace_back(motion.record->time[k], motion.record->q(k, column));
-  return curve;
-}
-
-Plot makeKneePlot(const Comparison& entry, const ComparedRobot& robot) {
-  const std::string& knee = robot.joints.knees[0];
-  return {"Angle of " + knee,
-          "time [s]",
-          "angle [rad]",
-          PlotScale::Free,
-          {makeAngleCurve(entry.closed, knee, "closed", kClosedColor),
-           makeAngleCurve(entry.lifted, knee, "serial, lifted", kLiftedColor),
-           makeAngleCurve(entry.serial, knee, "serial", kSerialColor)}};
-}
-
-Curve makePath(const RowMatrixXd& path, int x, int y, const VectorXd* time, const std::string& title, const char* color,
-               bool dashed = false) {
-  Curve curve{title, color, CurveStyle::Lines, dashed, {}};
-  for (int k = 0; k < path.rows(); ++k) curve.points.emplace_back(time ? (*time)[k] : path(k, x), path(k, y));
-  return curve;
+Plot makeKneePlot(const Comparison& entry, const std::string& knee) {
+  return makeHistory(entry, "Angle of " + knee, "angle [rad]", {kClosedMotion, kLiftedMotion, kSerialMotion},
+                     [&](const MotionRecord& record) { return record.q.col(findColumn(record.q_names, knee)); });
 }
 
 // Feet seen from the side and the centre of mass over time, of both models.
-std::vector<Plot> makePathPlots(const Comparison& entry, const ComparedRobot& robot) {
-  std::vector<Plot> plots = {{"Feet, from the side", "x [m]", "z [m]", PlotScale::Free, {}},
-                             {"Centre of mass, height", "time [s]", "z [m]", PlotScale::Free, {}},
-                             {"Centre of mass, forward", "time [s]", "x [m]", PlotScale::Free, {}},
-                             {"Centre of mass, sideways", "time [s]", "y [m]", PlotScale::Free, {}}};
-  const auto add = [&](const Performance& motion, const char* title, const char* color) {
-    if (!motion.record) return;
-    const std::vector<RowMatrixXd> feet = calcFeet(robot.robot.model, *motion.record);
+std::vector<Plot> makePathPlots(const Comparison& entry, const Model& model) {
+  std::vector<Plot> plots = {{"Feet, from the side", "x [m]", "z [m]"}};
+  for (const Compared& one : {kClosedMotion, kLiftedMotion}) {
+    const auto& record = (entry.*one.motion).record;
+    const std::vector<RowMatrixXd> feet = record ? calcFeet(model, *record) : std::vector<RowMatrixXd>();
     for (size_t i = 0; i < feet.size(); ++i)
-      plots[0].curves.push_back(makePath(
-          feet[i], 0, 2, nullptr, std::string(title) + ", " + robot.robot.model.contacts()[i].name, color, i > 0));
-    for (const auto& [plot, axis] : {std::pair{1, 2}, {2, 0}, {3, 1}})
-      plots[plot].curves.push_back(makePath(motion.record->com, 0, axis, &motion.record->time, title, color));
-  };
-  add(entry.closed, "closed", kClosedColor);
-  add(entry.lifted, "serial, lifted", kLiftedColor);
+      plots[0].curves.push_back({std::string(one.title) + ", " + model.contacts()[i].name, one.color,
+                                 pairUp(feet[i].col(0), feet[i].col(2)), CurveStyle::Lines, i > 0});
+  }
+  for (const auto& [title, label, axis] :
+       {std::tuple{"height", "z [m]", 2}, {"forward", "x [m]", 0}, {"sideways", "y [m]", 1}})
+    plots.push_back(makeHistory(entry, std::string("Centre of mass, ") + title, label, {kClosedMotion, kLiftedMotion},
+                                [axis = axis](const MotionRecord& record) { return record.com.col(axis); }));
   return plots;
 }
 
@@ -140,25 +104,24 @@ void addHistories(const StudyResult& result, const ComparedRobot& robot, std::ve
     if (entry.value != result.study.shown && result.comparisons.size() > 1) continue;
     const std::string name = makeClosedCase(result.study, entry.value, "").name;
     const std::string stem = result.study.name + name.substr(name.find('-'), name.rfind('-') - name.find('-'));
-    figures.push_back({stem + "-paths", "Feet and centre of mass of both models", makePathPlots(entry, robot)});
-    figures.push_back({stem + "-torques",
-                       "Largest torque of the motors of knees and ankles, and the angle of a knee",
-                       {makeTorqueHistory(entry, robot.knee_motors, "Knee motors"),
-                        makeTorqueHistory(entry, robot.ankle_motors, "Ankle motors"), makeKneePlot(entry, robot)}});
+    figures.push_back(
+        {stem + "-paths", "Feet and centre of mass of both models", makePathPlots(entry, robot.robot.model)});
+    figures.push_back(
+        {stem + "-torques",
+         "Largest torque of the motors of knees and ankles, and the angle of a knee",
+         {makeTorqueHistory(entry, robot.knee_motors, "Knee motors"),
+          makeTorqueHistory(entry, robot.ankle_motors, "Ankle motors"), makeKneePlot(entry, robot.joints.knees[0])}});
   }
 }
 
 void addRatio(const RatioFinding& ratio, std::vector<Figure>& figures) {
-  Curve curve{ratio.joint, kClosedColor, CurveStyle::Lines, false, {}};
+  Curve curve{ratio.joint, kClosedColor};
   for (size_t i = 0; i < ratio.ratio.size(); ++i)
     if (ratio.ratio[i] < 5 * ratio.start) curve.points.emplace_back(ratio.angle[i], ratio.ratio[i]);
-  figures.push_back({"ratio",
-                     "Reduction ratio of the knee, up to five times that of the starting posture",
-                     {{"Reduction ratio",
-                       "angle of " + ratio.joint + " [rad]",
-                       "motor speed / joint speed",
-                       PlotScale::Free,
-                       {curve}}}});
+  figures.push_back(
+      {"ratio",
+       "Reduction ratio of the knee, up to five times that of the starting posture",
+       {{"Reduction ratio", "angle of " + ratio.joint + " [rad]", "motor speed / joint speed", {curve}}}});
 }
 
 }  // namespace
@@ -169,7 +132,9 @@ std::vector<Figure> makeFigures(const StudyResult& result, const ComparedRobot& 
   if (result.comparisons.size() > 1) {
     std::vector<Plot> plots = {makeTorquePlot(result, "Peak torque of the knee motors", &Load::peak),
                                makeTorquePlot(result, "Mean torque of the knee motors", &Load::mean)};
-    if (result.study.motion == "walk") plots.insert(plots.begin(), makeHeightPlot(result));
+    if (result.study.motion == "walk")
+      plots.insert(plots.begin(), makeSweeps(result, "Mean height of the centre of mass", "height [m]",
+                                             [](const Performance& motion) { return motion.com_mean; }));
     figures.push_back({name, "Closed model against the lifted serial one", plots});
   }
   addHistories(result, robot, figures);
