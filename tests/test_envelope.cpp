@@ -15,7 +15,7 @@
 #include "design/gradient.h"
 #include "design/measures.h"
 #include "design/spec.h"
-#include "motion/motion_envelope.h"
+#include "design/motion_envelope.h"
 
 using namespace bielle;
 

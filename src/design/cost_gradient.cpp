@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
-#include "motion/motion_envelope.h"
+#include "design/motion_envelope.h"
 #include "motion/neighbour_plans.h"
 
 namespace bielle {

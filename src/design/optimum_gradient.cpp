@@ -9,7 +9,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "design/conditioning.h"
-#include "motion/motion_envelope.h"
+#include "design/motion_envelope.h"
 #include "motion/neighbour_plans.h"
 
 namespace bielle {

@@ -1,8 +1,8 @@
 #pragma once
 /// \file Gradients of motions that are optimized for every design (MotionMode::Reoptimized).
 ///
-/// The cost of an optimum changes by the envelope theorem (ocp/envelope.h), its torques and speeds by the change of the optimum
-/// itself (ocp/followed_optimum.h), as do margins and distances at the nodes where they are least; no motion is solved
+/// The cost of an optimum changes by the envelope theorem (envelope.h), its torques and speeds by the change of the optimum
+/// itself (followed_optimum.h), as do margins and distances at the nodes where they are least; no motion is solved
 /// again. Both are central differences across each variable, of the robot planned for anew: the posture at the start,
 /// footholds and references move with it.
 #include "bielle/design/parametrization.h"

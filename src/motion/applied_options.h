@@ -1,10 +1,13 @@
 #pragma once
 /// \file What the options of a problem (bielle/motion/problem_options.h) make of the stages of a motion.
+#include <memory>
 #include <vector>
 
-#include "bielle/motion/problem_options.h"
+#include "bielle/motion/motion.h"
 
 namespace bielle {
+
+class PeakProblem;
 
 /// Effort limits by motor (nu), those of the model or the given replacements. \throws InputError as Limits does
 VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
@@ -46,5 +49,8 @@ void setObjective(const Model& model, const ObjectiveOptions& options, std::vect
 
 /// L of the peak torque, nu. \param limits  those of the motion, which replace some of the model
 VectorXd getPeakLimits(const Model& model, const LimitOptions& limits);
+
+/// The problem that solve() solves for the least peak torque; null for other objectives. The motion must outlive it.
+std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion);
 
 }  // namespace bielle

@@ -4,6 +4,7 @@
 
 #include "bielle/motion/motion.h"
 #include "motion/applied_options.h"
+#include "solve/peak_problem.h"
 
 namespace bielle {
 
@@ -61,6 +62,14 @@ VectorXd getPeakLimits(const Model& model, const LimitOptions& limits) {
   VectorXd efforts = getEffortLimits(model, limits);
   if (!efforts.array().isFinite().any()) efforts.setConstant(model.mass() * model.gravity().norm() * kReferenceLever);
   return efforts;
+}
+
+std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion) {
+  const ProblemOptions& options = motion.problem_options;
+  if (options.objective.objective != Objective::PeakTorque) return nullptr;
+  const double most = motion.within_limits ? 1 : std::numeric_limits<double>::infinity();
+  return std::make_unique<PeakProblem>(*motion.problem, getPeakLimits(motion.problem->model(), options.limits),
+                                       options.objective.scale.value_or(1), most);
 }
 
 namespace {

@@ -7,8 +7,8 @@
 #include "model/number_text.h"
 #include "motion/applied_options.h"
 #include "motion/join.h"
-#include "motion/motion_envelope.h"
 #include "motion/refinement.h"
+#include "solve/peak_problem.h"
 
 namespace bielle {
 namespace {

@@ -7,7 +7,7 @@
 
 namespace bielle {
 
-/// Derivatives of the optimal cost by all variables, by the envelope theorem (src/ocp/envelope.h): two models, two motions
+/// Derivatives of the optimal cost by all variables, by the envelope theorem (src/design/envelope.h): two models, two motions
 /// and two evaluations of their stages per variable; nothing is solved.
 /// \param optimum  a solved motion of the robot at x
 /// \param make     the same motion for another robot: same options; posture, footholds and references planned again
@@ -20,7 +20,7 @@ VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const
 /// rounding with the inverse.
 inline constexpr double kDesignStep = 2e-5;
 /// The step of a forward difference, likewise: its error grows with the step itself. For derivatives that sweeps leave a thousandth
-/// of anyway (src/ocp/followed_optimum.h).
+/// of anyway (src/design/followed_optimum.h).
 inline constexpr double kForwardStep = 2e-6;
 
 }  // namespace bielle

@@ -1,14 +1,12 @@
 #pragma once
 /// \file Derivatives of an optimal motion, of its cost and of itself, with respect to the robot and to the request.
 #include "bielle/motion/solve.h"
-#include "ocp/envelope.h"
-#include "ocp/followed_optimum.h"
+#include "design/envelope.h"
+#include "design/followed_optimum.h"
+#include "motion/applied_options.h"
 #include "solve/peak_problem.h"
 
 namespace bielle {
-
-/// The problem that solve() solves for the least peak torque; null for other objectives. The motion must outlive it.
-std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion);
 
 /// Envelope of a solved motion, whatever it minimizes. Other motions are made like it, with the same options, for a robot
 /// that differs a little: postures at the start and at the end, references and footholds are those planned for that robot.
@@ -31,7 +29,7 @@ class MotionEnvelope {
   Envelope envelope_;
 };
 
-/// The optimum of another motion like it to first order, as a trajectory of changed.problem (ocp/followed_optimum.h).
+/// The optimum of another motion like it to first order, as a trajectory of changed.problem (followed_optimum.h).
 std::optional<ShootingTrajectory> followOptimum(const Solution& optimum, const Motion& changed, int sweeps = 2);
 
 /// FollowedOptimum of a motion, whatever it minimizes.

@@ -1,4 +1,4 @@
-#include "ocp/optimum_path.h"
+#include "design/optimum_path.h"
 
 #include <algorithm>
 #include <stdexcept>

@@ -1,18 +1,6 @@
-#include "motion/motion_envelope.h"
-
-#include <limits>
-
-#include "motion/applied_options.h"
+#include "design/motion_envelope.h"
 
 namespace bielle {
-
-std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion) {
-  const ProblemOptions& options = motion.problem_options;
-  if (options.objective.objective != Objective::PeakTorque) return nullptr;
-  const double most = motion.within_limits ? 1 : std::numeric_limits<double>::infinity();
-  return std::make_unique<PeakProblem>(*motion.problem, getPeakLimits(motion.problem->model(), options.limits),
-                                       options.objective.scale.value_or(1), most);
-}
 
 MotionEnvelope::MotionEnvelope(const Solution& optimum)
     : motion_(optimum.motion),

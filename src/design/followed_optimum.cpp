@@ -1,10 +1,10 @@
-#include "ocp/followed_optimum.h"
+#include "design/followed_optimum.h"
 
 #include <algorithm>
 #include <stdexcept>
 
 #include "math/decompositions.h"
-#include "ocp/optimum_path.h"
+#include "design/optimum_path.h"
 
 namespace bielle {
 namespace {

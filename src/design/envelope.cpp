@@ -1,9 +1,9 @@
-#include "ocp/envelope.h"
+#include "design/envelope.h"
 
 #include <limits>
 #include <stdexcept>
 
-#include "ocp/optimum_path.h"
+#include "design/optimum_path.h"
 
 namespace bielle {
 
