@@ -81,12 +81,12 @@ function(bielle_precompile target kind)
   endif()
 endfunction()
 
-# bielle_fast(TARGET): a room whose speed `bielle bench` shows. Its files are compiled at -O3, each by itself even in a unity
-# build, so that what the compiler makes of a function does not depend on its neighbours. Left to itself, GCC calls functions of
+# bielle_fast(TARGET): a room whose speed `bielle bench` shows. Its files are compiled at -O3, in a unity build by the groups of
+# bielle_group(), so that what the compiler makes of a function depends on neighbours that stay the same. Left to itself, GCC calls functions of
 # Eigen for single entries of small matrices of Lanes, which takes a fifth of the time of predictive control.
 function(bielle_fast target)
   if(NOT BIELLE_SANITIZE)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
     if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
       target_compile_definitions(${target} PRIVATE "EIGEN_STRONG_INLINE=__attribute__((always_inline)) inline")
     endif()
@@ -100,6 +100,12 @@ endfunction()
 function(bielle_plain target)
   target_compile_options(${target} PRIVATE -fPIC $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized;-Wno-subobject-linkage>)
   bielle_precompile(${target} plain <nlohmann/json.hpp>)
+endfunction()
+
+# bielle_group(NAME SOURCES...): files of a fast room that a unity build compiles together, because they instantiate the same
+# templates. Those in no group are compiled one by one.
+function(bielle_group name)
+  set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${name})
 endfunction()
 
 function(bielle_tune target fast)

@@ -15,13 +15,19 @@ struct NodeSizes {
   void require(const StageSpec& spec, const NodeCosts& costs) const;
 };
 
+// The nodes of a problem. They outlive the transcription.
+struct NodeList {
+  const std::vector<StageSpec>& specs;
+  const std::vector<TimeScalePlace>& places;
+};
+
 class Transcription {
  public:
   virtual ~Transcription() = default;
   // After the spec of a node has been replaced. \throws std::invalid_argument as RobotProblem::replaceStage() does
-  virtual void updateStage(int node) = 0;
+  virtual void updateStage(int node);
   // After the state cost of a node has changed.
-  virtual void updateStateCost(int node) = 0;
+  virtual void updateStateCost(int) {}
   virtual int tangentSize() const = 0;  // without a time scale
   virtual int batchSize() const = 0;
   virtual std::unique_ptr<RobotEvaluation> makeEvaluation() const = 0;
@@ -32,21 +38,31 @@ class Transcription {
   virtual void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const = 0;
   // RobotProblem's Eq. (7).
   virtual void mapGains(const RobotEvaluation& at, const RowMatrixXd& K, RowMatrixXd& gains) const = 0;
+
+ protected:
+  Transcription(const Model& model, const NodeList& nodes);
+
+  bool isRunning(int node) const { return node + 1 < static_cast<int>(specs_.size()); }
+  bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
+  bool isStep(int node) const { return isRunning(node) && !isImpact(node); }
+  bool isMidpoint(int node) const { return isStep(node) && specs_[node].step == StepRule::Midpoint; }
+  // Gives `at` the sizes, the state, the controls and the length of a task, and the status Failed. False if they are not
+  // finite, or the time scale is not positive.
+  bool startEvaluation(const EvaluateTask& task, RobotEvaluation& at) const;
+
+  Model model_;
+  const NodeList nodes_;
+  const std::vector<StageSpec>& specs_;
+  std::vector<NodeCosts> costs_;
+  NodeSizes sizes_;
 };
 
-// The nodes of a problem. They outlive the transcription.
-struct NodeList {
-  const std::vector<StageSpec>& specs;
-  const std::vector<TimeScalePlace>& places;
-};
 std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const NodeList& nodes);
 // \throws InputError when q0 is open
 std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0, const NodeList& nodes);
 
-// Gives `at` the sizes, the state, the controls and the length of a task, and the status Failed. False if they are not
-// finite, or the time scale is not positive.
-bool startEvaluation(const Model& model, const EvaluateTask& task, const NodeList& nodes, const NodeCosts& costs,
-                     RobotEvaluation& at);
+int countControls(const Model& model, const TimeScalePlace& place);
+double getTimeScale(const TimeScalePlace& place, const VectorXd& x, const VectorXd& u);
 
 // The number of rows of F^T before those of (dq, dv): torques and, last, a free time scale.
 inline int countLeading(const Model& model, const TimeScalePlace& place) {

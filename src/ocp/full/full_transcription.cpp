@@ -23,18 +23,7 @@ struct FullScratch : ProblemScratch {
 
 class FullTranscription : public Transcription {
  public:
-  FullTranscription(const Model& model, const NodeList& nodes) : model_(model), nodes_(nodes), specs_(nodes.specs) {
-    for (const StageSpec& spec : specs_) {
-      costs_.emplace_back(spec, &spec != &specs_.back());
-      sizes_.include(spec, costs_.back());
-    }
-  }
-
-  void updateStage(int node) override {
-    costs_[node] = NodeCosts(specs_[node], true);
-    sizes_.require(specs_[node], costs_[node]);
-  }
-  void updateStateCost(int) override {}
+  FullTranscription(const Model& model, const NodeList& nodes) : Transcription(model, nodes) {}
 
   int tangentSize() const override { return 2 * model_.nv(); }
   int batchSize() const override { return 1; }
@@ -80,9 +69,6 @@ class FullTranscription : public Transcription {
   }
 
  private:
-  bool isRunning(int node) const { return node + 1 < static_cast<int>(specs_.size()); }
-  bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
-
   void evaluate(EvaluateTask& task, FullScratch& scratch) const;
   NumericalStatus updateImpactStep(int node, FullEvaluation& at) const;
   double calcStateCost(const StateCost& state, const FullEvaluation& at, VectorXd& difference) const;
@@ -101,18 +87,12 @@ class FullTranscription : public Transcription {
     model_.difference(x0.head(nq), x1.head(nq), dx.head(nv));
     dx.tail(nv) = x1.segment(nq, nv) - x0.segment(nq, nv);
   }
-
-  Model model_;
-  const NodeList nodes_;
-  const std::vector<StageSpec>& specs_;
-  std::vector<NodeCosts> costs_;
-  NodeSizes sizes_;
 };
 
 void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const {
   auto& at = static_cast<FullEvaluation&>(*task.out);
   const int node = task.node;
-  if (!startEvaluation(model_, task, nodes_, costs_[node], at)) return;
+  if (!startEvaluation(task, at)) return;
   if (isRunning(node)) {
     const NumericalStatus status =
         isImpact(node) ? updateImpactStep(node, at) : updateFullStep(model_, specs_[node], scratch.step, at);

@@ -35,20 +35,10 @@ struct Batch {
 class ReducedTranscription : public Transcription {
  public:
   ReducedTranscription(const Model& model, const VectorXd& q0, const NodeList& nodes)
-      : model_(model),
-        nodes_(nodes),
-        specs_(nodes.specs),
-        reduction_(makeReduction(model, q0)),
-        layout_(model, reduction_, specs_) {
-    for (const StageSpec& spec : specs_) {
-      costs_.emplace_back(spec, &spec != &specs_.back());
-      sizes_.include(spec, costs_.back());
-    }
-  }
+      : Transcription(model, nodes), reduction_(makeReduction(model, q0)), layout_(model, reduction_, specs_) {}
 
   void updateStage(int node) override {
-    costs_[node] = NodeCosts(specs_[node], true);
-    sizes_.require(specs_[node], costs_[node]);
+    Transcription::updateStage(node);
     layout_.updateStage(node, specs_);
   }
   void updateStateCost(int node) override { layout_.updateStateCost(node, specs_); }
@@ -73,20 +63,11 @@ class ReducedTranscription : public Transcription {
   void mapGains(const RobotEvaluation& at, const RowMatrixXd& K, RowMatrixXd& gains) const override;
 
  private:
-  bool isRunning(int node) const { return node + 1 < static_cast<int>(specs_.size()); }
-  bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
-  bool isStep(int node) const { return isRunning(node) && !isImpact(node); }
-  bool isMidpoint(int node) const { return isStep(node) && specs_[node].step == StepRule::Midpoint; }
   void finishEvaluation(int node, const LaneView& view, LinkageWorkspaces& linkages, RobotEvaluation& at) const;
   void finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const;
 
-  Model model_;
-  const NodeList nodes_;
-  const std::vector<StageSpec>& specs_;
   const Reduction reduction_;
   ReducedLayout layout_;
-  std::vector<NodeCosts> costs_;
-  NodeSizes sizes_;
 };
 
 void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memory) const {
@@ -96,7 +77,7 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
   for (int i = 0; i < count; ++i) {
     const int node = tasks[i].node;
     auto& at = static_cast<ReducedEvaluation&>(*tasks[i].out);
-    if (!startEvaluation(model_, tasks[i], nodes_, costs_[node], at)) continue;
+    if (!startEvaluation(tasks[i], at)) continue;
     at.leading = isRunning(node) ? countLeading(model_, nodes_.places[node]) : 0;
     const int rows = layout_.contacts[node].rows;
     if (at.factors.D.size() != rows || at.factors.L.rows() != reduction_.size) at.factors.resize(reduction_.size, rows);
