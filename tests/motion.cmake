@@ -19,3 +19,12 @@ bielle_test(hostile_numbers SOURCES test_hostile_numbers.cpp LIBS bielle_results
 set_tests_properties(hostile_numbers PROPERTIES LABELS system)
 bielle_test(objectives SOURCES test_objectives.cpp LIBS bielle_results)
 set_tests_properties(objectives PROPERTIES LABELS system)
+# What the core lacks. Of the shared library nobody links a part.
+if(NOT BUILD_SHARED_LIBS)
+  add_executable(core_program core_program.cpp)
+  target_link_libraries(core_program PRIVATE bielle_motion bielle_warnings)
+  target_include_directories(core_program PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_compile_options(core_program PRIVATE ${options})
+  add_test(NAME core_program COMMAND core_program ${PROJECT_SOURCE_DIR}/robots/bipetto)
+  set_tests_properties(core_program PROPERTIES LABELS unit)
+endif()

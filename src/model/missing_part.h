@@ -1,10 +1,10 @@
 #pragma once
 /// \file What a program was linked without.
 ///
-/// The command `bielle` holds what most motions need. Readers of other formats, generators of robots and further formulations are in
-/// libraries of their own, whose objects enter themselves in tables when a program that has them starts. Whoever looks for
-/// an entry that is not there throws a MissingPart; the command then becomes its complete program (cli/program.h). Programs that
-/// link bielle::bielle have everything and never see it.
+/// The command `bielle` holds what a squat needs. Readers of other formats, generators of robots, all other motions and the full
+/// formulation are in libraries of their own, whose objects enter themselves in tables when a program that has them starts. Whoever
+/// looks for an entry that is not there throws a MissingPart; the command then becomes its complete program (cli/program.h).
+/// Programs that link bielle::bielle have everything and never see it.
 #include <stdexcept>
 #include <string>
 

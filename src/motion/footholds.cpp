@@ -96,20 +96,6 @@ Ground makeGround(const Model& model, const Stance& stance, const std::vector<Fo
 
 }  // namespace
 
-LocomotionOptions FootholdsOptions::makeGaitDefaults() {
-  LocomotionOptions gait = StairsOptions::makeGaitDefaults();
-  gait.timing.single = 0.5;
-  gait.swing.height = 0.04;
-  gait.swing.leave = 0.15;
-  gait.swing.arrive = 0.85;
-  return gait;
-}
-
-void describe(OptionFields& f, FootholdsOptions& o) {
-  f.number("rim", o.rim, "m", {0, 1}, "width of the stones around the soles");
-  describe(f, o.gait);
-}
-
 std::vector<Footstep> readFootholds(const std::string& path) {
   std::vector<Footstep> footholds;
   readYamlDocument(path, readTextFile(path, "give a YAML file with a list of footholds"),

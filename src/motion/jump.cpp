@@ -196,26 +196,6 @@ JumpHeight calcJumpHeight(const JumpOptions& o, double gravity, double t) {
   return {};
 }
 
-void describe(OptionFields& f, JumpOptions& o) {
-  f.number("flight", o.flight, "s", kNotNegative,
-           "time in the air, rounded to an even number of time steps; the height follows");
-  f.number("length", o.length, "m", {-2, 2}, "distance from take-off to landing, forward");
-  f.number("stand", o.stand, "s", kNotNegative, "time at rest before the push");
-  f.number("push", o.push, "s", kPositive, "time of acceleration with the feet on the ground");
-  f.number("land", o.land, "s", kPositive, "time from touchdown until the body is braked");
-  f.number("settle", o.settle, "s", kNotNegative, "time to come back to rest");
-  f.number("stretch", o.stretch, "m", kNotNegative,
-           "height of the centre of mass at take-off and touchdown above that at the start");
-  f.number("clearance", o.clearance, "m", kNotNegative, "least height of the soles at mid-flight");
-  f.number("time_step", o.time_step, "s", kPositive, "length of a shooting stage");
-  f.number("apex_weight", o.apex_weight, "1/m^2", kNotNegative, "height of the centre of mass at mid-flight");
-  f.number("com_weight", o.com_weight, "1/m^2", kNotNegative, "height of the centre of mass on the ground");
-  f.number("swing_weight", o.swing_weight, "1/m^2", kNotNegative, "follow the path of the feet in flight");
-  f.number("swing_rotation_weight", o.swing_rotation_weight, "1", kNotNegative, "keep the soles level in flight");
-  f.number("terminal_weight", o.terminal_weight, "1/m^2", kNotNegative, "position of the centre of mass at the end");
-  describe(f, static_cast<MotionOptions&>(o));
-}
-
 MotionPlan planJump(const Model& model, const JumpOptions& options, const StandingRobot& standing) {
   check(model, options);
   const JumpScene scene = makeScene(model, options, standing);

@@ -44,30 +44,6 @@ void checkGap(const GapOptions& o) {
 
 }  // namespace
 
-LocomotionOptions BoxOptions::makeGaitDefaults() {
-  LocomotionOptions gait = StairsOptions::makeGaitDefaults();
-  gait.timing.single = 0.6;
-  gait.swing.leave = 0.25;
-  gait.swing.arrive = 0.75;
-  return gait;
-}
-
-void describe(OptionFields& f, BoxOptions& o) {
-  f.number("height", o.height, "m", {0, 10, true}, "height of the box");
-  f.number("length", o.length, "m", {0, 10}, "length of its top; the feet stand in the middle");
-  f.number("width", o.width, "m", {0, 100}, "width of the box");
-  f.number("distance", o.distance, "m", kNotNegative, "distance from the soles to the box");
-  f.flag("down", o.down, "step down again behind the box");
-  describe(f, o.gait);
-}
-
-void describe(OptionFields& f, GapOptions& o) {
-  f.number("width", o.width, "m", kPositive, "width of the gap in the direction of travel");
-  f.number("distance", o.distance, "m", kNotNegative, "distance of the soles from its edges, on both sides");
-  f.number("depth", o.depth, "m", {0, 100, true}, "depth of the gap's floor below its banks");
-  describe(f, o.gait);
-}
-
 MotionPlan planBox(const Model& model, const BoxOptions& o, const StandingRobot& standing) {
   const Stance stance = makeStance(model, o.gait, standing);
   checkBox(model, stance, o);

@@ -9,37 +9,39 @@
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "model/missing_part.h"
 #include "motion/footholds.h"
+#include "motion/motion_part.h"
 #include "motion/obstacles.h"
 
 namespace bielle {
 namespace {
 
-template <typename Options>
-MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&),
-                          const Options& others) {
-  return [=](const Model& model, const StandingRobot& standing, const OptionSet& options) {
-    return plan(model, readOptions(options, others), standing);
-  };
+// \throws MissingPart when this program has the description of a motion, but not the motion itself
+const MotionPart& getPart(const std::string& motion) {
+  const auto part = getMotionParts().find(motion);
+  if (part == getMotionParts().end()) throw MissingPart("the motion " + motion);
+  return part->second;
 }
 
 // describe() is found by the type of the options.
 template <typename Options>
-MotionRequest makeRequest(MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&)) {
-  return {listOptions(Options()), {}, makePlanner(plan, Options()), {}};
+MotionRequest makeRequest(const std::string& motion) {
+  return {listOptions(Options()),
+          {},
+          [motion](const Model& model, const StandingRobot& standing, const OptionSet& options) {
+            return getPart(motion).planner(model, standing, options);
+          },
+          {}};
 }
 
 MotionRequest makeFootholdsRequest() {
-  MotionRequest request = makeRequest(planFootholds);
+  MotionRequest request = makeRequest<FootholdsOptions>("footholds");
   request.files.push_back(
       {"footholds",
        "YAML file, a list `footholds` of {foot: left or right, x, y, z [m], yaw, pitch, roll [rad]}, "
        "relative to the middle of the feet at the start",
-       [](const std::string& path, MotionRequest& changed) {
-         FootholdsOptions options;
-         options.footholds = readFootholds(path);
-         changed.planner = makePlanner(planFootholds, options);
-       }});
+       [](const std::string& path, MotionRequest& changed) { getPart("footholds").read(path, changed); }});
   return request;
 }
 
@@ -67,33 +69,38 @@ std::vector<SequencePart> listParts(const std::vector<std::pair<std::string, Mot
 
 }  // namespace
 
+std::map<std::string, MotionPart>& getMotionParts() {
+  static std::map<std::string, MotionPart> parts{{"squat", {makePlanner(planSquat)}}};
+  return parts;
+}
+
 const std::vector<MotionEntry>& getMotions() {
   static const std::vector<MotionEntry> motions = {
       {"squat",
        "go down and up again with feet flat; the height of the centre of mass follows a sine",
        "bielle solve squat --robot bipetto --depth 0.7 -o squat",
        {"depth", "duration"},
-       makeRequest(planSquat)},
+       makeRequest<SquatOptions>("squat")},
       {"walk",
        "steps forward or backward on level ground, from standing to standing",
        "bielle solve walk --robot bipetto --speed 0.5 -o walk",
        {"speed", "steps", "single_support", "double_support", "swing_height"},
-       makeRequest(planWalk)},
+       makeRequest<WalkOptions>("walk")},
       {"side-walk",
        "steps to the left or to the right",
        "bielle solve side-walk --robot bipetto --speed -0.2 -o side",
        {"speed", "steps", "single_support", "double_support", "swing_height"},
-       makeRequest(planSideWalk)},
+       makeRequest<SideWalkOptions>("side-walk")},
       {"turn",
        "steps on the spot or along an arc, to another heading",
        "bielle solve turn --robot bipetto --angle 1.57 --radius 0.5 -o turn",
        {"angle", "radius", "steps", "single_support", "double_support", "swing_height"},
-       makeRequest(planTurn)},
+       makeRequest<TurnOptions>("turn")},
       {"stairs",
        "climb or descend stairs, one foot per step",
        "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
        {"height", "depth", "slope", "stairs", "speed", "width", "double_support", "swing_height"},
-       makeRequest(planStairs)},
+       makeRequest<StairsOptions>("stairs")},
       {"footholds",
        "steps on uneven footholds from a file",
        "bielle solve footholds --robot bipetto --footholds stones.yaml -o stones",
@@ -103,27 +110,27 @@ const std::vector<MotionEntry>& getMotions() {
        "a step onto a box, and down again if requested",
        "bielle solve box --robot bipetto --height 0.1 --down -o box",
        {"height", "length", "width", "distance", "down", "single_support", "swing_height"},
-       makeRequest(planBox)},
+       makeRequest<BoxOptions>("box")},
       {"gap",
        "a step over a gap in the ground",
        "bielle solve gap --robot bipetto --width 0.2 -o gap",
        {"width", "distance", "depth", "single_support", "swing_height"},
-       makeRequest(planGap)},
+       makeRequest<GapOptions>("gap")},
       {"jump",
        "push off, fly for a given time, land; the time determines the height of the centre of mass at mid-flight",
        "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
        {"flight", "length"},
-       makeRequest(planJump)},
+       makeRequest<JumpOptions>("jump")},
       {"run",
        "steps with flights between them, from standing to standing",
        "bielle solve run --robot bipetto --speed 1 -o run",
        {"speed", "steps", "flight", "stance", "swing_height"},
-       makeRequest(planRun)},
+       makeRequest<RunOptions>("run")},
       {"hop",
        "lift one foot, take off and land on the other one",
        "bielle solve hop --robot bipetto --foot left --flight 0.15 -o hop",
        {"foot", "hops", "flight", "length", "stance", "swing_height"},
-       makeRequest(planHop)},
+       makeRequest<HopOptions>("hop")},
   };
   return motions;
 }

@@ -10,15 +10,6 @@ namespace {
 
 constexpr int kSteadySteps = 8;  // shorter runs do not reach their speed: the steps at both ends are half as long
 
-// Supports and flights have options of their own.
-void describeGait(OptionFields& f, LocomotionOptions& gait) {
-  f.omit({"single_support", "double_support"});
-  describe(f, gait);
-  f.omit({});
-  f.number("stretch", gait.stretch, "m", {-0.5, 0.5},
-           "height of the centre of mass at take-off and touchdown above that at the start");
-}
-
 // Every foot lands by `displacements` ahead of where it stood at the start, along x of the feet.
 std::vector<Footstep> moveAhead(const Stance& stance, const std::vector<std::pair<Side, double>>& displacements) {
   const Vector3d forward = stance.middle.R.col(0);
@@ -56,38 +47,6 @@ Goal makeFlightGoal(const ContactSchedule& schedule, int flights, double flight)
 }
 
 }  // namespace
-
-LocomotionOptions RunOptions::makeGaitDefaults() {
-  LocomotionOptions gait;
-  gait.swing.arrive = 1;
-  gait.force_weight = 100;
-  return gait;
-}
-
-LocomotionOptions HopOptions::makeGaitDefaults() {
-  LocomotionOptions gait = RunOptions::makeGaitDefaults();
-  gait.timing.start = 0.6;
-  gait.swing.height = 0.02;
-  return gait;
-}
-
-void describe(OptionFields& f, RunOptions& o) {
-  f.number("speed", o.speed, "m/s", {}, "speed of the steady steps; negative: backward");
-  f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
-  f.number("flight", o.flight, "s", kPositive, "time in the air between two steps");
-  f.number("stance", o.stance, "s", kNotNegative, "time with one foot on the ground");
-  describeGait(f, o.gait);
-}
-
-void describe(OptionFields& f, HopOptions& o) {
-  f.choice("foot", o.foot, {"left", "right"}, "foot to hop on");
-  f.integer("hops", o.hops, {1, 100}, "number of flights");
-  f.number("flight", o.flight, "s", kPositive, "time in the air of each hop");
-  f.number("length", o.length, "m", {}, "length of each hop, forward; negative: backward");
-  f.number("stance", o.stance, "s", kNotNegative,
-           "time on one foot before the first flight, between flights and after the last one");
-  describeGait(f, o.gait);
-}
 
 MotionPlan planRun(const Model& model, const RunOptions& o, const StandingRobot& standing) {
   listOptions(o).check();

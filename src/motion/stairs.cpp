@@ -41,28 +41,6 @@ Goal makeClimbGoal(const Model& model, const Stance& stance, double height, int 
 
 }  // namespace
 
-LocomotionOptions StairsOptions::makeGaitDefaults() {
-  LocomotionOptions gait;
-  gait.timing.both = 0.09;
-  gait.swing.height = 0.03;
-  gait.swing.leave = 0.1;
-  gait.swing.arrive = 0.9;
-  gait.com_height_weight = 1e3;
-  return gait;
-}
-
-void describe(OptionFields& f, StairsOptions& o) {
-  f.number("height", o.height, "m", {}, "height of a step; negative: down");
-  f.number("depth", o.depth, "m", kNotNegative, "depth of a step");
-  f.number("slope", o.slope, "1", {}, "height over depth; replaces the height unless 0");
-  f.integer("stairs", o.stairs, {1, 100}, "number of steps of the staircase");
-  f.number("speed", o.speed, "m/s", kPositive, "forward speed; with the depth it determines the duration of a step");
-  f.number("width", o.width, "m", kNotNegative, "width of the stairs");
-  f.omit({"single_support"});
-  describe(f, o.gait);
-  f.omit({});
-}
-
 Ground makeStairsGround(const StairsOptions& o, const SE3& X_WP) {
   Ground ground;
   ground.height = X_WP.p.z() + std::min(0.0, o.stairs * o.height);

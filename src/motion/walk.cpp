@@ -37,25 +37,6 @@ void addGoals(std::vector<Goal> goals, MotionPlan& plan) {
 
 }  // namespace
 
-void describe(OptionFields& f, WalkOptions& o) {
-  f.number("speed", o.speed, "m/s", {}, "speed of the steady steps; negative: backward");
-  f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
-  describe(f, o.gait);
-}
-
-void describe(OptionFields& f, SideWalkOptions& o) {
-  f.number("speed", o.speed, "m/s", {}, "speed of the steady steps to the left; negative: to the right");
-  f.integer("steps", o.steps, {2, 200}, "number of steps: one opens the stance, the next one closes it");
-  describe(f, o.gait);
-}
-
-void describe(OptionFields& f, TurnOptions& o) {
-  f.number("angle", o.angle, "rad", {}, "angle to turn to the left; negative: to the right");
-  f.number("radius", o.radius, "m", kNotNegative, "radius of the arc to walk along; 0: turn on the spot");
-  f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
-  describe(f, o.gait);
-}
-
 MotionPlan planWalk(const Model& model, const WalkOptions& o, const StandingRobot& standing) {
   StepsPlan plan = planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d::UnitX(), o.speed,
                              Side::Right, o, standing);

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "bielle/model/error.h"
+#include "model/missing_part.h"
 #include "ocp/transcription.h"
 
 namespace bielle {
@@ -100,7 +101,19 @@ std::vector<TimeScalePlace> placeTimeScales(const Model& model, const std::vecto
   return places;
 }
 
+std::unique_ptr<Transcription> makeTranscription(const Model& model, const VectorXd& q0, const NodeList& nodes,
+                                                 Formulation formulation) {
+  if (formulation == Formulation::Reduced) return makeReducedTranscription(model, q0, nodes);
+  if (!getFullTranscriptionMaker()) throw MissingPart("the full formulation");
+  return getFullTranscriptionMaker()(model, nodes);
+}
+
 }  // namespace
+
+FullTranscriptionMaker& getFullTranscriptionMaker() {
+  static FullTranscriptionMaker make = nullptr;
+  return make;
+}
 
 const char* getName(StepRule rule) { return rule == StepRule::Euler ? "euler" : "midpoint"; }
 
@@ -115,9 +128,7 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
     throw InputError(model.name(), "shooting problem", "the initial state has the wrong size", "q0: nq, v0: nv");
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k, k + 1 == specs_.size());
   places_ = placeTimeScales(model, specs_);
-  const NodeList nodes{specs_, places_};
-  transcription_ = formulation == Formulation::Full ? makeFullTranscription(model, nodes)
-                                                    : makeReducedTranscription(model, q0, nodes);
+  transcription_ = makeTranscription(model, q0, {specs_, places_}, formulation);
   const bool free = std::any_of(places_.begin(), places_.end(), [](const TimeScalePlace& p) { return p.isFree(); });
   x0_.setOnes(model.nq() + model.nv() + (free ? 1 : 0));
   x0_.head(model.nq()) = q0;

@@ -57,9 +57,11 @@ class Transcription {
   NodeSizes sizes_;
 };
 
-std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const NodeList& nodes);
 // \throws InputError when q0 is open
 std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0, const NodeList& nodes);
+// Null, unless a library has entered it (model/missing_part.h).
+using FullTranscriptionMaker = std::unique_ptr<Transcription> (*)(const Model& model, const NodeList& nodes);
+FullTranscriptionMaker& getFullTranscriptionMaker();
 
 int countControls(const Model& model, const TimeScalePlace& place);
 double getTimeScale(const TimeScalePlace& place, const VectorXd& x, const VectorXd& u);

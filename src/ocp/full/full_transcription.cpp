@@ -307,10 +307,14 @@ void FullTranscription::addStateCost(int node, const FullEvaluation& at, VectorX
   }
 }
 
-}  // namespace
-
 std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const NodeList& nodes) {
   return std::make_unique<FullTranscription>(model, nodes);
 }
 
+}  // namespace
 }  // namespace bielle
+
+extern "C" const bool bielle_full = [] {
+  bielle::getFullTranscriptionMaker() = &bielle::makeFullTranscription;
+  return true;
+}();

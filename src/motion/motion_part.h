@@ -1,0 +1,28 @@
+#pragma once
+// Motions that a library enters (model/missing_part.h). What `bielle solve` tells of them, their options included, is in the core
+// (registry.cpp, motion_options.cpp).
+#include <map>
+#include <string>
+
+#include "bielle/motion/registry.h"
+
+namespace bielle {
+
+struct MotionPart {
+  MotionPlanner planner;
+  // Of a motion with a file: reads it.
+  std::function<void(const std::string& path, MotionRequest&)> read{};
+};
+// By name.
+std::map<std::string, MotionPart>& getMotionParts();
+
+// \param others  what is no option by name
+template <typename Options>
+MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&),
+                          const Options& others = {}) {
+  return [=](const Model& model, const StandingRobot& standing, const OptionSet& options) {
+    return plan(model, readOptions(options, others), standing);
+  };
+}
+
+}  // namespace bielle
