@@ -179,21 +179,4 @@ void addDistanceGradient(const Model& model, const Workspace& ws, const Shape& a
   add(b.body, distance.point_b, -1);
 }
 
-double calcDistanceVariation(const Model& model, const Workspace& ws, int a, int b, const ShapeDistance& distance,
-                             const ModelVariation& change, const VariationWorkspace& variation) {
-  // How far the surface at a point advances along a direction, outwards or not.
-  const auto advance = [&](int index, const Vector3d& point, const Vector3d& direction, double outward) {
-    const Shape& shape = model.shapes()[index];
-    const ShapeVariation& own = change.shapes[index];
-    const SE3 X_WS = getPlacement(ws, shape.body, shape.X_BS);
-    const Vector6d D = variation.D[shape.body] + X_WS.actMotion(own.frame);
-    const Vector3d in_core = X_WS.R.transpose() * (point - outward * shape.radius * direction - X_WS.p);
-    Vector3d grown = Vector3d::Zero();  // of the point of the core, which keeps its shares of the edges
-    for (int i = 0; i < 3; ++i)
-      if (shape.half[i] > 0) grown[i] = in_core[i] / shape.half[i] * own.half[i];
-    return direction.dot(D.head<3>() + D.tail<3>().cross(point) + X_WS.R * grown) + outward * own.radius;
-  };
-  return advance(a, distance.point_a, distance.normal, -1) - advance(b, distance.point_b, distance.normal, 1);
-}
-
 }  // namespace bielle

@@ -12,11 +12,11 @@
 /// need exact nearest points, whereas general methods iterate to a tolerance.
 ///
 /// Moving the nearest points within their shapes changes nothing to first order, so that with D the displacement of a body
-/// (variation.h)
+/// (variation.h, which also has Eq. (3) for a change of the mechanism)
 ///     d distance = n . (D_a at point_a - D_b at point_b)                                                            (3)
 /// wherever the nearest points are unique; at other places (parallel faces, two faces equally deep) Eq. (3) is a directional
 /// derivative at most.
-#include "bielle/dynamics/variation.h"
+#include "bielle/dynamics/workspace.h"
 
 namespace bielle {
 
@@ -33,11 +33,6 @@ ShapeDistance calcDistance(const Shape& a, const SE3& X_WA, const Shape& b, cons
 /// Adds Eq. (3) per velocity coordinate to `gradient` (1 x nv); needs updatePositions.
 void addDistanceGradient(const Model& model, const Workspace& ws, const Shape& a, const Shape& b,
                          const ShapeDistance& distance, MatrixRef gradient);
-
-/// Change of the distance between shapes a and b of the model, given by their indices, with the mechanism and its motion; needs
-/// updateVariation.
-double calcDistanceVariation(const Model& model, const Workspace& ws, int a, int b, const ShapeDistance& distance,
-                             const ModelVariation& change, const VariationWorkspace& variation);
 
 /// Two shapes of a model on bodies that are not neighbours: no joint or closure connects the bodies, directly or through
 /// bodies without shapes. Bodies that a closure welds together count as one.

@@ -32,6 +32,7 @@
 /// Forward dynamics change by Eq. (5) of saddle_point.h. With redundant rows, this holds for changes that keep them
 /// redundant: any other change would alter the rank.
 #include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/distance.h"
 
 namespace bielle {
 
@@ -109,5 +110,10 @@ struct DynamicsVariation {
 DynamicsVariation calcConstrainedVariation(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
                                            const ConstraintSet& constraints, const std::vector<ModelVariation>& changes,
                                            const std::vector<MotionVariation>& motions = {});
+
+/// Change of the distance between shapes a and b of the model, given by their indices, by Eq. (3) of distance.h; needs
+/// updateVariation.
+double calcDistanceVariation(const Model& model, const Workspace& ws, int a, int b, const ShapeDistance& distance,
+                             const ModelVariation& change, const VariationWorkspace& variation);
 
 }  // namespace bielle
