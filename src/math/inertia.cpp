@@ -2,6 +2,10 @@
 
 namespace bielle {
 
+Inertia Inertia::transformed(const SE3& X_AB) const {
+  return {mass, X_AB.act(com), X_AB.R * I_com * X_AB.R.transpose()};
+}
+
 Inertia Inertia::operator+(const Inertia& o) const {
   Inertia sum;
   sum.mass = mass + o.mass;

@@ -6,6 +6,39 @@
 #include "math/so3.h"
 
 namespace bielle {
+
+template <>
+SE3 SE3::inverse() const {
+  return inlineInverse();
+}
+template <>
+SE3 SE3::inverseTimes(const SE3& o) const {
+  return inlineInverseTimes(o);
+}
+template <>
+Vector3d SE3::act(const Vector3d& point) const {
+  return inlineAct(point);
+}
+template <>
+Vector6d SE3::actMotion(const Vector6d& m) const {
+  return inlineActMotion(m);
+}
+template <>
+Vector6d SE3::actInvMotion(const Vector6d& m) const {
+  return inlineActInvMotion(m);
+}
+template <>
+Vector6d SE3::actForce(const Vector6d& f) const {
+  return inlineActForce(f);
+}
+template <>
+Vector6d SE3::actInvForce(const Vector6d& f) const {
+  return inlineActInvForce(f);
+}
+template <>
+Matrix6d SE3::toActionMatrix() const {
+  return inlineToActionMatrix();
+}
 namespace {
 
 // Off-diagonal block Q of the left Jacobian of SE(3) (Barfoot, "State estimation for robotics", eq. 7.86), for the

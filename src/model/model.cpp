@@ -115,6 +115,8 @@ int getRows(ClosureKind kind) {
   return 0;
 }
 
+Model::Model() : data_(std::make_shared<Data>()) {}
+
 int Model::findJoint(const std::string& name) const {
   const int index = findByName(data_->joints, name);
   return index == 0 ? -1 : index;  // the world is not a joint

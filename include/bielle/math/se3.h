@@ -46,39 +46,51 @@ struct SE3Of {
     out.p += p;
     return out;
   }
-  SE3Of inverse() const { return {R.transpose(), -(R.transpose() * p)}; }
+  SE3Of inverse() const { return inlineInverse(); }
   /// inverse() * o
-  SE3Of inverseTimes(const SE3Of& o) const { return {R.transpose() * o.R, R.transpose() * (o.p - p)}; }
-  Vector3<T> act(const Vector3<T>& point) const { return p + R * point; }
+  SE3Of inverseTimes(const SE3Of& o) const { return inlineInverseTimes(o); }
+  Vector3<T> act(const Vector3<T>& point) const { return inlineAct(point); }
+  Vector6<T> actMotion(const Vector6<T>& m) const { return inlineActMotion(m); }
+  Vector6<T> actInvMotion(const Vector6<T>& m) const { return inlineActInvMotion(m); }
+  Vector6<T> actForce(const Vector6<T>& f) const { return inlineActForce(f); }
+  Vector6<T> actInvForce(const Vector6<T>& f) const { return inlineActInvForce(f); }
+  /// Ad(X), 6x6.
+  Matrix6<T> toActionMatrix() const { return inlineToActionMatrix(); }
 
-  Vector6<T> actMotion(const Vector6<T>& m) const {
+ private:
+  struct Unset {};
+  explicit SE3Of(Unset) {}
+  SE3Of inlineInverse() const { return {R.transpose(), -(R.transpose() * p)}; }
+  SE3Of inlineInverseTimes(const SE3Of& o) const { return {R.transpose() * o.R, R.transpose() * (o.p - p)}; }
+  Vector3<T> inlineAct(const Vector3<T>& point) const { return p + R * point; }
+
+  Vector6<T> inlineActMotion(const Vector6<T>& m) const {
     Vector6<T> out;
     angular(out).noalias() = R * angular(m);
     linear(out).noalias() = R * linear(m);
     linear(out) += p.cross(angular(out));
     return out;
   }
-  Vector6<T> actInvMotion(const Vector6<T>& m) const {
+  Vector6<T> inlineActInvMotion(const Vector6<T>& m) const {
     Vector6<T> out;
     linear(out).noalias() = R.transpose() * (linear(m) - p.cross(angular(m)));
     angular(out).noalias() = R.transpose() * angular(m);
     return out;
   }
-  Vector6<T> actForce(const Vector6<T>& f) const {
+  Vector6<T> inlineActForce(const Vector6<T>& f) const {
     Vector6<T> out;
     linear(out).noalias() = R * linear(f);
     angular(out).noalias() = R * angular(f);
     angular(out) += p.cross(linear(out));
     return out;
   }
-  Vector6<T> actInvForce(const Vector6<T>& f) const {
+  Vector6<T> inlineActInvForce(const Vector6<T>& f) const {
     Vector6<T> out;
     linear(out).noalias() = R.transpose() * linear(f);
     angular(out).noalias() = R.transpose() * (angular(f) - p.cross(linear(f)));
     return out;
   }
-  /// Ad(X), 6x6.
-  Matrix6<T> toActionMatrix() const {
+  Matrix6<T> inlineToActionMatrix() const {
     Matrix6<T> A;
     A.template topLeftCorner<3, 3>() = R;
     A.template bottomRightCorner<3, 3>() = R;
@@ -86,12 +98,26 @@ struct SE3Of {
     A.template bottomLeftCorner<3, 3>().setZero();
     return A;
   }
-
- private:
-  struct Unset {};
-  explicit SE3Of(Unset) {}
 };
 using SE3 = SE3Of<double>;
+
+// For double these are compiled once: every file that calls them would take the compiler half a second longer.
+template <>
+SE3 SE3::inverse() const;
+template <>
+SE3 SE3::inverseTimes(const SE3& o) const;
+template <>
+Vector3d SE3::act(const Vector3d& point) const;
+template <>
+Vector6d SE3::actMotion(const Vector6d& m) const;
+template <>
+Vector6d SE3::actInvMotion(const Vector6d& m) const;
+template <>
+Vector6d SE3::actForce(const Vector6d& f) const;
+template <>
+Vector6d SE3::actInvForce(const Vector6d& f) const;
+template <>
+Matrix6d SE3::toActionMatrix() const;
 
 /// [v x] m
 template <typename A, typename B>
@@ -136,7 +162,7 @@ struct Inertia {
   Matrix3d I_com = Matrix3d::Zero();  ///< about the centre of mass, in the axes of the body frame, kg m^2
 
   /// The same inertia in frame A, this one being given in frame B.
-  Inertia transformed(const SE3& X_AB) const { return {mass, X_AB.act(com), X_AB.R * I_com * X_AB.R.transpose()}; }
+  Inertia transformed(const SE3& X_AB) const;
   /// Sum of two inertias given in the same frame (parallel axis theorem).
   Inertia operator+(const Inertia& o) const;
   /// 6x6 spatial inertia about the frame's origin: momentum = matrix * twist.

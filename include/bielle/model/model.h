@@ -231,6 +231,7 @@ struct Dof {
 /// controller or a world keeps one of its own, as cheap as a pointer.
 class Model {
  public:
+  Model();
   /// Whether both are copies of one model.
   bool isCopyOf(const Model& other) const { return data_ == other.data_; }
 
@@ -313,7 +314,7 @@ class Model {
     VectorXd lower, upper, velocity_limit, armature;
   };
   // Only the builder writes to it, before it gives the model away.
-  std::shared_ptr<Data> data_ = std::make_shared<Data>();
+  std::shared_ptr<Data> data_;
 };
 
 }  // namespace bielle
