@@ -13,6 +13,16 @@
 
 namespace bielle {
 
+/// The result of a comparison in each lane; for double it is a bool.
+struct LaneMask {
+  LaneIntegers v;  // -1 or 0
+  bool operator[](Eigen::Index lane) const { return v[lane] != 0; }
+  void set(Eigen::Index lane, bool x) { setLane(v, lane, x ? -1 : 0); }
+  friend LaneMask operator&&(const LaneMask& a, const LaneMask& b) { return {a.v & b.v}; }
+  friend LaneMask operator||(const LaneMask& a, const LaneMask& b) { return {a.v | b.v}; }
+  friend LaneMask operator!(const LaneMask& a) { return {~a.v}; }
+};
+
 /// kLane numbers.
 struct alignas(kLane * sizeof(double)) Lanes {
   LaneReals v;
@@ -34,26 +44,19 @@ struct alignas(kLane * sizeof(double)) Lanes {
     return out;
   }
   friend Lanes abs(const Lanes& x) { return Lanes(blend(x.v < spread(0.0), -x.v, x.v)); }
+
+  // Operators are friends alone: what is found by name is tried on every sum and product of matrices as well, which takes the
+  // compiler a good part of its time.
+  friend Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
+  friend Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a.v - b.v); }
+  friend Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v); }
+  friend Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(a.v / b.v); }
+  friend Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
+  friend LaneMask operator<(const Lanes& a, const Lanes& b) { return {a.v < b.v}; }
+  friend LaneMask operator<=(const Lanes& a, const Lanes& b) { return {a.v <= b.v}; }
+  friend LaneMask operator>(const Lanes& a, const Lanes& b) { return {a.v > b.v}; }
 };
 
-inline Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
-inline Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a.v - b.v); }
-inline Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v); }
-inline Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(a.v / b.v); }
-inline Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
-
-/// The result of a comparison in each lane; for double it is a bool.
-struct LaneMask {
-  LaneIntegers v;  // -1 or 0
-  bool operator[](Eigen::Index lane) const { return v[lane] != 0; }
-  void set(Eigen::Index lane, bool x) { setLane(v, lane, x ? -1 : 0); }
-};
-inline LaneMask operator<(const Lanes& a, const Lanes& b) { return {a.v < b.v}; }
-inline LaneMask operator<=(const Lanes& a, const Lanes& b) { return {a.v <= b.v}; }
-inline LaneMask operator>(const Lanes& a, const Lanes& b) { return {a.v > b.v}; }
-inline LaneMask operator&&(const LaneMask& a, const LaneMask& b) { return {a.v & b.v}; }
-inline LaneMask operator||(const LaneMask& a, const LaneMask& b) { return {a.v | b.v}; }
-inline LaneMask operator!(const LaneMask& a) { return {~a.v}; }
 inline bool any(const LaneMask& a) { return isAny(a.v); }
 inline bool any(bool a) { return a; }
 inline double getLane(const Lanes& x, Eigen::Index lane) { return x[lane]; }
@@ -75,8 +78,8 @@ struct LaneIndex {
   LaneIntegers v;
   int operator[](Eigen::Index lane) const { return static_cast<int>(v[lane]); }
   void set(Eigen::Index lane, int i) { setLane(v, lane, i); }
+  friend bool operator!=(const LaneIndex& a, const LaneIndex& b) { return any(LaneMask{a.v != b.v}); }
 };
-inline bool operator!=(const LaneIndex& a, const LaneIndex& b) { return any(LaneMask{a.v != b.v}); }
 
 /// A bool and an index for each lane.
 template <typename T>
