@@ -38,10 +38,8 @@ if(BIELLE_NATIVE)
   # Eigen's alignment depends on it, and its functions, which the linker takes once, do as well.
   target_compile_options(bielle_headers INTERFACE -march=native)
 endif()
-# Vectors of eight numbers (math/lanes.h) have this alignment whatever the processor, and Eigen may not ask for less.
-if(BUILD_SHARED_LIBS OR NOT BIELLE_NATIVE)
-  target_compile_definitions(bielle_headers INTERFACE EIGEN_MAX_ALIGN_BYTES=64 EIGEN_MAX_STATIC_ALIGN_BYTES=64)
-endif()
+# Vectors of eight numbers (math/lanes.h) have this alignment whatever the processor, and Eigen may not ask for less: clang refuses.
+target_compile_definitions(bielle_headers INTERFACE EIGEN_MAX_ALIGN_BYTES=64 EIGEN_MAX_STATIC_ALIGN_BYTES=64)
 
 # bielle_shared_library(TARGET FOLDER): the shared library, without layers so far.
 function(bielle_shared_library target folder)
