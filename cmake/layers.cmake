@@ -60,9 +60,11 @@ if(BUILD_SHARED_LIBS)
   endforeach()
 endif()
 
-# bielle_precompile(TARGET KIND HEADERS...): headers that most files include are parsed once for all targets of a KIND, whose
-# flags are the same. A file that forgets one of them still compiles; scripts/check_includes.sh finds it. A header whose inline
-# functions call templates makes every file instantiate them: CLI11, 4 s each, is left to the files that include it.
+# bielle_precompile(TARGET KIND HEADERS...): headers of the standard library and of Eigen that most files include are parsed once
+# for all targets of a KIND, whose flags are the same. A file that forgets one of them still compiles; scripts/check_includes.sh
+# finds it. A header whose inline functions call templates makes every file instantiate them: CLI11, 4 s each, is left to the
+# files that include it. Headers of Bielle are not among them, so that a change of one rebuilds only the
+# files that include it; but for math/decompositions.h, which declares what Eigen's headers would have every file compile.
 option(BIELLE_PRECOMPILE "Precompile headers" ON)
 function(bielle_precompile target kind)
   if(NOT BIELLE_PRECOMPILE OR BUILD_SHARED_LIBS)
@@ -73,23 +75,31 @@ function(bielle_precompile target kind)
     target_precompile_headers(${target} REUSE_FROM ${first})
   else()
     set_property(GLOBAL PROPERTY BIELLE_PRECOMPILED_${kind} ${target})
-    target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <filesystem> <functional> <iostream> <map> <memory>
-      <optional> <set> <sstream> <string> <vector> <Eigen/Dense> "${PROJECT_SOURCE_DIR}/src/math/decompositions.h"
-      "${PROJECT_SOURCE_DIR}/include/bielle/model/model.h" ${ARGN})
+    target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <functional> <map> <memory> <optional> <set>
+      <string> <vector> <Eigen/Core> <Eigen/Geometry> ${ARGN})
   endif()
 endfunction()
 
-# bielle_fast(TARGET): a room whose speed `bielle bench` shows. Its files are compiled at -O3, in a unity build by the groups of
-# bielle_group(), so that what the compiler makes of a function depends on neighbours that stay the same. Left to itself, GCC calls functions of
-# Eigen for single entries of small matrices of Lanes, which takes a fifth of the time of predictive control.
+# bielle_fast(TARGET): a room whose speed `bielle bench` shows. Its files are compiled at -O3, those of a bielle_group together
+# and the others each by itself, in a unity build or not, so that what the compiler makes of a function does not depend on how
+# the rest is built. Left to itself, GCC calls functions of Eigen for single entries of small matrices of Lanes, which takes a
+# fifth of the time of predictive control.
 function(bielle_fast target)
   if(NOT BIELLE_SANITIZE)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+    # Without precompiled headers, for scripts/check_includes.sh, every file is by itself.
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ${BIELLE_PRECOMPILE} UNITY_BUILD_MODE GROUP)
     if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
       target_compile_definitions(${target} PRIVATE "EIGEN_STRONG_INLINE=__attribute__((always_inline)) inline")
     endif()
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   endif()
   bielle_precompile(${target} fast)
+endfunction()
+
+# bielle_group(NAME SOURCES...): sources of a fast room that use the same templates, which are then instantiated once for all of
+# them: a third of the compiler's time. Their anonymous namespaces are one. A group may take a compiler 1.2 GB.
+function(bielle_group name)
+  set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${name})
 endfunction()
 
 # bielle_plain(TARGET): everything else. -O1 takes three quarters of the time to compile; GCC 12 then reports its AVX-512
@@ -97,13 +107,7 @@ endfunction()
 # their precompiled headers would not fit.
 function(bielle_plain target)
   target_compile_options(${target} PRIVATE -fPIC $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized;-Wno-subobject-linkage>)
-  bielle_precompile(${target} plain <nlohmann/json.hpp>)
-endfunction()
-
-# bielle_group(NAME SOURCES...): files of a fast room that a unity build compiles together, because they instantiate the same
-# templates. Those in no group are compiled one by one.
-function(bielle_group name)
-  set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${name})
+  bielle_precompile(${target} plain <filesystem> <iostream> <sstream> "${PROJECT_SOURCE_DIR}/src/math/decompositions.h")
 endfunction()
 
 function(bielle_tune target fast)

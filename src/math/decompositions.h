@@ -15,13 +15,7 @@
 #define BIELLE_DENSE(EXTERN)                                                                                         \
   EXTERN template class JacobiSVD<MatrixXd>;                                                                         \
   EXTERN template class ColPivHouseholderQR<MatrixXd>;                                                               \
-  EXTERN template class CompleteOrthogonalDecomposition<MatrixXd>;                                                   \
-  EXTERN template class HouseholderQR<MatrixXd>;                                                                     \
-  EXTERN template class FullPivLU<MatrixXd>;                                                                         \
-  EXTERN template class PartialPivLU<MatrixXd>;                                                                      \
   EXTERN template class LLT<MatrixXd>;                                                                               \
-  EXTERN template class LDLT<MatrixXd>;                                                                              \
-  EXTERN template class SelfAdjointEigenSolver<MatrixXd>;                                                            \
   EXTERN template class HouseholderSequence<MatrixXd, VectorXd>;                                                     \
   namespace internal {                                                                                               \
   EXTERN template struct general_matrix_matrix_product<Index, double, ColMajor, false, double, ColMajor, false,      \
@@ -71,6 +65,8 @@
                                                                               MatrixXd&) const;                    \
   EXTERN template SelfAdjointEigenSolver<MatrixXd>& SelfAdjointEigenSolver<MatrixXd>::compute(                     \
       const EigenBase<MatrixXd>&, int);                                                                            \
+  EXTERN template class CompleteOrthogonalDecomposition<MatrixXd>;                                                 \
+  EXTERN template class FullPivLU<MatrixXd>;                                                                       \
   EXTERN template class EigenSolver<MatrixXd>;                                                                     \
   EXTERN template EigenSolver<MatrixXd>& EigenSolver<MatrixXd>::compute(const EigenBase<MatrixXd>&, bool);         \
   namespace internal {                                                                                             \
