@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 #include <numeric>
+#include <sstream>
+#include <type_traits>
 
 #include "bielle/model/error.h"
 #include "model/number_text.h"
@@ -48,9 +50,23 @@ OptionValue convert(const Option& option, const OptionValue& value) {
   return value;
 }
 
+// As OptionFields lists those that may be missing or given more than once.
+void readNumber(const std::string& text, std::optional<double>& value) {
+  double number = 0;
+  value.reset();
+  if (parse(text, number)) value = number;
+}
+std::vector<std::string> readLines(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
 std::string describeKind(const Option& option) {
   if (!option.choices.empty()) return "one of its choices";
   if (std::holds_alternative<bool>(option.value)) return "true or false";
+  if (std::holds_alternative<std::string>(option.value)) return "a text";
   return std::holds_alternative<int>(option.value) ? "a whole number" : "a number";
 }
 
@@ -120,7 +136,8 @@ void OptionSet::check(const Option& option, const OptionValue& value) const {
   if (value.index() != option.value.index())
     fail(option, "'" + formatOption(value) + "' is not " + describeKind(option));
   if (const std::string* name = std::get_if<std::string>(&value)) {
-    if (std::find(option.choices.begin(), option.choices.end(), *name) == option.choices.end())
+    if (!option.choices.empty() &&
+        std::find(option.choices.begin(), option.choices.end(), *name) == option.choices.end())
       fail(option, "'" + *name + "' is not one of its choices");
     return;
   }
@@ -140,6 +157,26 @@ void OptionSet::set(const std::string& name, const OptionValue& value) {
   const OptionValue converted = convert(option, value);
   check(option, converted);
   option.value = converted;
+}
+
+void ReadFields::visit(const Option& option, const Member& member) {
+  const Option* found = values_.find(option.name);
+  if (!found) return;
+  std::visit(
+      [&](const auto& place) {
+        using Place = std::decay_t<decltype(place)>;
+        if constexpr (std::is_same_v<Place, std::function<void(const std::string&)>>)
+          place(std::get<std::string>(found->value));
+        else if constexpr (std::is_same_v<Place, unsigned*>)
+          *place = static_cast<unsigned>(std::get<int>(found->value));
+        else if constexpr (std::is_same_v<Place, std::optional<double>*>)
+          readNumber(std::get<std::string>(found->value), *place);
+        else if constexpr (std::is_same_v<Place, std::vector<std::string>*>)
+          *place = readLines(std::get<std::string>(found->value));
+        else
+          *place = std::get<std::decay_t<decltype(*place)>>(found->value);
+      },
+      member);
 }
 
 OptionValues OptionSet::listValues() const {

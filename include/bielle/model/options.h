@@ -9,7 +9,9 @@
 ///     }
 ///
 /// listOptions() makes an OptionSet of it, a value of its own, and readOptions() the struct again.
+#include <functional>
 #include <limits>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -84,30 +86,51 @@ class OptionSet {
   std::vector<Option> options_;
 };
 
-/// Visits the members of a struct of options, for its describe(): lists them, or sets them.
+/// Visits the members of a struct of options, for its describe(). What comes of them is up to the visitor: below, options are
+/// listed or set; results/option_flags.h makes flags of a command of them.
 class OptionFields {
  public:
-  explicit OptionFields(OptionSet& list) : list_(&list) {}
-  explicit OptionFields(const OptionSet& values) : values_(&values) {}
+  virtual ~OptionFields() = default;
 
   void number(const std::string& name, double& member, const std::string& unit, const OptionBounds& bounds,
               const std::string& help) {
-    visit({name, member, unit, bounds, help}, member);
+    pass({name, member, unit, bounds, help}, &member);
+  }
+  /// That may be missing, which its value in a list, a text, then tells by being empty.
+  void number(const std::string& name, std::optional<double>& member, const std::string& unit,
+              const OptionBounds& bounds, const std::string& help) {
+    pass({name, member ? formatOption(*member) : std::string(), unit, bounds, help}, &member);
   }
   void integer(const std::string& name, int& member, const OptionBounds& bounds, const std::string& help) {
-    visit({name, member, "1", bounds, help}, member);
+    pass({name, member, "1", bounds, help}, &member);
+  }
+  void integer(const std::string& name, unsigned& member, const std::string& help) {
+    pass({name, static_cast<int>(member), "1", kNotNegative, help}, &member);
   }
   void flag(const std::string& name, bool& member, const std::string& help) {
-    visit({name, member, "", {}, help}, member);
+    pass({name, member, "", {}, help}, &member);
+  }
+  void text(const std::string& name, std::string& member, const std::string& help) {
+    pass({name, member, "", {}, help}, &member);
+  }
+  /// That may be given more than once; in a list, one a line.
+  void texts(const std::string& name, std::vector<std::string>& member, const std::string& help) {
+    std::string all;
+    for (const std::string& each : member) all += each + "\n";
+    pass({name, all, "", {}, help}, &member);
   }
   /// \param choices  names of the values 0, 1 and so on of the enumeration
   template <typename Enumeration>
   void choice(const std::string& name, Enumeration& member, const std::vector<std::string>& choices,
               const std::string& help) {
-    std::string chosen = choices.at(static_cast<size_t>(member));
-    visit({name, chosen, "", {}, help, choices}, chosen);
-    for (size_t i = 0; i < choices.size(); ++i)
-      if (choices[i] == chosen) member = static_cast<Enumeration>(i);
+    pass({name, choices.at(static_cast<size_t>(member)), "", {}, help, choices}, makeSetter(member, choices));
+  }
+  /// That may be missing; its name is then empty.
+  template <typename Enumeration>
+  void choice(const std::string& name, std::optional<Enumeration>& member, const std::vector<std::string>& choices,
+              const std::string& help) {
+    const std::string chosen = member ? choices.at(static_cast<size_t>(*member)) : std::string();
+    pass({name, chosen, "", {}, help, choices}, makeSetter(member, choices));
   }
 
   /// Passes over these from now on; over none if empty.
@@ -115,26 +138,60 @@ class OptionFields {
   /// Passes over all others from now on; over none if empty.
   void restrictTo(std::set<std::string> names) { selected_ = std::move(names); }
 
+ protected:
+  /// A member of the struct; of a choice what sets it by its name.
+  using Member = std::variant<bool*, int*, unsigned*, double*, std::optional<double>*, std::string*,
+                              std::vector<std::string>*, std::function<void(const std::string&)>>;
+  virtual void visit(const Option& option, const Member& member) = 0;
+
  private:
-  template <typename T>
-  void visit(const Option& option, T& member) {
-    if (omitted_.count(option.name) || (!selected_.empty() && !selected_.count(option.name))) return;
-    if (list_)
-      list_->add(option);
-    else if (values_->find(option.name))
-      member = values_->get<T>(option.name);
+  template <typename Chosen>
+  static std::function<void(const std::string&)> makeSetter(Chosen& member, const std::vector<std::string>& choices) {
+    return [&member, choices](const std::string& chosen) {
+      for (size_t i = 0; i < choices.size(); ++i)
+        if (choices[i] == chosen) setChoice(member, i);
+    };
+  }
+  template <typename Enumeration>
+  static void setChoice(Enumeration& member, size_t index) {
+    member = static_cast<Enumeration>(index);
+  }
+  template <typename Enumeration>
+  static void setChoice(std::optional<Enumeration>& member, size_t index) {
+    member = static_cast<Enumeration>(index);
+  }
+  void pass(const Option& option, const Member& member) {
+    if (!omitted_.count(option.name) && (selected_.empty() || selected_.count(option.name))) visit(option, member);
   }
 
-  OptionSet* list_ = nullptr;
-  const OptionSet* values_ = nullptr;
   std::set<std::string> omitted_, selected_;
+};
+
+/// Adds the options to a set.
+class ListedFields : public OptionFields {
+ public:
+  explicit ListedFields(OptionSet& list) : list_(list) {}
+
+ private:
+  void visit(const Option& option, const Member&) override { list_.add(option); }
+  OptionSet& list_;
+};
+
+/// Sets the members that a set has, by their names.
+class ReadFields : public OptionFields {
+ public:
+  explicit ReadFields(const OptionSet& values) : values_(values) {}
+
+ private:
+  void visit(const Option& option, const Member& member) override;
+  const OptionSet& values_;
 };
 
 /// The options of a struct, with its values.
 template <typename Options>
 OptionSet listOptions(Options options, const std::string& noun = "option", const std::string& owner = "") {
   OptionSet list(noun, owner);
-  OptionFields fields(list);
+  ListedFields fields(list);
   describe(fields, options);
   return list;
 }
@@ -142,7 +199,7 @@ OptionSet listOptions(Options options, const std::string& noun = "option", const
 /// The struct with the values of a set; what is not in the set stays.
 template <typename Options>
 Options readOptions(const OptionSet& values, Options options = {}) {
-  OptionFields fields(values);
+  ReadFields fields(values);
   describe(fields, options);
   return options;
 }
