@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
@@ -12,7 +11,7 @@
 #include "dynamics/point_spring.h"
 #include "math/decompositions.h"
 #include "worlds/closed_tree.h"
-#include "worlds/sole_track.h"
+#include "worlds/contact_law.h"
 
 namespace bielle::worlds {
 namespace {
@@ -38,20 +37,12 @@ class BielleWorld : public World {
  public:
   BielleWorld(const Model& model, const BielleWorldOptions& options);
 
-  void reset(ConstVectorRef q, ConstVectorRef v) override;
-  void setTorques(ConstVectorRef u) override;
-  void setPush(const Vector3d& force) override { push_ = force; }
-  bool advance(double duration) override;
-  const std::string& message() const override { return message_; }
-  double time() const override { return time_; }
-  const VectorXd& configuration() const override { return tree_.configuration(); }
-  const VectorXd& velocity() const override { return tree_.velocity(); }
-  const VectorXd& torques() const override { return u_; }
-  const std::vector<FootReport>& feet() const override { return soles_.reports(); }
   Books books() const override;
-  double gap() const override;
 
  private:
+  void start() override;
+  bool step(double duration) override;
+  void noteForces() override { calcMotorForces(model_, u_, tau_); }
   // Forces at a velocity: their loads in reduced coordinates, and their damping if a matrix is given.
   void addForces(const VectorXd& w, VectorXd& loads, MatrixXd* damping);
   void addContacts(const VectorXd& w, VectorXd& loads, MatrixXd* damping);
@@ -60,94 +51,58 @@ class BielleWorld : public World {
   void addWrench(int tip, const Vector6d& wrench, VectorXd& loads) const;
   bool kick(double h);
   void book(double h);
-  double calcElasticEnergy(double* of_stops = nullptr) const;
-  bool fail(const std::string& why);
+  bool move(double duration);
+  Vector3d getPlace(int body, const Vector3d& point) const { return tree_.getPlacement(body).act(point); }
 
-  Model model_;
   const double time_step_;
-  const std::atomic<bool>* const interrupt_;
-  const int pushed_body_;
-  const Terrain terrain_;
-  const ConstraintSet loops_;
   ClosedTree tree_;
-  std::vector<ContactPoint> points_;
+  ContactSet contacts_;
   std::vector<ContactForce> forces_;  // of the last step, per point
   std::vector<Vector3d> places_;      // where they acted, m (world)
-  std::vector<JointStop> stops_;
   std::vector<double> stop_forces_;
-  SoleTrack soles_;
-  VectorXd u_, tau_;                                              // nu, nv
-  Vector3d push_ = Vector3d::Zero(), com_ = Vector3d::Zero();     // of the pushed body
-  VectorXd w_mean_, dw_, correction_, loads_, half_last_, zero_;  // size
-  MatrixXd damping_, system_;                                     // size x size
+  VectorXd tau_;                                           // nv
+  Vector3d com_ = Vector3d::Zero();                        // of the pushed body
+  VectorXd w_mean_, dw_, correction_, loads_, half_last_;  // size
+  MatrixXd damping_, system_;                              // size x size
   Eigen::LLT<MatrixXd> factors_;
-  double time_ = 0;
-  double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0, joint_work_ = 0;  // on the robot, J
-  double elastic_start_ = 0, stops_start_ = 0;
-  std::string message_;
-  mutable Workspace ws_;  // of books() and gap()
 };
 
 BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
-    : model_(model),
+    : World(model, options.world),
       time_step_(options.world.time_step > 0 ? options.world.time_step : kBielleTimeStep),
-      interrupt_(options.world.interrupt),
-      pushed_body_(options.world.pushed_body),
-      terrain_(options.world.ground),
-      loops_(makeConstraintSet(model)),
-      tree_(model, findPosture(model), listTips(model, options.world.pushed_body)),
-      points_(makeContactPoints(model, options.world.ground, options.contact)),
-      forces_(points_.size()),
-      places_(points_.size(), Vector3d::Zero()),
-      stops_(makeJointStops(model)),
-      stop_forces_(stops_.size(), 0.0),
-      soles_(model),
-      factors_(tree_.size()),
-      ws_(model) {
-  u_.setZero(model.nu());
+      tree_(model, findPosture(model), listTips(model, pushed_body_)),
+      contacts_(model, ground_, options.contact),
+      forces_(contacts_.points.size()),
+      places_(contacts_.points.size(), Vector3d::Zero()),
+      stop_forces_(contacts_.stops.size(), 0.0),
+      factors_(tree_.size()) {
   tau_.setZero(model.nv());
-  for (VectorXd* x : {&w_mean_, &dw_, &correction_, &loads_, &half_last_, &zero_}) x->setZero(tree_.size());
+  for (VectorXd* x : {&w_mean_, &dw_, &correction_, &loads_, &half_last_}) x->setZero(tree_.size());
   for (MatrixXd* x : {&damping_, &system_}) x->setZero(tree_.size(), tree_.size());
 }
 
-void BielleWorld::reset(ConstVectorRef q, ConstVectorRef v) {
-  requireFinite(q, v);
-  message_.clear();
-  if (!tree_.set(q, v)) message_ = tree_.failure();
-  time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = joint_work_ = 0;
-  u_.setZero();
+void BielleWorld::start() {
+  if (!tree_.set(q_, v_)) fail(tree_.failure());
+  q_ = tree_.configuration();
+  v_ = tree_.velocity();
   tau_.setZero();
-  push_.setZero();
   half_last_.setZero();
-  soles_.reset();
-  for (ContactPoint& point : points_) {
-    point.touches = false;
-    const Vector3d x = tree_.getPlacement(point.body).act(point.p);
-    updateAnchor(terrain_, x, ContactForce(), point);
-  }
-  elastic_start_ = calcElasticEnergy(&stops_start_);
+  const auto place = [this](int body, const Vector3d& point) { return getPlace(body, point); };
+  contacts_.resetAnchors(place);
+  contacts_.setStart(place, [this](const JointStop& stop) { return q_[stop.coordinate]; });
 }
 
-void BielleWorld::setTorques(ConstVectorRef u) {
-  for (int m = 0; m < model_.nu(); ++m) {
-    const Motor& motor = model_.motors()[m];
-    u_[m] = motor.clampEffort(u[m], tree_.velocity()[motor.dof]);
-  }
-  calcMotorForces(model_, u_, tau_);
+bool BielleWorld::step(double duration) {
+  const bool is_done = move(duration);
+  q_ = tree_.configuration();
+  v_ = tree_.velocity();
+  return is_done;
 }
 
-bool BielleWorld::fail(const std::string& why) {
-  message_ = why;
-  return false;
-}
-
-bool BielleWorld::advance(double duration) {
-  if (!message_.empty()) return false;
-  if (!(duration > 0)) return true;
-  const double steps = std::max(1.0, std::ceil(duration / time_step_ - 1e-9));  // maybe more than an integer holds
-  const double h = duration / steps;
+bool BielleWorld::move(double duration) {
+  const double steps = countSteps(duration, time_step_), h = duration / steps;
   double taken = 0;
-  while (taken < steps && !(taken > 0 && interrupt_ && *interrupt_)) {
+  while (taken < steps && !(taken > 0 && isInterrupted())) {
     if (!tree_.drift(taken == 0 ? h / 2 : h)) return fail(tree_.failure());
     if (!kick(h)) return fail("the velocities are no longer finite");
     ++taken;
@@ -155,7 +110,7 @@ bool BielleWorld::advance(double duration) {
   const bool is_done = taken == steps;
   time_ += is_done ? duration : taken * h;
   if (!tree_.drift(h / 2)) return fail(tree_.failure());
-  soles_.update([this](int body) { return tree_.getPlacement(body); });
+  reportFeet([this](int body) { return tree_.getPlacement(body); });
   return is_done;
 }
 
@@ -163,8 +118,9 @@ bool BielleWorld::advance(double duration) {
 bool BielleWorld::kick(double h) {
   tree_.updateMassMatrix();
   tree_.updateLoads(tau_, half_last_);
-  for (size_t i = 0; i < points_.size(); ++i) places_[i] = tree_.getPlacement(points_[i].body).act(points_[i].p);
-  com_ = tree_.getPlacement(pushed_body_).act(model_.bodies()[pushed_body_].inertia.com);
+  std::vector<ContactPoint>& points = contacts_.points;
+  for (size_t i = 0; i < points.size(); ++i) places_[i] = getPlace(points[i].body, points[i].p);
+  com_ = getPlace(pushed_body_, model_.bodies()[pushed_body_].inertia.com);
   dw_.setZero();
   for (int i = 0; i < kMaxNewton; ++i) {
     w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
@@ -186,7 +142,7 @@ bool BielleWorld::kick(double h) {
   loads_.setZero();
   addForces(w_mean_, loads_, nullptr);
   book(h);
-  for (size_t i = 0; i < points_.size(); ++i) updateAnchor(terrain_, places_[i], forces_[i], points_[i]);
+  for (size_t i = 0; i < points.size(); ++i) updateAnchor(contacts_.terrain, places_[i], forces_[i], points[i]);
   tree_.kick(dw_);
   half_last_ = 0.5 * dw_;
   return true;
@@ -215,6 +171,7 @@ void BielleWorld::addWrench(int tip, const Vector6d& wrench, VectorXd& loads) co
 }
 
 void BielleWorld::addContacts(const VectorXd& w, VectorXd& loads, MatrixXd* damping) {
+  const std::vector<ContactPoint>& points = contacts_.points;
   size_t i = 0;
   for (size_t c = 0; c < model_.contacts().size(); ++c) {
     const int tip = static_cast<int>(c);
@@ -222,10 +179,10 @@ void BielleWorld::addContacts(const VectorXd& w, VectorXd& loads, MatrixXd* damp
     Vector6d wrench = Vector6d::Zero();
     Matrix6d D = Matrix6d::Zero();
     bool touches = false;
-    for (; i < points_.size() && points_[i].contact == tip; ++i) {
+    for (; i < points.size() && points[i].contact == tip; ++i) {
       const Vector3d& x = places_[i];
       const Vector3d velocity = twist.head<3>() + twist.tail<3>().cross(x);
-      forces_[i] = calcContactForce(terrain_, points_[i], x, velocity, damping != nullptr);
+      forces_[i] = calcContactForce(contacts_.terrain, points[i], x, velocity, damping != nullptr);
       if (forces_[i].elastic == 0) continue;
       touches = true;
       wrench.head<3>() += forces_[i].force;
@@ -250,8 +207,8 @@ void BielleWorld::addContacts(const VectorXd& w, VectorXd& loads, MatrixXd* damp
 }
 
 void BielleWorld::addStops(const VectorXd& w, VectorXd& loads, MatrixXd* damping) {
-  for (size_t i = 0; i < stops_.size(); ++i) {
-    const JointStop& stop = stops_[i];
+  for (size_t i = 0; i < contacts_.stops.size(); ++i) {
+    const JointStop& stop = contacts_.stops[i];
     const double q = tree_.configuration()[stop.coordinate];
     stop_forces_[i] = 0;
     if (q <= stop.upper && q >= stop.lower) continue;
@@ -274,68 +231,43 @@ void BielleWorld::book(double h) {
     tree_.visitRow(dof, [&](int k, double entry) { v += entry * w_mean_[k]; });
     return v;
   };
-  for (int m = 0; m < model_.nu(); ++m) motor_work_ += h * u_[m] * calcRate(model_.motors()[m].dof);
+  for (int m = 0; m < model_.nu(); ++m) work_.motor += h * u_[m] * calcRate(model_.motors()[m].dof);
   for (const JointForce& force : model_.jointForces()) {
     const double rate = calcRate(force.dof);
-    joint_work_ += h * calcDissipativeForce(force, rate) * rate;
+    work_.joint += h * calcDissipativeForce(force, rate) * rate;
   }
   int tip = static_cast<int>(model_.contacts().size()) + 1;
   for (const PointSpring& spring : model_.pointSprings()) {
-    const Vector3d p1 = tree_.getPlacement(spring.body1).act(spring.point1),
-                   p2 = tree_.getPlacement(spring.body2).act(spring.point2);
+    const Vector3d p1 = getPlace(spring.body1, spring.point1), p2 = getPlace(spring.body2, spring.point2);
     const Vector6d twist1 = calcTwist(tip, w_mean_), twist2 = calcTwist(tip + 1, w_mean_);
     const auto at = &PointSpringLine<double>::calcVelocityAt;
     const double rate = calcLineDirection<double>(p2 - p1).dot(at(twist2, p2) - at(twist1, p1));
-    joint_work_ -= h * spring.damping * rate * rate;
+    work_.joint -= h * spring.damping * rate * rate;
     tip += 2;
   }
-  for (size_t i = 0; i < stops_.size(); ++i)
-    if (stop_forces_[i] != 0) stop_work_ += h * stop_forces_[i] * calcRate(stops_[i].dof);
+  for (size_t i = 0; i < stop_forces_.size(); ++i)
+    if (stop_forces_[i] != 0) work_.stop += h * stop_forces_[i] * calcRate(contacts_.stops[i].dof);
   if (!push_.isZero(0)) {
     const Vector6d twist = calcTwist(static_cast<int>(model_.contacts().size()), w_mean_);
-    push_work_ += h * push_.dot(Vector3d(twist.head<3>() + twist.tail<3>().cross(com_)));
+    work_.push += h * push_.dot(Vector3d(twist.head<3>() + twist.tail<3>().cross(com_)));
   }
-  soles_.clearForces();
-  for (size_t i = 0; i < points_.size(); ++i) {
+  clearFootForces();
+  for (size_t i = 0; i < forces_.size(); ++i) {
     if (forces_[i].elastic == 0) continue;
-    const Vector6d twist = calcTwist(points_[i].contact, w_mean_);
+    const int contact = contacts_.points[i].contact;
+    const Vector6d twist = calcTwist(contact, w_mean_);
     const Vector3d& x = places_[i];
-    contact_work_ += h * forces_[i].force.dot(Vector3d(twist.head<3>() + twist.tail<3>().cross(x)));
-    soles_.addForce(points_[i].contact, x, forces_[i].force);
+    work_.contact += h * forces_[i].force.dot(Vector3d(twist.head<3>() + twist.tail<3>().cross(x)));
+    addFootForce(contact, x, forces_[i].force);
   }
-}
-
-double BielleWorld::calcElasticEnergy(double* of_stops) const {
-  double contacts = 0, stops = 0;
-  for (const ContactPoint& point : points_)
-    contacts +=
-        calcContactForce(terrain_, point, tree_.getPlacement(point.body).act(point.p), Vector3d::Zero()).elastic;
-  for (const JointStop& stop : stops_) stops += calcStopForce(stop, tree_.configuration()[stop.coordinate], 0).elastic;
-  if (of_stops) *of_stops = stops;
-  return contacts + stops;
 }
 
 Books BielleWorld::books() const {
-  updatePositions(model_, ws_, configuration());
-  updateVelocities<double>(model_, ws_, velocity());
-  Books books;
-  books.kinetic = calcKineticEnergy(model_, ws_);
-  books.potential = calcPotentialEnergy(model_, ws_);
-  double stops = 0;
-  books.elastic = calcElasticEnergy(&stops);
-  books.motor_work = motor_work_;
-  books.push_work = push_work_;
-  books.contact_loss = -contact_work_ - (books.elastic - stops - (elastic_start_ - stops_start_));
-  books.stop_loss = stops_start_ - stops - stop_work_;
-  books.other_loss = -joint_work_;
+  Books books = World::books();
+  contacts_.addTo(
+      books, [this](int body, const Vector3d& point) { return getPlace(body, point); },
+      [this](const JointStop& stop) { return q_[stop.coordinate]; });
   return books;
-}
-
-double BielleWorld::gap() const {
-  updatePlacements<double>(model_, ws_, configuration());
-  double gap = 0;
-  for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureGap(ws_, closure).position);
-  return gap;
 }
 
 }  // namespace

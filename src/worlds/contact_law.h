@@ -75,4 +75,51 @@ struct StopForce {
 };
 StopForce calcStopForce(const JointStop& stop, double q, double v);
 
+/// All points and stops of a robot on its ground, with the energy that their springs held at the start.
+/// Places are those of points in the world: body, point of it -> m. Coordinates are those of joints with stops: stop -> rad or m.
+class ContactSet {
+ public:
+  ContactSet(const Model& model, const Ground& ground, const ContactOptions& options)
+      : terrain(ground), points(makeContactPoints(model, ground, options)), stops(makeJointStops(model)) {}
+
+  const Terrain terrain;
+  std::vector<ContactPoint> points;
+  const std::vector<JointStop> stops;
+
+  /// Points that have not touched before.
+  template <typename GetPlace>
+  void resetAnchors(const GetPlace& getPlace) {
+    for (ContactPoint& point : points) {
+      point.touches = false;
+      updateAnchor(terrain, getPlace(point.body, point.p), ContactForce(), point);
+    }
+  }
+  template <typename GetPlace, typename GetCoordinate>
+  void setStart(const GetPlace& getPlace, const GetCoordinate& getCoordinate) {
+    start_ = calcElastic(getPlace, getCoordinate);
+  }
+  /// Sets the energy that springs hold, of which the losses so far are free.
+  template <typename GetPlace, typename GetCoordinate>
+  void addTo(Books& books, const GetPlace& getPlace, const GetCoordinate& getCoordinate) const {
+    const Elastic now = calcElastic(getPlace, getCoordinate);
+    books.elastic = now.all;
+    books.contact_loss -= now.all - now.stops - (start_.all - start_.stops);
+    books.stop_loss += start_.stops - now.stops;
+  }
+
+ private:
+  struct Elastic {
+    double all = 0, stops = 0;  // J; the latter a part of the former
+  };
+  template <typename GetPlace, typename GetCoordinate>
+  Elastic calcElastic(const GetPlace& getPlace, const GetCoordinate& getCoordinate) const {
+    double contacts = 0, stop = 0;
+    for (const ContactPoint& point : points)
+      contacts += calcContactForce(terrain, point, getPlace(point.body, point.p), Vector3d::Zero()).elastic;
+    for (const JointStop& each : stops) stop += calcStopForce(each, getCoordinate(each), 0).elastic;
+    return {contacts + stop, stop};
+  }
+  Elastic start_;
+};
+
 }  // namespace bielle::worlds

@@ -11,7 +11,7 @@
 #include "dynamics/point_spring.h"
 #include "math/runge_kutta.h"
 #include "model/number_text.h"
-#include "worlds/sole_track.h"
+#include "worlds/contact_law.h"
 
 namespace bielle::worlds {
 namespace {
@@ -34,85 +34,52 @@ class ManifoldWorld : public World {
  public:
   ManifoldWorld(const Model& model, const ManifoldWorldOptions& options);
 
-  void reset(ConstVectorRef q, ConstVectorRef v) override;
-  void setTorques(ConstVectorRef u) override;
-  void setPush(const Vector3d& force) override { push_ = force; }
-  bool advance(double duration) override;
-  const std::string& message() const override { return message_; }
-  double time() const override { return time_; }
-  const VectorXd& configuration() const override { return q_; }
-  const VectorXd& velocity() const override { return v_; }
-  const VectorXd& torques() const override { return u_; }
-  const std::vector<FootReport>& feet() const override { return soles_.reports(); }
   Books books() const override;
   double gap() const override { return gap_; }
 
  private:
+  void start() override;
+  bool step(double duration) override;
+  void noteForces() override { calcMotorForces(model_, u_, tau_motors_); }
   void checkStart(int rank);
   bool evaluate(const VectorXd& x, VectorXd& rate);
   void calcForces(VectorXd& tau, std::array<double, kWorks>& power);
   void addForce(int body, const Vector3d& at, const Vector3d& force, VectorXd& tau) const;
-  bool step(double& h);
+  bool takeStep(double& h);
   bool settle(ConstVectorRef d, ConstVectorRef u);
   void updateFeet();
-  double calcElasticEnergy(double* of_stops = nullptr) const;
-  bool fail(const std::string& why);
   std::string describeStop() const;
+  Vector3d getPlace(int body, const Vector3d& point) const { return field_.workspace().X_WB[body].act(point); }
+  Vector3d calcVelocityAt(int body, const Vector3d& x) const {
+    const Vector6d& V = field_.workspace().V[body];
+    return V.head<3>() + V.tail<3>().cross(x);
+  }
 
-  Model model_;
-  const std::atomic<bool>* const interrupt_;
-  const int pushed_body_;
   const double tolerance_, longest_step_;
-  const Terrain terrain_;
   ClosedField field_;
   RungeKutta method_;
   RungeKutta::Derivative derivative_;
-  std::vector<ContactPoint> points_;
-  std::vector<JointStop> stops_;
-  SoleTrack soles_;
-  VectorXd u_, q_, v_;  // nu, nq, nv
-  Vector3d push_ = Vector3d::Zero();
+  ContactSet contacts_;
   VectorXd tau_motors_, tau_, x_, rate_, scale_;
-  std::array<double, kWorks> work_{};  // on the robot since reset(), J
-  double time_ = 0, next_step_ = 0, usual_step_ = 0, gap_ = 0, best_independence_ = 1, least_independence_ = 1;
-  double elastic_start_ = 0, stops_start_ = 0;
-  std::string message_;
-  mutable Workspace ws_;
+  double next_step_ = 0, usual_step_ = 0, gap_ = 0, best_independence_ = 1, least_independence_ = 1;
 };
 
 ManifoldWorld::ManifoldWorld(const Model& model, const ManifoldWorldOptions& options)
-    : model_(model),
-      interrupt_(options.world.interrupt),
-      pushed_body_(options.world.pushed_body),
+    : World(model, options.world),
       tolerance_(std::max(options.tolerance, kLeastTolerance)),
       longest_step_(options.world.time_step > 0 ? options.world.time_step : std::numeric_limits<double>::infinity()),
-      terrain_(options.world.ground),
-      field_(model),
+      field_(model_),
       method_(2 * model.nv() + kWorks),
       derivative_([this](const VectorXd& x, VectorXd& rate) { return evaluate(x, rate); }),
-      points_(makeContactPoints(model, options.world.ground, options.contact)),
-      stops_(makeJointStops(model)),
-      soles_(model),
-      ws_(model) {
-  u_.setZero(model.nu());
-  q_ = model.makeNeutral();
-  for (VectorXd* x : {&v_, &tau_motors_, &tau_}) x->setZero(model.nv());
+      contacts_(model, ground_, options.contact) {
+  for (VectorXd* x : {&tau_motors_, &tau_}) x->setZero(model.nv());
   for (VectorXd* x : {&x_, &rate_}) x->setZero(2 * model.nv() + kWorks);
   scale_.setZero(2 * model.nv());
 }
 
-void ManifoldWorld::reset(ConstVectorRef q, ConstVectorRef v) {
-  requireFinite(q, v);
-  message_.clear();
-  time_ = 0;
-  work_.fill(0);
+void ManifoldWorld::start() {
   next_step_ = usual_step_ = kFirstStep;
-  u_.setZero();
   tau_motors_.setZero();
-  push_.setZero();
-  q_ = q;
-  v_ = v;
-  soles_.reset();
   if (!model_.closures().empty()) {
     const int rank = field_.select(q_);
     if (rank <= ClosedField::kDenseRows) checkStart(rank);
@@ -120,11 +87,10 @@ void ManifoldWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   }
   if (!settle(VectorXd::Zero(model_.nv()), v_)) fail(field_.failure());
   best_independence_ = field_.independence();
-  for (ContactPoint& point : points_) {
-    point.touches = false;
-    updateAnchor(terrain_, field_.workspace().X_WB[point.body].act(point.p), ContactForce(), point);
-  }
-  elastic_start_ = calcElasticEnergy(&stops_start_);
+  contacts_.resetAnchors([this](int body, const Vector3d& point) { return getPlace(body, point); });
+  updatePlacements(model_, ws_, q_);
+  contacts_.setStart([this](int body, const Vector3d& point) { return ws_.X_WB[body].act(point); },
+                     [this](const JointStop& stop) { return q_[stop.coordinate]; });
 }
 
 // A posture where rows are dependent that are independent all around it: the motion is not determined.
@@ -136,19 +102,6 @@ void ManifoldWorld::checkStart(int rank) {
   if (other > rank)
     fail("the loops are singular at the start: they have rank " + std::to_string(rank) + ", and " +
          std::to_string(other) + " beside it; start from another posture");
-}
-
-void ManifoldWorld::setTorques(ConstVectorRef u) {
-  for (int m = 0; m < model_.nu(); ++m) {
-    const Motor& motor = model_.motors()[m];
-    u_[m] = motor.clampEffort(u[m], v_[motor.dof]);
-  }
-  calcMotorForces(model_, u_, tau_motors_);
-}
-
-bool ManifoldWorld::fail(const std::string& why) {
-  message_ = why;
-  return false;
 }
 
 // The state at d, u of a chart that begins at q_, as the state of the world.
@@ -163,20 +116,18 @@ bool ManifoldWorld::settle(ConstVectorRef d, ConstVectorRef u) {
   return true;
 }
 
-bool ManifoldWorld::advance(double duration) {
-  if (!message_.empty()) return false;
-  if (!(duration > 0)) return true;
+bool ManifoldWorld::step(double duration) {
   const double end = time_ + duration;
   bool is_first = true;
   while (time_ < end) {
-    if (!is_first && interrupt_ && *interrupt_) break;
+    if (!is_first && isInterrupted()) break;
     is_first = false;
     const double left = end - time_, wanted = std::min(next_step_, longest_step_);
     // Two halves rather than a step and a splinter.
     double h = wanted >= left ? left : 2 * wanted > left ? 0.5 * left : wanted;
     const bool is_last = h == left;
     const double asked = h;
-    if (!step(h)) return false;
+    if (!takeStep(h)) return false;
     time_ = is_last && h == asked ? end : time_ + h;
   }
   updateFeet();
@@ -184,7 +135,7 @@ bool ManifoldWorld::advance(double duration) {
 }
 
 // Takes one step of h or, where it has to, of less.
-bool ManifoldWorld::step(double& h) {
+bool ManifoldWorld::takeStep(double& h) {
   const int nv = model_.nv();
   field_.begin(q_);
   x_.setZero();
@@ -213,7 +164,12 @@ bool ManifoldWorld::step(double& h) {
         q_ = field_.configuration();
         model_.normalize(q_);
         v_ = field_.velocity();
-        for (int w = 0; w < kWorks; ++w) work_[w] += end[2 * nv + w];
+        const auto works = end.tail(kWorks);
+        work_.motor += works[kMotors];
+        work_.push += works[kPush];
+        work_.contact += works[kContacts];
+        work_.stop += works[kStops];
+        work_.joint += works[kJoints];
         // A step that had to be short says nothing about the next one.
         next_step_ = std::max(h < next_step_ && h == wanted ? next_step_ : 0.0, h * factor);
         if (least_independence_ >= kNear * best_independence_)
@@ -236,12 +192,10 @@ bool ManifoldWorld::step(double& h) {
     }
     if (!(h > kShortestStep)) return fail(describeStop());
   }
-  for (ContactPoint& point : points_) {
-    const Workspace& ws = field_.workspace();
-    const Vector3d x = ws.X_WB[point.body].act(point.p);
-    const Vector6d& V = ws.V[point.body];
-    const Vector3d velocity = V.head<3>() + V.tail<3>().cross(x);
-    updateAnchor(terrain_, x, calcContactForce(terrain_, point, x, velocity), point);
+  for (ContactPoint& point : contacts_.points) {
+    const Vector3d x = getPlace(point.body, point.p);
+    const ContactForce force = calcContactForce(contacts_.terrain, point, x, calcVelocityAt(point.body, x));
+    updateAnchor(contacts_.terrain, x, force, point);
   }
   return true;
 }
@@ -269,22 +223,19 @@ void ManifoldWorld::calcForces(VectorXd& tau, std::array<double, kWorks>& power)
   const VectorXd& v = field_.velocity();
   tau = tau_motors_;
   power[kMotors] = tau.dot(v);
-  const auto calcVelocityAt = [&ws](int body, const Vector3d& x) -> Vector3d {
-    return ws.V[body].head<3>() + ws.V[body].tail<3>().cross(x);
-  };
   if (!push_.isZero(0)) {
-    const Vector3d com = ws.X_WB[pushed_body_].act(model_.bodies()[pushed_body_].inertia.com);
+    const Vector3d com = getPlace(pushed_body_, model_.bodies()[pushed_body_].inertia.com);
     addForce(pushed_body_, com, push_, tau);
     power[kPush] = push_.dot(calcVelocityAt(pushed_body_, com));
   }
-  for (const ContactPoint& point : points_) {
-    const Vector3d x = ws.X_WB[point.body].act(point.p), velocity = calcVelocityAt(point.body, x);
-    const ContactForce force = calcContactForce(terrain_, point, x, velocity);
+  for (const ContactPoint& point : contacts_.points) {
+    const Vector3d x = getPlace(point.body, point.p), velocity = calcVelocityAt(point.body, x);
+    const ContactForce force = calcContactForce(contacts_.terrain, point, x, velocity);
     if (force.elastic == 0) continue;
     addForce(point.body, x, force.force, tau);
     power[kContacts] += force.force.dot(velocity);
   }
-  for (const JointStop& stop : stops_) {
+  for (const JointStop& stop : contacts_.stops) {
     const double q = ws.q[stop.coordinate];
     if (q <= stop.upper && q >= stop.lower) continue;
     const StopForce force = calcStopForce(stop, q, v[stop.dof]);
@@ -300,40 +251,20 @@ void ManifoldWorld::calcForces(VectorXd& tau, std::array<double, kWorks>& power)
 }
 
 void ManifoldWorld::updateFeet() {
-  const Workspace& ws = field_.workspace();
-  soles_.clearForces();
-  for (const ContactPoint& point : points_) {
-    const Vector3d x = ws.X_WB[point.body].act(point.p);
-    const Vector3d velocity = ws.V[point.body].head<3>() + ws.V[point.body].tail<3>().cross(x);
-    const ContactForce force = calcContactForce(terrain_, point, x, velocity);
-    if (force.elastic > 0) soles_.addForce(point.contact, x, force.force);
+  clearFootForces();
+  for (const ContactPoint& point : contacts_.points) {
+    const Vector3d x = getPlace(point.body, point.p);
+    const ContactForce force = calcContactForce(contacts_.terrain, point, x, calcVelocityAt(point.body, x));
+    if (force.elastic > 0) addFootForce(point.contact, x, force.force);
   }
-  soles_.update([&ws](int body) { return ws.X_WB[body]; });
-}
-
-double ManifoldWorld::calcElasticEnergy(double* of_stops) const {
-  updatePlacements<double>(model_, ws_, q_);
-  double contacts = 0, stops = 0;
-  for (const ContactPoint& point : points_)
-    contacts += calcContactForce(terrain_, point, ws_.X_WB[point.body].act(point.p), Vector3d::Zero()).elastic;
-  for (const JointStop& stop : stops_) stops += calcStopForce(stop, q_[stop.coordinate], 0).elastic;
-  if (of_stops) *of_stops = stops;
-  return contacts + stops;
+  reportFeet([this](int body) { return field_.workspace().X_WB[body]; });
 }
 
 Books ManifoldWorld::books() const {
-  updatePositions(model_, ws_, q_);
-  updateVelocities<double>(model_, ws_, v_);
-  Books books;
-  books.kinetic = calcKineticEnergy(model_, ws_);
-  books.potential = calcPotentialEnergy(model_, ws_);
-  double stops = 0;
-  books.elastic = calcElasticEnergy(&stops);
-  books.motor_work = work_[kMotors];
-  books.push_work = work_[kPush];
-  books.contact_loss = -work_[kContacts] - (books.elastic - stops - (elastic_start_ - stops_start_));
-  books.stop_loss = stops_start_ - stops - work_[kStops];
-  books.other_loss = -work_[kJoints];
+  Books books = World::books();  // which also places the bodies
+  contacts_.addTo(
+      books, [this](int body, const Vector3d& point) { return ws_.X_WB[body].act(point); },
+      [this](const JointStop& stop) { return q_[stop.coordinate]; });
   return books;
 }
 

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "dynamics/loop_conflict.h"
 #include "worlds/mujoco_ground.h"
 #include "worlds/mujoco_model.h"
-#include "worlds/sole_track.h"
 
 namespace bielle::worlds {
 namespace {
@@ -34,116 +32,74 @@ VectorXd findPosture(const Model& model) {
 class MujocoWorld : public World {
  public:
   MujocoWorld(const Model& model, const MujocoWorldOptions& options)
-      : model_(model),
-        ground_(model, options.world.ground),
-        options_(makeRobotOptions(options, ground_)),
-        interrupt_(options.world.interrupt),
-        pushed_body_(options.world.pushed_body),
+      : World(model, options.world),
+        boxes_(model, ground_),
+        options_(makeRobotOptions(options, boxes_)),
         mujoco_(model, findPosture(model), options_),
         data_(mujoco_.makeData()),
-        contact_of_geom_(mujoco_.get()->ngeom, -1),
-        ws_(model),
-        soles_(model) {
+        contact_of_geom_(mujoco_.get()->ngeom, -1) {
     const mjModel& mj = *mujoco_.get();
     if (options.runge_kutta) mujoco_.get()->opt.integrator = mjINT_RK4;
-    ground_.bind(mj);
+    boxes_.bind(mj);
     for (size_t c = 0; c < model.contacts().size(); ++c)
       for (int corner = 1; corner <= 4; ++corner) {
         const std::string name = model.contacts()[c].name + "." + std::to_string(corner);
         const int geom = mj_name2id(&mj, mjOBJ_GEOM, name.c_str());
         if (geom >= 0) contact_of_geom_[geom] = static_cast<int>(c);
       }
-    q_.setZero(model.nq());
-    u_.setZero(model.nu());
-    for (VectorXd* x : {&v_, &v_before_, &v_mean_, &push_force_}) x->setZero(model.nv());
+    for (VectorXd* x : {&v_before_, &v_mean_, &push_force_}) x->setZero(model.nv());
     q_before_.setZero(mj.nq);
     row_velocity_.setZero(mj.njmax);
   }
 
-  void reset(ConstVectorRef q, ConstVectorRef v) override;
-  void setTorques(ConstVectorRef u) override;
-  void setPush(const Vector3d& force) override;
-  bool advance(double duration) override;
-  const std::string& message() const override { return message_; }
-  double time() const override { return time_; }
-  const VectorXd& configuration() const override { return q_; }
-  const VectorXd& velocity() const override { return v_; }
-  const VectorXd& torques() const override { return u_; }
-  const std::vector<FootReport>& feet() const override { return soles_.reports(); }
-  Books books() const override;
-  double gap() const override;
-
  private:
-  bool step();
+  void start() override;
+  bool step(double duration) override;
+  void noteForces() override;
+  bool takeStep();
   void book(double h);
   void addSoleForces(double share);
 
-  Model model_;
-  MujocoGround ground_;
+  MujocoGround boxes_;
   const MjcfOptions options_;
-  const std::atomic<bool>* const interrupt_;
-  const int pushed_body_;
   MujocoModel mujoco_;
   std::unique_ptr<mjData, void (*)(mjData*)> data_;
   std::vector<int> contact_of_geom_;  // of the model, -1 if the geom is not one of a sole
-  mutable Workspace ws_;
-  SoleTrack soles_;
-  VectorXd q_, v_, u_;
   VectorXd q_before_, v_before_, v_mean_, push_force_, row_velocity_;  // MuJoCo's
-  double time_ = 0;
-  double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0, other_work_ = 0;  // on the robot, J
-  std::string message_;
 };
 
-void MujocoWorld::reset(ConstVectorRef q, ConstVectorRef v) {
-  requireFinite(q, v);
+void MujocoWorld::start() {
   mj_resetData(mujoco_.get(), data_.get());
-  mujoco_.setState(q, v, *data_);
+  mujoco_.setState(q_, v_, *data_);
   mj_kinematics(mujoco_.get(), data_.get());
-  q_ = q;
-  v_ = v;
-  u_.setZero();
-  time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = other_work_ = 0;
-  soles_.reset();
-  message_.clear();
 }
 
-void MujocoWorld::setTorques(ConstVectorRef u) {
-  for (int m = 0; m < model_.nu(); ++m) {
-    const Motor& motor = model_.motors()[m];
-    u_[m] = data_->ctrl[m] = motor.clampEffort(u[m], v_[motor.dof]);
-  }
+void MujocoWorld::noteForces() {
+  Eigen::Map<VectorXd>(data_->ctrl, u_.size()) = u_;
+  Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * mujoco_.getBody(pushed_body_)) = push_;
 }
 
-void MujocoWorld::setPush(const Vector3d& force) {
-  Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * mujoco_.getBody(pushed_body_)) = force;
-}
-
-bool MujocoWorld::advance(double duration) {
-  if (!message_.empty()) return false;
-  if (!(duration > 0)) return true;
-  const double steps =
-      std::max(1.0, std::ceil(duration / options_.time_step - 1e-9));  // maybe more than an integer holds
-  const double h = duration / steps;
+bool MujocoWorld::step(double duration) {
+  const double steps = countSteps(duration, options_.time_step), h = duration / steps;
   mujoco_.get()->opt.timestep = h;
-  soles_.clearForces();
+  clearFootForces();
   const double box_steps = std::max(1.0, std::floor(kBoxPeriod / h));
   double taken = 0;
-  for (; taken < steps && !(taken > 0 && interrupt_ && *interrupt_); ++taken) {
-    if (std::fmod(taken, box_steps) == 0 && !ground_.update(*mujoco_.get(), *data_))
+  for (; taken < steps && !(taken > 0 && isInterrupted()); ++taken) {
+    if (std::fmod(taken, box_steps) == 0 && !boxes_.update(*mujoco_.get(), *data_))
       message_ = "there are too many boxes under the soles";
-    if (!message_.empty() || !step()) break;
+    if (!message_.empty() || !takeStep()) break;
     book(h);
     addSoleForces(1.0 / steps);
     time_ += h;
   }
   mujoco_.getState(*data_, q_, v_);
   updatePositions(model_, ws_, q_);
-  soles_.update([this](int body) { return ws_.X_WB[body]; });
+  reportFeet([this](int body) { return ws_.X_WB[body]; });
   return taken == steps;
 }
 
-bool MujocoWorld::step() {
+bool MujocoWorld::takeStep() {
   const mjModel& mj = *mujoco_.get();
   q_before_ = Eigen::Map<const VectorXd>(data_->qpos, mj.nq);
   v_before_ = Eigen::Map<const VectorXd>(data_->qvel, mj.nv);
@@ -169,32 +125,31 @@ bool MujocoWorld::step() {
 void MujocoWorld::book(double h) {
   const mjModel& mj = *mujoco_.get();
   v_mean_ = 0.5 * (v_before_ + Eigen::Map<const VectorXd>(data_->qvel, mj.nv));
-  motor_work_ += h * v_mean_.dot(Eigen::Map<const VectorXd>(data_->qfrc_actuator, mj.nv));
+  work_.motor += h * v_mean_.dot(Eigen::Map<const VectorXd>(data_->qfrc_actuator, mj.nv));
   const int pushed = mujoco_.getBody(pushed_body_);
-  const Eigen::Map<const Vector3d> push(data_->xfrc_applied + 6 * pushed);
-  if (!push.isZero(0)) {
+  if (!push_.isZero(0)) {
     push_force_.setZero();
-    mj_applyFT(&mj, data_.get(), push.data(), nullptr, data_->xipos + 3 * pushed, pushed, push_force_.data());
-    push_work_ += h * v_mean_.dot(push_force_);
+    mj_applyFT(&mj, data_.get(), push_.data(), nullptr, data_->xipos + 3 * pushed, pushed, push_force_.data());
+    work_.push += h * v_mean_.dot(push_force_);
   }
   // MuJoCo takes dampers at the end of a step.
-  for (int k = 0; k < mj.nv; ++k) other_work_ -= h * mj.dof_damping[k] * data_->qvel[k] * v_mean_[k];
+  for (int k = 0; k < mj.nv; ++k) work_.joint -= h * mj.dof_damping[k] * data_->qvel[k] * v_mean_[k];
   // Those of tendons at its start. The robot is written with sparse matrices.
   for (int t = 0; t < mj.ntendon; ++t) {
     double rate = 0;
     for (int i = data_->ten_J_rowadr[t]; i < data_->ten_J_rowadr[t] + data_->ten_J_rownnz[t]; ++i)
       rate += data_->ten_J[i] * v_mean_[data_->ten_J_colind[i]];
-    other_work_ -= h * mj.tendon_damping[t] * data_->ten_velocity[t] * rate;
+    work_.joint -= h * mj.tendon_damping[t] * data_->ten_velocity[t] * rate;
   }
   mj_mulJacVec(&mj, data_.get(), row_velocity_.data(), v_mean_.data());
   for (int i = 0; i < data_->nefc; ++i) {
     const double work = h * data_->efc_force[i] * row_velocity_[i];
     if (data_->efc_type[i] == mjCNSTR_EQUALITY || data_->efc_type[i] == mjCNSTR_FRICTION_DOF)
-      other_work_ += work;
+      work_.joint += work;
     else if (data_->efc_type[i] == mjCNSTR_LIMIT_JOINT)
-      stop_work_ += work;
+      work_.stop += work;
     else
-      contact_work_ += work;
+      work_.contact += work;
   }
 }
 
@@ -208,29 +163,8 @@ void MujocoWorld::addSoleForces(double share) {
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R_CW(contact.frame);
     Vector3d force = share * (R_CW.transpose() * Vector3d(wrench[0], wrench[1], wrench[2]));
     if (second < 0) force = -force;
-    soles_.addForce(second >= 0 ? second : first, Eigen::Map<const Vector3d>(contact.pos), force);
+    addFootForce(second >= 0 ? second : first, Eigen::Map<const Vector3d>(contact.pos), force);
   }
-}
-
-Books MujocoWorld::books() const {
-  updatePositions(model_, ws_, q_);
-  updateVelocities(model_, ws_, v_);
-  Books books;
-  books.kinetic = calcKineticEnergy(model_, ws_);
-  books.potential = calcPotentialEnergy(model_, ws_);
-  books.motor_work = motor_work_;
-  books.push_work = push_work_;
-  books.contact_loss = -contact_work_;
-  books.stop_loss = -stop_work_;
-  books.other_loss = -other_work_;
-  return books;
-}
-
-double MujocoWorld::gap() const {
-  updatePositions(model_, ws_, q_);
-  double gap = 0;
-  for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureGap(ws_, closure).position);
-  return gap;
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 
 #include "dynamics/joint_force.h"
 #include "worlds/simbody_tree.h"
-#include "worlds/sole_track.h"
 
 namespace bielle::worlds {
 namespace {
@@ -16,44 +15,39 @@ using SimTK::Stage;
 using SimTK::State;
 using SimTK::Vec3;
 
-// What the forces of a world do at one instant: power given to the robot, W.
-struct Powers {
-  double motor = 0, push = 0, contact = 0, stop = 0, joint = 0;
-};
-
 // Contacts, stops, motors and push: everything but gravity and the forces of joints.
 class WorldForces : public SimTK::Force::Custom::Implementation {
  public:
-  WorldForces(const SimbodyTree& tree, const SimbodyWorldOptions& options)
-      : tree_(tree),
-        terrain(options.world.ground),
-        pushed_body(options.world.pushed_body),
-        points(makeContactPoints(tree.model, options.world.ground, options.contact)),
-        stops(makeJointStops(tree.model)),
-        u(VectorXd::Zero(tree.model.nu())) {}
+  // \param torques, force  of the motors and of the push, as they are at any time; must outlive it, as the others
+  WorldForces(const SimbodyTree& tree, const ContactSet& contacts, int pushed_body, const VectorXd& torques,
+              const Vector3d& force)
+      : tree_(tree), contacts_(contacts), pushed_body_(pushed_body), u_(torques), push_(force) {}
 
   void calcForce(const State& state, SimTK::Vector_<SpatialVec>& body_forces, SimTK::Vector_<Vec3>&,
                  SimTK::Vector& mobility_forces) const override {
-    for (const ContactPoint& point : points) {
+    for (const ContactPoint& point : contacts_.points) {
       const MobilizedBody& body = tree_.bodies[point.body];
       const ContactForce force = calcForce(state, point);
       if (force.elastic > 0) body.applyForceToBodyPoint(state, toSimTK(point.p), toSimTK(force.force), body_forces);
     }
-    for (const JointStop& stop : stops) {
+    for (const JointStop& stop : contacts_.stops) {
       const double force = calcForce(state, stop).force;
       if (force != 0) mobility_forces[tree_.u_index[stop.dof]] += force;
     }
-    for (int m = 0; m < tree_.model.nu(); ++m) mobility_forces[tree_.u_index[tree_.model.motors()[m].dof]] += u[m];
-    tree_.bodies[pushed_body].applyForceToBodyPoint(state, toSimTK(pushPoint()), toSimTK(push), body_forces);
+    for (int m = 0; m < tree_.model.nu(); ++m) mobility_forces[tree_.u_index[tree_.model.motors()[m].dof]] += u_[m];
+    tree_.bodies[pushed_body_].applyForceToBodyPoint(state, toSimTK(pushPoint()), toSimTK(push_), body_forces);
   }
   double calcPotentialEnergy(const State&) const override { return 0; }  // Books keeps it apart
 
   ContactForce calcForce(const State& state, const ContactPoint& point) const {
-    return calcContactForce(terrain, point, findPlace(state, point), findVelocity(state, point));
+    return calcContactForce(contacts_.terrain, point, findPlace(state, point.body, point.p),
+                            findVelocity(state, point.body, point.p));
+  }
+  double findCoordinate(const State& state, const JointStop& stop) const {
+    return tree_.bodies[tree_.model.dofs()[stop.dof].joint].getOneQ(state, 0);
   }
   StopForce calcForce(const State& state, const JointStop& stop) const {
-    const MobilizedBody& body = tree_.bodies[tree_.model.dofs()[stop.dof].joint];
-    return calcStopForce(stop, body.getOneQ(state, 0), state.getU()[tree_.u_index[stop.dof]]);
+    return calcStopForce(stop, findCoordinate(state, stop), getRate(state, stop.dof));
   }
   Vector3d findPlace(const State& state, int body, const Vector3d& p) const {
     return toEigen(tree_.bodies[body].findStationLocationInGround(state, toSimTK(p)));
@@ -61,19 +55,13 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
   Vector3d findVelocity(const State& state, int body, const Vector3d& p) const {
     return toEigen(tree_.bodies[body].findStationVelocityInGround(state, toSimTK(p)));
   }
-  Vector3d findPlace(const State& state, const ContactPoint& point) const {
-    return findPlace(state, point.body, point.p);
-  }
-  Vector3d findVelocity(const State& state, const ContactPoint& point) const {
-    return findVelocity(state, point.body, point.p);
-  }
-
-  Powers calcPowers(const State& state) const {
-    Powers powers;
-    for (const ContactPoint& point : points)
-      powers.contact += calcForce(state, point).force.dot(findVelocity(state, point));
-    for (const JointStop& stop : stops) powers.stop += calcForce(state, stop).force * getRate(state, stop.dof);
-    for (int m = 0; m < tree_.model.nu(); ++m) powers.motor += u[m] * getRate(state, tree_.model.motors()[m].dof);
+  Works calcPowers(const State& state) const {
+    Works powers;
+    for (const ContactPoint& point : contacts_.points)
+      powers.contact += calcForce(state, point).force.dot(findVelocity(state, point.body, point.p));
+    for (const JointStop& stop : contacts_.stops)
+      powers.stop += calcForce(state, stop).force * getRate(state, stop.dof);
+    for (int m = 0; m < tree_.model.nu(); ++m) powers.motor += u_[m] * getRate(state, tree_.model.motors()[m].dof);
     for (const JointForce& force : tree_.model.jointForces()) {
       const double rate = getRate(state, force.dof);
       powers.joint += calcDissipativeForce(force, rate) * rate;
@@ -85,31 +73,19 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
                                                      findVelocity(state, spring.body1, spring.point1));
       powers.joint -= spring.damping * rate * rate;
     }
-    powers.push = push.dot(toEigen(tree_.bodies[pushed_body].findStationVelocityInGround(state, toSimTK(pushPoint()))));
+    powers.push = push_.dot(findVelocity(state, pushed_body_, pushPoint()));
     return powers;
-  }
-  double calcElasticEnergy(const State& state, double& of_stops) const {
-    double contacts = 0;
-    for (const ContactPoint& point : points)
-      contacts += calcContactForce(terrain, point, findPlace(state, point), Vector3d::Zero()).elastic;
-    of_stops = 0;
-    for (const JointStop& stop : stops) of_stops += calcForce(state, stop).elastic;
-    return contacts + of_stops;
   }
 
  private:
   double getRate(const State& state, int dof) const { return state.getU()[tree_.u_index[dof]]; }
-  Vector3d pushPoint() const { return tree_.model.bodies()[pushed_body].inertia.com; }
+  Vector3d pushPoint() const { return tree_.model.bodies()[pushed_body_].inertia.com; }
 
   const SimbodyTree& tree_;
-
- public:
-  const Terrain terrain;
-  const int pushed_body;
-  std::vector<ContactPoint> points;
-  const std::vector<JointStop> stops;
-  VectorXd u;
-  Vector3d push = Vector3d::Zero();
+  const ContactSet& contacts_;
+  const int pushed_body_;
+  const VectorXd& u_;
+  const Vector3d& push_;
 };
 
 // The speeds of rotors are those of their motors: one constraint for all, much quicker than Simbody's SpeedCouplers.
@@ -162,47 +138,33 @@ class SimbodyWorld : public World {
  public:
   SimbodyWorld(const Model& model, const SimbodyWorldOptions& options);
 
-  void reset(ConstVectorRef q, ConstVectorRef v) override;
-  void setTorques(ConstVectorRef u) override;
-  void setPush(const Vector3d& force) override;
-  bool advance(double duration) override;
-  const std::string& message() const override { return message_; }
-  double time() const override { return time_; }
-  const VectorXd& configuration() const override { return q_; }
-  const VectorXd& velocity() const override { return v_; }
-  const VectorXd& torques() const override { return forces_->u; }
-  const std::vector<FootReport>& feet() const override { return soles_.reports(); }
   Books books() const override;
   double gap() const override;
 
  private:
+  void start() override;
+  bool step(double duration) override;
+  void noteForces() override { changed_ = true; }
   void addRotors();
   void finishStep(double duration);
   void readState();
-  void noteChange();
+  void realizeForces();
 
-  Model model_;
   SimbodyTree tree_;
+  ContactSet contacts_;
   WorldForces* forces_;                                // owned by the tree's system
   std::vector<std::pair<MobilizedBody, int>> rotors_;  // with the dof of their motor
   std::unique_ptr<SimTK::Integrator> integrator_;
-  SoleTrack soles_;
-  VectorXd q_, v_;
-  const std::atomic<bool>* const interrupt_;
-  double time_ = 0;
-  Powers last_, work_;  // at the end of the last step; J
-  double elastic_start_ = 0, stops_start_ = 0;
+  Works last_;            // powers at the end of the last step, W
   bool changed_ = false;  // torques or push since the last step
-  std::string message_;
 };
 
 SimbodyWorld::SimbodyWorld(const Model& model, const SimbodyWorldOptions& options)
-    : model_(model),
-      tree_(model, model.closures(), options.as_modelled ? LoopCut::AsModelled : LoopCut::FewestRows),
-      forces_(new WorldForces(tree_, options)),
-      integrator_(makeIntegrator(options.integrator, tree_.system)),
-      soles_(model),
-      interrupt_(options.world.interrupt) {
+    : World(model, options.world),
+      tree_(model_, model_.closures(), options.as_modelled ? LoopCut::AsModelled : LoopCut::FewestRows),
+      contacts_(model, ground_, options.contact),
+      forces_(new WorldForces(tree_, contacts_, pushed_body_, u_, push_)),
+      integrator_(makeIntegrator(options.integrator, tree_.system)) {
   SimTK::Force::Custom(tree_.forces, forces_);
   addRotors();
   tree_.finish();
@@ -236,28 +198,19 @@ void SimbodyWorld::addRotors() {
   SimTK::Constraint::Custom constraint(coupling);
 }
 
-void SimbodyWorld::reset(ConstVectorRef q, ConstVectorRef v) {
-  requireFinite(q, v);
-  message_.clear();
-  time_ = 0;
-  work_ = {};
-  forces_->u.setZero();
-  forces_->push.setZero();
-  soles_.reset();
+void SimbodyWorld::start() {
   SimTK::State& state = tree_.state;
   state.setTime(0);
-  tree_.setCoordinates(q);
-  tree_.updateVelocityMap(q, v);
+  tree_.setCoordinates(q_);
+  tree_.updateVelocityMap(q_, v_);
   SimTK::Vector& u = state.updU();
   u = 0;
-  tree_.scatter(tree_.T * v, u);
+  tree_.scatter(tree_.T * v_, u);
   for (const auto& [rotor, dof] : rotors_) u[int(rotor.getFirstUIndex(state))] = u[tree_.u_index[dof]];
   tree_.system.realize(state, Stage::Velocity);
-  for (ContactPoint& point : forces_->points) {
-    point.touches = false;
-    updateAnchor(forces_->terrain, forces_->findPlace(state, point), ContactForce(), point);
-  }
-  elastic_start_ = forces_->calcElasticEnergy(state, stops_start_);
+  const auto place = [&](int body, const Vector3d& point) { return forces_->findPlace(state, body, point); };
+  contacts_.resetAnchors(place);
+  contacts_.setStart(place, [&](const JointStop& stop) { return forces_->findCoordinate(state, stop); });
   try {
     tree_.system.project(state, 1e-9);
     integrator_->initialize(state);
@@ -269,22 +222,8 @@ void SimbodyWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   readState();
 }
 
-void SimbodyWorld::setTorques(ConstVectorRef u) {
-  for (int m = 0; m < model_.nu(); ++m) {
-    const Motor& motor = model_.motors()[m];
-    forces_->u[m] = motor.clampEffort(u[m], v_[motor.dof]);
-  }
-  changed_ = true;
-}
-
-void SimbodyWorld::setPush(const Vector3d& force) {
-  if (force == forces_->push) return;
-  forces_->push = force;
-  changed_ = true;
-}
-
 // Forces that do not depend on the state alone have changed: what was computed of them is stale.
-void SimbodyWorld::noteChange() {
+void SimbodyWorld::realizeForces() {
   if (!changed_) return;
   integrator_->updAdvancedState().invalidateAllCacheAtOrAbove(Stage::Dynamics);
   integrator_->reinitialize(Stage::Dynamics, false);
@@ -293,16 +232,14 @@ void SimbodyWorld::noteChange() {
   changed_ = false;
 }
 
-bool SimbodyWorld::advance(double duration) {
-  if (!message_.empty()) return false;
+bool SimbodyWorld::step(double duration) {
   const double start = integrator_->getTime(), end = time_ + duration;
   try {
-    noteChange();
+    realizeForces();
     for (double before = integrator_->getTime(); before < end - 1e-12; before = integrator_->getTime()) {
       integrator_->stepTo(end, end);
       finishStep(integrator_->getTime() - before);
-      if (integrator_->getTime() > start && interrupt_ && *interrupt_)
-        break;  // the first return may be before any step
+      if (integrator_->getTime() > start && isInterrupted()) break;  // the first return may be before any step
     }
   } catch (const std::exception& error) {
     message_ = error.what();
@@ -318,19 +255,19 @@ bool SimbodyWorld::advance(double duration) {
 void SimbodyWorld::finishStep(double duration) {
   const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Velocity);
-  const Powers now = forces_->calcPowers(state);
+  const Works now = forces_->calcPowers(state);
   work_.motor += 0.5 * duration * (last_.motor + now.motor);
   work_.push += 0.5 * duration * (last_.push + now.push);
   work_.contact += 0.5 * duration * (last_.contact + now.contact);
   work_.stop += 0.5 * duration * (last_.stop + now.stop);
   work_.joint += 0.5 * duration * (last_.joint + now.joint);
   last_ = now;
-  soles_.clearForces();
-  for (ContactPoint& point : forces_->points) {
-    const Vector3d x = forces_->findPlace(state, point);
+  clearFootForces();
+  for (ContactPoint& point : contacts_.points) {
+    const Vector3d x = forces_->findPlace(state, point.body, point.p);
     const ContactForce force = forces_->calcForce(state, point);
-    if (force.elastic > 0) soles_.addForce(point.contact, x, force.force);
-    updateAnchor(forces_->terrain, x, force, point);
+    if (force.elastic > 0) addFootForce(point.contact, x, force.force);
+    updateAnchor(contacts_.terrain, x, force, point);
   }
 }
 
@@ -338,7 +275,7 @@ void SimbodyWorld::readState() {
   const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Velocity);
   tree_.readState(state, q_, v_);
-  soles_.update([&](int body) {
+  reportFeet([&](int body) {
     const SimTK::Transform& X = tree_.bodies[body].getBodyTransform(state);
     return SE3(toEigen(X.R()), toEigen(X.p()));
   });
@@ -347,16 +284,12 @@ void SimbodyWorld::readState() {
 Books SimbodyWorld::books() const {
   const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Dynamics);
-  Books books;
+  Books books = World::books();
   books.kinetic = tree_.system.calcKineticEnergy(state);
   books.potential = tree_.system.calcPotentialEnergy(state);
-  double stops = 0;
-  books.elastic = forces_->calcElasticEnergy(state, stops);
-  books.motor_work = work_.motor;
-  books.push_work = work_.push;
-  books.contact_loss = -work_.contact - (books.elastic - stops - (elastic_start_ - stops_start_));
-  books.stop_loss = stops_start_ - stops - work_.stop;
-  books.other_loss = -work_.joint;
+  contacts_.addTo(
+      books, [&](int body, const Vector3d& point) { return forces_->findPlace(state, body, point); },
+      [&](const JointStop& stop) { return forces_->findCoordinate(state, stop); });
   return books;
 }
 

@@ -5,13 +5,11 @@
 /// ground pushes, or they slip. Worlds differ in how they integrate; robot, ground and numbers that they report are the
 /// same. The robot's rotors weigh their armature, joints have stops at their limits, loops are closed.
 #include <atomic>
-#include <limits>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "bielle/dynamics/ground.h"
-#include "bielle/model/model.h"
+#include "bielle/dynamics/workspace.h"
 
 namespace bielle::worlds {
 
@@ -40,6 +38,11 @@ struct Books {
   double energy() const { return kinetic + potential + elastic; }
 };
 
+/// What each kind of force does on the robot, J (or W).
+struct Works {
+  double motor = 0, push = 0, contact = 0, stop = 0, joint = 0;
+};
+
 /// What the ground does to a contact of the model.
 struct FootReport {
   Vector6d wrench = Vector6d::Zero();  ///< of the ground on the foot, in its contact frame (notation.h), N and N m
@@ -47,38 +50,76 @@ struct FootReport {
   bool touches = false;
 };
 
-/// One robot in one world. Not thread-safe; different worlds are independent.
+/// One robot in one world. Not thread-safe; different worlds are independent. An engine derives from it (below).
 class World {
  public:
   virtual ~World() = default;
 
   /// Sets a closed configuration q (nq) and a velocity v (nv) that keeps it closed; time, work and slip start from zero,
   /// torques and push are zero. \throws std::invalid_argument when a number is not finite; nothing has changed then
-  virtual void reset(ConstVectorRef q, ConstVectorRef v) = 0;
+  void reset(ConstVectorRef q, ConstVectorRef v);
   /// Torques of the motors in their order (nu, N m or N), cut at their limits and held until the next call.
-  virtual void setTorques(ConstVectorRef u) = 0;
+  void setTorques(ConstVectorRef u);
   /// A force at the centre of mass of the pushed body (WorldOptions), N (world), held until the next call.
-  virtual void setPush(const Vector3d& force) = 0;
+  void setPush(const Vector3d& force);
   /// Advances by a duration, s.
   /// \returns false if the integration broke off; the state is then the last one that is finite, and message() says
   ///   why. Exceptions of an engine do not pass. Also false if it was interrupted, without a message; it can go on.
-  virtual bool advance(double duration) = 0;
-  virtual const std::string& message() const = 0;  ///< empty unless the integration broke off
+  bool advance(double duration);
+  const std::string& message() const { return message_; }  ///< empty unless the integration broke off
 
-  virtual double time() const = 0;                          ///< since reset(), s
-  virtual const VectorXd& configuration() const = 0;        ///< nq, coordinates of the model
-  virtual const VectorXd& velocity() const = 0;             ///< nv
-  virtual const VectorXd& torques() const = 0;              ///< nu, as they were cut
-  virtual const std::vector<FootReport>& feet() const = 0;  ///< per contact of the model
-  virtual Books books() const = 0;
-  virtual double gap() const = 0;  ///< opening of the closures at present: the largest distance of their points, m
+  const Model& model() const { return model_; }                  ///< of the robot
+  const Ground& ground() const { return ground_; }               ///< with its coefficient of friction
+  double time() const { return time_; }                          ///< since reset(), s
+  const VectorXd& configuration() const { return q_; }           ///< nq, coordinates of the model
+  const VectorXd& velocity() const { return v_; }                ///< nv
+  const VectorXd& torques() const { return u_; }                 ///< nu, as they were cut
+  const std::vector<FootReport>& feet() const { return feet_; }  ///< per contact of the model
+  virtual Books books() const;
+  virtual double gap() const;  ///< opening of the closures at present: the largest distance of their points, m
 
  protected:
-  static void requireFinite(ConstVectorRef q, ConstVectorRef v) {
-    if (!q.allFinite() || !v.allFinite())
-      throw std::invalid_argument(
-          "world: the state has a number that is not finite; give a closed configuration and a velocity");
+  World(const Model& model, const WorldOptions& options);
+
+  /// Takes q_ and v_, which are finite, for the start of the engine; all else is reset. May set message_.
+  virtual void start() = 0;
+  /// Integrates for a duration, s, above zero: moves time_, q_ and v_, books works and reports the feet.
+  /// \returns as advance() does
+  virtual bool step(double duration) = 0;
+  /// Torques or push have changed.
+  virtual void noteForces() {}
+
+  bool fail(const std::string& why);  ///< sets message_; false
+  bool isInterrupted() const { return interrupt_ && *interrupt_; }
+  /// How many steps of this length, or a little shorter, make up a duration; maybe more than an integer holds.
+  static double countSteps(double duration, double time_step);
+  /// Wrenches of the ground on the feet are sums of forces at x (world).
+  void clearFootForces();
+  void addFootForce(int contact, const Vector3d& x, const Vector3d& force);
+  /// Their wrenches and slips for the present placements. \param getPlacement  body -> SE3
+  template <typename GetPlacement>
+  void reportFeet(const GetPlacement& getPlacement) {
+    for (size_t c = 0; c < feet_.size(); ++c)
+      reportFoot(c, getPlacement(model_.contacts()[c].body) * model_.contacts()[c].X_BF);
   }
+
+  const Model model_;
+  const Ground ground_;
+  const int pushed_body_;
+  double time_ = 0;
+  VectorXd q_, v_, u_;  // nq, nv, nu
+  Vector3d push_ = Vector3d::Zero();
+  Works work_;  // since reset()
+  std::string message_;
+  mutable Workspace ws_;
+
+ private:
+  void reportFoot(size_t contact, const SE3& X_WF);
+
+  const std::atomic<bool>* const interrupt_;
+  std::vector<FootReport> feet_;
+  std::vector<Vector6d> wrenches_;    // about the origin of the world
+  std::vector<Vector3d> touchdowns_;  // of the centres of the soles, m (world)
 };
 
 }  // namespace bielle::worlds
