@@ -72,7 +72,7 @@ bool PassiveJoints::follow(Follower& f, ConstVectorRef positions) {
     std::swap(f.state, f.next);
     f.updateTangent();
   }
-  return f.margin < kDeadPointMargin;
+  return f.margin < kLeastTransmission;
 }
 
 NumericalStatus PassiveJoints::update(ConstVectorRef positions, VectorRef q) {
@@ -86,7 +86,7 @@ NumericalStatus PassiveJoints::update(ConstVectorRef positions, VectorRef q) {
     }
     scatterConfiguration(model_, f.cluster, f.state.basis.q, q);
   }
-  if (margin_ < kDeadPointMargin && status == NumericalStatus::Ok) status = NumericalStatus::NearDeadPoint;
+  if (margin_ < kLeastTransmission && status == NumericalStatus::Ok) status = NumericalStatus::NearDeadPoint;
   for (int m = 0; m < model_.nu(); ++m) {
     const Motor& motor = model_.motors()[m];
     if (places_[motor.dof].cluster < 0) q[model_.joints()[motor.joint].idx_q] = positions[m];

@@ -17,8 +17,8 @@ namespace bielle {
 /// No function allocates but the constructor.
 class PassiveJoints {
  public:
-  /// Below this a linkage is near a dead point.
-  static constexpr double kDeadPointMargin = 0.02;
+  /// Below this transmission of motors to joints a linkage is near a dead point.
+  static constexpr double kLeastTransmission = 0.02;
 
   /// \param q  closed configuration at which ranks are determined
   /// \throws InputError when motors do not determine a joint other than the free-flyer of the trunk
@@ -54,7 +54,7 @@ class PassiveJoints {
  private:
   struct Follower {
     explicit Follower(Linkage of);
-    void updateTangent() { margin = tangent.update(state.basis.N, linkage.motor_dofs, kDeadPointMargin); }
+    void updateTangent() { margin = tangent.update(state.basis.N, linkage.motor_dofs, kLeastTransmission); }
     Linkage linkage;
     const ReducedCluster& cluster;  // of the linkage
     ClusterScratch scratch;
