@@ -223,8 +223,9 @@ class Echo : public Controller {
 TEST_CASE("restricted controller: it hears of the joints that its model has, and its torques reach the same motors") {
   const Model &model = getSquat().robot.model, cut = cutAtBalls(model);
   REQUIRE(cut.nv() < model.nv());
-  Echo inner(cut);
-  RestrictedController controller(model, cut, inner);
+  auto echo = std::make_unique<Echo>(cut);
+  const Echo& inner = *echo;
+  RestrictedController controller(model, cut, std::move(echo));
   Measurement measurement{
       0.5, VectorXd::LinSpaced(model.nq(), 0, 1), VectorXd::LinSpaced(model.nv(), -1, 1), {1, 0}, 3e-3};
   VectorXd u(model.nu());

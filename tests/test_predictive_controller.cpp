@@ -66,9 +66,10 @@ PredictiveOptions makeShortWindow(int threads) {
   return options;
 }
 
-Execution carryOut(const Solved& solved, Controller& controller, const ExecutionOptions& options) {
-  const auto world = makeWorld("bielle", getBipetto(), {options.ground, 0});
-  return execute(getBipetto(), *solved.gains, controller, *world, options);
+Execution carryOut(const Solved& solved, Controller& controller, const ExecutionOptions& options,
+                   const PerceptionOptions& sensors = {}, const ContactSchedule& planned = {}) {
+  const auto world = makeWorld("bielle", getBipetto());
+  return carryOut(Plan{*solved.gains, planned}, controller, *world, sensors, options);
 }
 
 const Solved& getShortSquat() {
@@ -379,13 +380,14 @@ class HeldBack : public Controller {
 TEST_CASE("estimator: contacts are expected where the controller is in its plan, whatever the time") {
   ExecutionOptions options;
   options.duration = 0.4;
-  options.perception.sensors = SensorOptions{};
-  options.perception.estimator.surprising_contact = 2;  // of the weight: only expected feet stand
-  options.perception.planned.phases = {{"double support", 10, 0.01, {{0, {}, 0, 0}, {1, {}, 0, 0}}},
-                                       {"flight", 30, 0.01, {}}};
+  PerceptionOptions sensors;
+  sensors.sensors = SensorOptions{};
+  sensors.estimator.surprising_contact = 2;  // of the weight: only expected feet stand
+  ContactSchedule planned;
+  planned.phases = {{"double support", 10, 0.01, {{0, {}, 0, 0}, {1, {}, 0, 0}}}, {"flight", 30, 0.01, {}}};
   HeldBack held(0.05), on_time(1);
-  CHECK(carryOut(getShortSquat(), held, options).estimation.contact_errors < 0.05);
-  CHECK(carryOut(getShortSquat(), on_time, options).estimation.contact_errors > 0.5);
+  CHECK(carryOut(getShortSquat(), held, options, sensors, planned).estimation.contact_errors < 0.05);
+  CHECK(carryOut(getShortSquat(), on_time, options, sensors, planned).estimation.contact_errors > 0.5);
 }
 
 TEST_CASE("carried out: a world that cannot follow a torque names the motor") {

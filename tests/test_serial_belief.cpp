@@ -46,8 +46,9 @@ struct Trial {
 
   // Power of the motors less that of the torques that were requested, over the latter.
   double calcPowerError(Belief belief) {
-    Constant inner(tau);
-    SerialController controller(robot.model, serial, inner, belief);
+    auto constant = std::make_unique<Constant>(tau);
+    const Constant& inner = *constant;
+    SerialController controller(robot.model, serial, std::move(constant), belief);
     VectorXd u(robot.model.nu());
     controller.update({0.5, q, v}, u);
     CHECK(inner.told.time == 0.5);

@@ -104,7 +104,7 @@ CheckedMotion readMotion(const std::string& directory) {
   std::error_code error;
   const bool file_exists = std::filesystem::exists(motion.summary.run.robot_file, error);
   motion.model = loadRobot(file_exists ? motion.summary.run.robot_file : motion.summary.run.robot).model;
-  if (motion.summary.run.model == "serial")
+  if (motion.summary.run.model == Belief::Serial)
     motion.model = makeSerialModel(motion.model, makeStandingPosture(motion.model),
                                    parseSerialArmature(motion.summary.run.serial_armature))
                        .model;

@@ -12,6 +12,7 @@
 
 #include "arrays.h"
 #include "bielle/model/options.h"
+#include "bielle/motion/serial_model.h"
 
 namespace bielle::python {
 
@@ -74,6 +75,17 @@ struct Convert<M, std::enable_if_t<std::is_base_of_v<Eigen::EigenBase<M>, M>>> {
       if (!python::same(a.data()[i], b.data()[i])) return false;
     return true;
   }
+};
+
+/// A model of the robot is known by its name.
+template <>
+struct Convert<Belief> {
+  static std::string type() { return "str"; }
+  static py::object show(Belief member, py::handle) { return py::cast(getName(member)); }
+  static Belief read(py::handle value, const std::string& what) {
+    return parseBelief(Convert<std::string>::read(value, what));
+  }
+  static bool same(Belief a, Belief b) { return a == b; }
 };
 
 template <>

@@ -50,7 +50,8 @@ Lift liftMotion(const Robot& robot, const NamedSerial& named, const HeldSolution
   const LiftResult lifted = lift(robot.get(), serial, makeSerialTrajectory(motion.motion, record), options);
   Lift out = {lifted.lifted(), lifted.nodes, {}};
   if (!lifted.trajectory.us.empty())
-    out.result = makeLiftedResult({robot.name, robot.file, {}, "closed", ""}, robot.get(), motion.motion, lifted, 0);
+    out.result =
+        makeLiftedResult({robot.name, robot.file, {}, Belief::Closed, ""}, robot.get(), motion.motion, lifted, 0);
   return out;
 }
 

@@ -14,14 +14,10 @@
 namespace bielle::python {
 namespace {
 
-using worlds::BielleWorldOptions;
 using worlds::World;
 
 std::unique_ptr<World> makeOwnWorld(const std::string&, const Model& model, const worlds::WorldOptions& options) {
-  if (options.tolerance > 0) return worlds::makeManifoldWorld(model, {options, {}, options.tolerance});
-  BielleWorldOptions own;
-  own.world = options;
-  return worlds::makeBielleWorld(model, own);
+  return worlds::makeOwnWorld(model, options);
 }
 
 // Of the module that links the engines, which is there where Bielle was built with them.

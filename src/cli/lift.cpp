@@ -64,8 +64,9 @@ void printOutcome(const LiftArguments& arguments, const LiftResult& lifted, cons
 int run(const LiftArguments& arguments) {
   requireApart(arguments.directory, {arguments.serial_directory});
   const MotionSummary summary = readSummary(arguments.serial_directory);
-  if (summary.run.model != "serial")
-    throw InputError(summary.file, "model '" + summary.run.model + "'", "it is not a motion of the serial model",
+  if (summary.run.model != Belief::Serial)
+    throw InputError(summary.file, std::string("model '") + getName(summary.run.model) + "'",
+                     "it is not a motion of the serial model",
                      "make one with `bielle solve " + summary.motion + " --model serial`");
   if (summary.step != StepRule::Euler)
     throw InputError(summary.file, std::string("step '") + getName(summary.step) + "'",
@@ -89,7 +90,7 @@ int run(const LiftArguments& arguments) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::optional<MotionResult> result;
   if (!lifted.trajectory.us.empty())
-    result = makeLiftedResult({summary.run.robot, robot.file, getCommandLine(), "closed", ""}, robot.model, motion,
+    result = makeLiftedResult({summary.run.robot, robot.file, getCommandLine(), Belief::Closed, ""}, robot.model, motion,
                               lifted, seconds);
   const MotionResult* written = result ? &*result : nullptr;
   printOutcome(arguments, lifted, written, static_cast<int>(trajectory.a.size()));

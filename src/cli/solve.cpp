@@ -207,9 +207,10 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   if (!arguments.warm_start.empty()) options.start = makeStart(readResultRecord(arguments.warm_start), motion);
   makeOutputDirectory(arguments.directory);
   watchInterrupts();
-  const MotionResult result = makeResult({arguments.robot.name, robot.file, getCommandLine(),
-                                          serial ? "serial" : "closed", serial ? arguments.serial_armature : ""},
-                                         bielle::solve(motion, options, makeObserver(arguments)));
+  const MotionResult result =
+      makeResult({arguments.robot.name, robot.file, getCommandLine(), serial ? Belief::Serial : Belief::Closed,
+                  serial ? arguments.serial_armature : ""},
+                 bielle::solve(motion, options, makeObserver(arguments)));
   printResult(model, result, writeResult(arguments.directory, result));
   const bool failed = !arguments.no_check && !checkResult(arguments.directory);
   if (!arguments.no_report) addReport(arguments.directory);  // the check is part of it

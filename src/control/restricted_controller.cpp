@@ -11,8 +11,8 @@ void restrictTo(const std::vector<int>& places, const VectorXd& from, VectorXd& 
 
 }  // namespace
 
-RestrictedController::RestrictedController(const Model& robot, const Model& model, Controller& inner)
-    : inner_(inner), coordinates_(findRestrictedCoordinates(robot, model)), dofs_(findRestrictedDofs(robot, model)) {
+RestrictedController::RestrictedController(const Model& robot, const Model& model, std::unique_ptr<Controller> inner)
+    : inner_(std::move(inner)), coordinates_(findRestrictedCoordinates(robot, model)), dofs_(findRestrictedDofs(robot, model)) {
   measurement_.q.resize(model.nq());
   measurement_.v.resize(model.nv());
   measurement_.contacts.reserve(model.contacts().size());
@@ -24,7 +24,7 @@ void RestrictedController::update(const Measurement& measurement, VectorRef u) {
   measurement_.contacts = measurement.contacts;
   restrictTo(coordinates_, measurement.q, measurement_.q);
   restrictTo(dofs_, measurement.v, measurement_.v);
-  inner_.update(measurement_, u);
+  inner_->update(measurement_, u);
 }
 
 }  // namespace bielle

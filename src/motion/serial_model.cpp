@@ -171,6 +171,24 @@ void forCommonJoints(const Model& from, const Model& model, const Copy& copy) {
 
 }  // namespace
 
+const char* getName(Belief belief) {
+  switch (belief) {
+    case Belief::Closed:
+      return "closed";
+    case Belief::Serial:
+      return "serial";
+    case Belief::Ratio:
+      return "ratio";
+  }
+  return "?";
+}
+
+Belief parseBelief(const std::string& name) {
+  for (Belief belief : {Belief::Closed, Belief::Serial, Belief::Ratio})
+    if (name == getName(belief)) return belief;
+  throw InputError("", "model '" + name + "'", "there is no such model of a robot", "give closed, serial or ratio");
+}
+
 SerialModelOptions parseSerialArmature(const std::string& text) {
   SerialModelOptions options;
   if (text.empty()) return options;

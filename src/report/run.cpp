@@ -58,7 +58,8 @@ ReportRun readRun(const std::string& directory) {
   if (fs::exists(place / "check.json", error)) run.check = readJson(place / "check.json");
   run.robot = loadRobotOf(run.summary, place / "summary.json");
   run.summary.erase("robot_file");  // pages are given away, and need no path of this machine
-  if (getText(run.summary, "model") == "serial")
+  const std::string model = getText(run.summary, "model");
+  if (!model.empty() && parseBelief(model) == Belief::Serial)
     run.robot.model = makeSerialModel(run.robot.model, makeStandingPosture(run.robot.model)).model;
   const fs::path plan = place / "plan.npz";
   run.record = readRecordOf(run.robot, place / "trajectory.npz");

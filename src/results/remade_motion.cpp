@@ -32,7 +32,8 @@ Motion remakeMotion(const Model& model, const MotionSummary& summary) {
   const auto refuse = [&summary](const std::string& element, const std::string& problem, const std::string& remedy) {
     throw InputError(summary.file, element, problem, remedy);
   };
-  if (summary.run.model != "closed") refuse("model", "it is that of the serial chain", "solve it without --serial");
+  if (summary.run.model != Belief::Closed)
+    refuse("model", "it is that of the serial chain", "solve it without --serial");
   if (!summary.timings.empty())
     refuse("free_timings", "durations are variables of this problem", "solve it without --free-timings");
   if (summary.objective.objective == Objective::PeakTorque)

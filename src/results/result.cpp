@@ -131,7 +131,7 @@ Json makeSummary(const MotionResult& result) {
   return {{"motion", result.motion},
           {"robot", result.run.robot},
           {"robot_file", result.run.robot_file},
-          {"model", result.run.model},
+          {"model", getName(result.run.model)},
           {"serial_armature", result.run.serial_armature},
           {"formulation", getName(result.formulation)},
           {"step", getName(result.step)},

@@ -71,7 +71,8 @@ ObjectiveOptions readObjective(const Json& json) {
 MotionSummary read(const Json& json) {
   MotionSummary summary;
   summary.motion = json.at("motion");
-  summary.run = {json.at("robot"), json.at("robot_file"), {}, json.at("model"), json.at("serial_armature")};
+  summary.run = {
+      json.at("robot"), json.at("robot_file"), {}, parseBelief(json.at("model")), json.at("serial_armature")};
   const std::string formulation = json.at("formulation");
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
   const std::string step = json.at("step");

@@ -48,7 +48,8 @@ bool advance(World& world, TorqueDelay& delay, double time, double period) {
 }
 
 // The largest torque often tells why a world cannot go on: a motor without a limit gives whatever it is asked for.
-std::string describeBreak(const Model& model, const World& world) {
+std::string describeBreak(const World& world) {
+  const Model& model = world.model();
   if (model.nu() == 0) return world.message();
   Eigen::Index largest = 0;
   const double torque = world.torques().cwiseAbs().maxCoeff(&largest);
@@ -69,12 +70,6 @@ Vector3d calcPush(const std::vector<Push>& pushes, double time) {
   return force;
 }
 
-double calcExchange(const Books& before, const Books& now) {
-  return std::abs(now.motor_work - before.motor_work) + std::abs(now.push_work - before.push_work) +
-         std::abs(now.contact_loss - before.contact_loss) + std::abs(now.stop_loss - before.stop_loss) +
-         std::abs(now.other_loss - before.other_loss);
-}
-
 const char* getName(Outcome outcome) {
   switch (outcome) {
     case Outcome::Running:
@@ -93,87 +88,76 @@ const char* getName(Outcome outcome) {
   return "?";
 }
 
-Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
-                  const ExecutionOptions& o, const ExecutionObserver& observer) {
-  const double duration = o.duration > 0 ? o.duration : plan.duration() + o.hold;
+Execution carryOut(const Plan& plan, Controller& controller, World& world, const PerceptionOptions& sensors,
+                   const ExecutionOptions& o, const ExecutionObserver& observer) {
+  const Policy& reference = plan.reference();
+  const Model& model = world.model();
+  const double duration = o.duration > 0 ? o.duration : reference.duration() + o.hold;
   const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
   const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
-  MotionRecorder recorder(model, (ticks + ticks_per_row - 1) / ticks_per_row);
+  MotionRecorder recorder(world, (ticks + ticks_per_row - 1) / ticks_per_row);
+  Execution& happened = recorder.happened;
 
-  Execution out;
-  Perception perception(plan.model(), o.perception);
+  Perception perception(reference.model(), plan.schedule, sensors);
   TorqueDelay delay(model.nu(), o.control_period, o.delay);
   VectorXd u = VectorXd::Zero(model.nu());
   Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
-  plan.getReference(0, measurement.q, measurement.v);
-  if (model.isCopyOf(plan.model())) {
+  reference.getReference(0, measurement.q, measurement.v);
+  if (model.isCopyOf(reference.model())) {
     world.reset(measurement.q, measurement.v);
   } else {
-    const VectorXd q = assembleMachine(plan.model(), model, measurement.q);
+    const VectorXd q = assembleMachine(reference.model(), model, measurement.q);
     Workspace ws(model);
     world.reset(q, projectVelocity(model, ws, makeConstraintSet(model), q, measurement.v));
   }
-  FallDetector detector(model, plan, world.configuration(), o.fall, o.ground, o.planned_ground);
+  FallDetector detector(model, reference, world.configuration(), o.fall, world.ground(), plan.ground);
   perception.reset(world, measurement.q, measurement.v);
-  out.start = out.end = world.books();
-  out.update_seconds.reserve(static_cast<size_t>(ticks));
-  recorder.addNode(world, controller.footholds());
-  const Vector3d com_start = recorder.com();
+  happened.update_seconds.reserve(static_cast<size_t>(ticks));
+  recorder.addNode(controller.footholds());
   int cut = 0, tick = 0;
-  double exchanged = 0;
   bool advances = true, is_stopped = false;
   std::string fall;
   const Pace pace;
   const auto describe = [&](double since) {
-    Execution so_far = out;
-    so_far.outcome = Outcome::Running;
-    so_far.duration = world.time();
-    so_far.distance = (recorder.com() - com_start).head<2>().norm();
-    so_far.imbalance = calcImbalance(so_far.start, so_far.end);
-    so_far.energy_balance = exchanged > 0 ? so_far.imbalance / exchanged : 0;
+    Execution so_far = recorder.describe(since);
+    so_far.distance = recorder.way().head<2>().norm();
     so_far.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
     so_far.whole_seconds = pace.elapsed();
     so_far.estimation = perception.errors();
-    so_far.record = recorder.getRecord(since);
     return so_far;
   };
   for (; tick < ticks && !is_stopped && fall.empty(); ++tick) {
-    if (o.real_time) out.largest_lag = std::max(out.largest_lag, pace.await(world.time()));
+    if (o.real_time) happened.largest_lag = std::max(happened.largest_lag, pace.await(world.time()));
     const double start = pace.elapsed();
     measurement = perception.update(world, controller.getPlanTime(world.time()));
     measurement.delay = o.delay.delay;
     const double perceived = pace.elapsed();
     controller.update(measurement, u);
-    out.update_seconds.push_back(pace.elapsed() - perceived);
+    happened.update_seconds.push_back(pace.elapsed() - perceived);
     delay.send(measurement.time, u);
     world.setPush(calcPush(o.pushes, measurement.time));
     const double controlled = pace.elapsed();
     advances = advance(world, delay, measurement.time, o.control_period);
-    out.control_seconds += controlled - start;
-    out.world_seconds += pace.elapsed() - controlled;
+    happened.control_seconds += controlled - start;
+    recorder.noteAdvance(pace.elapsed() - controlled);
     is_stopped = o.interrupt && *o.interrupt;
     for (int m = 0; m < model.nu(); ++m) cut += delay.acting()[m] != world.torques()[m];
-    for (const FootReport& foot : world.feet()) out.largest_slip = std::max(out.largest_slip, foot.slip);
-    out.largest_gap = std::max(out.largest_gap, world.gap());
     if (!world.message().empty()) break;
-    if (tick % ticks_per_row == 0) recorder.addStage(world);
+    if (tick % ticks_per_row == 0) recorder.addStage();
     fall = detector.find(world.time(), controller.getPlanTime(world.time()), world.configuration());
-    out.largest_deviation = std::max(out.largest_deviation, detector.deviation());
-    out.largest_joint_deviation = std::max(out.largest_joint_deviation, detector.jointDeviation());
+    happened.largest_deviation = std::max(happened.largest_deviation, detector.deviation());
+    happened.largest_joint_deviation = std::max(happened.largest_joint_deviation, detector.jointDeviation());
     if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && !is_stopped && fall.empty()) continue;
-    recorder.addNode(world, controller.footholds());
-    const Books books = world.books();
-    exchanged += calcExchange(out.end, books);
-    out.end = books;
+    recorder.addNode(controller.footholds());
     if (observer && !is_stopped && fall.empty() && tick + 1 < ticks) observer(world.time(), duration, describe);
   }
-  out = describe(0);
+  Execution out = describe(0);
   const bool breaks = !world.message().empty();
   out.outcome = breaks                      ? Outcome::BrokeOff
                 : !fall.empty()             ? Outcome::Fell
                 : advances && tick == ticks ? Outcome::Stood
                                             : Outcome::Stopped;
-  out.message = breaks ? describeBreak(model, world) : fall;
+  out.message = breaks ? describeBreak(world) : fall;
   return out;
 }
 

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "bielle/control/policy.h"
 #include "bielle/motion/record.h"
 #include "bielle/worlds/world.h"
 #include "worlds/fall_detector.h"
 #include "worlds/perception.h"
+#include "worlds/plan.h"
 #include "worlds/torque_delay.h"
 
 namespace bielle::worlds {
@@ -29,11 +29,9 @@ struct ExecutionOptions {
   double record_period = 5e-3;   ///< s
   /// Each instant of control awaits its time on the clock: for controllers that work beside the world.
   bool real_time = false;
-  PerceptionOptions perception;  ///< what the controller is told
   DelayOptions delay;
   std::vector<Push> pushes;
   FallCriterion fall;
-  Ground ground, planned_ground;  ///< of the world; that the plan was made for
   /// Ends the motion where it is, as WorldOptions::interrupt does within a period of control.
   const std::atomic<bool>* interrupt = nullptr;
 };
@@ -74,12 +72,11 @@ using ExecutionObserver = std::function<void(double time, double duration, const
 
 /// The force of all pushes at an instant [s], N (world).
 Vector3d calcPush(const std::vector<Push>& pushes, double time);
-/// Energy that motors, pushes and losses have moved between two instants, J.
-double calcExchange(const Books& before, const Books& now);
 
-/// From the state in which the policy starts.
-/// \param model  of the world's robot; that of the policy may differ from it in its dimensions (robot_errors.h)
-Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
-                  const ExecutionOptions& options = {}, const ExecutionObserver& observer = {});
+/// From the state in which the plan starts.
+/// \param controller  for the robot of the plan, from which that of the world may differ in its dimensions (robot_errors.h)
+/// \param sensors  what the controller is told
+Execution carryOut(const Plan& plan, Controller& controller, World& world, const PerceptionOptions& sensors = {},
+                   const ExecutionOptions& options = {}, const ExecutionObserver& observer = {});
 
 }  // namespace bielle::worlds

@@ -38,68 +38,50 @@ VectorXd findTorques(const std::vector<TimedTorques>& torques, double time, int 
 
 }  // namespace
 
-FreeMotion moveFreely(const Model& model, World& world, ConstVectorRef q, ConstVectorRef v,
-                      const FreeMotionOptions& options, const ExecutionObserver& observer) {
+FreeMotion moveFreely(World& world, ConstVectorRef q, ConstVectorRef v, const FreeMotionOptions& options,
+                      const ExecutionObserver& observer) {
   using Clock = std::chrono::steady_clock;
+  const auto getSeconds = [](Clock::time_point since) {
+    return std::chrono::duration<double>(Clock::now() - since).count();
+  };
   const int rows = std::max(1, static_cast<int>(std::ceil(options.duration / options.record_period - kClockTolerance)));
-  MotionRecorder recorder(model, rows);
-  FreeMotion out;
-  Execution& e = out.execution;
+  MotionRecorder recorder(world, rows);
   const Clock::time_point start = Clock::now();
   world.reset(q, v);
-  e.start = e.end = world.books();
-  out.books.push_back(e.start);
-  recorder.addNode(world);
-  int row = 0;
-  double next_row = options.record_period, exchanged = 0;
-  bool has_stage = false;
+  recorder.addNode();
   const auto describe = [&](double since) {
-    Execution so_far = e;
-    so_far.outcome = Outcome::Running;
-    so_far.duration = world.time();
-    so_far.imbalance = calcImbalance(e.start, e.end);
-    so_far.energy_balance = exchanged > 0 ? so_far.imbalance / exchanged : 0;
-    so_far.whole_seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    so_far.record = recorder.getRecord(since);
+    Execution so_far = recorder.describe(since);
+    so_far.whole_seconds = getSeconds(start);
     return so_far;
   };
-  bool advances = world.message().empty();
-  const auto addRow = [&] {
-    recorder.addNode(world);
-    const Books books = world.books();
-    exchanged += calcExchange(e.end, books);
-    e.end = books;
-    out.books.push_back(books);
-    has_stage = false;
-    ++row;
-  };
+  double next_row = options.record_period;
+  bool has_stage = false, advances = world.message().empty();
   for (double instant : listInstants(options, rows)) {
     if (!advances) break;
-    world.setTorques(findTorques(options.torques, world.time(), model.nu()));
+    world.setTorques(findTorques(options.torques, world.time(), world.model().nu()));
     world.setPush(calcPush(options.pushes, world.time() + kClockTolerance));
     if (!has_stage) {
-      recorder.addStage(world);
-      recorder.addClosureForces(world);
+      recorder.addStage();
+      recorder.addClosureForces();
       has_stage = true;
     }
     const Clock::time_point before = Clock::now();
     advances = world.advance(instant - world.time());
-    e.world_seconds += std::chrono::duration<double>(Clock::now() - before).count();
-    e.largest_gap = std::max(e.largest_gap, world.gap());
-    for (const FootReport& foot : world.feet()) e.largest_slip = std::max(e.largest_slip, foot.slip);
+    recorder.noteAdvance(getSeconds(before));
     const bool is_end = instant >= options.duration - kClockTolerance;
     if (instant < next_row - kClockTolerance && !is_end && advances) continue;
     next_row += options.record_period;
-    addRow();
+    recorder.addNode();
+    has_stage = false;
     if (observer && advances && !is_end) observer(world.time(), options.duration, describe);
   }
-  if (row == 0) {  // a record has a stage at least
-    recorder.addStage(world);
-    addRow();
+  if (recorder.numNodes() == 1) {  // a record has a stage at least
+    recorder.addStage();
+    recorder.addNode();
   }
-  e = describe(0);
-  e.outcome = !world.message().empty() ? Outcome::BrokeOff : advances ? Outcome::Ended : Outcome::Stopped;
-  e.message = world.message();
+  FreeMotion out{describe(0), recorder.books()};
+  out.execution.outcome = !world.message().empty() ? Outcome::BrokeOff : advances ? Outcome::Ended : Outcome::Stopped;
+  out.execution.message = world.message();
   return out;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 /// \file A mechanism that moves by itself: from a state, under given torques, without a plan, a controller or feet.
-#include <atomic>
 #include <vector>
 
 #include "worlds/execution.h"
@@ -18,7 +17,6 @@ struct FreeMotionOptions {
   double record_period = 0.01;        ///< s
   std::vector<TimedTorques> torques;  ///< in order of time; before the first, none
   std::vector<Push> pushes;
-  const std::atomic<bool>* interrupt = nullptr;
 };
 
 struct FreeMotion {
@@ -28,8 +26,8 @@ struct FreeMotion {
 
 /// Moves a world from a closed state. Steps end where torques and pushes change.
 /// \param observer  is called after every row of the record
-FreeMotion moveFreely(const Model& model, World& world, ConstVectorRef q, ConstVectorRef v,
-                      const FreeMotionOptions& options, const ExecutionObserver& observer = {});
+FreeMotion moveFreely(World& world, ConstVectorRef q, ConstVectorRef v, const FreeMotionOptions& options,
+                      const ExecutionObserver& observer = {});
 
 /// A spring and damper that hold a motor at a coordinate.
 struct MotorSpring {

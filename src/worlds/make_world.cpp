@@ -16,11 +16,7 @@ struct Entry {
 };
 
 const Entry kWorlds[] = {
-    {"bielle",
-     [](const Model& model, const WorldOptions& options) {
-       if (options.tolerance > 0) return makeManifoldWorld(model, {options, {}, options.tolerance});
-       return makeBielleWorld(model, {options, {}});
-     }},
+    {"bielle", makeOwnWorld},
 #ifdef BIELLE_WITH_MUJOCO
     {"mujoco",
      [](const Model& model, const WorldOptions& options) {

@@ -9,7 +9,7 @@ namespace bielle::worlds {
 /// Names for makeWorld(): those that were built.
 std::vector<std::string> listWorlds();
 
-/// "bielle" is the world with fixed steps or, with a tolerance, the one with steps of controlled error (makeManifoldWorld()).
+/// "bielle": makeOwnWorld().
 /// \throws InputError when there is no world of this name, or it cannot carry the robot
 std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options = {});
 

@@ -284,4 +284,9 @@ std::unique_ptr<World> makeManifoldWorld(const Model& model, const ManifoldWorld
   return std::make_unique<ManifoldWorld>(model, options);
 }
 
+std::unique_ptr<World> makeOwnWorld(const Model& model, const WorldOptions& options) {
+  if (options.tolerance > 0) return makeManifoldWorld(model, {options, {}, options.tolerance});
+  return makeBielleWorld(model, {options, {}});
+}
+
 }  // namespace bielle::worlds

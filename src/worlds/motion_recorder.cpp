@@ -1,6 +1,7 @@
 #include "worlds/motion_recorder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "bielle/dynamics/closure.h"
@@ -13,6 +14,13 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
+// Energy that motors, pushes and losses have moved between two instants, J.
+double calcExchange(const Books& before, const Books& now) {
+  return std::abs(now.motor_work - before.motor_work) + std::abs(now.push_work - before.push_work) +
+         std::abs(now.contact_loss - before.contact_loss) + std::abs(now.stop_loss - before.stop_loss) +
+         std::abs(now.other_loss - before.other_loss);
+}
+
 bool isWithinStops(const Model& model, const VectorXd& q) {
   for (const Joint& joint : model.joints())
     if (joint.nv == 1 &&
@@ -23,19 +31,19 @@ bool isWithinStops(const Model& model, const VectorXd& q) {
 
 }  // namespace
 
-MotionRecorder::MotionRecorder(const Model& model, int stages)
-    : model_(model), loops_(makeConstraintSet(model)), ws_(model) {
-  record_.q_names = makePositionNames(model);
-  record_.v_names = makeVelocityNames(model);
-  record_.u_names = getNames(model.motors());
-  record_.closure_names = getNames(model.closures());
-  record_.contact_names = getNames(model.contacts());
+MotionRecorder::MotionRecorder(const World& world, int stages)
+    : world_(world), model_(world_.model()), loops_(makeConstraintSet(model_)), ws_(model_) {
+  record_.q_names = makePositionNames(model_);
+  record_.v_names = makeVelocityNames(model_);
+  record_.u_names = getNames(model_.motors());
+  record_.closure_names = getNames(model_.closures());
+  record_.contact_names = getNames(model_.contacts());
   resizeRecord(stages, record_);
 }
 
-void MotionRecorder::addNode(const World& world, const std::vector<PredictedFoothold>& footholds) {
-  const VectorXd &q = world.configuration(), &v = world.velocity();
-  record_.time[node_] = world.time();
+void MotionRecorder::addNode(const std::vector<PredictedFoothold>& footholds) {
+  const VectorXd &q = world_.configuration(), &v = world_.velocity();
+  record_.time[node_] = world_.time();
   record_.q.row(node_) = q;
   record_.v.row(node_) = v;
   updatePositions(model_, ws_, q);
@@ -51,29 +59,49 @@ void MotionRecorder::addNode(const World& world, const std::vector<PredictedFoot
         (record_.v.row(node_) - record_.v.row(node_ - 1)) / (record_.time[node_] - record_.time[node_ - 1]);
   addFootholds(footholds);
   ++node_;
+  books_.push_back(world_.books());
+  if (node_ > 1) exchanged_ += calcExchange(books_[books_.size() - 2], books_.back());
 }
 
-void MotionRecorder::addStage(const World& world) {
+void MotionRecorder::addStage() {
   const int stage = node_ - 1;
-  record_.u.row(stage) = world.torques();
+  record_.u.row(stage) = world_.torques();
   record_.closure_wrenches.row(stage).setConstant(kUnknown);
-  for (size_t c = 0; c < world.feet().size(); ++c)
-    record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world.feet()[c].wrench;
+  for (size_t c = 0; c < world_.feet().size(); ++c)
+    record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world_.feet()[c].wrench;
 }
 
-void MotionRecorder::addClosureForces(const World& world) {
+void MotionRecorder::addClosureForces() {
   const int stage = node_ - 1;
   if (loops_.rows == 0 || !record_.contact_wrenches.row(stage).isZero(0) ||
-      !isWithinStops(model_, world.configuration()))
+      !isWithinStops(model_, world_.configuration()))
     return;
-  if (updateConstrainedDynamics(model_, ws_, cws_, loops_, world.configuration(), world.velocity(),
-                                calcMotorForces(model_, world.torques())) != NumericalStatus::Ok)
+  if (updateConstrainedDynamics(model_, ws_, cws_, loops_, world_.configuration(), world_.velocity(),
+                                calcMotorForces(model_, world_.torques())) != NumericalStatus::Ok)
     return;
   for (size_t c = 0; c < loops_.closures.size(); ++c) {
     const Closure& closure = loops_.closures[c];
     record_.closure_wrenches.block<1, 6>(stage, 6 * static_cast<Eigen::Index>(c)) =
         expandRows(closure, cws_.lambda.segment(loops_.offsets[c], getRows(closure.kind))).transpose();
   }
+}
+
+void MotionRecorder::noteAdvance(double seconds) {
+  happened.world_seconds += seconds;
+  happened.largest_gap = std::max(happened.largest_gap, world_.gap());
+  for (const FootReport& foot : world_.feet()) happened.largest_slip = std::max(happened.largest_slip, foot.slip);
+}
+
+Execution MotionRecorder::describe(double since) const {
+  Execution out = happened;
+  out.outcome = Outcome::Running;
+  out.duration = world_.time();
+  out.start = books_.front();
+  out.end = books_.back();
+  out.imbalance = calcImbalance(out.start, out.end);
+  out.energy_balance = exchanged_ > 0 ? out.imbalance / exchanged_ : 0;
+  out.record = getRecord(since);
+  return out;
 }
 
 MotionRecord MotionRecorder::getRecord(double since) const {

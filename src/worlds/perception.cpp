@@ -21,11 +21,11 @@ EstimatorOptions withImu(EstimatorOptions options, const SE3& imu) {
 
 }  // namespace
 
-Perception::Perception(const Model& model, const PerceptionOptions& options)
+Perception::Perception(const Model& model, const ContactSchedule& planned, const PerceptionOptions& options)
     : model_(model),
       measurement_{0, model.makeNeutral(), VectorXd::Zero(model.nv()), std::vector<char>(model.contacts().size(), 0)} {
   double end = 0;
-  for (const ContactPhase& phase : options.planned.phases) {
+  for (const ContactPhase& phase : planned.phases) {
     if (phase.dt == 0) continue;
     end += phase.nodes * phase.dt;
     periods_.push_back({end, {}});

@@ -8,9 +8,8 @@
 namespace bielle::worlds {
 
 struct PerceptionOptions {
-  std::optional<SensorOptions> sensors;  ///< empty: the truth
-  EstimatorOptions estimator;            ///< `imu` is that of the sensors
-  ContactSchedule planned;               ///< tells the estimator where contacts are expected; empty: nothing
+  std::optional<SensorOptions> sensors{};  ///< empty: the truth
+  EstimatorOptions estimator{};            ///< `imu` is that of the sensors
 };
 
 /// Errors of an estimate over all instants. The truth goes nowhere else.
@@ -25,15 +24,14 @@ struct EstimationErrors {
 
 class Perception {
  public:
-  /// \param model  that the controller believes in
-  Perception(const Model& model, const PerceptionOptions& options);
+  /// \param model  that the controller believes in   \param planned  tells the estimator where contacts are expected; empty: nothing
+  Perception(const Model& model, const ContactSchedule& planned, const PerceptionOptions& options);
 
   /// From the state in which the world is. The estimator starts from q and v (nq, nv), where the plan does; the robot has stood
   /// there for two seconds, from which offsets of the IMU are known.
   void reset(const World& world, ConstVectorRef q, ConstVectorRef v);
   /// At the time of the world. No allocation. \param plan_time  at which the controller is in its plan, s
   const Measurement& update(const World& world, double plan_time);
-  bool isReal() const { return sensors_.has_value(); }
   EstimationErrors errors() const;  ///< zero where the truth is known
 
  private:

@@ -4,11 +4,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "bielle/dynamics/ball_cuts.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/solve.h"
 #include "bielle/robots/robot_loader.h"
-#include "control/restricted_controller.h"
 #include "motion/applied_options.h"
 #include "results/interrupt.h"
 #include "results/remade_motion.h"
@@ -16,12 +14,9 @@
 namespace bielle::worlds {
 namespace {
 
-// Of predictive control. Feet may land elsewhere than planned, on steps a little; wrenches keep away from the edges of the
-// cones, since feedback and errors of the model add to what is planned.
+constexpr int kMaxIterations = 200;                                 // more than a motion takes from its own solution
 constexpr double kFootholdRoom = 0.4, kFootholdRoomOnSteps = 0.02;  // m
 constexpr double kFeedbackMargin = 0.2;
-constexpr double kStopShare = 0.5;   // of the margin to dead points that the plan keeps
-constexpr int kMaxIterations = 200;  // more than a motion takes from its own solution
 
 // Sets an option of a motion, or of the parts of a sequence, where it has one.
 void setWherePresent(const std::string& name, double value, OptionSet& options) {
@@ -30,14 +25,6 @@ void setWherePresent(const std::string& name, double value, OptionSet& options) 
                       option.compare(option.size() - name.size() - 1, std::string::npos, "." + name) == 0;
     if (option == name || ends) options.set(option, value);
   }
-}
-
-// Feet stand where they landed, wherever that is, and land where they must.
-MotionRequest freeFeet(const Ground& ground, MotionRequest request) {
-  setWherePresent("contact_kp", 0, request.options);
-  setWherePresent("foothold_room", ground.steps.empty() ? kFootholdRoom : kFootholdRoomOnSteps, request.options);
-  setWherePresent("cone_margin", kFeedbackMargin, request.options);
-  return request;
 }
 
 LoadedRobot loadRobotOf(const MotionSummary& summary) {
@@ -96,25 +83,21 @@ MotionRequest fixDurations(const MotionSummary& summary, MotionRequest request) 
   return request;
 }
 
-// In states of a model that has fewer joints.
-ShootingTrajectory restrictTrajectory(const Model& from, const Model& model, ShootingTrajectory trajectory) {
-  for (VectorXd& x : trajectory.xs) {
-    const VectorXd all = x;
-    x.resize(model.nq() + model.nv());
-    x << restrictConfiguration(from, model, all.head(from.nq())), restrictVelocity(from, model, all.tail(from.nv()));
-  }
-  return trajectory;
+// The serial model of a summary that believes in it, which names its armature.
+std::optional<SerialModel> makeSerial(const Model& closed, const MotionSummary& summary, Belief belief) {
+  if (belief == Belief::Closed) return {};
+  return makeSerialModel(closed, makeStandingPosture(closed), parseSerialArmature(summary.run.serial_armature));
 }
 
-// A plan with robot and summary, from its request. `guess`: directory of a solution, or empty.
-void finishPlan(const MotionRequest& request, const std::string& guess, PlanControl control,
-                const PredictiveOptions& predictive, Plan& plan) {
-  const MotionSummary& summary = plan.summary;
-  const Model& model = plan.model();
+// A plan from its request. `guess`: directory of a solution, or empty.
+Plan finishPlan(const LoadedRobot& robot, MotionSummary summary, Belief belief, const MotionRequest& request,
+                const std::string& guess, const ControlOptions& options) {
+  const PlanControl control = options.control;
+  std::optional<SerialModel> serial = makeSerial(robot.model, summary, belief);
   ProblemOptions problem(summary.formulation, summary.step);
   problem.limits = readLimits(summary);
   problem.objective = summary.objective;
-  const Motion motion = makeMotion(model, fixDurations(summary, request), problem);
+  const Motion motion = makeMotion(serial ? serial->model : robot.model, fixDurations(summary, request), problem);
   Solution solution{motion, {}, {}};
   if (!guess.empty()) solution.trajectory = makeStart(readResultRecord(guess), motion).trajectory;
   // A solution in the files is only solved again for its gains; predictive control has its own.
@@ -123,49 +106,28 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
   if (!is_open || !is_known) checkControl(summary, control);
   if (guess.empty()) {
     solution = solveUnlessInterrupted(motion, {});
-    plan.summary.options = solution.motion.options;  // maybe in shorter stages
+    summary.options = solution.motion.options;  // maybe in shorter stages
   }
-  if (!is_known) solution = solveForGains(summary.file, solution.motion, solution.trajectory, plan.iterations);
-  plan.ground = solution.motion.ground;
+  int iterations = 0;
+  if (!is_known) solution = solveForGains(summary.file, solution.motion, solution.trajectory, iterations);
+  Plan plan{control == PlanControl::Gains ? makePolicy(solution) : makePolicy(solution.motion, solution.trajectory)};
+  plan.policy.setLookAhead(options.predictive.look_ahead);
   plan.schedule = solution.motion.schedule;
+  plan.ground = solution.motion.ground;
   plan.goals = solution.motion.goals;
-  plan.policy = std::make_unique<Policy>(
-      control == PlanControl::Gains ? makePolicy(solution) : makePolicy(solution.motion, solution.trajectory));
-  if (control != PlanControl::Predictive) return;
-  problem = solution.motion.problem_options;
-  const MotionRequest freed = freeFeet(plan.ground, *solution.motion.request);
-  // A plan may be closer to a dead point than motors would let it come, or start from one: without a margin there is no stop.
-  PredictiveOptions stopping = predictive;
-  stopping.dead_point_stop = std::min(stopping.dead_point_stop, kStopShare * problem.limits.dead_point_margin);
-  const Model cut = plan.serial ? model : cutAtBalls(model);
-  const VectorXd q0 = restrictConfiguration(model, cut, motion.problem->initialState().head(model.nq()));
-  plan.predictive = std::make_unique<PredictiveController>(
-      makePredictiveMotion(cut, freed.plan(cut, makeStandingRobot(cut, q0)), problem, stopping),
-      restrictTrajectory(model, cut, solution.trajectory), stopping);
-  adaptPredictive(cut, plan);
+  plan.robot = robot;
+  plan.summary = std::move(summary);
+  plan.belief = belief;
+  if (serial) plan.lifted = makeReference(robot.model, *serial, plan.policy, belief);
+  plan.serial = std::move(serial);
+  plan.solution = std::move(solution);
+  plan.iterations = iterations;
+  return plan;
 }
 
 void setModel(Belief belief, MotionSummary& summary) {
-  summary.run.model = belief == Belief::Closed ? "closed" : "serial";
+  summary.run.model = belief == Belief::Closed ? Belief::Closed : Belief::Serial;
   summary.run.serial_armature = belief == Belief::Ratio ? "reflected" : "";
-}
-
-// The serial model of a plan that believes in it. Summaries name its armature.
-void makeBelief(Belief belief, Plan& plan) {
-  plan.belief = belief;
-  if (belief == Belief::Closed) return;
-  const Model& closed = plan.robot.model;
-  const std::string& armature = plan.summary.run.serial_armature;
-  plan.serial = std::make_unique<SerialModel>(
-      makeSerialModel(closed, makeStandingPosture(closed), parseSerialArmature(armature)));
-}
-
-// The controller of the serial model made one of the closed robot.
-void finishBelief(Plan& plan) {
-  if (!plan.serial) return;
-  Controller& inner = plan.predictive ? static_cast<Controller&>(*plan.predictive) : *plan.policy;
-  plan.reference = makeReference(plan.robot.model, *plan.serial, *plan.policy, plan.belief);
-  plan.adapter = std::make_unique<SerialController>(plan.robot.model, *plan.serial, inner, plan.belief);
 }
 
 // As many steps as there is time for.
@@ -179,54 +141,39 @@ void chooseSteps(double duration, OptionSet& options) {
 
 }  // namespace
 
-void adaptPredictive(const Model& cut, Plan& plan) {
-  if (!cut.isCopyOf(plan.model()))
-    plan.adapter = std::make_unique<RestrictedController>(plan.model(), cut, *plan.predictive);
+void freeFeet(const Ground& ground, OptionSet& options) {
+  setWherePresent("contact_kp", 0, options);
+  setWherePresent("foothold_room", ground.steps.empty() ? kFootholdRoom : kFootholdRoomOnSteps, options);
+  setWherePresent("cone_margin", kFeedbackMargin, options);
 }
 
 void requireNoInterrupt() {
   if (isInterrupted()) throw InterruptedPlan();
 }
 
-std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control, const PredictiveOptions& predictive,
-                               std::optional<Belief> belief) {
-  auto plan = std::make_unique<Plan>();
-  plan->summary = readSummary(directory);
-  const MotionSummary& summary = plan->summary;
-  const bool serial = summary.run.model == "serial";
-  const Belief believed = belief.value_or(serial ? Belief::Serial : Belief::Closed);
-  const bool other = serial != (believed != Belief::Closed);
-  if (other) setModel(believed, plan->summary);
-  plan->robot = loadRobotOf(summary);
-  makeBelief(believed, *plan);
-  finishPlan(remakeRequest(summary), other ? "" : directory, control, predictive, *plan);
-  finishBelief(*plan);
-  return plan;
+Plan readPlan(const std::string& directory, const ControlOptions& control, std::optional<Belief> belief) {
+  MotionSummary summary = readSummary(directory);
+  const bool is_serial = summary.run.model != Belief::Closed;
+  const Belief believed = belief.value_or(summary.run.model);
+  const bool is_other = is_serial != (believed != Belief::Closed);
+  if (is_other) setModel(believed, summary);
+  return finishPlan(loadRobotOf(summary), summary, believed, remakeRequest(summary), is_other ? "" : directory,
+                    control);
 }
 
-std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control, const PredictiveOptions& predictive) {
-  auto plan = std::make_unique<Plan>();
+Plan makePlan(const PlanRequest& request, const ControlOptions& control) {
   MotionRequest motion = findMotion("", request.motion).request;
   if (motion.options.find("steps")) chooseSteps(request.duration, motion.options);
   for (const auto& [name, value] : request.settings) motion.options.set(name, value);
-  plan->robot = loadRobot(request.robot);
-  MotionSummary& summary = plan->summary;
+  const LoadedRobot robot = loadRobot(request.robot);
+  MotionSummary summary;
   summary.motion = request.motion;
-  summary.run = {request.robot, plan->robot.file, {}};
+  summary.run = {request.robot, robot.file, {}};
   setModel(request.belief, summary);
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;
   summary.options = motion.options.listValues();
-  makeBelief(request.belief, *plan);
-  finishPlan(motion, "", control, predictive, *plan);
-  finishBelief(*plan);
-  return plan;
-}
-
-void freeFeet(LocomotionOptions& options) {
-  options.contact_kp = 0;
-  options.foothold_room = kFootholdRoom;
-  options.cone_margin = kFeedbackMargin;
+  return finishPlan(robot, summary, request.belief, motion, "", control);
 }
 
 }  // namespace bielle::worlds

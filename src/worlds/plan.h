@@ -1,5 +1,5 @@
 #pragma once
-/// \file A motion ready to be carried out: read from its files, or solved on the spot.
+/// \file A motion ready to be carried out: read from its files, or solved on the spot; and the controller that carries it out.
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -13,25 +13,30 @@
 namespace bielle::worlds {
 
 enum class PlanControl {
-  Open,       ///< the torques of the files
-  Gains,      ///< and the gains of the solver's last sweep
-  Predictive  ///< predictive control along the motion
+  Predictive,  ///< predictive control along the plan
+  Gains,       ///< the torques of the plan, and the gains of the solver's last sweep
+  Open         ///< the torques of the plan
 };
 
-/// The policies refer to the models: a plan stays where it was made.
+struct ControlOptions {
+  PlanControl control = PlanControl::Predictive;
+  PredictiveOptions predictive;  ///< its look_ahead is that of gains, too (Policy::setLookAhead)
+};
+
+/// What is to be carried out, and what it was planned for.
 struct Plan {
-  LoadedRobot robot;
-  MotionSummary summary;
-  Ground ground;  ///< that the motion was planned for
-  ContactSchedule schedule;
-  std::vector<Goal> goals;             ///< of the plan
-  std::vector<TimedCommand> commands;  ///< of a walk by command
+  Policy policy;  ///< of the model that is believed in; with gains, if they are wanted
+  ContactSchedule schedule{};
+  Ground ground{};
+  std::vector<Goal> goals{};
+  LoadedRobot robot{};
+  MotionSummary summary{};
   Belief belief = Belief::Closed;
-  std::unique_ptr<SerialModel> serial;               ///< null for Belief::Closed
-  std::unique_ptr<Policy> policy;                    ///< of the model that is believed in
-  std::unique_ptr<PredictiveController> predictive;  ///< of the same, cut at its balls (dynamics/ball_cuts.h), or null
-  SerialReference reference;                         ///< empty for Belief::Closed
-  std::unique_ptr<Controller> adapter;               ///< of a controller whose model is not the robot's, or null
+  std::optional<SerialModel> serial{};   ///< none for Belief::Closed
+  SerialReference lifted{};              ///< the plan of the serial model as one of the robot; empty for Belief::Closed
+  std::optional<Solution> solution{};    ///< of the policy; none for a walk by command
+  std::optional<CommandedWalk> walk{};   ///< by command: of the robot cut at its balls, before its first stage
+  std::vector<TimedCommand> commands{};  ///< of that walk
   int iterations = 0;  ///< that the solver took for the gains; 0: the motion in the files was its solution
 
   /// Of the model that is believed in.
@@ -39,14 +44,10 @@ struct Plan {
   /// When a node of the plan comes, s.
   double getTime(int node) const {
     const size_t k = static_cast<size_t>(node);
-    return k < policy->stages().size() ? policy->stages()[k].start : policy->duration();
+    return k < policy.stages().size() ? policy.stages()[k].start : policy.duration();
   }
   /// The plan in states of the closed robot.
-  const Policy& getReference() const { return reference.policy ? *reference.policy : *policy; }
-  Controller& getController() {
-    if (adapter) return *adapter;
-    return predictive ? static_cast<Controller&>(*predictive) : *policy;
-  }
+  const Policy& reference() const { return lifted.policy ? *lifted.policy : policy; }
 };
 
 /// Ctrl-C (results/interrupt.h) came before the motion began.
@@ -60,8 +61,7 @@ void requireNoInterrupt();
 /// hold them; for predictive control only if that has not converged.
 /// \param belief  what the controller takes the robot for; empty: the model of the motion, which is solved anew for another
 /// \throws InterruptedPlan, as makePlan() does; InputError when the files cannot be read, the motion does not converge, or has the least peak torque or the full formulation, and gains or predictive control are wanted that need others
-std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control,
-                               const PredictiveOptions& predictive = {}, std::optional<Belief> belief = {});
+Plan readPlan(const std::string& directory, const ControlOptions& control, std::optional<Belief> belief = {});
 
 /// A motion by its name (`bielle solve`), solved when it is carried out.
 struct PlanRequest {
@@ -71,14 +71,26 @@ struct PlanRequest {
   Belief belief = Belief::Closed;
 };
 /// \throws InputError when robot, motion or an option do not exist, or it does not converge
-std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control,
-                               const PredictiveOptions& predictive = {});
+Plan makePlan(const PlanRequest& request, const ControlOptions& control);
 
-/// Makes the plan's predictive controller, whose model this is, one of the plan's model.
-void adaptPredictive(const Model& cut, Plan& plan);
+/// A walk that follows a file of commands, made while it is carried out: there is only predictive control. Its policy is the
+/// standing posture, moved along the path that the commands foresee, with the ground and the contacts of that path.
+/// \param request  of the motion 'walk'; its settings are those of locomotion.h   \param file  of commands (motion/commanded_walk.h)
+/// \throws InputError when the file cannot be read, a command is impossible, the motion is no walk or an option does not exist
+Plan makeCommandedPlan(const PlanRequest& request, const std::string& file);
 
-/// Sets what predictive control wants of steps: feet stand where they landed and may land elsewhere than planned, and wrenches
-/// keep away from the edges of their cones.
-void freeFeet(LocomotionOptions& options);
+/// Sets what predictive control wants of steps, where a motion has the option: feet stand where they landed, and may land
+/// elsewhere than planned, on steps of the ground a little; wrenches keep away from the edges of their cones, since feedback and
+/// errors of the model add to what is planned.
+void freeFeet(const Ground& ground, OptionSet& options);
+
+/// A controller that owns all that it works with.
+struct PlanController {
+  std::unique_ptr<Controller> law;                   ///< of the closed robot
+  const PredictiveController* prediction = nullptr;  ///< the part of it that predicts, or null
+};
+/// \param options  for which the plan was made
+/// \throws InputError as PredictiveController does
+PlanController makeController(const Plan& plan, const ControlOptions& options);
 
 }  // namespace bielle::worlds

@@ -24,37 +24,26 @@ VectorXd calcMotorTorques(const MatrixXd& R, const VectorXd& tau) { return R.tra
 
 }  // namespace
 
-const char* getName(Belief belief) {
-  switch (belief) {
-    case Belief::Closed:
-      return "closed";
-    case Belief::Serial:
-      return "serial";
-    case Belief::Ratio:
-      return "ratio";
-  }
-  return "?";
-}
-
-SerialController::SerialController(const Model& closed, const SerialModel& serial, Controller& inner, Belief belief)
+SerialController::SerialController(const Model& closed, const SerialModel& serial, std::unique_ptr<Controller> inner,
+                                   Belief belief)
     : closed_(closed),
-      serial_(serial.model),
-      inner_(inner),
+      serial_(serial),
+      inner_(std::move(inner)),
       belief_(belief),
-      posture_(std::make_unique<PostureLift>(closed, serial)) {
+      posture_(std::make_unique<PostureLift>(closed_, serial_)) {
   posture_->setClosedConfiguration(serial.q_reference, kSingular);
-  calcRatio(closed_, serial_, *posture_, R_);
+  calcRatio(closed_, serial_.model, *posture_, R_);
 }
 SerialController::~SerialController() = default;
 
 void SerialController::update(const Measurement& measurement, VectorRef u) {
   Measurement believed = measurement;
-  believed.q = restrictConfiguration(closed_, serial_, measurement.q);
-  believed.v = restrictVelocity(closed_, serial_, measurement.v);
-  VectorXd tau(serial_.nu());
-  inner_.update(believed, tau);
+  believed.q = restrictConfiguration(closed_, serial_.model, measurement.q);
+  believed.v = restrictVelocity(closed_, serial_.model, measurement.v);
+  VectorXd tau(serial_.model.nu());
+  inner_->update(believed, tau);
   if (belief_ == Belief::Serial && posture_->setClosedConfiguration(measurement.q, kSingular) == NumericalStatus::Ok)
-    calcRatio(closed_, serial_, *posture_, R_);
+    calcRatio(closed_, serial_.model, *posture_, R_);
   u = calcMotorTorques(R_, tau);
 }
 
@@ -94,7 +83,7 @@ SerialReference makeReference(const Model& closed, const SerialModel& serial, co
     stages.push_back(std::move(stage));
   }
   const VectorXd u_hold = stages.back().u;
-  out.policy = std::make_unique<Policy>(closed, std::move(stages), u_hold);
+  out.policy.emplace(closed, std::move(stages), u_hold);
   return out;
 }
 

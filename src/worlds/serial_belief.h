@@ -10,6 +10,7 @@
 /// no rotors, as in the paper. Belief::Ratio takes R where the robot stands, as if linkages were gears, and the rotors as they
 /// appear at the joints there.
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "bielle/control/controller.h"
@@ -22,24 +23,21 @@ class PostureLift;
 
 namespace bielle::worlds {
 
-/// What a controller takes the robot for.
-enum class Belief { Closed, Serial, Ratio };
-const char* getName(Belief belief);
-
 class SerialController : public Controller {
  public:
-  /// \param serial, inner  must outlive it. `inner` controls the serial model.
-  SerialController(const Model& closed, const SerialModel& serial, Controller& inner, Belief belief);
+  /// \param inner  controls the serial model
+  SerialController(const Model& closed, const SerialModel& serial, std::unique_ptr<Controller> inner, Belief belief);
   ~SerialController() override;
 
   /// Allocates. At a dead point, where Eq. (1) has no solution, R is that of the last posture away from one.
   void update(const Measurement& measurement, VectorRef u) override;
-  double getPlanTime(double time) const override { return inner_.getPlanTime(time); }
-  const std::vector<PredictedFoothold>& footholds() const override { return inner_.footholds(); }
+  double getPlanTime(double time) const override { return inner_->getPlanTime(time); }
+  const std::vector<PredictedFoothold>& footholds() const override { return inner_->footholds(); }
 
  private:
-  const Model &closed_, &serial_;
-  Controller& inner_;
+  const Model closed_;
+  const SerialModel serial_;
+  const std::unique_ptr<Controller> inner_;
   const Belief belief_;
   std::unique_ptr<PostureLift> posture_;
   MatrixXd R_;  // nu x nu
@@ -47,9 +45,9 @@ class SerialController : public Controller {
 
 /// What a plan of the serial model means to the closed robot.
 struct SerialReference {
-  std::unique_ptr<Policy> policy;  ///< without gains: states and torques by Eq. (1)
-  double first_missed = -1;        ///< when linkages first cannot follow, s; negative: they can
-  std::string message;             ///< why not
+  std::optional<Policy> policy;  ///< without gains: states and torques by Eq. (1)
+  double first_missed = -1;      ///< when linkages first cannot follow, s; negative: they can
+  std::string message;           ///< why not
 };
 /// Where linkages cannot follow, they stay as they last could. \param plan  of the serial model
 SerialReference makeReference(const Model& closed, const SerialModel& serial, const Policy& plan, Belief belief);

@@ -41,7 +41,8 @@ int solve(const MotionArguments& arguments, const CommandLine& command, const Ma
   const Motion motion = make(model, makeStandingPosture(model));
   makeOutputDirectory(arguments.directory);
   const Solution solution = bielle::solve(motion);
-  const RunInfo run{arguments.robot, robot.file, command, serial ? "serial" : "closed", serial ? kArmature : ""};
+  const RunInfo run{arguments.robot, robot.file, command, serial ? Belief::Serial : Belief::Closed,
+                    serial ? kArmature : ""};
   const MotionResult result = makeResult(run, solution);
   std::cout << motion.name << " of " << arguments.robot << ": " << getName(solution.summary.termination) << ", "
             << solution.summary.iterations << " iterations, cost " << solution.summary.cost << "\n";
@@ -56,8 +57,8 @@ struct LiftArguments {
 
 int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   const MotionSummary summary = readSummary(arguments.serial_directory);
-  if (summary.motion != "paper-walk" || summary.run.model != "serial")
-    throw InputError(summary.file, "motion '" + summary.motion + "' of the " + summary.run.model + " model",
+  if (summary.motion != "paper-walk" || summary.run.model != Belief::Serial)
+    throw InputError(summary.file, "motion '" + summary.motion + "' of the " + getName(summary.run.model) + " model",
                      "it is not the paper's walk of the serial model", "make one with `bielle-paper walk --serial`");
   WalkOptions walk;
   for (const auto& [name, value] : summary.options)
@@ -72,8 +73,8 @@ int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::optional<MotionResult> result;
   if (!lifted.trajectory.us.empty())
-    result =
-        makeLiftedResult({summary.run.robot, robot.file, command, "closed", ""}, robot.model, motion, lifted, seconds);
+    result = makeLiftedResult({summary.run.robot, robot.file, command, Belief::Closed, ""}, robot.model, motion, lifted,
+                              seconds);
   print(writeLift(arguments.directory, arguments.options.method, lifted, result ? &*result : nullptr));
   return lifted.lifted() ? 0 : 1;
 }

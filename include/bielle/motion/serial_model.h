@@ -25,6 +25,17 @@ struct SerialModelOptions {
   double armature = 1e-3;  ///< kg m^2
 };
 
+/// What a solve or a controller takes a robot for.
+enum class Belief {
+  Closed,  ///< its model
+  Serial,  ///< the serial model
+  Ratio    ///< of controllers: the same, with the constant ratio of motors to joints where the robot stands
+};
+/// As on command lines and in files: "closed", "serial", "ratio".
+const char* getName(Belief belief);
+/// \throws InputError for another name
+Belief parseBelief(const std::string& name);
+
 /// Parses an armature: kg m^2, or "reflected"; empty for the default.
 /// \throws InputError for any other text
 SerialModelOptions parseSerialArmature(const std::string& text);

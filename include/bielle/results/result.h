@@ -6,6 +6,7 @@
 #include "bielle/dynamics/linkage.h"
 #include "bielle/motion/lift.h"
 #include "bielle/motion/record.h"
+#include "bielle/motion/serial_model.h"
 #include "bielle/motion/solve.h"
 
 namespace bielle {
@@ -58,7 +59,7 @@ struct RunInfo {
   std::string robot;                 ///< name or path, as given
   std::string robot_file;            ///< its .urdf, absolute
   std::vector<std::string> command;  ///< the command line, or empty
-  std::string model = "closed";      ///< or "serial": the robot's linkages were frozen (motion/serial_model.h)
+  Belief model = Belief::Closed;     ///< or Serial: the robot's linkages were frozen (motion/serial_model.h)
   std::string serial_armature{};     ///< of the serial model, as requested (parseSerialArmature)
 };
 

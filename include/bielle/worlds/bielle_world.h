@@ -63,4 +63,7 @@ struct ManifoldWorldOptions {
 /// \throws InputError when the robot has no closed configuration
 std::unique_ptr<World> makeManifoldWorld(const Model& model, const ManifoldWorldOptions& options = {});
 
+/// The world with steps of controlled error if a tolerance is given, else the one with fixed steps.
+std::unique_ptr<World> makeOwnWorld(const Model& model, const WorldOptions& options);
+
 }  // namespace bielle::worlds

@@ -5,45 +5,61 @@
 #include <string>
 #include <vector>
 
+#include "bielle/model/options.h"
 #include "worlds/execution.h"
-#include "worlds/plan.h"
 #include "worlds/robot_errors.h"
 
 namespace bielle::worlds {
 
+enum class Sensing { Ideal, Real };
+// As on the command line.
+std::string getName(PlanControl control);
+std::string getName(Sensing sensors);
+
 struct SimulateArguments {
-  std::string directory, output, world = "bielle", terrain = "planned";
-  std::string control;   // empty: chosen for the motion, "mpc" where it can carry it out
-  std::string reason;    // of a choice other than "mpc"; empty: there is none
+  std::string directory, output;
+  // Of the plan.
   std::string robot;     // of a motion that is to be solved; empty: `directory` holds one
   std::string commands;  // file; empty: none
   std::optional<double> speed;
-  std::string model;                  // that the controller believes in; empty: that of the motion
   std::vector<std::string> settings;  // name=value
-  std::vector<std::string> pushes;
+  // Of the world.
+  std::string world = "bielle", terrain = "planned";
   double friction = 0;  // 0: that of the plan
+  double accuracy = 0;  // 0: that of the world
+  double time_step = 0;
+  RobotErrors errors;
+  std::vector<std::string> pushes;
+  unsigned seed = 1;
+  // Of the controller.
+  std::optional<PlanControl> wanted_control;  // none: chosen for the motion, predictive where that can carry it out
+  std::optional<Belief> belief;               // none: in the model of the motion
+  ControlOptions control;
+  double solve_time = 0;  // ms
+  // Of what it is told.
+  Sensing sensors = Sensing::Ideal;
+  PerceptionOptions perception;
+  double noise = 1;
+  std::optional<double> look_ahead;  // ms
+  double delay = 0, jitter = 0;      // ms
   // Of a free motion.
   std::string posture, state, torques;  // name of a reference; files
   std::string push_body;                // link; empty: the first body
   std::vector<std::string> springs;
-  double accuracy = 0;  // 0: that of the world
-  bool has_record_period = false;
-  double time_step = 0;
-  std::string sensors = "ideal";
-  double noise = 1;
-  std::optional<double> look_ahead;  // ms
-  double delay = 0, jitter = 0;      // ms
-  double solve_time = 0;             // ms
-  RobotErrors errors;
-  unsigned seed = 1;
-  bool live = false, no_report = false, summary_only = false, dry_run = false;
+
   ExecutionOptions execution;
-  PredictiveOptions predictive;
+  bool has_record_period = false;
+  bool live = false, no_report = false, summary_only = false, dry_run = false;
 };
+// All but the places of files.
+void describe(OptionFields& fields, SimulateArguments& arguments);
 
 void addOptions(CLI::App& app, SimulateArguments& arguments);
 
-/// Reads pushes and delays, and checks what can be checked without the motion. \throws InputError
+/// The flag of the first of these options that is not as usual.
+std::optional<std::string> findGiven(const SimulateArguments& arguments, const std::vector<std::string>& names);
+
+/// Sets what follows from pushes, delays and sensors, and checks what can be checked without the motion. \throws InputError
 void parseOptions(SimulateArguments& arguments);
 
 /// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01". \throws InputError

@@ -119,23 +119,12 @@ std::vector<std::string> splitWorlds(const std::string& text) {
 }
 
 // What only a plan can use.
-void refuseOptionsOfPlans(const SimulateArguments& a) {
-  const std::pair<bool, const char*> options[] = {{!a.control.empty(), "--control"},
-                                                  {!a.commands.empty(), "--command"},
-                                                  {!a.model.empty(), "--model"},
-                                                  {a.speed.has_value(), "--speed"},
-                                                  {!a.settings.empty(), "--set"},
-                                                  {a.execution.real_time, "--real-time"},
-                                                  {a.sensors != "ideal", "--sensors"},
-                                                  {a.delay != 0, "--delay"},
-                                                  {a.live, "--live"},
-                                                  {a.solve_time != 0, "--solve-time"},
-                                                  {a.errors.mass != 0, "--mass-error"},
-                                                  {a.errors.rod != 0, "--rod-error"}};
-  for (const auto& [is_given, name] : options)
-    if (is_given)
-      throw InputError("", name, "'" + a.directory + "' is a robot without a plan, which moves freely",
-                       "leave it out, or give the directory of a solved motion");
+void refuseOptionsOfPlans(const SimulateArguments& arguments) {
+  const auto flag = findGiven(arguments, {"control", "command", "model", "speed", "set", "real_time", "sensors",
+                                          "delay", "live", "solve_time", "mass_error", "rod_error"});
+  if (flag)
+    throw InputError("", *flag, "'" + arguments.directory + "' is a robot without a plan, which moves freely",
+                     "leave it out, or give the directory of a solved motion");
 }
 
 std::string makeEnergyText(const MotionRecord& record, const std::vector<Books>& books) {
@@ -271,7 +260,6 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   options.record_period = execution.record_period;
   options.torques = readTorques(model, arguments.torques, start.u);
   options.pushes = execution.pushes;
-  options.interrupt = &isInterrupted();
 
   const std::vector<std::string> names = splitWorlds(arguments.world);
   std::vector<FreeRun> runs;
@@ -279,7 +267,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   bool has_ended = true;
   makeOutputDirectory(arguments.output);
   for (const std::string& name : names) {
-    WorldOptions world_options{ground, arguments.time_step, options.interrupt};
+    WorldOptions world_options{ground, arguments.time_step, &isInterrupted()};
     world_options.tolerance = arguments.accuracy > 0 ? arguments.accuracy
                               : name == "simbody"    ? kSimbodyTolerance
                                                      : kOwnTolerance;
@@ -287,10 +275,10 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
     const std::unique_ptr<World> world = makeWorld(name, model, world_options);
     FreeRun run{name, names.size() > 1 ? (fs::path(arguments.output) / name).string() : arguments.output, {}};
     Watch watch{Watch::Show()};
-    run.motion = moveFreely(model, *world, start.q, start.v, options,
-                            [&](double time, double duration, const ExecutionSoFar& so_far) {
-                              if (!arguments.summary_only) watch.update(time, duration, so_far);
-                            });
+    run.motion =
+        moveFreely(*world, start.q, start.v, options, [&](double time, double duration, const ExecutionSoFar& so_far) {
+          if (!arguments.summary_only) watch.update(time, duration, so_far);
+        });
     has_ended = has_ended && run.motion.execution.outcome == Outcome::Ended;
     printRun(run);
     makeOutputDirectory(run.directory);

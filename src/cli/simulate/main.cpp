@@ -1,6 +1,5 @@
 // bielle-simulate: carries a motion out in a world.
 #include <iostream>
-#include <map>
 #include <memory>
 
 #include "bielle/model/error.h"
@@ -13,7 +12,6 @@
 #include "results/output_place.h"
 #include "results/setting.h"
 #include "results/standard_output.h"
-#include "worlds/commanded_plan.h"
 #include "worlds/make_world.h"
 
 using namespace bielle;
@@ -21,71 +19,58 @@ using namespace bielle::worlds;
 
 namespace {
 
-constexpr double kRealLookAhead = 36;  // ms
 constexpr int kStood = 0, kFell = 1, kBadInput = 2;
 
-// Predictive control needs states with closed loops, which other formulations do not have.
-void chooseControl(SimulateArguments& arguments) {
-  if (!arguments.control.empty()) return;
-  arguments.control = "mpc";
-  if (!arguments.robot.empty() || arguments.execution.real_time ||
+// Predictive control needs states with closed loops, which other formulations do not have. Returns why another one is chosen.
+std::string chooseControl(SimulateArguments& arguments) {
+  PlanControl& control = arguments.control.control;
+  control = arguments.wanted_control.value_or(PlanControl::Predictive);
+  if (arguments.wanted_control || !arguments.robot.empty() || arguments.execution.real_time ||
       readSummary(arguments.directory).formulation == Formulation::Reduced)
-    return;
-  arguments.control = "gains";
-  arguments.reason = "mpc cannot carry out motions solved with --formulation full";
+    return "";
+  control = PlanControl::Gains;
+  return "mpc cannot carry out motions solved with --formulation full";
 }
 
 // Options of free motions alone.
 void requirePlan(const SimulateArguments& arguments) {
-  const std::pair<bool, const char*> options[] = {{!arguments.posture.empty(), "--posture"},
-                                                  {!arguments.state.empty(), "--state"},
-                                                  {!arguments.torques.empty(), "--torques"},
-                                                  {!arguments.push_body.empty(), "--push-body"},
-                                                  {!arguments.springs.empty(), "--spring"}};
-  for (const auto& [is_given, name] : options)
-    if (is_given)
-      throw InputError("", name, "a motion has its own start and torques", "leave it out, or give a robot alone");
+  if (const auto flag = findGiven(arguments, {"posture", "state", "torques", "push_body", "spring"}))
+    throw InputError("", *flag, "a motion has its own start and torques", "leave it out, or give a robot alone");
   if (arguments.world.find(',') != std::string::npos)
     throw InputError("", "--world", "a motion is carried out in one world at a time", "give one");
 }
 
 // The motion solved before or, where a robot is given, the motion of that name.
-std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
-  const std::map<std::string, PlanControl> controls{
-      {"open", PlanControl::Open}, {"gains", PlanControl::Gains}, {"mpc", PlanControl::Predictive}};
-  const PlanControl control = controls.at(arguments.control);
-  const std::map<std::string, Belief> beliefs{
-      {"closed", Belief::Closed}, {"serial", Belief::Serial}, {"ratio", Belief::Ratio}};
-  std::optional<Belief> belief;
-  if (!arguments.model.empty()) belief = beliefs.at(arguments.model);
+Plan obtainPlan(const SimulateArguments& arguments) {
   if (arguments.robot.empty()) {
-    if (arguments.speed || !arguments.settings.empty())
-      throw InputError("", arguments.speed ? "--speed" : "--set", "a solved motion has its own",
-                       "give --robot and the name of a motion");
-    return readPlan(arguments.directory, control, arguments.predictive, belief);
+    if (const auto flag = findGiven(arguments, {"speed", "set"}))
+      throw InputError("", *flag, "a solved motion has its own", "give --robot and the name of a motion");
+    return readPlan(arguments.directory, arguments.control, arguments.belief);
   }
-  PlanRequest request{
-      arguments.directory, arguments.robot, {}, arguments.execution.duration, belief.value_or(Belief::Closed)};
+  PlanRequest request{arguments.directory,
+                      arguments.robot,
+                      {},
+                      arguments.execution.duration,
+                      arguments.belief.value_or(Belief::Closed)};
   if (arguments.speed) request.settings.emplace_back("speed", *arguments.speed);
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] = splitSetting("--set", setting, "steps=8");
     request.settings.emplace_back(name, parseOption(value));
   }
-  if (!arguments.commands.empty()) return makeCommandedPlan(request, arguments.commands, arguments.predictive);
-  return makePlan(request, control, arguments.predictive);
+  if (!arguments.commands.empty()) return makeCommandedPlan(request, arguments.commands);
+  return makePlan(request, arguments.control);
 }
 
-// A robot that is not quite the one that its controller knows, if errors are given.
-std::optional<Model> makeOtherRobot(const Plan& plan, const SimulateArguments& arguments) {
-  RobotErrors errors = arguments.errors;
-  errors.seed = arguments.seed;
-  if (errors.isZero()) return std::nullopt;
-  Model machine = makeMachine(plan.robot.model, errors);
-  VectorXd q = plan.robot.model.makeNeutral(), v = VectorXd::Zero(plan.robot.model.nv());
-  plan.getReference().getReference(0, q, v);
+// The robot of the world, which is not quite the one that its controller knows if errors are given.
+Model makeRobot(const Plan& plan, const RobotErrors& errors) {
+  const Model& model = plan.robot.model;
+  if (errors.isZero()) return model;
+  Model machine = makeMachine(model, errors);
+  VectorXd q = model.makeNeutral(), v = VectorXd::Zero(model.nv());
+  plan.reference().getReference(0, q, v);
   try {
     if (!machine.references().empty()) makeStandingPosture(machine);
-    assembleMachine(plan.robot.model, machine, q);
+    assembleMachine(model, machine, q);
   } catch (const InputError& error) {  // which names the robot's file, where nothing is wrong
     if (errors.rod == 0) throw;
     throw InputError("", "--rod-error " + formatNumber(errors.rod),
@@ -101,30 +86,18 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   watchInterrupts();
   if (isFree(arguments)) return simulateFreely(arguments, command) ? kStood : kFell;
   requirePlan(arguments);
-  const double look_ahead = 1e-3 * arguments.look_ahead.value_or(arguments.sensors == "real" ? kRealLookAhead : 0);
-  arguments.predictive.look_ahead = look_ahead;
-  chooseControl(arguments);
-  const auto plan = obtainPlan(arguments);
-  const Model& model = plan->robot.model;
-  plan->policy->setLookAhead(look_ahead);
+  const std::string reason = chooseControl(arguments);
+  const Plan plan = obtainPlan(arguments);
+  const PlanController controller = makeController(plan, arguments.control);
+  const Ground ground = makeGround(arguments, plan.ground);
+  const auto world = makeWorld(arguments.world, makeRobot(plan, arguments.errors),
+                               {ground, arguments.time_step, &isInterrupted(), arguments.accuracy});
   ExecutionOptions& options = arguments.execution;
-  if (arguments.sensors == "real") {
-    options.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
-    options.perception.planned = plan->schedule;
-  }
-  const Ground ground = makeGround(arguments, plan->ground);
-  options.ground = ground;
-  options.planned_ground = plan->ground;
-  options.fall.only_whirling = plan->predictive != nullptr;
+  options.fall.only_whirling = controller.prediction != nullptr;
   options.interrupt = &isInterrupted();
-  const std::optional<Model> machine = makeOtherRobot(*plan, arguments);
-  const Model& robot = machine ? *machine : model;
-  const auto world =
-      makeWorld(arguments.world, robot, {ground, arguments.time_step, options.interrupt, arguments.accuracy});
   makeOutputDirectory(arguments.output);
-  const auto writeFiles = [&](const Execution& execution) {
-    return write(arguments, *plan, ground, execution, command);
-  };
+  const CarriedOut carried{arguments, plan, controller.prediction, ground, command};
+  const auto writeFiles = [&carried](const Execution& execution) { return write(carried, execution); };
   ExecutionObserver observer;
   if (!arguments.summary_only) {  // a campaign's, which looks at nothing else
     const auto watch = std::make_shared<Watch>(arguments.live ? writeFiles : Watch::Show());
@@ -133,8 +106,8 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
     };
   }
   requireNoInterrupt();
-  const Execution execution = execute(robot, plan->getReference(), plan->getController(), *world, options, observer);
-  print(arguments, *plan, execution);
+  const Execution execution = carryOut(plan, *controller.law, *world, arguments.perception, options, observer);
+  print(carried, reason, execution);
   for (const std::string& path : writeFiles(execution)) std::cout << "  " << path << "\n";
   return execution.outcome == Outcome::Stood ? kStood : kFell;
 }

@@ -20,16 +20,16 @@ namespace bielle::worlds {
 namespace {
 
 // A motion that happened, in the form of a solved one.
-MotionResult makeResult(const SimulateArguments& arguments, const Plan& plan, const Ground& ground,
-                        const Execution& execution, const std::vector<std::string>& command) {
+MotionResult makeResult(const CarriedOut& carried, const Execution& execution) {
+  const Plan& plan = carried.plan;
   MotionResult result;
-  result.run = {plan.summary.run.robot, plan.robot.file, command};
+  result.run = {plan.summary.run.robot, plan.robot.file, carried.command};
   result.motion = plan.summary.motion;
   result.formulation = plan.summary.formulation;
   result.options = plan.summary.options;
   const int stages = static_cast<int>(execution.record.u.rows());
-  result.schedule.phases.push_back({"simulated", stages, arguments.execution.record_period, {}});
-  result.ground = ground;
+  result.schedule.phases.push_back({"simulated", stages, carried.arguments.execution.record_period, {}});
+  result.ground = carried.ground;
   result.record = execution.record;
   result.objective = plan.summary.objective;
   setFigures(plan.robot.model, result);
@@ -170,14 +170,16 @@ std::string describeSteadySpeed(const Plan& plan, const Execution& e) {
 }
 
 // The summary of a result, with what happened in place of how it was solved.
-Json makeSummary(const MotionResult& result, const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
+Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Execution& e) {
+  const SimulateArguments& arguments = carried.arguments;
+  const Plan& plan = carried.plan;
   Json summary = makeHappenedSummary(result);
   summary["world"] = arguments.world;
-  summary["control"] = arguments.control;
+  summary["control"] = getName(arguments.control.control);
   summary["believed_model"] = getName(plan.belief);
   if (plan.belief != Belief::Closed)
-    summary["plan_reachable_until"] = plan.reference.first_missed < 0 ? nullptr : Json(plan.reference.first_missed);
-  if (plan.predictive) summary["solves"] = listSolves(plan.predictive->counts());
+    summary["plan_reachable_until"] = plan.lifted.first_missed < 0 ? nullptr : Json(plan.lifted.first_missed);
+  if (carried.prediction) summary["solves"] = listSolves(carried.prediction->counts());
   for (const auto& [name, value] : plan.summary.options)
     if (const double* speed = std::get_if<double>(&value); name == "speed" && speed)
       summary["commanded_speed"] = *speed;
@@ -186,8 +188,8 @@ Json makeSummary(const MotionResult& result, const SimulateArguments& arguments,
     summary["commands"] = listCommands(plan.commands);
   }
   summary["terrain"] = arguments.terrain;
-  summary["sensors"] = arguments.sensors;
-  if (arguments.sensors == "real") {
+  summary["sensors"] = getName(arguments.sensors);
+  if (arguments.sensors == Sensing::Real) {
     summary["noise"] = arguments.noise;
     summary["estimator"] = listEstimation(e.estimation);
   }
@@ -214,7 +216,7 @@ Json makeSummary(const MotionResult& result, const SimulateArguments& arguments,
   summary["saturated_share"] = e.saturated_share;
   summary["real_time_factor"] = e.realTimeFactor();
   summary["seconds"] = {{"whole", e.whole_seconds}, {"world", e.world_seconds}, {"control", e.control_seconds}};
-  if (arguments.execution.real_time) summary["real_time"] = listTimes(plan.predictive->counts(), e);
+  if (arguments.execution.real_time) summary["real_time"] = listTimes(carried.prediction->counts(), e);
   return summary;
 }
 
@@ -235,16 +237,16 @@ void markAsFailed(const std::filesystem::path& directory) {
   }
 }
 
-std::vector<std::string> writeFiles(const SimulateArguments& arguments, const Plan& plan, const MotionResult& result,
-                                    const Json& summary) {
+std::vector<std::string> writeFiles(const CarriedOut& carried, const MotionRecord& record, const Json& summary) {
+  const SimulateArguments& arguments = carried.arguments;
   const std::filesystem::path output = arguments.output;
   if (arguments.summary_only) {
     writeSummary(arguments.output, summary);
     return {(output / "summary.json").string()};
   }
-  std::vector<std::string> paths = writeResult(arguments.output, result.record, summary);
+  std::vector<std::string> paths = writeResult(arguments.output, record, summary);
   paths.push_back((output / "plan.npz").string());
-  writeNpz(paths.back(), makePlannedRecord(plan.robot.model, plan.getReference(), result.record));
+  writeNpz(paths.back(), makePlannedRecord(carried.plan.robot.model, carried.plan.reference(), record));
   if (!arguments.no_report) {
     paths.push_back((output / "report.html").string());
     writeReport(paths.back(), {arguments.output});
@@ -294,10 +296,12 @@ Json listPushes(const std::vector<Push>& pushes) {
   return list;
 }
 
-void print(const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
+void print(const CarriedOut& carried, const std::string& reason, const Execution& e) {
+  const SimulateArguments& arguments = carried.arguments;
+  const Plan& plan = carried.plan;
   std::cout << plan.summary.motion << " of " << plan.summary.run.robot << " in world " << arguments.world
-            << ", control " << arguments.control;
-  if (!arguments.reason.empty()) std::cout << " (" << arguments.reason << ")";
+            << ", control " << getName(arguments.control.control);
+  if (!reason.empty()) std::cout << " (" << reason << ")";
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
   std::cout << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
@@ -320,11 +324,11 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
     std::cout << "  push                " << formatNumber(push.impulse) << " N s at " << formatNumber(push.time)
               << " s, for " << formatNumber(push.duration) << " s, direction " << formatNumber(push.direction)
               << " degrees\n";
-  if (plan.reference.first_missed >= 0)
-    std::cout << "  the linkages cannot follow the plan from " << plan.reference.first_missed
-              << " s on: " << plan.reference.message << "\n";
-  if (plan.predictive) {
-    const PredictiveCounts& c = plan.predictive->counts();
+  if (plan.lifted.first_missed >= 0)
+    std::cout << "  the linkages cannot follow the plan from " << plan.lifted.first_missed
+              << " s on: " << plan.lifted.message << "\n";
+  if (carried.prediction) {
+    const PredictiveCounts& c = carried.prediction->counts();
     std::snprintf(text, sizeof text,
                   "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
                   "                      %d of %d stages %s\n",
@@ -335,7 +339,7 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
     std::cout << text;
     if (arguments.execution.real_time) printTimes(c, e);
   }
-  if (arguments.sensors != "real") return;
+  if (arguments.sensors != Sensing::Real) return;
   const EstimationErrors& s = e.estimation;
   std::snprintf(text, sizeof text,
                 "  estimated trunk     rms error %.4f m, %.4f m/s, tilt %.4f rad\n"
@@ -345,13 +349,12 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
   std::cout << text;
 }
 
-std::vector<std::string> write(const SimulateArguments& arguments, const Plan& plan, const Ground& ground,
-                               const Execution& execution, const std::vector<std::string>& command) {
+std::vector<std::string> write(const CarriedOut& carried, const Execution& execution) {
   try {
-    const MotionResult result = makeResult(arguments, plan, ground, execution, command);
-    return writeFiles(arguments, plan, result, makeSummary(result, arguments, plan, execution));
+    const MotionResult result = makeResult(carried, execution);
+    return writeFiles(carried, result.record, makeSummary(result, carried, execution));
   } catch (...) {
-    markAsFailed(arguments.output);
+    markAsFailed(carried.arguments.output);
     throw;
   }
 }

@@ -10,10 +10,19 @@ Json makeHappenedSummary(const MotionResult& result);
 Json listBooks(const Execution& execution);
 Json listPushes(const std::vector<Push>& pushes);
 
-void print(const SimulateArguments& arguments, const Plan& plan, const Execution& execution);
+/// What is told besides what happened: who asked for what.
+struct CarriedOut {
+  const SimulateArguments& arguments;
+  const Plan& plan;
+  const PredictiveController* prediction;  // null under other control
+  const Ground& ground;                    // of the world
+  const std::vector<std::string>& command;
+};
 
-/// Writes the files of a motion that happened; returns their paths. \param ground  of the world
-std::vector<std::string> write(const SimulateArguments& arguments, const Plan& plan, const Ground& ground,
-                               const Execution& execution, const std::vector<std::string>& command);
+/// \param reason  of a choice of control other than the usual one, or empty
+void print(const CarriedOut& carried, const std::string& reason, const Execution& execution);
+
+/// Writes the files of a motion that happened; returns their paths.
+std::vector<std::string> write(const CarriedOut& carried, const Execution& execution);
 
 }  // namespace bielle::worlds

@@ -1,0 +1,57 @@
+#include <algorithm>
+
+#include "bielle/dynamics/ball_cuts.h"
+#include "control/restricted_controller.h"
+#include "worlds/plan.h"
+
+namespace bielle::worlds {
+namespace {
+
+constexpr double kStopShare = 0.5;  // of the margin to dead points that the plan keeps
+
+// In states of a model that has fewer joints.
+ShootingTrajectory restrictTrajectory(const Model& from, const Model& model, ShootingTrajectory trajectory) {
+  for (VectorXd& x : trajectory.xs) {
+    const VectorXd all = x;
+    x.resize(model.nq() + model.nv());
+    x << restrictConfiguration(from, model, all.head(from.nq())), restrictVelocity(from, model, all.tail(from.nv()));
+  }
+  return trajectory;
+}
+
+// Along a solution, with the model cut at its balls.
+std::unique_ptr<PredictiveController> predict(const Model& model, const Model& cut, const Solution& solution,
+                                              PredictiveOptions options) {
+  const Motion& motion = solution.motion;
+  const ProblemOptions& problem = motion.problem_options;
+  // A plan may be closer to a dead point than motors would let it come, or start from one: without a margin there is no stop.
+  options.dead_point_stop = std::min(options.dead_point_stop, kStopShare * problem.limits.dead_point_margin);
+  const VectorXd q0 = restrictConfiguration(model, cut, motion.problem->initialState().head(model.nq()));
+  MotionRequest freed = *motion.request;
+  freeFeet(motion.ground, freed.options);
+  return std::make_unique<PredictiveController>(
+      makePredictiveMotion(cut, freed.plan(cut, makeStandingRobot(cut, q0)), problem, options),
+      restrictTrajectory(model, cut, solution.trajectory), options);
+}
+
+}  // namespace
+
+PlanController makeController(const Plan& plan, const ControlOptions& options) {
+  const Model& model = plan.model();
+  PlanController out;
+  if (options.control == PlanControl::Predictive) {
+    const Model cut = plan.walk ? plan.walk->model() : plan.serial ? model : cutAtBalls(model);
+    auto prediction = plan.walk ? std::make_unique<PredictiveController>(*plan.walk, options.predictive)
+                                : predict(model, cut, *plan.solution, options.predictive);
+    out.prediction = prediction.get();
+    out.law = std::move(prediction);
+    if (!cut.isCopyOf(model)) out.law = std::make_unique<RestrictedController>(model, cut, std::move(out.law));
+  } else {
+    out.law = std::make_unique<Policy>(plan.policy);
+  }
+  if (plan.serial)
+    out.law = std::make_unique<SerialController>(plan.robot.model, *plan.serial, std::move(out.law), plan.belief);
+  return out;
+}
+
+}  // namespace bielle::worlds
