@@ -45,7 +45,9 @@ set_tests_properties(interruptions PROPERTIES LABELS system)
 
 add_test(NAME determinism COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_determinism.py
   $<TARGET_FILE:bielle_command>)
-set_tests_properties(determinism PROPERTIES LABELS system)
+add_test(NAME determinism_long COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_determinism.py
+  $<TARGET_FILE:bielle_command> rest)
+set_tests_properties(determinism determinism_long PROPERTIES LABELS system)
 add_test(NAME licences COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_licences.py
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(licences PROPERTIES LABELS system)

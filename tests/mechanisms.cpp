@@ -1,6 +1,7 @@
 #include "mechanisms.h"
 
 #include <cmath>
+#include <ostream>
 
 #include "bielle/dynamics/kinematics.h"
 #include "math/so3.h"
@@ -162,6 +163,20 @@ Mechanism makeMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, 
 Mechanism makeRandomMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
                               double kd) {
   return makeMechanism(rng, kind, closure, base, kp, kd, Extra::None);
+}
+
+std::vector<MechanismKind> listMechanismKinds() {
+  std::vector<MechanismKind> kinds;
+  for (JointKind joint : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
+      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer})
+        kinds.push_back({joint, closure, base});
+  return kinds;
+}
+
+std::ostream& operator<<(std::ostream& out, const MechanismKind& kind) {
+  return out << getName(kind.joint) << ", " << getName(kind.closure)
+             << (kind.base == MechanismBase::Fixed ? ", on the ground" : ", free");
 }
 
 Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, bool repeated,

@@ -1,6 +1,7 @@
 #pragma once
 // Random closed-chain mechanisms and central differences, shared by the tests and the validation against Simbody.
 #include <functional>
+#include <iosfwd>
 #include <random>
 
 #include "bielle/model/builder.h"
@@ -30,6 +31,15 @@ struct Mechanism {
 enum class MechanismBase { Fixed, FreeFlyer };
 Mechanism makeRandomMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
                               double kp = 0, double kd = 0);
+
+struct MechanismKind {
+  JointKind joint;
+  ClosureKind closure;
+  MechanismBase base;
+};
+/// Every joint that moves, with every closure, on every base.
+std::vector<MechanismKind> listMechanismKinds();
+std::ostream& operator<<(std::ostream& out, const MechanismKind& kind);
 
 /// The same with a coupler beside the closure, between joints of its loop; repeated: with a second coupler that says the
 /// same, so that its row is redundant.

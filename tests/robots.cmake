@@ -1,4 +1,4 @@
-bielle_test(generators SOURCES test_generators.cpp test_generator_errors.cpp test_generated_linkages.cpp test_leg_biped.cpp test_conversions.cpp test_mjcf_reader.cpp test_adopt.cpp test_drake.cpp test_drake_files.cpp LIBS bielle_results)
+bielle_test(generators SOURCES test_generators.cpp test_generator_errors.cpp test_generated_linkages.cpp test_leg_biped.cpp test_conversions.cpp test_adopt.cpp test_drake.cpp test_drake_files.cpp LIBS bielle_results)
 bielle_test(workshop SOURCES test_workshop.cpp LIBS bielle_results)
 bielle_test(parts SOURCES test_parts.cpp LIBS bielle_design)
 find_package(sdformat12 QUIET)

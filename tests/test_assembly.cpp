@@ -69,7 +69,7 @@ TEST_CASE("assembly: a given angle out of reach is listed with where it ends, on
   for (const ReferenceJoint& joint : listReferenceJoints(model, reference, as_given.q)) CHECK(joint.moved < 1e-5);
 }
 
-TEST_CASE("assembly: the torso at every height within reach; far outside, what stays open is named") {
+TEST_CASE("assembly: the torso at every height within reach; far outside, what stays open is named", "[sweep]") {
   const Model model = loadOwn("bipetto").model;
   Reference reference = model.references().front();
   Workspace ws(model);

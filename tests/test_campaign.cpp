@@ -119,7 +119,7 @@ TEST_CASE("campaign: a grid of runs, the same bytes with one process or several,
   CHECK(countProgress(runCampaign(spec, out)) == 0);  // nothing is left to do
 }
 
-TEST_CASE("campaign: after an interruption only what is missing is done") {
+TEST_CASE("campaign: after an interruption only what is missing is done", "[long]") {
   const RobotDirectory directory;
   // A squat of 40 stages, whose gains are found at once; twelve runs.
   const std::string head = "motions: [{name: squat, solve: squat, robot: " BIELLE_SOURCE_DIR
@@ -176,7 +176,7 @@ TEST_CASE("campaign: after an interruption only what is missing is done") {
   }
 }
 
-TEST_CASE("campaign: dry runs stop at once when the user asks for it, and equal ones are done once") {
+TEST_CASE("campaign: dry runs stop at once when the user asks for it, and equal ones are done once", "[long]") {
   const RobotDirectory directory;
   const std::string out = directory.path() + "/out", squat = "{name: NAME, solve: squat, robot: bipetto}";
   std::string seeds = "1";
@@ -217,7 +217,7 @@ TEST_CASE("campaign: dry runs stop at once when the user asks for it, and equal 
   CHECK(countLines(calls) == 2);
 }
 
-TEST_CASE("campaign: the largest impulse that is survived, by bisection") {
+TEST_CASE("campaign: the largest impulse that is survived, by bisection", "[long]") {
   const RobotDirectory directory;
   const std::string spec =
       directory.write("spec.yaml", std::string("motions: [") + kMotion +

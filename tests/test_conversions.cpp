@@ -83,34 +83,32 @@ TEST_CASE("generated robots come back from MJCF") {
 
 TEST_CASE("random mechanisms come back from MJCF: every joint, closure, base, springs and belts") {
   unsigned seed = 0;
-  for (JointKind joint : kJointKinds)
-    for (ClosureKind closure : kClosureKinds)
-      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
-        CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
-        std::mt19937 rng(++seed);
-        const Mechanism plain = makeRandomMechanism(rng, joint, closure, base);
-        checkMjcfRoundTrip(plain.model, plain.q_closed);
-        const Mechanism belted = makeBeltedMechanism(rng, joint, closure, base, true);
-        checkMjcfRoundTrip(belted.model, belted.q_closed);
-        const Mechanism sprung = makeSprungMechanism(rng, joint, closure, base);
-        const Model back = readMjcfText(formatMjcf(sprung.model, sprung.q_closed).xml);
-        REQUIRE(back.jointForces().size() == sprung.model.jointForces().size());
-        for (const JointForce& force : sprung.model.jointForces()) {
-          const auto same = [&](const JointForce& other) {
-            return back.joints()[other.joint].name == sprung.model.joints()[force.joint].name &&
-                   other.stiffness == force.stiffness && other.damping == force.damping &&
-                   other.friction == force.friction &&
-                   // A preload is the rest of a spring there, and lost without one.
-                   (force.stiffness == 0 ||
-                    std::abs(other.stiffness * other.rest - force.stiffness * force.rest - force.preload) < 1e-12);
-          };
-          CHECK(std::any_of(back.jointForces().begin(), back.jointForces().end(), same));
-        }
-        ModelParts parts = takeParts(plain.model);  // without friction, which MuJoCo has otherwise
-        parts.point_springs = sprung.model.pointSprings();
-        REQUIRE(parts.point_springs.size() >= 3);
-        checkMjcfRoundTrip(ModelBuilder::restore(parts), plain.q_closed);
-      }
+  for (const MechanismKind& kind : listMechanismKinds()) {
+    CAPTURE(kind);
+    std::mt19937 rng(++seed);
+    const Mechanism plain = makeRandomMechanism(rng, kind.joint, kind.closure, kind.base);
+    checkMjcfRoundTrip(plain.model, plain.q_closed);
+    const Mechanism belted = makeBeltedMechanism(rng, kind.joint, kind.closure, kind.base, true);
+    checkMjcfRoundTrip(belted.model, belted.q_closed);
+    const Mechanism sprung = makeSprungMechanism(rng, kind.joint, kind.closure, kind.base);
+    const Model back = readMjcfText(formatMjcf(sprung.model, sprung.q_closed).xml);
+    REQUIRE(back.jointForces().size() == sprung.model.jointForces().size());
+    for (const JointForce& force : sprung.model.jointForces()) {
+      const auto same = [&](const JointForce& other) {
+        return back.joints()[other.joint].name == sprung.model.joints()[force.joint].name &&
+               other.stiffness == force.stiffness && other.damping == force.damping &&
+               other.friction == force.friction &&
+               // A preload is the rest of a spring there, and lost without one.
+               (force.stiffness == 0 ||
+                std::abs(other.stiffness * other.rest - force.stiffness * force.rest - force.preload) < 1e-12);
+      };
+      CHECK(std::any_of(back.jointForces().begin(), back.jointForces().end(), same));
+    }
+    ModelParts parts = takeParts(plain.model);  // without friction, which MuJoCo has otherwise
+    parts.point_springs = sprung.model.pointSprings();
+    REQUIRE(parts.point_springs.size() >= 3);
+    checkMjcfRoundTrip(ModelBuilder::restore(parts), plain.q_closed);
+  }
 }
 
 TEST_CASE("springs between points in MJCF: what it cannot say, other tendons, and a poisoned number") {

@@ -146,7 +146,7 @@ TEST_CASE("the dofs of a coupler are those between its joints and the body that 
   CHECK_THAT(getError([&] { copy.addCoupler("bad", {{"to_a", 1}, {"to_b", NAN}}); }), Catch::Contains("not finite"));
 }
 
-TEST_CASE("couplers in the loops of other closures, redundant or not: derivatives along closed motions") {
+TEST_CASE("couplers in the loops of other closures, redundant or not: derivatives along closed motions", "[sweep]") {
   std::mt19937 rng(31);
   Selection selection;
   for (JointKind kind : kJointKinds)

@@ -319,7 +319,7 @@ std::string writeBipettoWithMotors(const RobotDirectory& directory) {
 
 }  // namespace
 
-TEST_CASE("design: a search that is killed goes on and ends the same way") {
+TEST_CASE("design: a search that is killed goes on and ends the same way", "[long]") {
   const RobotDirectory directory;
   const std::string robot = writeBipettoWithMotors(directory);
   const std::string spec = directory.write("spec.yaml", makeCrankSpec(robot));

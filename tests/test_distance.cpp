@@ -205,69 +205,68 @@ std::vector<ModelVariation> listShapeVariations(std::mt19937& rng, const Model& 
 
 }  // namespace
 
-TEST_CASE("distance: derivatives by the state and by the mechanism, every joint kind times every closure kind") {
+TEST_CASE("distance: derivatives by the state and by the mechanism, every joint kind times every closure kind",
+          "[sweep]") {
   std::mt19937 rng(62);
   Selection selection;
-  for (JointKind kind : kJointKinds)
-    for (ClosureKind closure : kClosureKinds)
-      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
-        if (selection.isLeftOut()) continue;
-        CAPTURE(getName(kind), getName(closure), base == MechanismBase::Fixed);
-        const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base);
-        const Model model = addShapes(rng, mechanism.model);
-        const VectorXd& q = mechanism.q_closed;
-        const std::vector<ShapePair> pairs = choosePairs(rng, model, q);
-        const Eigen::Index n = static_cast<Eigen::Index>(pairs.size());
+  for (const MechanismKind& kind : listMechanismKinds()) {
+    if (selection.isLeftOut()) continue;
+    CAPTURE(kind);
+    const Mechanism mechanism = makeRandomMechanism(rng, kind.joint, kind.closure, kind.base);
+    const Model model = addShapes(rng, mechanism.model);
+    const VectorXd& q = mechanism.q_closed;
+    const std::vector<ShapePair> pairs = choosePairs(rng, model, q);
+    const Eigen::Index n = static_cast<Eigen::Index>(pairs.size());
 
-        Workspace ws(model);
-        updatePositions(model, ws, q);
-        updateVelocities(model, ws, VectorXd::Zero(model.nv()));
-        updateAccelerations(model, ws, VectorXd::Zero(model.nv()));
-        std::vector<ShapeDistance> distances;
-        MatrixXd gradient = MatrixXd::Zero(n, model.nv());
-        for (Eigen::Index i = 0; i < n; ++i) {
-          const Shape &a = model.shapes()[pairs[i].a], &b = model.shapes()[pairs[i].b];
-          distances.push_back(calcDistance(a, ws.X_WB[a.body], b, ws.X_WB[b.body]));
-          addDistanceGradient(model, ws, a, b, distances.back(), gradient.middleRows(i, 1));
-        }
-        checkDerivative(gradient,
-                        differentiateTangent(model, q, kModelStep,
-                                             [&](const VectorXd& x) { return calcDistances(model, pairs, x); }),
-                        "by the tangent of q");
+    Workspace ws(model);
+    updatePositions(model, ws, q);
+    updateVelocities(model, ws, VectorXd::Zero(model.nv()));
+    updateAccelerations(model, ws, VectorXd::Zero(model.nv()));
+    std::vector<ShapeDistance> distances;
+    MatrixXd gradient = MatrixXd::Zero(n, model.nv());
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Shape &a = model.shapes()[pairs[i].a], &b = model.shapes()[pairs[i].b];
+      distances.push_back(calcDistance(a, ws.X_WB[a.body], b, ws.X_WB[b.body]));
+      addDistanceGradient(model, ws, a, b, distances.back(), gradient.middleRows(i, 1));
+    }
+    checkDerivative(
+        gradient,
+        differentiateTangent(model, q, kModelStep, [&](const VectorXd& x) { return calcDistances(model, pairs, x); }),
+        "by the tangent of q");
 
-        // Along the closed configurations, by the coordinates that determine them.
-        const std::vector<int> kept = chooseKept(model, q);
-        const Closing closing(model, ws, makeConstraintSet(model), kept);
-        const MatrixXd tangent = closing.calcTangent();
-        checkDerivative(gradient * tangent,
-                        differentiate(VectorXd::Zero(tangent.cols()), kModelStep,
-                                      [&](const VectorXd& t) {
-                                        const VectorXd near = model.integrate(q, tangent * t);
-                                        VectorXd fixed = closeHeld(model, near, kept);
-                                        return calcDistances(model, pairs, model.integrate(near, fixed));
-                                      }),
-                        "along the loops");
+    // Along the closed configurations, by the coordinates that determine them.
+    const std::vector<int> kept = chooseKept(model, q);
+    const Closing closing(model, ws, makeConstraintSet(model), kept);
+    const MatrixXd tangent = closing.calcTangent();
+    checkDerivative(gradient * tangent,
+                    differentiate(VectorXd::Zero(tangent.cols()), kModelStep,
+                                  [&](const VectorXd& t) {
+                                    const VectorXd near = model.integrate(q, tangent * t);
+                                    VectorXd fixed = closeHeld(model, near, kept);
+                                    return calcDistances(model, pairs, model.integrate(near, fixed));
+                                  }),
+                    "along the loops");
 
-        // By the mechanism, which stays closed.
-        const std::vector<ModelVariation> directions = listShapeVariations(rng, model, pairs);
-        MatrixXd analytic(n, static_cast<Eigen::Index>(directions.size()));
-        VariationWorkspace variation(model);
-        for (size_t d = 0; d < directions.size(); ++d) {
-          MotionVariation motion(model);
-          REQUIRE(closing.calcMotion(model, ws, directions[d], motion) < 1e-9);
-          updateVariation(model, ws, directions[d], motion, variation);
-          for (Eigen::Index i = 0; i < n; ++i)
-            analytic(i, static_cast<Eigen::Index>(d)) =
-                calcDistanceVariation(model, ws, pairs[i].a, pairs[i].b, distances[i], directions[d], variation);
-        }
-        checkDerivative(analytic,
-                        differentiateModel(model, directions, kModelStep,
-                                           [&](const Model& moved) {
-                                             const VectorXd x = moved.integrate(q, closeHeld(moved, q, kept));
-                                             return calcDistances(moved, pairs, x);
-                                           }),
-                        "by the mechanism");
-      }
+    // By the mechanism, which stays closed.
+    const std::vector<ModelVariation> directions = listShapeVariations(rng, model, pairs);
+    MatrixXd analytic(n, static_cast<Eigen::Index>(directions.size()));
+    VariationWorkspace variation(model);
+    for (size_t d = 0; d < directions.size(); ++d) {
+      MotionVariation motion(model);
+      REQUIRE(closing.calcMotion(model, ws, directions[d], motion) < 1e-9);
+      updateVariation(model, ws, directions[d], motion, variation);
+      for (Eigen::Index i = 0; i < n; ++i)
+        analytic(i, static_cast<Eigen::Index>(d)) =
+            calcDistanceVariation(model, ws, pairs[i].a, pairs[i].b, distances[i], directions[d], variation);
+    }
+    checkDerivative(analytic,
+                    differentiateModel(model, directions, kModelStep,
+                                       [&](const Model& moved) {
+                                         const VectorXd x = moved.integrate(q, closeHeld(moved, q, kept));
+                                         return calcDistances(moved, pairs, x);
+                                       }),
+                    "by the mechanism");
+  }
 }
 
 TEST_CASE("pairs of shapes: neighbours do not count, legs are told from the trunk") {

@@ -204,18 +204,16 @@ TEST_CASE("generated robots come back from Drake's URDF") {
 
 TEST_CASE("random mechanisms come back from Drake's URDF: every joint, closure, base, springs and belts") {
   unsigned seed = 0;
-  for (JointKind joint : kJointKinds)
-    for (ClosureKind closure : kClosureKinds)
-      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
-        CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
-        std::mt19937 rng(++seed);
-        const Mechanism plain = makeSquare(makeRandomMechanism(rng, joint, closure, base));
-        checkDrakeRoundTrip(plain.model, plain.q_closed);
-        const Mechanism belted = makeSquare(makeBeltedMechanism(rng, joint, closure, base, true));
-        checkDrakeRoundTrip(belted.model, belted.q_closed);
-        const Mechanism sprung = makeSquare(makeSprungMechanism(rng, joint, closure, base));
-        checkDrakeRoundTrip(sprung.model, sprung.q_closed);
-      }
+  for (const MechanismKind& kind : listMechanismKinds()) {
+    CAPTURE(kind);
+    std::mt19937 rng(++seed);
+    const Mechanism plain = makeSquare(makeRandomMechanism(rng, kind.joint, kind.closure, kind.base));
+    checkDrakeRoundTrip(plain.model, plain.q_closed);
+    const Mechanism belted = makeSquare(makeBeltedMechanism(rng, kind.joint, kind.closure, kind.base, true));
+    checkDrakeRoundTrip(belted.model, belted.q_closed);
+    const Mechanism sprung = makeSquare(makeSprungMechanism(rng, kind.joint, kind.closure, kind.base));
+    checkDrakeRoundTrip(sprung.model, sprung.q_closed);
+  }
 }
 
 namespace {

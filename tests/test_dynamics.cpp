@@ -109,7 +109,8 @@ TEST_CASE("closures: residual rate, velocity and acceleration are time derivativ
   }
 }
 
-TEST_CASE("constrained dynamics: every joint kind times every closure kind, closed and open, against differences") {
+TEST_CASE("constrained dynamics: every joint kind times every closure kind, closed and open, against differences",
+          "[sweep]") {
   std::mt19937 rng(4);
   Selection selection(5);
   for (JointKind kind : kJointKinds)

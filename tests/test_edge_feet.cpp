@@ -34,7 +34,7 @@ CommandResult runOnBlades(std::vector<std::string> arguments) {
 
 }  // namespace
 
-TEST_CASE("edge feet: a robot on blades walks, passes the check, and is carried out") {
+TEST_CASE("edge feet: a robot on blades walks, passes the check, and is carried out", "[long]") {
   const testing::RobotDirectory directory;
   const std::string robot = writeBlades(directory), walk = directory.path() + "/walk";
   const CommandResult solved = runOnBlades(

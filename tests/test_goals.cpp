@@ -153,7 +153,7 @@ TEST_CASE("goals: a miss is said with its share and tolerance; what is not a num
         "requested within 0.01 m, achieved 0.0123 m, missed");
 }
 
-TEST_CASE("goals: motions of Bipetto have those requested") {
+TEST_CASE("goals: motions of Bipetto have those requested", "[long]") {
   struct Row {
     std::string name;
     double requested;
@@ -177,7 +177,7 @@ TEST_CASE("goals: motions of Bipetto have those requested") {
 }
 
 // The tests check_* solve the motions above, and more, and fail where a goal is missed.
-TEST_CASE("goals: a walk, one backwards and a squat that goes up achieve what was requested") {
+TEST_CASE("goals: a walk, one backwards and a squat that goes up achieve what was requested", "[long]") {
   const auto expect = [](const MotionResult& result, double requested) {
     CAPTURE(result.motion);
     CHECK(result.converged());
@@ -197,7 +197,7 @@ TEST_CASE("goals: a walk, one backwards and a squat that goes up achieve what wa
   expect(solveForResult(makeSquat(getBipetto(), up)), 1.05);
 }
 
-TEST_CASE("goals: a sequence has those of its motions, at their nodes") {
+TEST_CASE("goals: a sequence has those of its motions, at their nodes", "[long]") {
   SquatOptions squat;
   WalkOptions walk;
   walk.gait.rigid_landing = true;  // its impacts are stages too
@@ -258,7 +258,7 @@ TEST_CASE("goals: trajectories that miss are reported") {
   CHECK_FALSE(find(shallow, "depth").met());
 }
 
-TEST_CASE("goals: a squat far out of reach stays finite, and says by how much it missed") {
+TEST_CASE("goals: a squat far out of reach stays finite, and says by how much it missed", "[long]") {
   for (const auto& [depth, least, most] : {std::tuple(0.1, 0.15, 0.5), std::tuple(1.9, 1.05, 1.4)}) {
     CAPTURE(depth);
     SquatOptions options;

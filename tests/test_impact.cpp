@@ -38,8 +38,8 @@ void checkImpactDerivatives(const Model& model, const ConstraintSet& set, const 
 
 }  // namespace
 
-TEST_CASE(
-    "impacts: constraints hold afterwards, the energy of the change is lost, derivatives agree with differences") {
+TEST_CASE("impacts: constraints hold afterwards, the energy of the change is lost, derivatives agree with differences",
+          "[sweep]") {
   std::mt19937 rng(51);
   Selection selection;
   for (JointKind kind : kJointKinds)

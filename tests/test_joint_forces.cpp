@@ -129,7 +129,7 @@ TEST_CASE("refused springs between points") {
   refuse("a point is not finite", [](PointSpring& spring) { spring.point1.x() = HUGE_VAL; });
 }
 
-TEST_CASE("joint forces: inverse and constrained dynamics against differences, every joint kind") {
+TEST_CASE("joint forces: inverse and constrained dynamics against differences, every joint kind", "[sweep]") {
   std::mt19937 rng(41);
   Selection selection;
   for (JointKind kind : kJointKinds)

@@ -84,7 +84,7 @@ Ballistics calcBallistics(const Model& model, const VectorXd& x) {
 
 }  // namespace
 
-TEST_CASE("jump: Bipetto flies as long and as far as requested, and lands softly") {
+TEST_CASE("jump: Bipetto flies as long and as far as requested, and lands softly", "[long]") {
   struct Row {
     Formulation formulation;
     double flight, length;
@@ -119,7 +119,7 @@ TEST_CASE("jump: Bipetto flies as long and as far as requested, and lands softly
   }
 }
 
-TEST_CASE("jump: a planar hopper hops ahead on one foot, and flies by closed form") {
+TEST_CASE("jump: a planar hopper hops ahead on one foot, and flies by closed form", "[long]") {
   const Model model = makePlanarHopper();
   constexpr double kLength = 0.1;
   Eigen::Vector2d coarser = Eigen::Vector2d::Zero();
@@ -192,7 +192,7 @@ TEST_CASE("jump: its height follows from its time, its load from its height") {
   CHECK(load == Approx(1 + figures.take_off / (g * figures.push)).epsilon(1e-4));
 }
 
-TEST_CASE("jump: what no leg can do does not pass for done, and stays finite") {
+TEST_CASE("jump: what no leg can do does not pass for done, and stays finite", "[long]") {
   JumpOptions options;
   options.flight = 1;
   options.time_step = 0.01;

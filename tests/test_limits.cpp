@@ -80,20 +80,20 @@ void checkKneesAtFourFifths(const Make& make) {
 
 }  // namespace
 
-TEST_CASE("limits: a walk with four fifths of the torque that its knees would like") {
+TEST_CASE("limits: a walk with four fifths of the torque that its knees would like", "[long]") {
   WalkOptions options;
   options.steps = 2;
   checkKneesAtFourFifths([&](const ProblemOptions& problem) { return makeWalk(getBipetto(), options, problem); });
 }
 
-TEST_CASE("limits: a jump with four fifths of the torque that its knees would like") {
+TEST_CASE("limits: a jump with four fifths of the torque that its knees would like", "[long]") {
   JumpOptions options;
   options.flight = 0.2;
   options.time_step = 0.01;
   checkKneesAtFourFifths([&](const ProblemOptions& problem) { return makeJump(getBipetto(), options, problem); });
 }
 
-TEST_CASE("limits: motors keep to their velocity, and use it") {
+TEST_CASE("limits: motors keep to their velocity, and use it", "[long]") {
   SquatOptions options;
   options.duration = 1.2;
   options.settle = 0.1;
@@ -115,7 +115,7 @@ TEST_CASE("limits: motors keep to their velocity, and use it") {
   }
 }
 
-TEST_CASE("limits: motors keep to their power, and use it") {
+TEST_CASE("limits: motors keep to their power, and use it", "[long]") {
   JumpOptions options;
   options.time_step = 0.01;
   const std::vector<std::string> knees = {"motor_knee_left", "motor_knee_right"};
@@ -157,7 +157,7 @@ TEST_CASE("limits: joint ranges hold at every node but the first, and none witho
   CHECK(upper.minCoeff() == std::numeric_limits<double>::infinity());
 }
 
-TEST_CASE("limits: a joint stays within its range, and uses it") {
+TEST_CASE("limits: a joint stays within its range, and uses it", "[long]") {
   WalkOptions options;
   options.steps = 2;
   Motion wide = makeWalk(getBipetto(), options);
@@ -249,7 +249,7 @@ double calcVoltageUse(const Motion& motion) {
 
 }  // namespace
 
-TEST_CASE("limits: motors keep to the voltage of their supply, and use it") {
+TEST_CASE("limits: motors keep to the voltage of their supply, and use it", "[long]") {
   SquatOptions options;
   options.duration = 1.2;
   options.settle = 0.1;

@@ -82,7 +82,7 @@ void checkRemedies(const Model& model, const LoopConflict& conflict) {
 
 }  // namespace
 
-TEST_CASE("conflicts: bars too short by a known length, and the least change that closes them") {
+TEST_CASE("conflicts: bars too short by a known length, and the least change that closes them", "[sweep]") {
   // Stretched out, crank, coupler and rocker reach 0.8 m; the pins are farther apart.
   Selection selection;
   for (const double ground : {0.83, 1.0, 1.9}) {
@@ -131,7 +131,7 @@ double calcMissingReach() {
 
 }  // namespace
 
-TEST_CASE("conflicts: loops that close alone but not together; one beside them has no part in it") {
+TEST_CASE("conflicts: loops that close alone but not together; one beside them has no part in it", "[sweep]") {
   // Both dyads hold the tip of the bar; the one pulls it up, the other down, each by more than half of the way.
   const Vector3d tip(0.2, 0, 0);
   const Dyad up{"up", tip, {0.2, 0, 0.4}}, down{"down", tip, {0.2, 0, -0.4}}, idle{"idle", tip / 2, {0.2, 0, 0.05}};

@@ -73,26 +73,24 @@ TEST_CASE("MuJoCo has the mass matrix and the bias of every robot") {
 
 TEST_CASE("MuJoCo has the mass matrix, the bias and the closures of every joint and closure kind") {
   unsigned seed = 0;
-  for (JointKind joint : kJointKinds)
-    for (ClosureKind closure : kClosureKinds)
-      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
-        const Mechanism mechanism = makeMechanism(joint, closure, base, ++seed);
-        const Model& model = mechanism.model;
-        CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
-        const MujocoModel mujoco(model, mechanism.q_closed);
-        const Difference worst = compare(model, mujoco, mechanism.q_closed);
-        CHECK(worst.mass_matrix < kTolerance);
-        CHECK(worst.bias < kTolerance);
-        // Elsewhere on the closed manifold MuJoCo's loops are closed too, and beside it they are open.
-        std::mt19937 rng(seed);
-        const auto data = mujoco.makeData();
-        const VectorXd apart = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.2));
-        const AssemblyResult closed = closeConfiguration(model, apart);
-        REQUIRE(closed.status == NumericalStatus::Ok);
-        CHECK(model.difference(mechanism.q_closed, closed.q).norm() > 0.01);
-        CHECK(calcGap(model, mujoco, *data, closed.q) < 1e-10);
-        CHECK(calcGap(model, mujoco, *data, apart) > 1e-3);
-      }
+  for (const MechanismKind& kind : listMechanismKinds()) {
+    const Mechanism mechanism = makeMechanism(kind.joint, kind.closure, kind.base, ++seed);
+    const Model& model = mechanism.model;
+    CAPTURE(kind);
+    const MujocoModel mujoco(model, mechanism.q_closed);
+    const Difference worst = compare(model, mujoco, mechanism.q_closed);
+    CHECK(worst.mass_matrix < kTolerance);
+    CHECK(worst.bias < kTolerance);
+    // Elsewhere on the closed manifold MuJoCo's loops are closed too, and beside it they are open.
+    std::mt19937 rng(seed);
+    const auto data = mujoco.makeData();
+    const VectorXd apart = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.2));
+    const AssemblyResult closed = closeConfiguration(model, apart);
+    REQUIRE(closed.status == NumericalStatus::Ok);
+    CHECK(model.difference(mechanism.q_closed, closed.q).norm() > 0.01);
+    CHECK(calcGap(model, mujoco, *data, closed.q) < 1e-10);
+    CHECK(calcGap(model, mujoco, *data, apart) > 1e-3);
+  }
 }
 
 TEST_CASE("MuJoCo starts at the closed configuration, and the references are its keyframes") {

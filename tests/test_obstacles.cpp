@@ -52,7 +52,7 @@ constexpr const char* kStones = R"(footholds:
 
 }  // namespace
 
-TEST_CASE("footholds: Bipetto walks over inclined stones of a file") {
+TEST_CASE("footholds: Bipetto walks over inclined stones of a file", "[long]") {
   FootholdsOptions options;
   options.footholds = read(kStones);
   Motion motion = makeFootholds(getBipetto(), options);
@@ -109,7 +109,7 @@ TEST_CASE("footholds: a file's errors name the entry, impossible steps their num
   CHECK_THROWS_WITH(makeFootholds(getBipetto(), {}), Catch::Contains("--footholds"));
 }
 
-TEST_CASE("box: Bipetto steps onto it and down again") {
+TEST_CASE("box: Bipetto steps onto it and down again", "[long]") {
   BoxOptions options;
   options.down = true;
   Motion motion = makeBox(getBipetto(), options);
@@ -125,7 +125,7 @@ TEST_CASE("box: Bipetto steps onto it and down again") {
   CHECK(m.touchdown_coms.at(1).z() - m.start.z() == Approx(options.height).margin(0.03));
 }
 
-TEST_CASE("gap: the ground is missing where it was requested, and no foot stands there") {
+TEST_CASE("gap: the ground is missing where it was requested, and no foot stands there", "[long]") {
   GapOptions options;
   options.width = 0.2;
   Motion motion = makeGap(getBipetto(), options);

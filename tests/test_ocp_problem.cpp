@@ -152,7 +152,7 @@ VectorXd makeNextNode(std::mt19937& rng, ProblemProbe& problem, const VectorXd& 
 
 }  // namespace
 
-TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed, small and large") {
+TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed, small and large", "[sweep]") {
   const StepRule step = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(21);
   Selection selection(2);
@@ -268,7 +268,7 @@ TEST_CASE("shooting problem: forces alone, at the midpoint of a step") {
   }
 }
 
-TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities on the closures") {
+TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities on the closures", "[sweep]") {
   const Discretization how = GENERATE(from_range(kDiscretizations));
   CAPTURE(how);
   std::mt19937 rng(23);

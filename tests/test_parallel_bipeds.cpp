@@ -103,7 +103,8 @@ void checkMotions(const std::string& robot, const std::vector<Request>& requests
 
 }  // namespace
 
-TEST_CASE("Cleobot: bielle solve squat, walk and jump converge, are checked and stay far from singularities") {
+TEST_CASE("Cleobot: bielle solve squat, walk and jump converge, are checked and stay far from singularities",
+          "[long]") {
   const double standing = 0.538, rise = 9.81 * 0.3 * 0.3 / 8;
   checkMotions("cleobot",
                {{{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
@@ -112,7 +113,8 @@ TEST_CASE("Cleobot: bielle solve squat, walk and jump converge, are checked and 
                45, 0.25, {0.015, 0.2});
 }
 
-TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, are checked and stay far from singularities") {
+TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, are checked and stay far from singularities",
+          "[long]") {
   const double standing = 0.393, rise = 9.81 * 0.3 * 0.3 / 8;
   checkMotions("rsu_biped",
                {{{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
@@ -121,7 +123,7 @@ TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, are checked an
                70, 0.25, {0.015, 0.2});
 }
 
-TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checked") {
+TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checked", "[long]") {
   const double standing = 0.403, rise = 9.81 * 0.3 * 0.3 / 8;
   checkMotions("belt_biped",
                {{{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
@@ -131,7 +133,8 @@ TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checke
 }
 
 TEST_CASE(
-    "leg biped with 3-RRS hips: bielle solve squat and walk converge, are checked and stay far from singularities") {
+    "leg biped with 3-RRS hips: bielle solve squat and walk converge, are checked and stay far from singularities",
+    "[long]") {
   const RobotDirectory directory;
   const std::string robot = directory.path() + "/parallel";
   REQUIRE(run({"generate", "leg_biped", "--set", "hip=three_rrs", "-o", robot}).status == 0);
@@ -147,7 +150,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("belt knee and differential ankle: bielle solve squat and walk converge and are checked") {
+TEST_CASE("belt knee and differential ankle: bielle solve squat and walk converge and are checked", "[long]") {
   const double standing = 0.403;
   for (const char* name : {"belt_knee", "differential_ankle"}) {
     CAPTURE(name);
@@ -157,7 +160,7 @@ TEST_CASE("belt knee and differential ankle: bielle solve squat and walk converg
   }
 }
 
-TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 96 redundant rows") {
+TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 96 redundant rows", "[long]") {
   const double standing = 0.744;
   // Longer time steps than usual, and a walk of two steps: the redundant rows make it slow.
   const std::vector<std::string> squat = {"squat", "--set", "time_step=0.03"},
@@ -183,7 +186,8 @@ TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 
   CHECK(record.com.col(2).minCoeff() == Approx(0.7 * record.com(0, 2)).margin(0.015));
 }
 
-TEST_CASE("spring biped: a squat, a walk and a hop are solved and checked; its leaves take energy in at the landing") {
+TEST_CASE("spring biped: a squat, a walk and a hop are solved and checked; its leaves take energy in at the landing",
+          "[long]") {
   const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/spring_biped").model;
   const double standing = 0.849;
   const auto calcElastic = [&](const VectorXd& q) {
@@ -216,7 +220,7 @@ TEST_CASE("spring biped: a squat, a walk and a hop are solved and checked; its l
   }
 }
 
-TEST_CASE("belt biped: springs, dampers and friction are in the energy that the check counts") {
+TEST_CASE("belt biped: springs, dampers and friction are in the energy that the check counts", "[long]") {
   const RobotDirectory files;
   std::string forces = "joint_forces:\n";
   for (const std::string side : {"_left", "_right"})
@@ -240,7 +244,7 @@ TEST_CASE("belt biped: springs, dampers and friction are in the energy that the 
   }
 }
 
-TEST_CASE("Cleobot, the RSU biped and the belt biped walk at 0.9 m/s") {
+TEST_CASE("Cleobot, the RSU biped and the belt biped walk at 0.9 m/s", "[long]") {
   for (const std::string robot : {"cleobot", "rsu_biped", "belt_biped"}) {
     CAPTURE(robot);
     const RobotDirectory directory;
@@ -249,7 +253,7 @@ TEST_CASE("Cleobot, the RSU biped and the belt biped walk at 0.9 m/s") {
   }
 }
 
-TEST_CASE("Cleobot: feet of a walk land where they should and do not slide") {
+TEST_CASE("Cleobot: feet of a walk land where they should and do not slide", "[long]") {
   Motion motion = makeWalk(getCleobot());
   const FddpSummary summary = test::solveInPlace(*motion.problem, motion.guess);
   CAPTURE(summary.message, summary.iterations);

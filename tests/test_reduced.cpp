@@ -128,34 +128,33 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
 
 }  // namespace
 
-TEST_CASE("reduced step: random mechanisms, every joint kind times every closure kind") {
+TEST_CASE("reduced step: random mechanisms, every joint kind times every closure kind", "[sweep]") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(11);
   Selection selection(5);
-  for (JointKind kind : kJointKinds)
-    for (ClosureKind closure : kClosureKinds)
-      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
-        if (selection.isLeftOut()) continue;
-        CAPTURE(getName(rule), getName(kind), getName(closure), base == MechanismBase::Fixed);
-        const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base);
-        const Model& model = mechanism.model;
-        std::vector<ContactTarget> contacts;
-        if (base == MechanismBase::FreeFlyer) contacts = {{1, {}, 0, 10}};
-        const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
-        const RobotProblem whole(model, state.q, state.v,
-                                 makeStages(model, contacts, state.q, rng, StageKind::Dynamics, rule),
-                                 Formulation::Reduced);
-        ProblemProbe problem(whole);
-        VectorXd x_next(state.x().size());
-        double cost = 0;
-        REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == NumericalStatus::Ok);
-        checkLinearization(model, contacts, state, x_next, rng, StageKind::Dynamics, Formulation::Reduced, rule);
-        const State node = makeClosedState(model, x_next.head(model.nq()), 0.05, 1, rng);
-        checkLinearization(model, contacts, state, node.x(), rng, StageKind::Dynamics, Formulation::Reduced, rule);
-      }
+  for (const MechanismKind& kind : listMechanismKinds()) {
+    if (selection.isLeftOut()) continue;
+    CAPTURE(getName(rule), kind);
+    const Mechanism mechanism = makeRandomMechanism(rng, kind.joint, kind.closure, kind.base);
+    const Model& model = mechanism.model;
+    std::vector<ContactTarget> contacts;
+    if (kind.base == MechanismBase::FreeFlyer) contacts = {{1, {}, 0, 10}};
+    const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
+    const RobotProblem whole(model, state.q, state.v,
+                             makeStages(model, contacts, state.q, rng, StageKind::Dynamics, rule),
+                             Formulation::Reduced);
+    ProblemProbe problem(whole);
+    VectorXd x_next(state.x().size());
+    double cost = 0;
+    REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == NumericalStatus::Ok);
+    checkLinearization(model, contacts, state, x_next, rng, StageKind::Dynamics, Formulation::Reduced, rule);
+    const State node = makeClosedState(model, x_next.head(model.nq()), 0.05, 1, rng);
+    checkLinearization(model, contacts, state, node.x(), rng, StageKind::Dynamics, Formulation::Reduced, rule);
+  }
 }
 
-TEST_CASE("reduced step: springs, dampers and friction on joints in and outside loops, and between points of both") {
+TEST_CASE("reduced step: springs, dampers and friction on joints in and outside loops, and between points of both",
+          "[sweep]") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(17);
   Selection selection;
@@ -172,7 +171,7 @@ TEST_CASE("reduced step: springs, dampers and friction on joints in and outside 
     }
 }
 
-TEST_CASE("reduced step: couplers in the loops of other closures") {
+TEST_CASE("reduced step: couplers in the loops of other closures", "[sweep]") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(18);
   Selection selection(5);
@@ -190,7 +189,7 @@ TEST_CASE("reduced step: couplers in the loops of other closures") {
       }
 }
 
-TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar") {
+TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar", "[sweep]") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(12);
   Selection selection(2);
@@ -235,7 +234,7 @@ std::vector<OptionSet> listLegBipeds() {
 
 }  // namespace
 
-TEST_CASE("reduced step: combinations of the parts of leg_biped") {
+TEST_CASE("reduced step: combinations of the parts of leg_biped", "[sweep]") {
   std::mt19937 rng(19);
   const Generator& generator = findGenerator("leg_biped");
   const std::vector<OptionSet> bipeds = listLegBipeds();
@@ -253,7 +252,7 @@ TEST_CASE("reduced step: combinations of the parts of leg_biped") {
   }
 }
 
-TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, with and without a gap") {
+TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, with and without a gap", "[sweep]") {
   std::mt19937 rng(14);
   std::vector<Mechanism> mechanisms;
   for (JointKind kind : {JointKind::Spherical, JointKind::Universal, JointKind::Planar})
@@ -287,7 +286,7 @@ TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, w
     }
 }
 
-TEST_CASE("reduced accelerations are those of the full formulation") {
+TEST_CASE("reduced accelerations are those of the full formulation", "[sweep]") {
   std::mt19937 rng(13);
   const Generator& generator = findGenerator("leg_biped");
   const std::vector<OptionSet> bipeds = listLegBipeds();

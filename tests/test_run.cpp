@@ -209,7 +209,7 @@ TEST_CASE("run: stages are as short as the fastest swing needs") {
   CHECK(getStep(1.5) == Approx(0.004));
 }
 
-TEST_CASE("run: Bipetto runs as fast as requested, flies in between, and lands softly") {
+TEST_CASE("run: Bipetto runs as fast as requested, flies in between, and lands softly", "[long]") {
   const RunOptions options;
   Motion motion = makeRun(getBipetto(), options, {Formulation::Reduced, StepRule::Midpoint});
   const SolvedRun solved = solveRun(motion);
@@ -224,7 +224,7 @@ TEST_CASE("run: Bipetto runs as fast as requested, flies in between, and lands s
   CHECK(m.torque < 80);
 }
 
-TEST_CASE("hop: Bipetto hops on the requested foot, and ahead") {
+TEST_CASE("hop: Bipetto hops on the requested foot, and ahead", "[long]") {
   HopOptions options;  // the test check_hop has the left foot, on the spot
   options.foot = Side::Right;
   options.length = 0.15;

@@ -127,7 +127,7 @@ TEST_CASE("sequence: up, over the top and down again, on one ground") {
   checkWholeSoles(down);
 }
 
-TEST_CASE("sequence: unlike motions are solved as one problem") {
+TEST_CASE("sequence: unlike motions are solved as one problem", "[long]") {
   TurnOptions turn;
   turn.angle = 0.3;
   turn.steps = 2;

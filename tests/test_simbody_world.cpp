@@ -64,7 +64,7 @@ TEST_CASE("simbody world: springs and dampers between points move a linkage, and
   CHECK(testing::checkSprung(*makeSimbodyWorld(model, options), model, 1e-3) < 1e-3);
 }
 
-TEST_CASE("simbody world: where loops are cut does not change the motion") {
+TEST_CASE("simbody world: where loops are cut does not change the motion", "[long]") {
   const Model& model = getBipetto();
   Policy policy = makeWalkPolicy(model);
   SimbodyWorldOptions options;
@@ -82,7 +82,7 @@ TEST_CASE("simbody world: where loops are cut does not change the motion") {
   CHECK(fewest->gap() < 1e-7);
 }
 
-TEST_CASE("simbody world: a walk goes as in Bielle's world, the more so the finer the steps") {
+TEST_CASE("simbody world: a walk goes as in Bielle's world, the more so the finer the steps", "[long]") {
   const Model& model = getBipetto();
   Policy policy = makeWalkPolicy(model);
   constexpr double kDuration = 0.5;  // a foot has left the ground by then

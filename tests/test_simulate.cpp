@@ -48,7 +48,7 @@ TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
   CHECK(record.q.allFinite());
 }
 
-TEST_CASE("simulate: the speed in steady steps is told beside that of the whole; pushes are told") {
+TEST_CASE("simulate: the speed in steady steps is told beside that of the whole; pushes are told", "[long]") {
   const Scratch scratch;
   const std::string plan = (scratch.path / "plan").string(), output = (scratch.path / "walked").string();
   const std::string robot = BIELLE_SOURCE_DIR "/robots/bipetto";
@@ -184,7 +184,8 @@ TEST_CASE("simulate: without gains the walk falls, with status 1") {
   CHECK(result.out.find("fell") != std::string::npos);
 }
 
-TEST_CASE("simulate: with real sensors a walk stands on flat and on uneven ground, and the estimate hardly drifts") {
+TEST_CASE("simulate: with real sensors a walk stands on flat and on uneven ground, and the estimate hardly drifts",
+          "[long]") {
   const Scratch scratch;
   const std::string output = (scratch.path / "real").string();
   for (const std::string terrain : {"flat", "tiles=0.003"})
@@ -208,7 +209,7 @@ TEST_CASE("simulate: with real sensors a walk stands on flat and on uneven groun
     }
 }
 
-TEST_CASE("simulate: the same command writes the same bytes; ground, robot, pushes and seeds matter") {
+TEST_CASE("simulate: the same command writes the same bytes; ground, robot, pushes and seeds matter", "[long]") {
   const Scratch scratch;
   const auto record = [&](const std::string& name, std::vector<std::string> options,
                           const std::string& motion = getSquat()) {
@@ -251,7 +252,8 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, robot, push
   CHECK(tiles != walk("tiles=0.005", "2"));
 }
 
-TEST_CASE("simulate: a motion of least energy is carried out as such; one of least peak torque has no gains") {
+TEST_CASE("simulate: a motion of least energy is carried out as such; one of least peak torque has no gains",
+          "[long]") {
   const Scratch scratch;
   const auto solve = [&](const std::string& objective) {
     const std::string directory = (scratch.path / objective).string();

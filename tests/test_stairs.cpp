@@ -11,7 +11,7 @@
 using namespace bielle;
 using namespace bielle::testing;
 
-TEST_CASE("stairs: Bipetto goes up and down, every foot on its step") {
+TEST_CASE("stairs: Bipetto goes up and down, every foot on its step", "[long]") {
   for (double height : {0.12, -0.12}) {  // tests check_stairs, check_stairs_down have lower ones
     CAPTURE(height);
     StairsOptions options;

@@ -138,7 +138,7 @@ void checkForwardDynamics(std::mt19937& rng, const Model& model, const std::vect
 
 }  // namespace
 
-TEST_CASE("variation: forward dynamics, every joint kind times every closure kind, closed and open") {
+TEST_CASE("variation: forward dynamics, every joint kind times every closure kind, closed and open", "[sweep]") {
   std::mt19937 rng(22);
   Selection selection(5);
   for (JointKind kind : kJointKinds)
@@ -230,7 +230,7 @@ TEST_CASE("variation: redundant rows, changes that leave them so") {
   CHECK(Closing(model, ws, set, {0, 1, 2, 3}).calcMotion(model, ws, directions[0], motion) > 0.5);
 }
 
-TEST_CASE("variation: motor torques, forces and closing of a kept motion") {
+TEST_CASE("variation: motor torques, forces and closing of a kept motion", "[sweep]") {
   std::mt19937 rng(23);
   Selection selection;
   for (JointKind kind : kJointKinds)

@@ -140,7 +140,7 @@ TEST_CASE("gait: swings start and end at rest, the pendulum's zero-moment point 
   }
 }
 
-TEST_CASE("walk: Bipetto walks as fast as requested, on its feet") {
+TEST_CASE("walk: Bipetto walks as fast as requested, on its feet", "[long]") {
   for (double speed : {0.5, 1.0}) {  // tests check_walk_* have others, and the full formulation
     CAPTURE(speed);
     WalkOptions options;
@@ -159,7 +159,7 @@ TEST_CASE("walk: Bipetto walks as fast as requested, on its feet") {
   }
 }
 
-TEST_CASE("walk: a fast one with short stages, whose contacts are stiff, is found from the guess") {
+TEST_CASE("walk: a fast one with short stages, whose contacts are stiff, is found from the guess", "[long]") {
   WalkOptions options;
   options.speed = 0.9;
   options.gait.timing.time_step = 0.01;
@@ -231,7 +231,7 @@ TEST_CASE("walk: the first double support is as long as the soles need to set of
   CHECK(count(options) == std::lround(options.gait.timing.start / h));
 }
 
-TEST_CASE("side walk and turns: where they were requested to go") {
+TEST_CASE("side walk and turns: where they were requested to go", "[long]") {
   SideWalkOptions side;
   side.speed = -0.4;
   const SolvedWalk right = solveWalk(makeSideWalk(getBipetto(), side));
@@ -253,7 +253,7 @@ TEST_CASE("side walk and turns: where they were requested to go") {
   for (const ContactTarget& foot : last.contacts) CHECK(calcHeading(foot.X_WT) == Approx(-1.2).margin(0.01));
 }
 
-TEST_CASE("walk: feet that have room land near their footholds, and stand where they landed") {
+TEST_CASE("walk: feet that have room land near their footholds, and stand where they landed", "[long]") {
   WalkOptions options;
   options.speed = 0.4;
   options.steps = 4;
@@ -271,7 +271,7 @@ TEST_CASE("walk: feet that have room land near their footholds, and stand where 
   CHECK(solved.measures.slip < 2e-3);
 }
 
-TEST_CASE("walk: feet that come down strike within the cone of friction") {
+TEST_CASE("walk: feet that come down strike within the cone of friction", "[long]") {
   WalkOptions walk;
   walk.steps = 2;
   walk.gait.rigid_landing = true;
@@ -350,7 +350,7 @@ Motion makeFarLanding(int& landing) {
 
 }  // namespace
 
-TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with its node") {
+TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with its node", "[long]") {
   int landing = -1;
   const SolvedWalk far = solveWalk(makeFarLanding(landing));
   CAPTURE(far.summary.message, far.summary.iterations);
@@ -359,7 +359,7 @@ TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with i
              Catch::Contains("landing of foot_") && Catch::Contains("at node " + std::to_string(landing)));
 }
 
-TEST_CASE("walk: it is called infeasible after two attempts") {
+TEST_CASE("walk: it is called infeasible after two attempts", "[long]") {
   int landing = -1;
   SolveOptions how;
   how.solver = FddpOptions();

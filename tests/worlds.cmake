@@ -25,7 +25,6 @@ if(BIELLE_BUILD_SIMULATION)
   bielle_command_test(edge_feet SOURCES test_edge_feet.cpp LIBS bielle_results)
   bielle_command_test(free_motion SOURCES test_free_motion.cpp LIBS bielle_results)
   bielle_command_test(campaign SOURCES test_campaign.cpp LIBS bielle_tasks)
-  add_dependencies(test_command bielle-simulate)
   set(area control)
   # Without Work Queue it says that it is skipped. Workers mostly nap.
   add_test(NAME workers COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_workers.py

@@ -15,6 +15,7 @@
 #include "motion.h"
 #include "print_report.h"
 #include "published_robots.h"
+#include "selection.h"
 #include "simbody_bridge.h"
 #include "validate.h"
 
@@ -22,25 +23,25 @@ using namespace bielle;
 using namespace bielle::testing;
 using namespace bielle::validation;
 
-TEST_CASE("every joint kind with every closure kind agrees with Simbody") {
+TEST_CASE("every joint kind with every closure kind agrees with Simbody", "[sweep]") {
   std::mt19937 rng(11);
+  Selection selection(5);
   ValidationOptions options;
   options.samples = 3;
-  for (JointKind joint : kJointKinds)
-    for (ClosureKind closure : kClosureKinds)
-      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
-        const Mechanism mechanism = makeRandomMechanism(rng, joint, closure, base);
-        options.start = mechanism.q_closed;
-        const ValidationReport report = validateRobot(mechanism.model, options);
-        CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
-        INFO(print(report));
-        CHECK(report.passed());
-        for (const char* quantity : {"mass matrix", "accelerations, Simbody solver", "closure forces, Simbody solver",
-                                     "accelerations, with rotors", "da/dq along the closures"})
-          CHECK(report.findRow(quantity) != nullptr);
-        for (const ValidationRow& row : report.rows)  // Simbody's own rounding does not excuse these mechanisms
-          if (row.tolerance < options.derivative_tolerance) CHECK(row.difference < 1e-9);
-      }
+  for (const MechanismKind& kind : listMechanismKinds()) {
+    if (selection.isLeftOut()) continue;
+    const Mechanism mechanism = makeRandomMechanism(rng, kind.joint, kind.closure, kind.base);
+    options.start = mechanism.q_closed;
+    const ValidationReport report = validateRobot(mechanism.model, options);
+    CAPTURE(kind);
+    INFO(print(report));
+    CHECK(report.passed());
+    for (const char* quantity : {"mass matrix", "accelerations, Simbody solver", "closure forces, Simbody solver",
+                                 "accelerations, with rotors", "da/dq along the closures"})
+      CHECK(report.findRow(quantity) != nullptr);
+    for (const ValidationRow& row : report.rows)  // Simbody's own rounding does not excuse these mechanisms
+      if (row.tolerance < options.derivative_tolerance) CHECK(row.difference < 1e-9);
+  }
 }
 
 TEST_CASE("springs and dampers on joints and between points, and friction, agree with Simbody") {

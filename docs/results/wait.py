@@ -1,10 +1,10 @@
 """What a newcomer and a developer wait for: processor time, without a compiler cache, of this commit and of another one.
 
-    docs/results/wait.py --against REVISION [--steps demo edit ...] [--measure REVISION ...]
+    docs/results/wait.py --against REVISION [--steps demo edit ...] [--measure REVISION ...] [--build DIRECTORY]
 
 Each step runs in fresh clones, first of this commit, then of the other. Every part that ends adds a line to
 docs/results/data/wait.csv; what is there for the same commit is not measured again. All steps of both take four hours of two cores;
-the page has the last rows of each step.
+the page has the last rows of each step, and the tests of a build of this commit by tier.
 """
 import argparse
 import csv
@@ -18,17 +18,25 @@ import time
 
 import common
 
+sys.path.append(str(common.SOURCE / "tests"))
+from list_tiers import list_tests, list_tiers  # noqa: E402
+
 DATA = common.HERE / "data/wait.csv"
 COLUMNS = ("commit", "step", "title", "processor", "clock", "run")
 RELEASE = "cmake --preset release -G Ninja >/dev/null && "
 # Some commits also check that sources compile without precompiled headers.
 CHECK = "if [ -f scripts/check_includes.sh ]; then scripts/check_includes.sh; fi && "
 SANITIZED = "source scripts/setup.sh && eval \"$(sed -n '{}' .ci/run)\""
+# Commits before them have one tier of tests.
+TIERS = "if [ -f tests/tiers.cmake ]; then source scripts/setup.sh && {}; fi"
 # What runs once before and is not counted; what is counted, by its title.
 STEPS = {
     "demo": ("", {"`scripts/demo.sh`": "scripts/demo.sh"}),
-    "test": ("", {"`scripts/test.sh`, building": "sed -i '/^run_tests/d' scripts/test.sh && scripts/test.sh",
-                  "`scripts/test.sh`, testing": "source scripts/setup.sh && run_tests build/test"}),
+    "test": ("", {"`scripts/test.sh`, building": "sed '/^run_tests/d' scripts/test.sh >scripts/build.sh && bash scripts/build.sh",
+                  "`scripts/test.sh`, testing":
+                  "source scripts/setup.sh && eval \"$(sed -n '/^tier=/p;/^run_tests/p' scripts/test.sh)\"",
+                  "`scripts/test.sh --all` after it, building": TIERS.format("build build/test --preset release"),
+                  "`scripts/test.sh --all` after it, testing": TIERS.format("run_tests build/test --label-regex '^long$'")}),
     "ci": ("", {"`.ci/run` after it: building with sanitizers": CHECK + SANITIZED.format("/^bielle_targets=/,/^build/p"),
                 "`.ci/run` after it: testing with sanitizers": SANITIZED.format("/^run_tests build.sanitize/p")}),
     "edit": (RELEASE + "ninja -C build {target}",
@@ -38,9 +46,9 @@ STEPS = {
             {"`pip install .` in a fresh virtual environment": "environment/bin/pip install ."}),
 }
 # Steps that are also shown together.
-SUMS = {"`scripts/test.sh`": ["test"], "`.ci/run`": ["test", "ci"]}
+SUMS = {"`scripts/test.sh`": list(STEPS["test"][1])[:2], "`.ci/run`": [*STEPS["test"][1], *STEPS["ci"][1]]}
 # Largest ratios that were aimed at, of steps and of sums.
-GOALS = {"demo": 0.4, "edit": 0.4, "pip": 0.5, **dict.fromkeys(SUMS, 0.4)}
+GOALS = {"demo": 0.4, "edit": 0.4, "pip": 0.5, "`scripts/test.sh`": 0.4, "`.ci/run`": 0.5}
 
 
 def run(command, directory, log):
@@ -96,9 +104,10 @@ def find(chosen):
     """{title: (minutes of processor, of clock, run)}, with sums, by the last rows that are chosen."""
     rows = {row["title"]: row for row in read() if chosen(row)}
     out = {title: (row["processor"], row["clock"], row["run"]) for title, row in rows.items()}
-    for title, steps in SUMS.items():
-        parts = [row for row in rows.values() if row["step"] in steps]
-        if {row["step"] for row in parts} == set(steps) and len({row["commit"] for row in parts}) == 1:
+    for title, titles in SUMS.items():
+        parts = [rows[part] for part in titles if part in rows]
+        missing = [part for part in titles if part not in rows and "--all" not in part]  # older rows have one tier
+        if not missing and len({row["commit"] for row in parts}) == 1:
             out[title] = (*(sum(row[key] for row in parts) for key in ("processor", "clock")), parts[0]["run"])
     return out
 
@@ -117,12 +126,22 @@ def show_sizes(sizes):
     return f"{sizes[0]:,} lines of C++ and {sizes[1]} files of tests"
 
 
+def show_tiers(page, build):
+    """The names of the tests, which the test `tiers` compares with those of CTest."""
+    short, long = list_tiers(list_tests("ctest", build))
+    for title, names in ((f"`scripts/test.sh` runs {len(short)} tests", short),
+                         (f"`scripts/test.sh --all` runs these {len(long)} as well", long)):
+        page.heading(title)
+        page.add(", ".join(names))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--against", required=True, metavar="REVISION")
     parser.add_argument("--commit", default="HEAD", metavar="REVISION", help="instead of HEAD")
     parser.add_argument("--measure", nargs="*", metavar="REVISION", help="of these only; none: the page alone")
     parser.add_argument("--steps", nargs="+", choices=STEPS, default=list(STEPS))
+    parser.add_argument("--build", default=common.SOURCE / "build/test", help="whose tests are listed; default: build/test")
     arguments = parser.parse_args()
 
     def parse(name):
@@ -147,6 +166,7 @@ def main():
     sizes = {revision: count(revision) for revision in (there, here)}
     page.add(f"""Ratios are those of processor times. Goals were set for what {arguments.against} builds and tests, which has
 {show_sizes(sizes[there])}; this has {show_sizes(sizes[here])}.""")
+    show_tiers(page, arguments.build)
     page.write(False)
 
 
