@@ -90,7 +90,7 @@ const std::vector<Mistake> kYamlMistakes = {
     {kType, "typo: [6D]", "key 'typo' (line 2)", "unknown", "known keys are closed_loop, type"},
     {kType, "type: [6D]\ntype: [3D]", "document", "key 'type' is given twice", "keep one"},
     {kType, kType + "\n<<: {base: fixed}", "key '<<'", "unknown", "known keys are"},
-    {kType, kType + "\nmotor_armature: 0x10", "key 'motor_armature'", "not a number", "give one number"},
+    {kType, kType + "\ngravity: [0, 0, 0x10]", "key 'gravity'[2]", "not a number", "give one number"},
     {kType, "type: [7d]", "key 'type'[0] (line 2)", "'7d' is unknown", "6d (weld)"},
     {kType, "type: [6d, 6d]", "key 'type' (line 2)", "2 element(s)", "give 1"},
     {kType, "", "document", "no 'type'", "add it"},
