@@ -105,7 +105,7 @@ class DxfTest(unittest.TestCase):
 
     def test_links_that_are_not_plane_are_named(self):
         done = run("convert", "bipetto", "--to", "dxf", "-o", os.path.join(self.place.name, "bipetto.dxf"))
-        self.assertRegex(done.stderr, "^bielle: warning: link 'hip_yaw_left' is left out: ")
+        self.assertRegex(done.stderr, "(?m)^bielle: warning: link 'hip_yaw_left' is left out: ")
 
     def refuse(self, robot, said, **options):
         path = os.path.join(self.place.name, "refused.dxf")
