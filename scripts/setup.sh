@@ -29,6 +29,9 @@ bielle_dxf_packages=(python3-ezdxf)
 bielle_test_packages=(catch2 python3 chromium pkg-config python3-pytest
   python3-mypy python3-nbconvert python3-ipykernel python3-matplotlib)
 
+# Another compiler, by which .ci/run compiles a part.
+bielle_clang_packages=(clang)
+
 # install_missing PACKAGE...: installs the packages that dpkg does not list as installed.
 install_missing() {
   local missing=() package
