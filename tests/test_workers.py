@@ -220,7 +220,7 @@ def test_arguments():
         taken.listen()
         refuse("--workers", str(taken.getsockname()[1]), words="cannot be opened")
     os.mkdir("without")
-    for name in ("bielle", "bielle-simulate"):
+    for name in ("bielle", "bielle-complete", "bielle-tasks", "bielle-simulate"):
         shutil.copy(os.path.join("bin", name), "without")
     refuse("--workers", "auto", words="coop-computing-tools", command="without/bielle")
 
@@ -344,7 +344,7 @@ if __name__ == "__main__":
         os.chdir(place)
         os.mkdir("bin")
         os.mkdir("workers")
-        for name in ("bielle", "bielle-workers"):
+        for name in ("bielle", "bielle-complete", "bielle-design", "bielle-tasks", "bielle-workers"):
             shutil.copy(os.path.join(companions, name), "bin")
         with open("bin/bielle-simulate", "w") as file:
             file.write(CHEAP)
