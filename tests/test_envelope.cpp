@@ -14,8 +14,8 @@
 #include "bielle/motion/walk.h"
 #include "design/gradient.h"
 #include "design/measures.h"
-#include "design/spec.h"
 #include "design/motion_envelope.h"
+#include "design/spec.h"
 
 using namespace bielle;
 

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <set>
 
+#include "bielle/formats/reader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/serial_model.h"
-#include "bielle/formats/reader.h"
 
 namespace bielle::validation {
 namespace {

@@ -2,8 +2,8 @@
 #include <filesystem>
 #include <iostream>
 
-#include "bielle/results/robot_info.h"
 #include "bielle/formats/reader.h"
+#include "bielle/results/robot_info.h"
 #include "cli/commands.h"
 #include "dynamics/loop_conflict.h"
 

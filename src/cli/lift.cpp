@@ -90,8 +90,8 @@ int run(const LiftArguments& arguments) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::optional<MotionResult> result;
   if (!lifted.trajectory.us.empty())
-    result = makeLiftedResult({summary.run.robot, robot.file, getCommandLine(), Belief::Closed, ""}, robot.model, motion,
-                              lifted, seconds);
+    result = makeLiftedResult({summary.run.robot, robot.file, getCommandLine(), Belief::Closed, ""}, robot.model,
+                              motion, lifted, seconds);
   const MotionResult* written = result ? &*result : nullptr;
   printOutcome(arguments, lifted, written, static_cast<int>(trajectory.a.size()));
   for (const std::string& path : writeLift(arguments.directory, arguments.options.method, lifted, written))

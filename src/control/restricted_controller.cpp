@@ -12,7 +12,9 @@ void restrictTo(const std::vector<int>& places, const VectorXd& from, VectorXd& 
 }  // namespace
 
 RestrictedController::RestrictedController(const Model& robot, const Model& model, std::unique_ptr<Controller> inner)
-    : inner_(std::move(inner)), coordinates_(findRestrictedCoordinates(robot, model)), dofs_(findRestrictedDofs(robot, model)) {
+    : inner_(std::move(inner)),
+      coordinates_(findRestrictedCoordinates(robot, model)),
+      dofs_(findRestrictedDofs(robot, model)) {
   measurement_.q.resize(model.nq());
   measurement_.v.resize(model.nv());
   measurement_.contacts.reserve(model.contacts().size());

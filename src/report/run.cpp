@@ -3,12 +3,12 @@
 #include <filesystem>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/formats/reader.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
 #include "bielle/motion/serial_model.h"
 #include "bielle/results/result.h"
-#include "bielle/formats/reader.h"
 
 namespace fs = std::filesystem;
 
