@@ -1,11 +1,15 @@
 // Oracle: central differences on the group, and the group axioms.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
 #include <random>
+#include <vector>
 
 #include "bielle/math/se3.h"
+#include "math/constants.h"
 #include "math/direction.h"
 #include "math/small_dense.h"
+#include "math/so3.h"
 #include "model/joint.h"
 
 using namespace bielle;
@@ -131,6 +135,116 @@ TEST_CASE("every joint kind: integrate, difference, their Jacobians and the moti
       CHECK(((dp - dm) / (2 * h) - Jv.col(k)).norm() < 1e-8);
     }
   }
+}
+
+// To either side of where a turn has its singularities.
+std::vector<double> listTurns() {
+  std::vector<double> turns = {0, 1e-9, 1e-3, 0.0999, 0.1001, 1, 3, 3.5, 6, 8, 20, 1000};
+  for (const double whole : {kPi, 2 * kPi, 3 * kPi, 4 * kPi})
+    for (const double off : {0.0, 1e-13, 1e-9, 1e-6, 1e-3}) turns.insert(turns.end(), {whole - off, whole + off});
+  return turns;
+}
+
+TEST_CASE(
+    "every joint kind: differences are undone at every angle, beyond whole turns as well, and so are their Jacobians") {
+  using K = JointKind;
+  for (K kind : {K::Revolute, K::Continuous, K::Prismatic, K::Spherical, K::Universal, K::Planar, K::FreeFlyer})
+    for (const double turn : listTurns())
+      for (const double sign : {1, -1}) {
+        CAPTURE(getName(kind), turn, sign);
+        Joint joint;
+        joint.kind = kind;
+        joint.axis = random(3, 1).normalized();
+        joint.axis2 = random(3, 1).normalized();
+        joint.nq = getNq(kind);
+        joint.nv = getNv(kind);
+        const bool wraps = kind == K::Spherical || kind == K::FreeFlyer;
+        VectorXd q0(joint.nq), q1(joint.nq), back(joint.nq), dv = random(joint.nv, 0.5), d(joint.nv);
+        setNeutral(kind, back);
+        integrateJoint(joint, back, random(joint.nv, 0.5), q0);
+        if (wraps) dv.tail<3>() *= turn / dv.tail<3>().norm();
+        if (!wraps) dv[joint.nv - 1] = sign * turn;
+        integrateJoint(joint, q0, dv, q1);
+        calcJointDifference(joint, q0, q1, d);
+        integrateJoint(joint, q0, d, back);
+        const SE3 X1 = calcJointPlacement(joint, q1), X = calcJointPlacement(joint, back);
+        CHECK((X1.R - X.R).norm() < 1e-11);
+        CHECK((X1.p - X.p).norm() < 1e-11);
+        if (!wraps) CHECK((d - dv).norm() < 1e-11 * (1 + turn));
+        if (wraps && turn < kPi - 1e-7) CHECK((d - dv).norm() < 1e-11);
+
+        MatrixXd Jq(joint.nv, joint.nv), Jv(joint.nv, joint.nv), Jd(joint.nv, joint.nv);
+        calcJointIntegrateJacobians(joint, d, Jq, Jv);
+        calcJointDifferenceJacobian(joint, d, Jd);
+        CHECK((Jd * Jv - MatrixXd::Identity(joint.nv, joint.nv)).norm() < 1e-9);
+        if (wraps && turn > kPi - 1e-3) continue;  // differences of rotations jump at half a turn
+        const double h = 1e-6;
+        const auto derive = [&](const std::function<void(const VectorXd&, VectorXd&)>& f) {
+          MatrixXd J(joint.nv, joint.nv);
+          VectorXd plus(joint.nv), minus(joint.nv);
+          for (int k = 0; k < joint.nv; ++k) {
+            f(h * VectorXd::Unit(joint.nv, k), plus);
+            f(-h * VectorXd::Unit(joint.nv, k), minus);
+            J.col(k) = (plus - minus) / (2 * h);
+          }
+          return J;
+        };
+        VectorXd moved(joint.nq), end(joint.nq);
+        const MatrixXd by_q = derive([&](const VectorXd& x, VectorXd& out) {
+          integrateJoint(joint, q0, x, moved);
+          integrateJoint(joint, moved, d, end);
+          calcJointDifference(joint, q1, end, out);
+        });
+        const MatrixXd by_v = derive([&](const VectorXd& x, VectorXd& out) {
+          integrateJoint(joint, q0, d + x, end);
+          calcJointDifference(joint, q1, end, out);
+        });
+        const MatrixXd by_end = derive([&](const VectorXd& x, VectorXd& out) {
+          integrateJoint(joint, q1, x, end);
+          calcJointDifference(joint, q0, end, out);
+        });
+        // Rounding of angles and lengths over h, and the bend of the chord at half a turn times h.
+        const double error = 1e-6 + 1e-9 * turn;
+        CHECK((by_q - Jq).norm() < error * Jq.norm());
+        CHECK((by_v - Jv).norm() < error * Jv.norm());
+        CHECK((by_end - Jd).norm() < error * Jd.norm());
+      }
+}
+
+TEST_CASE("a planar joint moves along the exponential up to half a turn, and smoothly beyond") {
+  Joint joint;
+  joint.kind = JointKind::Planar;
+  joint.nq = joint.nv = 3;
+  const Vector3d q0(0.3, -0.2, 0.7);
+  VectorXd q1(3), q2(3);
+  for (const double turn : {0.0, 1e-6, 0.0999, 0.1001, 1.0, -2.0, 3.1, kPi, -kPi}) {
+    const Vector3d dv(0.5, 0.8, turn);
+    integrateJoint(joint, q0, dv, q1);
+    Vector6d twist;
+    twist << 0.5, 0.8, 0, 0, 0, turn;
+    const SE3 X = calcJointPlacement(joint, q0) * exp6(twist), Y = calcJointPlacement(joint, q1);
+    CHECK((X.p - Y.p).norm() < 1e-14);
+    CHECK((X.R - Y.R).norm() < 1e-14);
+  }
+  integrateJoint(joint, q0, Vector3d(0.5, 0.8, kPi - 1e-7), q1);
+  integrateJoint(joint, q0, Vector3d(0.5, 0.8, kPi + 1e-7), q2);
+  CHECK((q2 - q1).norm() < 1e-6);
+}
+
+TEST_CASE("rotations of half a turn and next to it: vector, quaternion and matrix are the same") {
+  for (const double off : {0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-8, 1e-7, 1e-6, 1e-4, 1e-3})
+    for (int i = 0; i < 20; ++i) {
+      const Vector3d axis = i < 3 ? Vector3d(Vector3d::Unit(i)) : Vector3d(random(3, 1).normalized());
+      const double angle = kPi - off;
+      CAPTURE(off, axis.transpose());
+      const Matrix3d R = exp3(angle * axis);
+      CHECK((exp3AsQuaternion(angle * axis).toRotationMatrix() - R).norm() < 1e-14);
+      const Vector3d w = log3(R);
+      CHECK(std::abs(w.norm() - angle) < 1e-14);
+      CHECK((exp3(w) - R).norm() < 1e-14);
+      CHECK(std::min((w - angle * axis).norm(), off < 1e-7 ? (w + angle * axis).norm() : 1) < 1e-14);
+      CHECK((calcRightJacobianInverse3(w) * calcRightJacobian3(w) - Matrix3d::Identity()).norm() < 1e-13);
+    }
 }
 
 TEST_CASE("small systems are solved with rows swapped more than once") {

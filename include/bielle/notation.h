@@ -27,7 +27,8 @@
 /// Free-flyer and spherical joints follow Pinocchio, so trajectories can be exchanged by joint name. A continuous joint
 /// is one angle here where Pinocchio stores (cos, sin); a planar joint is an angle here, (cos, sin) there.
 /// The tangent vector of a configuration has the size and frames of v: `integrate(q, dq)` is q (+) dq, and
-/// `difference(q0, q1)` is the dq with q0 (+) dq = q1.
+/// `difference(q0, q1)` is the dq with q0 (+) dq = q1. Both go along constant velocities dq (the
+/// exponential); those of planar joints, whose angles are not wrapped, up to half a turn (`src/model/joint.cpp`).
 ///
 /// ## Dynamics
 ///     M(q) a + b(q, v) = B u + J(q)^T lambda            (1)

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "math/constants.h"
 #include "math/so3.h"
 
 namespace bielle {
@@ -10,22 +11,29 @@ namespace {
 using VectorUpTo7 = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 7, 1>;
 using ConstQuaternionMap = Eigen::Map<const Eigen::Quaterniond>;
 
-// Planar joints live on SE(2), embedded in SE(3) through the basis of their plane.
-Vector6d embedPlanar(const Joint& joint, ConstVectorRef dv) {
-  const Matrix3d B = makePlaneBasis(joint.axis);
-  Vector6d twist;
-  twist << B.leftCols<2>() * dv.head<2>(), B.col(2) * dv[2];
-  return twist;
-}
+// The exponential of SE(2) goes along an arc: a translation rho and a turn t move by f(t) R(t/2) rho, the chord, with
+// f = sin(t/2) / (t/2). It vanishes after a whole turn, whatever rho; for it to have an inverse at every angle, the chord keeps the
+// length of the diameter, f = 2 / |t|, from half a turn on, where it turns on smoothly.
+struct Chord {
+  explicit Chord(double t) : half(0.5 * t) {
+    constexpr double kSmall = 0.1;  // below it the truncated terms of the series are below rounding
+    const double t2 = t * t;
+    if (std::abs(t) >= kPi) {
+      f = 2 / std::abs(t);
+      df = -f / t;
+    } else if (std::abs(t) >= kSmall) {
+      f = std::sin(0.5 * t) / (0.5 * t);
+      df = (std::cos(0.5 * t) - f) / t;
+    } else {
+      f = 1 - t2 / 24 * (1 - t2 / 80 * (1 - t2 / 168 * (1 - t2 / 288)));
+      df = -t / 12 * (1 - t2 / 40 * (1 - t2 / 112 * (1 - t2 / 216)));
+    }
+  }
+  Eigen::Rotation2Dd half;
+  double f, df;  // df = f'(t)
+};
 
-// Projection of a 6x6 Jacobian on the tangent of the plane.
-void projectPlanar(const Joint& joint, const Matrix6d& J, MatrixRef out) {
-  const Matrix3d B = makePlaneBasis(joint.axis);
-  Eigen::Matrix<double, 6, 3> E = Eigen::Matrix<double, 6, 3>::Zero();
-  E.topLeftCorner<3, 2>() = B.leftCols<2>();
-  E.bottomRightCorner<3, 1>() = B.col(2);
-  out = E.transpose() * J * E;
-}
+Eigen::Vector2d turnLeft(const Eigen::Vector2d& x) { return {-x.y(), x.x()}; }
 
 }  // namespace
 
@@ -186,12 +194,9 @@ void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, Vec
       break;
     }
     case JointKind::Planar: {
-      const SE3 step = exp6(embedPlanar(joint, dv));
-      const Matrix3d B = makePlaneBasis(joint.axis);
-      const Vector3d p = B.leftCols<2>() * q.head<2>() + makeAxisRotation(joint.axis, q[2]) * step.p;
-      const double angle = q[2] + dv[2];
-      q_out.head<2>() = B.leftCols<2>().transpose() * p;
-      q_out[2] = angle;
+      const Chord chord(dv[2]);
+      const Eigen::Rotation2Dd half_way = Eigen::Rotation2Dd(q[2]) * chord.half;
+      q_out << q.head<2>() + half_way * Eigen::Vector2d(chord.f * dv.head<2>()), q[2] + dv[2];
       break;
     }
     case JointKind::FreeFlyer: {
@@ -241,13 +246,10 @@ void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q
       break;
     }
     case JointKind::Planar: {
-      // The angle is not wrapped, so the translation is undone by the inverse of the exponential at that very angle.
       const double angle = q1[2] - q0[2];
-      const Matrix3d B = makePlaneBasis(joint.axis);
-      const Vector3d dp = makeAxisRotation(joint.axis, -q0[2]) * (B.leftCols<2>() * (q1.head<2>() - q0.head<2>()));
-      const Vector3d rho = calcRightJacobianInverse3(-joint.axis * angle) * dp;
-      dv.head<2>() = B.leftCols<2>().transpose() * rho;
-      dv[2] = angle;
+      const Chord chord(angle);
+      const Eigen::Rotation2Dd half_way = Eigen::Rotation2Dd(q0[2]) * chord.half;
+      dv << half_way.inverse() * Eigen::Vector2d((q1 - q0).head<2>() / chord.f), angle;
       break;
     }
     case JointKind::FreeFlyer:
@@ -294,9 +296,11 @@ void calcJointIntegrateJacobians(const Joint& joint, ConstVectorRef dv, MatrixRe
       J_dv = calcRightJacobian3(dv);
       break;
     case JointKind::Planar: {
-      const Vector6d twist = embedPlanar(joint, dv);
-      projectPlanar(joint, exp6(twist).inverse().toActionMatrix(), J_q);
-      projectPlanar(joint, calcRightJacobian6(twist), J_dv);
+      const Chord chord(dv[2]);
+      const Eigen::Vector2d rho = dv.head<2>();
+      const Eigen::Matrix2d back = chord.half.inverse().toRotationMatrix();
+      J_q << back * back, back * (chord.f * turnLeft(rho)), 0, 0, 1;
+      J_dv << chord.f * back, back * (chord.df * rho + 0.5 * chord.f * turnLeft(rho)), 0, 0, 1;
       break;
     }
     case JointKind::FreeFlyer:
@@ -314,9 +318,12 @@ void calcJointDifferenceJacobian(const Joint& joint, ConstVectorRef dv, MatrixRe
     case JointKind::Spherical:
       J_q1 = calcRightJacobianInverse3(dv);
       break;
-    case JointKind::Planar:
-      projectPlanar(joint, calcRightJacobianInverse6(embedPlanar(joint, dv)), J_q1);
+    case JointKind::Planar: {
+      const Chord chord(dv[2]);
+      const Eigen::Vector2d rho = dv.head<2>();
+      J_q1 << 1 / chord.f * chord.half.toRotationMatrix(), -(chord.df / chord.f * rho + 0.5 * turnLeft(rho)), 0, 0, 1;
       break;
+    }
     case JointKind::FreeFlyer:
       J_q1 = calcRightJacobianInverse6<double>(dv);
       break;
