@@ -247,6 +247,19 @@ TEST_CASE("rotations of half a turn and next to it: vector, quaternion and matri
     }
 }
 
+TEST_CASE("roll, pitch and yaw make the rotation that they come from, at right angles and next to them") {
+  for (const double off : {0.0, 1e-15, 1e-13, 1e-12, 1e-11, 1e-9, 1e-8, 1e-6, 1e-3, 0.5})
+    for (const double pitch : {0.5 * kPi - off, off - 0.5 * kPi, kPi - off})
+      for (const double roll : {0.0, 0.3, -2.5, kPi})
+        for (const double yaw : {0.0, 1.2, -0.5 * kPi, 3.0}) {
+          CAPTURE(off, roll, pitch, yaw);
+          const Matrix3d R = makeRotation({roll, pitch, yaw});
+          CHECK((makeRotation(calcRollPitchYaw(R)) - R).norm() < 2e-12);
+          if (off == 0.5 && std::abs(pitch) < 0.5 * kPi && roll != kPi)
+            CHECK((calcRollPitchYaw(R) - Vector3d(roll, pitch, yaw)).norm() < 1e-14);
+        }
+}
+
 TEST_CASE("small systems are solved with rows swapped more than once") {
   for (int n : {1, 2, 3, 6, 9, 12}) {
     MatrixXd A = MatrixXd::NullaryExpr(n, n, [](Eigen::Index, Eigen::Index) { return random(1, 1)[0]; });

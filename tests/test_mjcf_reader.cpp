@@ -8,6 +8,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/formats/robot_writer.h"
+#include "bielle/model/builder.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/drake.h"
 #include "formats/mjcf.h"
@@ -107,6 +108,35 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
   checkError(makeSwing("", "<keyframe>\n<key qpos=\"1 2 3\"/></keyframe>"), "key (line 2)",
              "its attribute 'qpos' is not");
   checkError(makeSwing("", "<compiler coordinate=\"global\"/>"), "compiler (line 1)", "its coordinates are global");
+}
+
+TEST_CASE("hinges in place of a ball make its rotation, locked and next to it") {
+  Joint joint;
+  joint.name = "ball";
+  joint.kind = JointKind::Spherical;
+  Inertia inertia;
+  inertia.mass = 1;
+  inertia.I_com = Matrix3d::Identity();
+  ModelBuilder builder("ball");
+  builder.addLink("bob", "world", joint, inertia);
+  const Model model = builder.build();
+  const auto turn = [](double angle, const Vector3d& axis) {
+    return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis));
+  };
+  const auto make = [&](double a, double b, double c) {
+    return turn(a, Vector3d::UnitX()) * turn(b, Vector3d::UnitY()) * turn(c, Vector3d::UnitZ());
+  };
+  for (const double off : {0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3, 0.5})
+    for (const double sign : {1, -1})
+      for (const double a : {0.0, 0.4, -2.0})
+        for (const double c : {0.0, 1.3, 3.0}) {
+          CAPTURE(off, sign, a, c);
+          const Eigen::Quaterniond rotation = make(a, sign * (M_PI / 2 - off), c);
+          const VectorXd angles = calcMjcfQpos(model, model.makeNeutral(), rotation.coeffs(), MjcfRotations::Hinges);
+          REQUIRE(angles.size() == 3);
+          CHECK((make(angles[0], angles[1], angles[2]).toRotationMatrix() - rotation.toRotationMatrix()).norm() <
+                1e-14);
+        }
 }
 
 TEST_CASE("files of today's MuJoCo: frames, sites in equalities, inertia by shapes, classes of defaults") {

@@ -12,6 +12,7 @@
 #include "bielle/model/error.h"
 #include "formats/adopt_feet.h"
 #include "formats/robot_text.h"
+#include "math/direction.h"
 
 namespace bielle {
 namespace {

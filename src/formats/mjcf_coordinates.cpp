@@ -21,10 +21,11 @@ Eigen::Quaterniond getOrigin(const Joint& joint, ConstVectorRef q_ref) {
   return isMjcfFree(joint) ? Eigen::Quaterniond::Identity() : toQuaternion(q_ref.segment<4>(findQuaternion(joint)));
 }
 
-// Eq. (1), solved for its angles.
+// Eq. (1), solved for its angles; c fits a, which is known less and less where b comes near a right angle, and any there.
 Vector3d calcHingeAngles(const Matrix3d& R) {
-  return {std::atan2(-R(1, 2), R(2, 2)), std::atan2(R(0, 2), std::hypot(R(0, 0), R(0, 1))),
-          std::atan2(-R(0, 1), R(0, 0))};
+  const double a = std::atan2(-R(1, 2), R(2, 2)), b = std::atan2(R(0, 2), std::hypot(R(0, 0), R(0, 1)));
+  const Eigen::RowVector3d y = std::cos(a) * R.row(1) + std::sin(a) * R.row(2);  // of Rx(a)^T R = Ry(b) Rz(c)
+  return {a, b, std::atan2(y.x(), y.y())};
 }
 
 // Eq. (2), solved for the rates.

@@ -27,13 +27,6 @@ std::string formatExact(const Vector3d& v) {
   return formatExact(v.x()) + " " + formatExact(v.y()) + " " + formatExact(v.z());
 }
 
-Vector3d calcRollPitchYaw(const Matrix3d& R) {
-  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
-  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9)  // roll and yaw turn about one axis: no yaw
-    return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0};
-  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
-}
-
 bool hasImpliedFreeFlyer(const Model& model) {
   const Joint& first = model.joints()[1];
   bool ground = false;  // any other element on the ground requires a separate link

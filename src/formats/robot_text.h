@@ -17,9 +17,6 @@ std::string formatRounded(const Vector3d& v, const char* separator = " ");
 std::string formatExact(double value);
 std::string formatExact(const Vector3d& v);
 
-/// Roll, pitch and yaw of a rotation R = Rz(yaw) Ry(pitch) Rx(roll), rad: the inverse of makeRotation().
-Vector3d calcRollPitchYaw(const Matrix3d& R);
-
 /// The root link is carried by the free-flyer that the reader makes: nothing else is on the ground.
 bool hasImpliedFreeFlyer(const Model& model);
 

@@ -7,6 +7,7 @@
 #include "formats/format_warnings.h"
 #include "formats/robot_text.h"
 #include "formats/xml_document.h"
+#include "math/direction.h"
 #include "math/so3.h"
 #include "model/joint.h"
 #include "model/number_text.h"
@@ -15,12 +16,7 @@ namespace bielle {
 namespace {
 
 // x y z roll pitch yaw, R = Rz(yaw) Ry(pitch) Rx(roll)
-std::string formatPose(const SE3& X) {
-  const double level = std::hypot(X.R(0, 0), X.R(1, 0)), pitch = std::atan2(-X.R(2, 0), level);
-  Vector3d angles(std::atan2(X.R(2, 1), X.R(2, 2)), pitch, std::atan2(X.R(1, 0), X.R(0, 0)));
-  if (level < 1e-9) angles = {std::atan2(-X.R(1, 2), X.R(1, 1)), pitch, 0};  // roll and yaw turn about one axis
-  return formatExact(X.p) + " " + formatExact(angles);
-}
+std::string formatPose(const SE3& X) { return formatExact(X.p) + " " + formatExact(calcRollPitchYaw(X.R)); }
 
 class SdfWriter {
  public:

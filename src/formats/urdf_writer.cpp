@@ -6,6 +6,7 @@
 
 #include "bielle/formats/robot_writer.h"
 #include "formats/robot_text.h"
+#include "math/direction.h"
 
 namespace bielle {
 namespace {

@@ -29,4 +29,13 @@ Matrix3d makeRotation(const Vector3d& rpy) {
       .toRotationMatrix();
 }
 
+Vector3d calcRollPitchYaw(const Matrix3d& R) {
+  constexpr double kLocked = 1e-12;
+  const double level = std::hypot(R(0, 0), R(1, 0)), pitch = std::atan2(-R(2, 0), level);
+  if (level < kLocked) return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0};
+  const double roll = std::atan2(R(2, 1), R(2, 2));
+  const Vector3d y = std::cos(roll) * R.col(1) - std::sin(roll) * R.col(2);  // of R Rx(roll)^T = Rz(yaw) Ry(pitch)
+  return {roll, pitch, std::atan2(-y.x(), y.y())};
+}
+
 }  // namespace bielle

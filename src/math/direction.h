@@ -11,5 +11,8 @@ Matrix3d calcRotationOfZ(const Vector3d& direction);
 
 /// Rz(yaw) Ry(pitch) Rx(roll). \param rpy  roll, pitch and yaw, rad
 Matrix3d makeRotation(const Vector3d& rpy);
+/// Its inverse, pitch within -pi/2 .. pi/2. Where that is a right angle to 1e-12 rad, roll and yaw turn about one axis, and yaw is 0;
+/// near it they are known less and less, but what they make of R is not: each is that which fits the other.
+Vector3d calcRollPitchYaw(const Matrix3d& R);
 
 }  // namespace bielle

@@ -4,6 +4,7 @@
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/linkage.h"
+#include "math/direction.h"
 #include "report/drawing.h"
 #include "report/pack.h"
 #include "report/run.h"
@@ -62,12 +63,6 @@ bool isLoaded(const MotionRecord& record, int stage, int contact) {
   return !record.contact_wrenches.row(stage).segment<6>(6 * contact).isZero(0);
 }
 
-// Roll, pitch and yaw of a rotation R = Rz(yaw) Ry(pitch) Rx(roll).
-Eigen::RowVector3d calcRollPitchYaw(const Matrix3d& R) {
-  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0))),
-          std::atan2(R(1, 0), R(0, 0))};
-}
-
 // Quantities that follow from the placements, node by node.
 struct NodeTables {
   RowMatrixXd placements;  // bodies x 7
@@ -95,7 +90,7 @@ NodeTables makeNodeTables(const Model& model, const MotionRecord& record) {
     tables.energy.row(k) << kinetic, potential, kinetic + potential;
     for (int i = 0; i < model.numBodies(); ++i) tables.placements.row(k).segment<7>(7 * i) = makePoseRow(ws.X_WB[i]);
     if (k == 0 && model.numBodies() > 1) R_start = ws.X_WB[1].R;
-    if (model.numBodies() > 1) tables.tilt.row(k) = calcRollPitchYaw(ws.X_WB[1].R * R_start.transpose());
+    if (model.numBodies() > 1) tables.tilt.row(k) = calcRollPitchYaw(ws.X_WB[1].R * R_start.transpose()).transpose();
     for (size_t c = 0; c < model.closures().size(); ++c) {
       const ClosureGap gap = calcClosureGap(ws, model.closures()[c]);
       tables.gaps(k, 2 * c) = gap.position;
