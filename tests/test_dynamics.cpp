@@ -9,6 +9,9 @@
 #include "bielle/dynamics/rnea.h"
 #include "check_derivative.h"
 #include "dynamics/saddle_point.h"
+#include "math/constants.h"
+#include "math/so3.h"
+#include "model/joint.h"
 #include "selection.h"
 
 using namespace bielle;
@@ -107,6 +110,40 @@ TEST_CASE("closures: residual rate, velocity and acceleration are time derivativ
         CHECK(calcRelativeError(-calcClosureVelocity(ws, closure), residual_rate) < 1e-8);
     }
   }
+}
+
+TEST_CASE("closures: a hinge turned by up to pi is open by its angle, and its rate is that of the residual") {
+  std::mt19937 rng(8);
+  Closure closure;
+  closure.kind = ClosureKind::Hinge5D;
+  for (const double off : {0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-6, 1e-3, 1.0})
+    for (int i = 0; i < 30; ++i) {
+      closure.axis = i < 3 ? Vector3d(Vector3d::Unit(i)) : Vector3d(randomVector(rng, 3, 1).normalized());
+      // About a normal of the axis; then any turn about the axis itself.
+      const Vector3d normal = makePlaneBasis(closure.axis) * Vector3d(std::cos(0.7 * i), std::sin(0.7 * i), 0);
+      const SE3 X(makeAxisRotation(normal, kPi - off) * makeAxisRotation(closure.axis, 0.2 * i), Vector3d(0.1, 0, 0.2));
+      CAPTURE(off, closure.axis.transpose());
+      const VectorXd r = calcClosureResidual(closure, X);
+      CHECK(r.head<3>() == X.p);
+      CHECK(std::abs(r.tail<2>().norm() - (kPi - off)) < 1e-14);
+      const RowsBy6 rate = calcClosureResidualRate(closure, X);
+      CHECK(rate.allFinite());
+      if (off < 1e-6) continue;  // the direction of the residual turns by more than any difference
+      const double h = 1e-3 * off;
+      const MatrixXd numeric = differentiate(Vector6d::Zero(), h, [&](const VectorXd& nu) {
+        return VectorXd(calcClosureResidual(closure, exp6(-nu) * X));  // frame 1 moves by nu
+      });
+      CHECK((rate - numeric).norm() < 1e-4 * rate.norm());
+    }
+  // What a matrix says exactly.
+  closure.axis = Vector3d::UnitZ();
+  const SE3 opposite(Vector3d(1, -1, -1).asDiagonal().toDenseMatrix(), Vector3d::Zero());
+  CHECK(calcClosureResidual(closure, opposite).norm() == Approx(kPi).epsilon(1e-15));
+  SE3Of<Lanes> lanes;
+  for (int k = 0; k < 9; ++k) lanes.R(k) = opposite.R(k);
+  for (int k = 0; k < 3; ++k) lanes.p[k] = 0;
+  CHECK(calcClosureResidual(closure, lanes)[3][kLane - 1] == calcClosureResidual(closure, opposite)[3]);
+  CHECK(calcClosureResidual(closure, SE3()).isZero(0));
 }
 
 TEST_CASE("constrained dynamics: every joint kind times every closure kind, closed and open, against differences",

@@ -6,8 +6,10 @@
 #include "bielle/robots/robot_loader.h"
 #include "dynamics/loop_conflict.h"
 #include "dynamics/loop_problem.h"
+#include "math/constants.h"
 #include "math/so3.h"
 #include "mechanisms.h"
+#include "model/joint.h"
 #include "selection.h"
 
 using namespace bielle;
@@ -289,5 +291,31 @@ TEST_CASE("conflicts: robots that close have none, from closed and from far star
     const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model;
     CHECK(findLoopConflicts(model, findClosedConfiguration(model).q).empty());
     CHECK(findLoopConflicts(model, model.makeNeutral()).empty());
+  }
+}
+
+TEST_CASE("conflicts: a hinge whose axes are opposite is named with its angle, alone and beside other loops") {
+  const auto make = [](bool turned, double off) {
+    Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 1);
+    ModelParts parts = takeParts(mechanism.model);
+    REQUIRE(parts.closures.size() == 1);
+    Closure& closure = parts.closures[0];
+    closure.kind = ClosureKind::Hinge5D;
+    closure.axis = closure.X_B1.R.transpose() * Vector3d::UnitY();
+    if (turned) closure.X_B2.R = closure.X_B2.R * makeAxisRotation(makePlaneBasis(closure.axis).col(1), kPi - off);
+    return ModelBuilder::restore(std::move(parts));
+  };
+  CHECK(findClosedConfiguration(make(false, 0)).status == NumericalStatus::Ok);
+  for (const double off : {0.0, 1e-15, 1e-13, 1e-12}) {
+    CAPTURE(off);
+    const Model model = make(true, off);
+    const AssemblyResult open = findClosedConfiguration(model);
+    CHECK(open.status == NumericalStatus::NotClosed);
+    Workspace ws(model);
+    updatePositions(model, ws, open.q);
+    CHECK(calcClosureGap(ws, model.closures()[0]).angle == Approx(kPi).epsilon(1e-9));
+    const InputError error = makeClosingError(model, "robot.urdf", open);
+    CHECK_THAT(error.problem(), Catch::Contains("3.14159 rad: its axes point in opposite directions"));
+    CHECK_THAT(error.remedy(), Catch::Contains("turn frame '") && Catch::Contains("by pi"));
   }
 }

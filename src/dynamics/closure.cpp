@@ -3,11 +3,16 @@
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
+#include "math/constants.h"
 #include "math/lanes.h"
 #include "model/joint.h"
 
 namespace bielle {
 namespace {
+
+// Nearer to opposite axes, where the direction of their angle vector turns ever faster, its rate is that of here: one that still
+// leaves the other rows their rank.
+constexpr double kLeastSine = 1e-6;
 
 template <typename T>
 SE3Of<T> getFrame1(const WorkspaceOf<T>& ws, const Closure& c) {
@@ -22,25 +27,25 @@ SE3Of<T> calcRelativePlacement(const WorkspaceOf<T>& ws, const Closure& c) {
 // The two reduced joint vectors normal to the hinge axis, as columns.
 Eigen::Matrix<double, 3, 2> getHingeNormals(const Closure& c) { return makePlaneBasis(c.axis).leftCols<2>(); }
 
-// g = theta / sin(theta) of the angle between the hinge axes, and dg/dcos(theta).
-template <typename T>
-struct HingeAngle {
-  T g, dg;
-};
-HingeAngle<double> calcHingeAngle(double sine, double cosine) {
+// theta / sin(theta) of the angle between the hinge axes, whose sine is positive.
+double calcHingeFactor(double sine, double cosine) {
   const double theta = std::atan2(sine, cosine);
-  if (theta < 1e-3) return {1 + theta * theta / 6, -1.0 / 3 - 2 * theta * theta / 15};
-  const double s = std::max(sine, 1e-12);
-  // dg/dtheta = (sin - theta cos) / sin^2 and dtheta = -dcos / sin
-  return {theta / s, -(s - theta * cosine) / (s * s * s)};
+  return theta < 1e-3 ? 1 + theta * theta / 6 : theta / sine;
 }
 
-HingeAngle<Lanes> calcHingeAngle(const Lanes& sine, const Lanes& cosine) {
-  HingeAngle<Lanes> out;
+// The angle vector between the hinge axes, by the two normals: `sine`, which is sin(theta) along it, made theta long. Opposite
+// axes do not determine its direction: that is then the first normal.
+Eigen::Vector2d calcHingeTurn(const Eigen::Vector2d& sine, double cosine) {
+  const double s = sine.norm();
+  if (s == 0 && cosine < 0) return {kPi, 0};
+  return calcHingeFactor(s, cosine) * sine;
+}
+
+Eigen::Vector2<Lanes> calcHingeTurn(const Eigen::Vector2<Lanes>& sine, const Lanes& cosine) {
+  Eigen::Vector2<Lanes> out;
   for (Eigen::Index l = 0; l < kLane; ++l) {
-    const HingeAngle<double> one = calcHingeAngle(sine[l], cosine[l]);
-    out.g.set(l, one.g);
-    out.dg.set(l, one.dg);
+    const Eigen::Vector2d one = calcHingeTurn(Eigen::Vector2d(sine[0][l], sine[1][l]), cosine[l]);
+    for (int k = 0; k < 2; ++k) out[k].set(l, one[k]);
   }
   return out;
 }
@@ -163,13 +168,24 @@ template <typename T>
 VectorUpTo6<T> calcClosureResidual(const Closure& c, const SE3Of<T>& X) {
   if (c.kind == ClosureKind::Weld6D) return log6(X);
   if (c.kind == ClosureKind::Ball3D) return X.p;
-  const Vector3<T> axis = c.axis.cast<T>(), n2 = X.R * axis, cross = axis.cross(n2);
-  using std::sqrt;
-  const auto angle = calcHingeAngle(sqrt(cross.squaredNorm()), axis.dot(n2));
+  const Vector3<T> axis = c.axis.cast<T>(), n2 = X.R * axis;
+  const Eigen::Vector2<T> sine = getHingeNormals(c).transpose() * axis.cross(n2);
   VectorUpTo6<T> rows(5);
-  const Vector3<T> turn = angle.g * cross;
-  rows << X.p, getHingeNormals(c).transpose() * turn;
+  rows << X.p, calcHingeTurn(sine, axis.dot(n2));
   return rows;
+}
+
+// Frame 2 turns in frame 1 with omega = -nu_ang. With the direction u of the turn in the plane of the normals and v = axis x u,
+//     d(theta u)/dt = u (u . omega) + v (theta cot(theta) (v . omega) + theta (axis . omega)).
+Eigen::Matrix<double, 2, 3> calcHingeTurnRate(const Closure& c, const Matrix3d& R) {
+  const Eigen::Matrix<double, 2, 3> normals = getHingeNormals(c).transpose();
+  const Vector3d n2 = R * c.axis;
+  const Eigen::Vector2d sine = normals * c.axis.cross(n2);
+  const double s = sine.norm(), cosine = c.axis.dot(n2), theta = std::atan2(s, cosine);
+  const Eigen::Vector2d u = s > 0 ? Eigen::Vector2d(sine / s) : Eigen::Vector2d::UnitX(), v(-u.y(), u.x());
+  const double across = cosine > 0 ? calcHingeFactor(s, cosine) * cosine : theta * cosine / std::max(s, kLeastSine);
+  const Eigen::RowVector3d axis = c.axis.transpose();
+  return -(u * (u.transpose() * normals) + v * (across * (v.transpose() * normals) + theta * axis));
 }
 
 RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& c) {
@@ -184,13 +200,7 @@ RowsBy6 calcClosureResidualRate(const Closure& c, const SE3& X) {
   if (c.kind == ClosureKind::Coupler) return rate;
   rate.topLeftCorner<3, 3>() = -Matrix3d::Identity();
   rate.topRightCorner<3, 3>() = skew(X.p);
-  if (c.kind == ClosureKind::Hinge5D) {
-    const Vector3d n2 = X.R * c.axis, cross = c.axis.cross(n2);
-    const auto angle = calcHingeAngle(cross.norm(), c.axis.dot(n2));
-    const Matrix3d dn2 = skew(n2);  // d n2 = -nu_ang x n2 = [n2 x] nu_ang
-    const Matrix3d dr = angle.g * skew(c.axis) * dn2 + angle.dg * cross * (c.axis.transpose() * dn2);
-    rate.bottomRightCorner<2, 3>() = getHingeNormals(c).transpose() * dr;
-  }
+  if (c.kind == ClosureKind::Hinge5D) rate.bottomRightCorner<2, 3>() = calcHingeTurnRate(c, X.R);
   return rate;
 }
 

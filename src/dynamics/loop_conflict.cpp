@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <set>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/builder.h"
 #include "dynamics/loop_problem.h"
+#include "math/constants.h"
 #include "math/so3.h"
 #include "model/frame_name.h"
+#include "model/joint.h"
 #include "model/number_text.h"
 
 namespace bielle {
@@ -280,11 +283,40 @@ std::string describeRemedies(const Model& model, const LoopConflict& conflict) {
                            " is one of: " + out;
 }
 
+namespace {
+
+// The turn by pi of frame 2 of a hinge that closes all loops of its cluster, where the axes of the hinge are opposite at q.
+std::optional<LoopRemedy> findOppositeHinge(const Model& model, const std::vector<int>& closures, ConstVectorRef q) {
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  for (int c : closures) {
+    const Closure& closure = model.closures()[c];
+    if (closure.kind != ClosureKind::Hinge5D || !(calcClosureGap(ws, closure).angle > kPi / 2)) continue;
+    const Matrix3d turn = makeAxisRotation<double>(makePlaneBasis(closure.axis).col(0), kPi);
+    const LoopRemedy remedy{{ModelPlace::Kind::Frame2, c}, {turn, Vector3d::Zero()}, 0, 0};
+    const Model part = selectClosures(applyRemedy(model, remedy), closures);
+    if (closeConfiguration(part, q).status == NumericalStatus::Ok ||
+        findClosedConfiguration(part).status == NumericalStatus::Ok)
+      return remedy;
+  }
+  return {};
+}
+
+}  // namespace
+
 InputError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open) {
   std::string element = open.worst;
   std::string problem = "its loop cannot be closed: from every start it stays open by at least " +
                         formatNumber(open.gap, "%.6g") + " (m or rad)";
   std::string remedy = "check the lengths and frames along the loop, or give a reference posture close to a closed one";
+  for (const LoopCluster& cluster : model.clusters())
+    if (const auto opposite = findOppositeHinge(model, cluster.closures, open.q)) {
+      const Closure& closure = model.closures()[opposite->place.index];
+      return {
+          source, "closure '" + closure.name + "'",
+          "its hinge stays open by " + formatNumber(kPi, "%.6g") + " rad: its axes point in opposite directions",
+          "turn frame '" + findFrameName(model, closure.body2, closure.X_B2) + "' by pi, about a normal of its axis"};
+    }
   const std::vector<LoopConflict> conflicts = findLoopConflicts(model, open.q);
   if (conflicts.empty()) return {source, element, problem, remedy};
   const LoopConflict& conflict = conflicts.front();

@@ -53,8 +53,8 @@ Vector6d expandRows(const Closure& closure, ConstVectorRef lambda);
 template <typename T>
 Vector6<T> expandRows(const Closure& closure, const VectorUpTo6<T>& lambda);
 
-/// Closing error, m and rad: zero if and only if closed (a hinge turned by pi about a normal has the residual pi); of a
-/// coupler offset - sum c_k q_k.
+/// Closing error, m and rad: zero if and only if closed; of a coupler offset - sum c_k q_k. The angle part of a hinge is as long
+/// as the angle between its axes, up to pi; where they are opposite, its direction is the first of the two normals.
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& closure);
 /// The same for the placement X_12 of frame 2 in frame 1.
@@ -65,8 +65,8 @@ struct ClosureGap {
   double position = 0, angle = 0;
 };
 ClosureGap calcClosureGap(const Workspace& ws, const Closure& closure);
-/// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1, exact also when open; zero
-/// for couplers, which have no frames.
+/// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1, exact also when open (but within
+/// 1e-6 rad of opposite axes of a hinge, where it is bounded); zero for couplers, which have no frames.
 RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& closure);
 /// The same for the placement X_12 of frame 2 in frame 1.
 RowsBy6 calcClosureResidualRate(const Closure& closure, const SE3& X_12);
