@@ -135,9 +135,9 @@ def calc_center_of_pressure(n, r):
 
 def calc_transmission(n, r):
     _, J, _ = n.state.calc_closures(r["closures"])
-    mobility = len(r["motor_dofs"])
+    mobility = len(r["motor_dofs"]) + r.get("idle", 0)
     N = transpose(np.linalg.svd(J[:, :, r["dofs"]])[2][:, len(r["dofs"]) - mobility:])
-    T = N @ np.linalg.inv(N[:, [r["dofs"].index(dof) for dof in r["motor_dofs"]]])
+    T = N @ np.linalg.pinv(N[:, [r["dofs"].index(dof) for dof in r["motor_dofs"]]])
     if r["output_dofs"]:
         Q = T[:, [r["dofs"].index(dof) for dof in r["output_dofs"]]]
         return (np.linalg.det(Q) / r["reference_volume"])[:, None]

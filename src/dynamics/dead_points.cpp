@@ -15,22 +15,23 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
-// A volume at the configuration of the point, and its gradient by the coordinates of N (m). With X the rows of motors
+// A volume at the configuration of the point, N (n x m), and the gradient by its coordinates. With X the rows of motors
 // or O, and dN = -J^+ J' N, ds = s tr((X N)^+ (X' - X J^+ J') N).
-double calcVolume(const Linkage& linkage, LinkageWorkspace& s, DeadPointKind kind, VectorXd& gradient) {
+double calcVolume(const Linkage& linkage, LinkageWorkspace& s, DeadPointKind kind, MatrixXd& N, VectorXd& gradient) {
   const ClusterBasis& basis = s.point.basis();
   const int m = linkage.size();
+  updateOutput(linkage, s.point.workspace(), s.O);
+  N = selectMoving(linkage, s, basis.N);
   const bool twists = kind == DeadPointKind::Output && linkage.joints.empty();
   const std::vector<int>& rows = kind == DeadPointKind::Output ? linkage.joint_dofs : linkage.motor_dofs;
   MatrixXd X;
   if (twists) {
-    updateOutput(linkage, s.point.workspace(), s.O);
     X = s.O;
   } else {
-    X.setZero(m, basis.N.rows());
+    X.setZero(m, N.rows());
     for (int i = 0; i < m; ++i) X(i, rows[i]) = 1;
   }
-  const Eigen::JacobiSVD<MatrixXd> svd(X * basis.N, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Eigen::JacobiSVD<MatrixXd> svd(X * N, Eigen::ComputeThinU | Eigen::ComputeThinV);
   const VectorXd& sigma = svd.singularValues();
   VectorXd others = VectorXd::Ones(m);  // products of all singular values but one: finite where the volume vanishes
   for (int i = 0; i < m; ++i)
@@ -41,11 +42,11 @@ double calcVolume(const Linkage& linkage, LinkageWorkspace& s, DeadPointKind kin
   s.point.solveGram(y);
   gradient.setZero(m);
   for (int j = 0; j < m; ++j) {
-    updateDrift(linkage, s, basis.N.col(j));
-    Eigen::RowVectorXd along = Eigen::RowVectorXd::Zero(basis.N.rows());
+    updateDrift(linkage, s, N.col(j));
+    Eigen::RowVectorXd along = Eigen::RowVectorXd::Zero(N.rows());
     for (int i = 0; i < linkage.cluster->rank; ++i) along -= y(i, j) * s.drift.row(basis.rows[i]);
     if (twists) along += C.row(j) * s.turn;
-    gradient += (along * basis.N).transpose();
+    gradient += (along * N).transpose();
   }
   return sigma.prod();
 }
@@ -71,11 +72,11 @@ double follow(const Linkage& linkage, const VectorXd& start, DeadPointKind kind,
   const ReducedCluster& cluster = *linkage.cluster;
   LinkageWorkspace here(linkage), there(linkage);
   if (!here.point.update(cluster, start)) return kNone;
+  MatrixXd N;
   VectorXd gradient, way, before;
   bool near = false;  // within the reach of Newton's method, whichever the side
   for (int step = 0; step < kMostSteps; ++step) {
-    const double volume = calcVolume(linkage, here, kind, gradient);
-    const MatrixXd& N = here.point.basis().N;
+    const double volume = calcVolume(linkage, here, kind, N, gradient);
     if (volume < kDead) {
       const double distance = calcWay(linkage, start, here.point.basis().q);
       return distance <= kFarthestDeadPoint ? distance : kNone;

@@ -48,6 +48,8 @@ struct LinkageWorkspace {
   const ClusterBasis* basis = nullptr;  // that of the point, or a given one
   VectorXd q;
   MatrixXd T, z, y, drift, O, turn, Q, Q_inverse;
+  MatrixXd both, N;                // of selectMoving(): the rows N_M and O N of the whole basis, N without what is idle
+  Eigen::JacobiSVD<MatrixXd> svd;  // of the former
   VectorXd derivative;
   Small N_M, inverse;
 };
@@ -81,6 +83,9 @@ void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory,
 bool hasReference(const Linkage& linkage);
 // O at the positions of the workspace; no rows where the output is joints.
 void updateOutput(const Linkage& linkage, const Workspace& ws, MatrixXd& O);
+// The columns of a basis of all closed motions (n x cluster size), less what is idle: N of linkage.h. Needs s.O; the result lives
+// until the next call.
+const MatrixXd& selectMoving(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& basis);
 // The drift of the closures, and that of O.
 void updateDrift(const Linkage& linkage, LinkageWorkspace& s, ConstVectorRef v);
 

@@ -10,6 +10,8 @@
 namespace bielle {
 namespace {
 
+constexpr double kIdle = 1e-7;  // of motors and output in a unit motion: what is left of gaps
+
 // Bodies of the cluster that carry other joints or soles; if there are none of these, frames.
 std::vector<int> findCarriers(const Model& model, const ReducedCluster& cluster) {
   std::vector<int> carriers;
@@ -76,8 +78,8 @@ void loadPositions(const ReducedCluster& cluster, ConstVectorRef q, const Worksp
   updateColumns(cluster.model, ws);
 }
 
-// T and Q of Eq. (2) at s.q: of the robot's positions and the given basis of the cluster, or by itself.
-bool updateTangent(const Linkage& linkage, LinkageWorkspace& s, const Workspace* robot, const LoopBases* bases) {
+// Positions and basis of the cluster at s.q: the robot's and the given one, or by itself.
+bool updateBasis(const Linkage& linkage, LinkageWorkspace& s, const Workspace* robot, const LoopBases* bases) {
   const ReducedCluster& cluster = getCluster(linkage, bases);
   if (bases) {
     s.basis = &bases->getBasis(linkage.index);
@@ -86,11 +88,17 @@ bool updateTangent(const Linkage& linkage, LinkageWorkspace& s, const Workspace*
     if (!s.point.update(cluster, s.q)) return false;
     s.basis = &s.point.basis();
   }
-  takeRows(s.basis->N, linkage.motor_dofs, s.N_M);
+  updateOutput(linkage, s.point.workspace(), s.O);
+  return true;
+}
+
+// Then T and Q of Eq. (2); false at a dead point of the motors.
+bool updateTangent(const Linkage& linkage, LinkageWorkspace& s) {
+  const MatrixXd& N = selectMoving(linkage, s, s.basis->N);
+  takeRows(N, linkage.motor_dofs, s.N_M);
   s.inverse = s.N_M.inverse();
-  s.T.noalias() = s.basis->N * s.inverse;
+  s.T.noalias() = N * s.inverse;
   if (linkage.joints.empty()) {
-    updateOutput(linkage, s.point.workspace(), s.O);
     s.Q.noalias() = s.O * s.T;
   } else {
     takeRows(s.T, linkage.joint_dofs, s.Q);
@@ -124,6 +132,20 @@ double evaluate(const Linkage& linkage, const MatrixXd& Q) {
   return sign * std::sqrt(std::max(0.0, calcDeterminant(square))) / linkage.reference_volume;
 }
 
+// The same by the volumes of Eq. (1), which need no inverse. \param basis  of all closed motions
+double evaluateByVolumes(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& basis) {
+  const MatrixXd& N = selectMoving(linkage, s, basis);
+  takeRows(N, linkage.motor_dofs, s.N_M);
+  if (linkage.joints.empty()) {
+    s.Q.noalias() = s.O * N;
+  } else {
+    takeRows(N, linkage.joint_dofs, s.Q);
+  }
+  const double output = evaluate(linkage, s.Q), motors = calcDeterminant(s.N_M);
+  if (motors == 0) return output == 0 ? 0 : std::numeric_limits<double>::infinity();
+  return output / motors;
+}
+
 // Eq. (3) at the configuration of the last updateTangent(), by the dofs of the cluster.
 void updateDerivative(const Linkage& linkage, LinkageWorkspace& s, const ReducedCluster& cluster) {
   const int m = linkage.size();
@@ -154,13 +176,55 @@ void updateDerivative(const Linkage& linkage, LinkageWorkspace& s, const Reduced
   }
 }
 
+// s.both: how the columns of a basis move motors and output.
+void updateRows(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& basis) {
+  takeRows(basis, linkage.motor_dofs, s.both);
+  auto output = s.both.bottomRows(s.Q.rows());
+  if (linkage.joints.empty()) {
+    output.noalias() = s.O * basis;
+  } else {
+    takeRows(basis, linkage.joint_dofs, output);
+  }
+}
+
+// Whether no more than as many closed motions as there are motors move motors or output, at the reference.
+bool isDetermined(const Model& model, ConstVectorRef q_reference, const Linkage& linkage) {
+  if (linkage.idle == 0) return true;
+  LinkageWorkspace s(linkage);
+  gatherConfiguration(model, *linkage.cluster, q_reference, s.q);
+  if (!updateBasis(linkage, s, nullptr, nullptr)) return false;
+  updateRows(linkage, s, s.basis->N);
+  s.svd.compute(s.both);
+  return s.svd.singularValues().tail(linkage.idle).maxCoeff() < kIdle;
+}
+
 // At the reference, where Q_0 may be zero or infinite.
 void setReference(const Model& model, ConstVectorRef q_reference, Linkage& linkage) {
   LinkageWorkspace s(linkage);
   gatherConfiguration(model, *linkage.cluster, q_reference, s.q);
   linkage.reference.setZero(s.Q.rows(), s.Q.cols());
-  if (updateTangent(linkage, s, nullptr, nullptr)) linkage.reference = s.Q;
+  if (updateBasis(linkage, s, nullptr, nullptr) && updateTangent(linkage, s)) linkage.reference = s.Q;
   linkage.reference_volume = evaluate(linkage, linkage.reference);
+}
+
+// Gives a linkage its output and its reference. Returns why it has no transmission; "" if it has one.
+std::string complete(const Model& model, ConstVectorRef q_reference, Linkage& linkage) {
+  const int motors = linkage.size(), mobility = linkage.cluster->size;
+  const std::string counts =
+      std::to_string(motors) + (motors == 1 ? " motor" : " motors") + " for a mobility of " + std::to_string(mobility);
+  linkage.idle = mobility - motors;
+  if (motors == 0 || linkage.idle < 0) return counts;
+  if (motors > kMostLinkageMobility) return counts + ", over " + std::to_string(kMostLinkageMobility);
+  const bool moves_bodies = static_cast<int>(linkage.joint_dofs.size()) != motors;
+  if (moves_bodies) {
+    const std::vector<int> bodies = findCarriers(model, *linkage.cluster);
+    if (bodies.empty()) return "no serial joints, and nothing on its bodies";
+    setBodies(model, bodies, q_reference, linkage);
+  }
+  if (!isDetermined(model, q_reference, linkage)) return counts;
+  setReference(model, q_reference, linkage);
+  if (moves_bodies && !hasReference(linkage)) return "what it carries stands still at the start";
+  return "";
 }
 
 }  // namespace
@@ -174,18 +238,21 @@ bool hasReference(const Linkage& linkage) {
 std::vector<Linkage> listLinkagesAnywhere(const Model& model, ConstVectorRef q_reference) {
   std::vector<Linkage> out;
   if (model.closures().empty()) return out;
+  for (Linkage& linkage : selectLinkages(model, makeReduction(model, q_reference)))
+    if (complete(model, q_reference, linkage).empty()) out.push_back(std::move(linkage));
+  return out;
+}
+
+std::vector<LinkageLeftOut> listLinkagesLeftOut(const Model& model, ConstVectorRef q_reference) {
+  std::vector<LinkageLeftOut> out;
+  if (model.closures().empty()) return out;
   for (Linkage& linkage : selectLinkages(model, makeReduction(model, q_reference))) {
-    const int mobility = linkage.cluster->size;
-    if (mobility == 0 || linkage.size() != mobility || mobility > kMostLinkageMobility) continue;
-    const bool moves_bodies = static_cast<int>(linkage.joint_dofs.size()) != mobility;
-    if (moves_bodies) {
-      const std::vector<int> bodies = findCarriers(model, *linkage.cluster);
-      if (bodies.empty()) continue;
-      setBodies(model, bodies, q_reference, linkage);
-    }
-    setReference(model, q_reference, linkage);
-    if (moves_bodies && !hasReference(linkage)) continue;  // they stand still, and are not the output
-    out.push_back(std::move(linkage));
+    if (linkage.cluster->size == 0) continue;  // nothing moves
+    const std::string name = linkage.joints.empty()
+                                 ? "closure " + model.closures()[linkage.cluster->closure_indices.front()].name
+                                 : linkage.output;
+    const std::string why = complete(model, q_reference, linkage);
+    if (!why.empty()) out.push_back({name, why, linkage.size() > 0});
   }
   return out;
 }
@@ -210,9 +277,13 @@ LinkageWorkspace::LinkageWorkspace(const Linkage& linkage)
       turn(O),
       Q(linkage.bodies.empty() ? T.cols() : O.rows(), T.cols()),
       Q_inverse(Q.cols(), Q.rows()),
+      both(T.cols() + Q.rows(), linkage.cluster->size),
+      N(T),
       derivative(T.rows()),
       N_M(T.cols(), T.cols()),
-      inverse(N_M) {}
+      inverse(N_M) {
+  if (linkage.idle > 0) svd = Eigen::JacobiSVD<MatrixXd>(both.rows(), both.cols(), Eigen::ComputeThinV);
+}
 
 LinkageWorkspace& LinkageWorkspaces::get(const Linkage& linkage) {
   for (const auto& [cluster, workspace] : all_)
@@ -223,29 +294,18 @@ LinkageWorkspace& LinkageWorkspaces::get(const Linkage& linkage) {
 double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q) {
   LinkageWorkspace& s = memory.get(linkage);
   gatherConfiguration(model, *linkage.cluster, q, s.q);
-  return updateTangent(linkage, s, nullptr, nullptr) ? evaluate(linkage, s.Q) : 0;
+  return updateBasis(linkage, s, nullptr, nullptr) ? evaluateByVolumes(linkage, s, s.basis->N) : 0;
 }
 
-// By the volumes of Eq. (1), which need no inverse.
 double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, const Workspace& robot,
                         const LoopBases* bases) {
   if (!bases) return calcTransmission(linkage, memory, model, robot.q);
-  const MatrixXd& N = bases->getBasis(linkage.index).N;
-  LinkageWorkspace::Small square(linkage.size(), linkage.size());
-  takeRows(N, linkage.motor_dofs, square);
-  const double volume = calcDeterminant(square);
-  if (!linkage.joints.empty()) {  // needs no kinematics
-    takeRows(N, linkage.joint_dofs, square);
-    return calcDeterminant(square) / volume / linkage.reference_volume;
-  }
-  const ReducedCluster& cluster = bases->getCluster(linkage.index);
   LinkageWorkspace& s = memory.get(linkage);
-  gatherConfiguration(model, cluster, robot.q, s.q);
-  loadPositions(cluster, s.q, robot, s.point.workspace());
-  updateOutput(linkage, s.point.workspace(), s.O);
-  s.Q = s.O.lazyProduct(N);
-  const double rho = evaluate(linkage, s.Q) / volume;
-  return std::isfinite(rho) ? rho : 0;
+  if (linkage.joints.empty()) {  // joints need no kinematics
+    gatherConfiguration(model, *linkage.cluster, robot.q, s.q);
+    updateBasis(linkage, s, &robot, bases);
+  }
+  return evaluateByVolumes(linkage, s, bases->getBasis(linkage.index).N);
 }
 
 double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
@@ -253,7 +313,8 @@ double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const
   LinkageWorkspace& s = memory.get(linkage);
   gatherConfiguration(model, *linkage.cluster, q, s.q);
   gradient.setZero();
-  if (!updateTangent(linkage, s, nullptr, nullptr)) return 0;
+  if (!updateBasis(linkage, s, nullptr, nullptr)) return 0;
+  if (!updateTangent(linkage, s)) return evaluateByVolumes(linkage, s, s.basis->N);
   updateDerivative(linkage, s, *linkage.cluster);
   for (int j = 0; j < linkage.size(); ++j) gradient[linkage.motors[j]] = s.derivative.dot(s.T.col(j));
   return evaluate(linkage, s.Q);
@@ -270,9 +331,17 @@ void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory,
   gatherConfiguration(model, *linkage.cluster, robot.q, s.q);
   const std::vector<int>& dofs = linkage.cluster->dofs;
   for (int dof : dofs) row(0, dof) = 0;
-  if (!updateTangent(linkage, s, &robot, bases)) return;
+  if (!updateBasis(linkage, s, &robot, bases) || !updateTangent(linkage, s)) return;
   updateDerivative(linkage, s, getCluster(linkage, bases));
   for (size_t k = 0; k < dofs.size(); ++k) row(0, dofs[k]) = s.derivative[static_cast<Eigen::Index>(k)];
+}
+
+const MatrixXd& selectMoving(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& basis) {
+  if (linkage.idle == 0) return basis;
+  updateRows(linkage, s, basis);
+  s.svd.compute(s.both);  // what is idle is its null space
+  s.N.noalias() = basis * s.svd.matrixV().leftCols(linkage.size());
+  return s.N;
 }
 
 void updateOutput(const Linkage& linkage, const Workspace& ws, MatrixXd& O) {

@@ -183,6 +183,10 @@ class RequestSolver {
       if (linkage.getNearest().distance < kNearDeadPoint) near += (near.empty() ? "" : "; ") + distance;
     }
     if (!list.empty()) tell("distance from dead points at the start (rad or m): " + list);
+    for (const LinkageLeftOut& linkage : listLinkagesLeftOut(model, motion_.problem->initialState().head(model.nq())))
+      if (linkage.has_motors && observer_.warn)
+        observer_.warn("warning: nothing keeps the linkage of " + linkage.name +
+                       " from its dead points, since it has " + linkage.why);
     const double margin = limits.dead_point_margin;
     if (!near.empty() && observer_.warn)
       observer_.warn("warning: this motion starts near a dead point, where motor and joint hardly move each other (" +

@@ -25,16 +25,18 @@ class TransmissionResidual : public DescribedResidual {
     };
     std::vector<int> bodies;
     for (const Closure& twist : linkage_.bodies) bodies.push_back(cluster.joints[twist.body1 - 1]);
-    return {"transmission",
-            {{"closures", cluster.closure_indices},
-             {"dofs", cluster.dofs},
-             {"motor_dofs", inModel(linkage_.motor_dofs)},
-             {"output_dofs", inModel(linkage_.joint_dofs)},
-             {"output_bodies", bodies},
-             {"root", cluster.root},
-             {"length", linkage_.length},
-             {"reference", linkage_.reference},
-             {"reference_volume", linkage_.reference_volume}}};
+    ResidualData data{"transmission",
+                      {{"closures", cluster.closure_indices},
+                       {"dofs", cluster.dofs},
+                       {"motor_dofs", inModel(linkage_.motor_dofs)},
+                       {"output_dofs", inModel(linkage_.joint_dofs)},
+                       {"output_bodies", bodies},
+                       {"root", cluster.root},
+                       {"length", linkage_.length},
+                       {"reference", linkage_.reference},
+                       {"reference_volume", linkage_.reference_volume}}};
+    if (linkage_.idle > 0) data.values.emplace_back("idle", linkage_.idle);
+    return data;
   }
 
  private:

@@ -25,7 +25,9 @@ std::optional<Linkage> findLinkage(const Model& model, const std::vector<int>& m
   return std::nullopt;
 }
 
-bool hasRatios(const Linkage& linkage) { return !linkage.joints.empty() && linkage.size() <= kMostRatioMotors; }
+bool hasRatios(const Linkage& linkage) {
+  return !linkage.joints.empty() && linkage.idle == 0 && linkage.size() <= kMostRatioMotors;
+}
 
 }  // namespace
 

@@ -171,6 +171,13 @@ void addDeadPoints(const Model& model, const Posture& posture, Json& out) {
                    {"distance", orNull(nearest.distance)},
                    {"of", far ? "none within " + formatNumber(kFarthestDeadPoint) : getName(nearest.kind)}});
   }
+  if (!posture.closed) return;
+  for (const LinkageLeftOut& linkage : listLinkagesLeftOut(model, posture.q))
+    if (linkage.has_motors)
+      out.push_back({{"reference", posture.name},
+                     {"linkage", linkage.name},
+                     {"distance", nullptr},
+                     {"of", "not known: " + linkage.why}});
 }
 
 // Least distances of shapes between two legs, within legs and trunk, and to the ground under the feet, which are left out.

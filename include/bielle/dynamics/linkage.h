@@ -2,8 +2,9 @@
 /// \file A linkage: motors, what they move, and the loops between them; its transmission, and how far it is from its dead
 /// points.
 ///
-/// A linkage is a loop cluster with as many motors as mobility m (up to 6). N (n x m) is an orthonormal basis of
-/// its closed motions, N_M its rows of the motors, and O N the motion of what the linkage is there for, its output: its
+/// A linkage is a loop cluster with as many motors as mobility m (up to 6), not counting what is idle: motions that move neither
+/// motors nor output, as the spin of a rod on two balls. N (n x m) is an orthonormal basis of its other closed motions, N_M its
+/// rows of the motors, and O N the motion of what the linkage is there for, its output: its
 /// serial joints, where there are m of them; else the bodies that carry other joints, soles or (if there are none of
 /// these) frames, by their twists relative to the body that carries the linkage, with lengths over the size of the
 /// linkage. Of the volumes
@@ -39,6 +40,7 @@ struct Linkage {
   std::vector<int> motor_dofs, joint_dofs;            ///< velocity coordinates of the cluster
   std::vector<int> motor_positions, joint_positions;  ///< entries of its q; -1 of joints of several coordinates
   std::string output;                                 ///< names of the joints, or of the bodies
+  int idle = 0;                                       ///< motions that move neither motors nor output
 
   std::vector<Closure> bodies;  ///< of the output, as closures to the root: their velocity rows are the bodies' twists
   double length = 1;            ///< m, the size of the linkage
@@ -49,9 +51,18 @@ struct Linkage {
   bool isDirect() const;  ///< the motor sits on the joint
 };
 
-/// The linkages of all loop clusters with as many motors as mobility, with their serial joints or bodies as output.
+/// The linkages of all loop clusters with as many motors as mobility (less what is idle), with their serial joints or bodies as
+/// output.
 /// \param q_reference  nq, closed   \throws InputError when it is open or a dead point
 std::vector<Linkage> listLinkages(const Model& model, ConstVectorRef q_reference);
+/// A loop cluster that moves and is not among them.
+struct LinkageLeftOut {
+  std::string name;         ///< of its serial joints, or "closure NAME"
+  std::string why;          ///< "1 motor for a mobility of 2"
+  bool has_motors = false;  ///< otherwise it is passive, and has no transmission
+};
+/// \param q_reference  nq, closed   \throws InputError when it is open
+std::vector<LinkageLeftOut> listLinkagesLeftOut(const Model& model, ConstVectorRef q_reference);
 /// The linkage that drives the joints, without a reference. When the linkage has more mobility than joints are named, the
 /// other serial joints of the model in it are added. A joint outside all loops with its own motor is a linkage too.
 /// \param q  nq, closed: where the mobility of the linkages is evaluated
@@ -59,7 +70,7 @@ std::vector<Linkage> listLinkages(const Model& model, ConstVectorRef q_reference
 /// motors of the linkage do not match
 Linkage makeLinkage(const Model& model, ConstVectorRef q, const std::vector<std::string>& joints);
 
-/// Eq. (2) at a closed configuration (nq); 0 where the closures lose rank.
+/// Eq. (2) at a closed configuration (nq); 0 where the closures lose rank, and where both volumes vanish.
 double calcTransmission(const Linkage& linkage, const Model& model, ConstVectorRef q);
 
 enum class DeadPointKind {

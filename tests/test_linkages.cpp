@@ -1,0 +1,216 @@
+// Transmissions and dead points of linkages that can be described in two ways, or that have motions which move nothing: both
+// descriptions answer the same.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/ratio.h"
+#include "bielle/model/builder.h"
+#include "dynamics/linkage_workspace.h"
+#include "leg_biped.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+Joint makeJoint(const std::string& name, JointKind kind, const Vector3d& axis, const Vector3d& place) {
+  Joint joint;
+  joint.name = name;
+  joint.kind = kind;
+  joint.axis = axis;
+  joint.axis2 = Vector3d::UnitX();
+  joint.X_PJ.p = place;
+  return joint;
+}
+
+Inertia makeBody() {
+  Inertia inertia;
+  inertia.mass = 0.2;
+  inertia.I_com = 1e-3 * Matrix3d::Identity();
+  return inertia;
+}
+
+SE3 at(const Vector3d& place) { return {Matrix3d::Identity(), place}; }
+
+enum class Output { Joints, Bodies };
+
+Model makeFourBar(Output output) {
+  ModelBuilder b("four");
+  const Vector3d axis = -Vector3d::UnitY();
+  b.addLink("rocker", "world", makeJoint("rocker", JointKind::Continuous, axis, {0.4, 0, 0}), makeBody());
+  b.addLink("crank", "world", makeJoint("crank", JointKind::Continuous, axis, {0, 0, 0}), makeBody());
+  b.addLink("coupler", "crank", makeJoint("coupler", JointKind::Continuous, axis, {0.15, 0, 0}), makeBody());
+  b.addFrame("coupler_end", "coupler", at({0.35, 0, 0}));
+  b.addFrame("rocker_end", "rocker", at({0.3, 0, 0}));
+  b.addClosure("pin", ClosureKind::Hinge5D, "coupler_end", "rocker_end", Vector3d::UnitY());
+  b.addMotor("crank", 0.001);
+  if (output == Output::Joints) b.addSerialJoint("rocker");
+  return b.build();
+}
+
+// A basis of the closed motions of one cluster, as given.
+struct GivenBases : LoopBases {
+  explicit GivenBases(const ReducedCluster& c) : cluster(c), basis(c) {}
+  const ReducedCluster& cluster;
+  ClusterBasis basis;
+  const ReducedCluster& getCluster(int) const override { return cluster; }
+  const ClusterBasis& getBasis(int) const override { return basis; }
+};
+
+// An ankle of two motors on the shank, cranks and rods to the foot. Rods are carried by universal joints, or by balls: then each
+// can also spin about its own line.
+Model makeAnkle(JointKind rods, Output output) {
+  ModelBuilder b("ankle");
+  const Vector3d y = Vector3d::UnitY(), x = Vector3d::UnitX();
+  for (const int i : {1, 2}) {
+    const double side = i == 1 ? 0.04 : -0.04, length = i == 1 ? 0.2 : 0.14;
+    const std::string n = std::to_string(i);
+    b.addLink("crank" + n, "world", makeJoint("motor" + n, JointKind::Revolute, y, {-0.01, side, length - 0.3 + 0.02}),
+              makeBody());
+    b.addLink("rod" + n, "crank" + n, makeJoint("rod" + n, rods, y, {-0.045, 0.1 * side, 0}), makeBody());
+    b.addFrame("end" + n, "rod" + n, at({-0.002, -0.07 * side, -length}));
+    b.addMotor("motor" + n, 0.004);
+  }
+  b.addLink("cross", "world", makeJoint("pitch", JointKind::Revolute, y, {0, 0, -0.3}), makeBody());
+  b.addLink("foot", "cross", makeJoint("roll", JointKind::Revolute, x, {0, 0, -0.01}), makeBody());
+  b.addFrame("heel1", "foot", at({-0.057, 0.042, 0.03}));
+  b.addFrame("heel2", "foot", at({-0.057, -0.042, 0.03}));
+  b.addFrame("sole", "foot", at({0.03, 0, -0.05}));
+  b.addContact("sole", "sole", ContactKind::Surface6D, 0.1, 0.04);
+  for (const std::string n : {"1", "2"}) b.addClosure("rod" + n, ClosureKind::Ball3D, "end" + n, "heel" + n);
+  if (output == Output::Joints)
+    for (const char* joint : {"pitch", "roll"}) b.addSerialJoint(joint);
+  return b.build();
+}
+
+// Closed with these angles of the ankle.
+VectorXd closeAnkle(const Model& model, double pitch, double roll) {
+  AssemblyProblem problem;
+  problem.q_ref = model.makeNeutral();
+  problem.weights = VectorXd::Constant(model.nv(), 1e-4);
+  for (const auto& [name, angle] : {std::pair("pitch", pitch), std::pair("roll", roll)}) {
+    const Joint& joint = model.joints()[model.findJoint(name)];
+    problem.q_ref[joint.idx_q] = angle;
+    problem.weights[joint.idx_v] = 1;
+  }
+  AssemblyResult result;
+  for (int i = 0; i < 3; ++i) {  // the weights pull to these angles, but not to the last digit
+    result = assemble(model, problem);
+    REQUIRE(result.status == NumericalStatus::Ok);
+    problem.q_ref = result.q;
+    problem.q_ref[model.joints()[model.findJoint("pitch")].idx_q] = pitch;
+    problem.q_ref[model.joints()[model.findJoint("roll")].idx_q] = roll;
+  }
+  return result.q;
+}
+
+}  // namespace
+
+TEST_CASE("transmission: joints and bodies agree next to a dead point of the motor, and are infinite at it") {
+  const std::vector<double> rates = {1e-3, 1e-8, 1e-300, -1e-8};
+  std::vector<double> found[2];
+  for (const Output output : {Output::Joints, Output::Bodies}) {
+    const Model model = makeFourBar(output);
+    const VectorXd q = closeConfiguration(model, (VectorXd(3) << 1.6, 1.0, -0.5).finished()).q;
+    const std::vector<Linkage> linkages = listLinkages(model, q);
+    REQUIRE(linkages.size() == 1);
+    const Linkage& linkage = linkages[0];
+    CHECK(linkage.joints.empty() == (output == Output::Bodies));
+    GivenBases bases(*linkage.cluster);
+    bases.basis.q = q;
+    bases.basis.N = MatrixXd::Constant(3, 1, 0.7);
+    Workspace ws(model);
+    updatePositions(model, ws, q);
+    LinkageWorkspaces memory;
+    const auto calc = [&](double motor) {
+      bases.basis.N(linkage.motor_dofs[0], 0) = motor;
+      return calcTransmission(linkage, memory, model, ws, &bases);
+    };
+    CHECK(calc(0) == kInfinite);
+    CHECK(calc(-0.0) == kInfinite);
+    CHECK(std::abs(calc(1e-300)) > 1e290);
+    for (const double rate : rates) found[static_cast<int>(output)].push_back(calc(rate) * rate);
+    CHECK(std::isfinite(found[static_cast<int>(output)].back()));
+    bases.basis.N.setZero();
+    CHECK(calc(0) == 0);  // nothing moves
+  }
+  for (int i = 0; i < 2; ++i)  // over the motor's rate both are constant
+    for (const double value : found[i]) CHECK(value == Approx(found[i][0]).epsilon(1e-3));
+}
+
+TEST_CASE("rods on two balls: transmission, its derivative and dead points are those of rods that cannot spin") {
+  for (const Output output : {Output::Joints, Output::Bodies}) {
+    const Model fixed = makeAnkle(JointKind::Universal, output), spinning = makeAnkle(JointKind::Spherical, output);
+    const VectorXd q0 = closeAnkle(fixed, 0, 0), q1 = closeAnkle(spinning, 0, 0);
+    const std::vector<Linkage> a = listLinkages(fixed, q0), b = listLinkages(spinning, q1);
+    REQUIRE(a.size() == 1);
+    REQUIRE(b.size() == 1);
+    CHECK(a[0].idle == 0);
+    CHECK(b[0].idle == 2);
+    CHECK(a[0].output == b[0].output);
+    CHECK(listLinkagesLeftOut(spinning, q1).empty());
+    LinkageWorkspaces memory;
+    int near = 0;
+    for (const double pitch : {-0.5, 0.0, 0.2, 0.35})
+      for (const double roll : {0.0, 0.15}) {
+        CAPTURE(static_cast<int>(output), pitch, roll);
+        const VectorXd p = closeAnkle(fixed, pitch, roll);
+        VectorXd q = closeAnkle(spinning, pitch, roll);
+        VectorXd by_motors[2] = {VectorXd(2), VectorXd(2)};
+        const double expected = calcTransmission(a[0], memory, fixed, p, by_motors[0]);
+        CHECK(calcTransmission(b[0], memory, spinning, q, by_motors[1]) == Approx(expected).epsilon(1e-6));
+        CHECK(calcTransmission(b[0], memory, spinning, q) == Approx(expected).epsilon(1e-6));
+        CHECK((by_motors[1] - by_motors[0]).norm() < 1e-5 * (1 + by_motors[0].norm()));
+        const DeadPoint one = findDeadPoint(a[0], fixed, p), other = findDeadPoint(b[0], spinning, q);
+        CHECK(one.kind == other.kind);
+        near += one.kind != DeadPointKind::None;
+        if (output == Output::Joints && one.kind != DeadPointKind::None)
+          CHECK(other.distance == Approx(one.distance).epsilon(1e-4));
+      }
+    CHECK(near > 0);
+    // Through the basis that a problem has at hand, in which spins are mixed with all other motions.
+    Reduction reduction = makeReduction(spinning, q1);
+    GivenBases bases(reduction.clusters[0]);
+    ClusterPoint point(reduction.clusters[0]);
+    VectorXd own(reduction.clusters[0].model.nq());
+    gatherConfiguration(spinning, reduction.clusters[0], q1, own);
+    REQUIRE(point.update(reduction.clusters[0], own));
+    bases.basis = point.basis();
+    Workspace ws(spinning);
+    updatePositions(spinning, ws, q1);
+    CHECK(calcTransmission(b[0], memory, spinning, ws, &bases) == Approx(1).epsilon(1e-9));
+    MatrixXd row[2] = {MatrixXd::Zero(1, spinning.nv()), MatrixXd::Zero(1, spinning.nv())};
+    calcTransmissionJacobian(b[0], memory, spinning, ws, row[0], &bases);
+    calcTransmissionJacobian(b[0], memory, spinning, ws, row[1], nullptr);
+    const MatrixXd along = (row[0] - row[1]) * bases.basis.N;  // rows agree along closed motions
+    CHECK(along.norm() < 1e-9);
+    for (Eigen::Index j = 0; j < bases.basis.N.cols(); ++j) {
+      const double h = 1e-4;
+      const auto calcAt = [&](double step) {
+        REQUIRE(point.close(reduction.clusters[0], bases.basis, step * bases.basis.N.col(j), VectorXd()));
+        VectorXd q = q1;
+        scatterConfiguration(spinning, reduction.clusters[0], point.basis().q, q);
+        return calcTransmission(b[0], memory, spinning, q);
+      };
+      CHECK((row[0] * bases.basis.N)(0, j) == Approx((calcAt(h) - calcAt(-h)) / (2 * h)).margin(1e-5));
+    }
+  }
+}
+
+TEST_CASE("linkages without a transmission are listed with the reason") {
+  Model model = makeAnkle(JointKind::Spherical, Output::Joints);
+  ModelParts parts = takeParts(model);
+  parts.motors.pop_back();
+  model = ModelBuilder::restore(std::move(parts));
+  const VectorXd q = closeAnkle(model, 0, 0);
+  CHECK(listLinkages(model, q).empty());
+  const std::vector<LinkageLeftOut> left_out = listLinkagesLeftOut(model, q);
+  REQUIRE(left_out.size() == 1);
+  CHECK(left_out[0].name == "pitch, roll");
+  CHECK(left_out[0].why == "1 motor for a mobility of 4");
+  CHECK(left_out[0].has_motors);
+}
