@@ -214,3 +214,30 @@ TEST_CASE("linkages without a transmission are listed with the reason") {
   CHECK(left_out[0].why == "1 motor for a mobility of 4");
   CHECK(left_out[0].has_motors);
 }
+
+TEST_CASE(
+    "a sweep lists the motors' dead points where their volume vanishes, not where the held joint's motion reverses") {
+  // Symmetric: with the foot level both rods are in line with their cranks at once.
+  const Model model = makeLegBiped({{"knee", "serial"},
+                                    {"ankle", "rsu"},
+                                    {"ankle_arm", 0.047},
+                                    {"ankle_crank", 0.038},
+                                    {"ankle_half_width", 0.05},
+                                    {"ankle_motor_height", 0.15},
+                                    {"ankle_arm_angle", 0.4}});
+  const VectorXd q = findClosedConfiguration(model).q;
+  const Linkage linkage = makeLinkage(model, q, {"ankley_left"});
+  const std::vector<RatioSample> dead = sweepRatio(model, linkage, q).deadPoints();
+  int outputs = 0;
+  for (const RatioSample& sample : dead) {
+    ClusterPoint point(*linkage.cluster);
+    REQUIRE(point.update(*linkage.cluster, sample.q));
+    const MatrixXd N = point.basis().N;
+    CAPTURE(sample.s, getName(sample.dead));
+    const bool of_motors = std::abs(N(linkage.motor_dofs, Eigen::all).determinant()) < 1e-8;
+    CHECK(of_motors == (sample.dead == DeadPointKind::Motors));
+    outputs += sample.dead == DeadPointKind::Output;
+  }
+  CHECK(outputs == 2);
+  CHECK(dead.size() == 2);
+}

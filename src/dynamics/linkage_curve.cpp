@@ -35,25 +35,20 @@ MatrixXd LinkageCurve::heldRows() const {
 bool LinkageCurve::finishPoint(const VectorXd& direction, CurvePoint& point) {
   const ClusterBasis& basis = point_.basis();
   const int m = linkage_.size();
-  MatrixXd H(m, m - 1);
   VectorXd C = VectorXd::Ones(m);
   if (m > 1) {
-    const Eigen::JacobiSVD<MatrixXd> svd(heldRows(), Eigen::ComputeThinU | Eigen::ComputeFullV);
+    const Eigen::JacobiSVD<MatrixXd> svd(heldRows(), Eigen::ComputeFullV);
     if (!(svd.singularValues()[m - 2] > kHeldRank * svd.singularValues()[0])) {
       why_ = "the other joints of the linkage cannot be held: they are at a dead point";
       return false;
     }
     C = svd.matrixV().col(m - 1);
-    H = svd.matrixV().leftCols(m - 1) * svd.singularValues().cwiseInverse().asDiagonal() * svd.matrixU().transpose();
   }
   if (C.dot(basis.WN.transpose() * direction) < 0) C = -C;
   point.q = basis.q;
   point.tangent = basis.N * C;
   point.joint_rate = point.tangent[linkage_.joint_dofs[joint_]];
-  MatrixXd motors(m, m);
-  for (int i = 0; i < m; ++i)
-    motors.row(i) << point.tangent[linkage_.motor_dofs[i]], basis.N.row(linkage_.motor_dofs[i]) * H;
-  point.motor_rate = motors.determinant();
+  point.motor_volume = point.side * basis.N(linkage_.motor_dofs, Eigen::all).determinant();
   return true;
 }
 
@@ -107,6 +102,7 @@ bool LinkageCurve::advance(const CurvePoint& from, double h, CurvePoint& to) {
     return false;
   }
   to.s = from.s + h;
+  to.side = (basis.N.transpose() * point_.basis().N).determinant() < 0 ? -from.side : from.side;
   return finishPoint(from.tangent, to);
 }
 

@@ -11,7 +11,8 @@ struct CurvePoint {
   VectorXd q;        // of the cluster, closed
   VectorXd tangent;  // n, of unit length in the metric of the cluster
   double s = 0;
-  double joint_rate = 0, motor_rate = 0;  // Eq. (5)
+  double joint_rate = 0, motor_volume = 0;  // Eq. (5)
+  double side = 1;                          // of N: +-1, such that it is oriented as at the start
 };
 
 class LinkageCurve {

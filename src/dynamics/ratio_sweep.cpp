@@ -128,7 +128,7 @@ class Walk {
   // Dead points between the two, in their order.
   void addEvents(const CurvePoint& at, const CurvePoint& next, double h, int& branch, int direction) {
     const auto joint = [](const CurvePoint& point) { return point.joint_rate; };
-    const auto motor = [](const CurvePoint& point) { return point.motor_rate; };
+    const auto motor = [](const CurvePoint& point) { return point.motor_volume; };
     std::vector<std::pair<double, DeadPointKind>> events;
     if (joint(at) * joint(next) < 0)
       events.emplace_back(curve_.findRoot(at, h, options_.tolerance, joint), DeadPointKind::Output);

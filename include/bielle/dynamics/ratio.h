@@ -22,8 +22,8 @@
 /// The curve is followed by steps along (4), corrected onto the closures and the held angles, in both directions from
 /// the start until a joint reaches its limit, the closures lose rank or do not close, or the linkage comes back to its
 /// start after a full turn. It passes smoothly through dead points, which are roots along s of
-///     output:  v_j(s) = N_j C,       motors:  det [N_M C, N_M H](s),   N_held H = I,                                (5)
-/// found by bracketing. At a dead point of the output the angle reverses, and another branch of the ratio as a function
+///     output:  v_j(s) = N_j C,       motors:  det N_M(s),                                                          (5)
+/// found by bracketing; N is oriented along the curve, det(N(s)^T N(s')) > 0 from step to step. At a dead point of the output the angle reverses, and another branch of the ratio as a function
 /// of the joint angle begins. Branch 0 contains the start.
 #include <optional>
 #include <string>
