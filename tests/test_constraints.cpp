@@ -1,6 +1,7 @@
 // Constraints of a shooting problem: the conditions of an optimum by an oracle that knows neither models nor sweeps, dense ones
 // on a quadratic program, and constraints that contradict each other.
 #include <Eigen/LU>
+#include <atomic>
 #include <catch2/catch.hpp>
 
 #include "constrained_problem.h"
@@ -333,6 +334,32 @@ Constrained<PlantProblem<Point>> makeWindingRoad(double goal, double other_road)
 }
 
 }  // namespace
+
+TEST_CASE("constraints that are not a number are named at the start, and make a trial too long") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const bool late : {false, true}) {  // a worse violation is met before, or after
+    auto problem = makeBoundedCartPole();
+    for (Row& row : problem.rows) row.lower -= 1e3, row.upper += 1e3;
+    problem.rows.push_back({"far", late ? 3 : 50, late ? 3 : 50, 1e3, kFree, getTip});
+    problem.rows.push_back({"root", 40, 41, 0, kFree, [nan](const Complex*, const Complex*) { return Complex(nan); }});
+    ShootingTrajectory t = makeGuess(problem);
+    const FddpSummary summary = solveInPlace(problem, t);
+    CHECK(summary.termination == FddpTermination::Failed);
+    CHECK(summary.message == "root at node 40 is not a number");
+    CHECK(std::isnan(summary.violation));
+  }
+  // Not along the way, but in trials beyond it.
+  Constrained<PlantProblem<CartPole>> problem(makeCartPole());
+  std::atomic<int> beyond{0};
+  problem.rows.push_back({"root", 1, problem.numStages(), -kFree, kFree, [&](const Complex* x, const Complex*) {
+                            for (int i = 0; i < 4; ++i)
+                              if (std::abs(x[i].real()) > 14) return ++beyond, Complex(nan);
+                            return x[0];
+                          }});
+  ShootingTrajectory t = makeGuess(problem);
+  CHECK(solveInPlace(problem, t, makeTightOptions()).termination == FddpTermination::Converged);
+  CHECK(beyond > 0);
+}
 
 TEST_CASE("where the cost creeps along curved constraints, it is accepted within them") {
   const auto solve = [](double acceptable_decrease, double other_road) {

@@ -153,6 +153,57 @@ TEST_CASE("path constraints: scaled bounds and names") {
   CHECK(problem.getConstraintName(1, 4) == "rest, row 1");
 }
 
+namespace {
+
+// Not a number where the base is lower.
+struct Root : Residual {
+  explicit Root(double height) : limit(height) {}
+  int size() const override { return 1; }
+  void calc(const NodeView& node, VectorRef r) const override { r[0] = std::sqrt(node.ws.q[2] - limit); }
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    rows.q(0, 2) = 0.5 / std::sqrt(node.ws.q[2] - limit);
+  }
+  double limit;
+};
+
+}  // namespace
+
+TEST_CASE("path constraints and costs that are not a number: the node fails, and says of which name") {
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
+  const VectorXd q = makeStandingPosture(model);
+  const Formulation formulation = GENERATE(Formulation::Full, Formulation::Reduced);
+  for (const bool is_cost : {false, true})
+    for (const double above : {-0.1, 0.1}) {
+      std::vector<StageSpec> stages(3);
+      for (StageSpec& stage : stages) {
+        stage.dt = 0.01;
+        if (&stage != &stages.back())
+          stage.constraints = makeConstraintSet(model, makeContactTargets(model, q, {0, 1}, 0, 50));
+        stage.path_constraints.push_back(makeConstraint("joint", makeJointPosition(model, {7})));
+      }
+      auto root = std::make_shared<Root>(q[2] + above);
+      if (is_cost)
+        stages[2].costs.push_back({"root", 1, Activation::makeQuadratic(VectorXd::Ones(1)), root});
+      else
+        stages[2].path_constraints.push_back(
+            {"root", root, VectorXd::Zero(1), VectorXd::Constant(1, kFree), VectorXd::Ones(1)});
+      const RobotProblem problem(model, q, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+      RobotEvaluator evaluator(problem);
+      const RobotEvaluation& at = evaluator.evaluate(2, problem.initialState());
+      CAPTURE(getName(formulation), is_cost, above, at.failure);
+      CHECK(at.status == (above > 0 ? NumericalStatus::NotFinite : NumericalStatus::Ok));
+      CHECK(at.failure == (above < 0 ? ""
+                           : is_cost ? "cost 'root' is not a number"
+                                     : "constraint 'root' is not a number"));
+      if (above < 0) continue;
+      ShootingTrajectory guess{std::vector<VectorXd>(3, problem.initialState()),
+                               std::vector<VectorXd>(2, VectorXd::Zero(model.nu()))};
+      const FddpSummary summary = solve(problem, std::move(guess)).summary;
+      CHECK(summary.termination == FddpTermination::Failed);
+      CHECK_THAT(summary.message, Catch::Contains("node 2") && Catch::Contains("'root' is not a number"));
+    }
+}
+
 TEST_CASE("path constraints that do not fit are refused by name") {
   const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
   const VectorXd q = makeStandingPosture(model);

@@ -58,6 +58,21 @@ void NodeCosts::calc(const NodeView& node, RobotEvaluation& at) const {
   at.cost = getScale(at) * sum;
 }
 
+std::string NodeCosts::describeNotFinite(const RobotEvaluation& at) const {
+  if (std::isfinite(at.cost) && at.constraints.allFinite()) return "";
+  std::string found;
+  const auto look = [&](const char* kind, const std::string& name, double value) {
+    if (found.empty() && !std::isfinite(value))
+      found = kind + (" '" + name) + (std::isnan(value) ? "' is not a number" : "' is infinite");
+  };
+  for (const Block& block : blocks_)
+    if (block.constraint)
+      for (const double value : at.constraints.segment(block.constraint_row, block.residual->size()))
+        look("constraint", block.constraint->name, value);
+  visitValues(at, [&](const std::string& name, double value) { look("cost", name, value); });
+  return found.empty() ? "the cost is not finite" : found;
+}
+
 std::vector<CostValue> NodeCosts::getValues(const RobotEvaluation& at) const {
   std::vector<CostValue> values;
   visitValues(at, [&](const std::string& name, double value) { values.push_back({name, value}); });

@@ -48,6 +48,8 @@ class NodeCosts {
 
   // Computes the residuals, the scaled cost and the scaled constraints; the state cost of `at` must be up to date.
   void calc(const NodeView& node, RobotEvaluation& at) const;
+  // What calc() has made not finite, by name: "constraint 'knee' is not a number"; "" if all is finite.
+  std::string describeNotFinite(const RobotEvaluation& at) const;
   // Computes scaled weights, and with them which rows count. `constraints` may be null.
   void selectRows(const RobotEvaluation& at, const ConstraintWeights* constraints, CountedRows& rows) const;
   // Computes the Jacobians of the counted rows, which must be zero before.

@@ -51,6 +51,11 @@ bool Transcription::startEvaluation(const EvaluateTask& task, RobotEvaluation& a
   return at.x.allFinite() && at.u.allFinite() && at.failure.empty();
 }
 
+void Transcription::finishEvaluation(int node, RobotEvaluation& at) const {
+  at.failure = costs_[node].describeNotFinite(at);
+  at.status = at.failure.empty() && at.x_next.allFinite() ? NumericalStatus::Ok : NumericalStatus::NotFinite;
+}
+
 void updateSpeeds(const Model& model, RobotEvaluation& at) {
   at.speeds.resize(model.nu());
   for (int m = 0; m < model.nu(); ++m) {

@@ -50,6 +50,9 @@ class Transcription {
   // finite, or the time scale is not positive.
   bool startEvaluation(const EvaluateTask& task, RobotEvaluation& at) const;
 
+  // The last of an evaluation: the status of what the costs and the constraints have become.
+  void finishEvaluation(int node, RobotEvaluation& at) const;
+
   Model model_;
   const NodeList nodes_;
   const std::vector<StageSpec>& specs_;

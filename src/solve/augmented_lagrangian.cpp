@@ -141,7 +141,7 @@ void AugmentedLagrangian::measure(int k, const VectorXd& c, Measures& out) {
   for (Eigen::Index i = 0; i < node.lower.size(); ++i) {
     const double violation = std::abs(c[i] - clamp(c[i], node.lower[i], node.upper[i]));
     out.squares += violation * violation;
-    if (violation > out.violation) {
+    if (violation > out.violation || (std::isnan(violation) && !std::isnan(out.violation))) {  // the first NaN is kept
       out.violation = violation;
       out.worst_node = k;
       out.worst_row = static_cast<int>(i);
@@ -294,8 +294,11 @@ void AugmentedLagrangian::move(const std::vector<NodeSource>& sources) {
 
 std::string AugmentedLagrangian::describeWorst(const ShootingProblem& problem) const {
   std::ostringstream out;
-  out << problem.getConstraintName(at_.worst_node, at_.worst_row) << " at node " << at_.worst_node << " is violated by "
-      << std::setprecision(3) << at_.violation;
+  out << problem.getConstraintName(at_.worst_node, at_.worst_row) << " at node " << at_.worst_node;
+  if (std::isnan(at_.violation))
+    out << " is not a number";
+  else
+    out << " is violated by " << std::setprecision(3) << at_.violation;
   return out.str();
 }
 

@@ -75,7 +75,9 @@ FddpIterations::End FddpIterations::evaluate() {
   if (failed < 0) {
     for (int k = 0; k <= N_; ++k) line_.cost += getIterate()[k]->cost;
     memory_.lagrangian.evaluate(getIterate());
-    return {};
+    if (std::isfinite(memory_.lagrangian.violation())) return {};
+    summary_.message = memory_.lagrangian.describeWorst(problem_);
+    return FddpTermination::Failed;
   }
   const std::string& reason = getIterate()[failed]->failure;
   summary_.message = "node " + std::to_string(failed) + ": the problem could not be evaluated";

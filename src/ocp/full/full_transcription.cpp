@@ -110,7 +110,7 @@ void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const
   costs_[node].calc(
       {model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, nullptr, &scratch.linkages},
       at);
-  if (std::isfinite(at.cost)) at.status = NumericalStatus::Ok;
+  finishEvaluation(node, at);
 }
 
 NumericalStatus FullTranscription::updateImpactStep(int node, FullEvaluation& at) const {

@@ -63,7 +63,7 @@ class ReducedTranscription : public Transcription {
   void mapGains(const RobotEvaluation& at, const RowMatrixXd& K, RowMatrixXd& gains) const override;
 
  private:
-  void finishEvaluation(int node, const LaneView& view, LinkageWorkspaces& linkages, RobotEvaluation& at) const;
+  void addCosts(int node, const LaneView& view, LinkageWorkspaces& linkages, RobotEvaluation& at) const;
   void finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const;
 
   const Reduction reduction_;
@@ -91,14 +91,13 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
   LinkageWorkspaces& linkages = scratch.assembly.linkages();
   for (Batch<ReducedKernel::StepItem>& batch : steps) {
     if (batch.count > 0) scratch.kernel.step(batch.items.data(), batch.count, scratch.views);
-    for (int l = 0; l < batch.count; ++l)
-      finishEvaluation(batch.items[l].node, scratch.views[l], linkages, *batch.items[l].at);
+    for (int l = 0; l < batch.count; ++l) addCosts(batch.items[l].node, scratch.views[l], linkages, *batch.items[l].at);
   }
   if (states.count > 0) scratch.kernel.place(states.items.data(), states.count, scratch.views);
   for (int l = 0; l < states.count; ++l) {
     const ReducedKernel::StepItem& item = states.items[l];
     if (isImpact(item.node) && item.at->status == NumericalStatus::Ok) scratch.impact.update(item);
-    finishEvaluation(item.node, scratch.views[l], linkages, *item.at);
+    addCosts(item.node, scratch.views[l], linkages, *item.at);
   }
 }
 
@@ -126,14 +125,14 @@ void ReducedTranscription::mapGains(const RobotEvaluation& at, const RowMatrixXd
 }
 
 // Computes the costs after a successful step.
-void ReducedTranscription::finishEvaluation(int node, const LaneView& view, LinkageWorkspaces& linkages,
-                                            RobotEvaluation& at) const {
+void ReducedTranscription::addCosts(int node, const LaneView& view, LinkageWorkspaces& linkages,
+                                    RobotEvaluation& at) const {
   if (at.status != NumericalStatus::Ok) return;
   if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
   const NodeBases bases(reduction_, static_cast<const ReducedEvaluation&>(at));
   costs_[node].calc(
       {model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, &bases, &linkages}, at);
-  if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = NumericalStatus::NotFinite;
+  finishEvaluation(node, at);
 }
 
 void ReducedTranscription::linearize(LinearizeTask* tasks, int count, ProblemScratch* memory) const {
