@@ -7,6 +7,7 @@
 #include "bielle/dynamics/ratio.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/robot_loader.h"
+#include "design/constraint.h"
 #include "design/evaluation.h"
 #include "design/page_data.h"
 #include "design/spec.h"
@@ -31,6 +32,17 @@ MotorTrace makeTrace(const std::vector<double>& dt, const std::vector<double>& t
 }
 
 using Eigen::Vector2d;
+
+TEST_CASE("constraints of designs: what cannot be measured is beyond its bound, on either side") {
+  for (const bool at_least : {false, true}) {
+    DesignConstraint constraint;
+    constraint.at_least = at_least;
+    constraint.bound = 2;
+    CHECK(calcViolation(constraint, 2) == 0);
+    CHECK(calcViolation(constraint, at_least ? 1.9 : 2.1) == Approx(0.05));
+    CHECK(calcViolation(constraint, std::numeric_limits<double>::quiet_NaN()) > 1e3);
+  }
+}
 
 // The five-bar leg on paper, in the plane x, z with the motors at the origin: one side's rods to the foot.
 struct Side {

@@ -79,6 +79,16 @@ TEST_CASE("falls: a linkage that has passed a dead point is one, even with its m
   }
 }
 
+TEST_CASE("falls: what is not a number is one") {
+  const Linkage linkage;
+  CHECK_FALSE(linkage.isFallen(linkage.planned, false));
+  for (const int k : {0, 2}) {
+    VectorXd q = linkage.planned;
+    q[k] = std::numeric_limits<double>::quiet_NaN();
+    CHECK(linkage.isFallen(q, false));
+  }
+}
+
 // Motors of an ankle turned by 1.6 rad from the plan, on a robot whose rods are not those of its model.
 TEST_CASE("falls: linkages of a robot that differs from its model are followed back as well") {
   const Model model = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto").model;

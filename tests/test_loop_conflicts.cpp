@@ -319,3 +319,12 @@ TEST_CASE("conflicts: a hinge whose axes are opposite is named with its angle, a
     CHECK_THAT(error.remedy(), Catch::Contains("turn frame '") && Catch::Contains("by pi"));
   }
 }
+
+TEST_CASE("gaps: what is not a number is never the smaller one") {
+  const Model model = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 1).model;
+  Workspace ws(model);
+  updatePositions(model, ws, VectorXd::Constant(model.nq(), std::numeric_limits<double>::quiet_NaN()));
+  std::string worst;
+  CHECK(std::isnan(calcLargestGap(ws, makeConstraintSet(model), &worst)));
+  CHECK(worst == "loop");
+}

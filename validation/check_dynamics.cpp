@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "check_rows.h"
-#include "largest.h"
+#include "math/largest.h"
 
 namespace bielle::validation {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "check_rows.h"
-#include "largest.h"
+#include "math/largest.h"
 #include "math/so3.h"
 
 namespace bielle::validation {

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "check_rows.h"
-#include "largest.h"
 #include "math/lanes.h"
+#include "math/largest.h"
 #include "wrench_cone.h"
 
 namespace bielle::validation {

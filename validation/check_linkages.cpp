@@ -10,8 +10,8 @@
 #include <set>
 
 #include "check_rows.h"
-#include "largest.h"
 #include "math/decompositions.h"
+#include "math/largest.h"
 #include "model/listing.h"
 #include "simbody_bridge.h"
 

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "check_accelerations.h"
-#include "largest.h"
 #include "math/decompositions.h"
+#include "math/largest.h"
 #include "math/so3.h"
 #include "simbody_bridge.h"
 

@@ -2,8 +2,8 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "largest.h"
 #include "math/decompositions.h"
+#include "math/largest.h"
 #include "model/joint.h"
 #include "simbody_bridge.h"
 

@@ -6,7 +6,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "largest.h"
+#include "math/largest.h"
 
 namespace bielle::validation {
 

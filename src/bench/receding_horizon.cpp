@@ -10,6 +10,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "math/largest.h"
 #include "solve/receding.h"
 #include "solve/window.h"
 
@@ -142,11 +143,12 @@ class ShiftedWalk {
       out_.up = solved && step.status == NumericalStatus::Ok;
       if (!out_.up) break;
       next = step.x_next;
-      out_.violation = std::max(out_.violation, calcViolation(k, step));
+      out_.violation = getLarger(out_.violation, calcViolation(k, step));
       x = disturbance_.apply(whole_.spec(k + 1).constraints, next);
       const Torso torso = findTorso(model_, ws_, x);
-      out_.least_height = std::min(out_.least_height, torso.height / start.height);
-      out_.largest_tilt = std::max(out_.largest_tilt, std::acos(std::min(1.0, torso.up.dot(start.up))));
+      out_.least_height = getSmaller(out_.least_height, torso.height / start.height);
+      out_.largest_tilt =
+          getLarger(out_.largest_tilt, std::atan2(torso.up.cross(start.up).norm(), torso.up.dot(start.up)));
       out_.up = out_.least_height > 0.8 && out_.largest_tilt < 0.5;
     }
   }
@@ -156,7 +158,7 @@ class ShiftedWalk {
     whole_.getConstraintBounds(k, lower, upper);
     double worst = 0;
     for (Eigen::Index i = 0; i < lower.size(); ++i)
-      worst = std::max({worst, lower[i] - step.constraints[i], step.constraints[i] - upper[i]});
+      worst = getLarger(worst, getLarger(lower[i] - step.constraints[i], step.constraints[i] - upper[i]));
     return worst;
   }
 

@@ -26,7 +26,8 @@ double calcMiss(const GoalOutcome& outcome) {
 double calcViolation(const DesignConstraint& constraint, double value) {
   const double beyond =
       (constraint.at_least ? constraint.bound - value : value - constraint.bound) / getScale(constraint);
-  return beyond > kConstraintSlack ? std::min(beyond, kMost) : 0;
+  if (beyond <= kConstraintSlack) return 0;
+  return beyond < kMost ? beyond : kMost;  // as is what cannot be measured
 }
 
 MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std::vector<int>& motors,

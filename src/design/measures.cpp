@@ -8,6 +8,7 @@
 #include "bielle/model/error.h"
 #include "design/conditioning.h"
 #include "design/motor_change.h"
+#include "math/largest.h"
 
 namespace bielle {
 namespace {
@@ -20,8 +21,8 @@ MotorMeasures calcMeasures(const MotorTrace& trace, Eigen::Index motor, const Mo
     const double h = trace.dt[k], u = trace.torque(motor, stage), v = trace.speed(motor, stage);
     const double c = drive.getEffortFactor(u * v);
     const double power = c * (u * v) + std::pow(c * u / drive.motor_constant, 2);  // Eq. (1)
-    out.peak_torque = std::max(out.peak_torque, std::abs(u));
-    out.peak_speed = std::max(out.peak_speed, std::abs(v));
+    out.peak_torque = getLarger(out.peak_torque, std::abs(u));
+    out.peak_speed = getLarger(out.peak_speed, std::abs(v));
     out.energy += h * std::abs(u * v);
     out.electrical_energy += h * (power > 0 ? power : drive.regeneration * power);
     squares += h * u * u;
@@ -37,10 +38,11 @@ void addShares(const MotorTrace& trace, Eigen::Index m, const Motor& motor, Moto
   for (size_t k = 0; k < trace.dt.size(); ++k) {
     const Eigen::Index stage = static_cast<Eigen::Index>(k);
     const double u = trace.torque(m, stage), v = trace.speed(m, stage);
-    out.envelope = std::max({out.envelope, std::abs(u) / motor.effort_limit, std::abs(v) / motor.velocity_limit});
+    out.envelope =
+        getLarger(out.envelope, getLarger(std::abs(u) / motor.effort_limit, std::abs(v) / motor.velocity_limit));
     if (motor.hasEnvelope() && trace.dt[k] > 0)
-      out.envelope = std::max(out.envelope,
-                              std::abs(motor.voltsPerEffort() * u + motor.voltsPerSpeed() * v) / motor.drive.voltage);
+      out.envelope = getLarger(out.envelope,
+                               std::abs(motor.voltsPerEffort() * u + motor.voltsPerSpeed() * v) / motor.drive.voltage);
     squares += trace.dt[k] * std::pow(motor.getEffortFactor(u * v) * u, 2);
     duration += trace.dt[k];
   }
@@ -104,7 +106,7 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
   out.motors = calcMotorMeasures(out.trace, drives);
   LinkageConditioning conditioning(model, trajectory.xs.front().head(model.nq()));
   for (const VectorXd& x : trajectory.xs)
-    out.conditioning = std::max(out.conditioning, conditioning.calc(x.head(model.nq())));
+    out.conditioning = getLarger(out.conditioning, conditioning.calc(x.head(model.nq())));
   return out;
 }
 
@@ -115,13 +117,13 @@ void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, 
   if (!model.serialJoints().empty()) {
     LinkageConditioning conditioning(model, trajectory.xs.front().head(model.nq()), LinkageSide::Joints);
     for (const VectorXd& x : trajectory.xs)
-      measures.margin = std::min(measures.margin, 1 / conditioning.calc(x.head(model.nq())));
+      measures.margin = getSmaller(measures.margin, 1 / conditioning.calc(x.head(model.nq())));
   }
   if (requested.count(Measure::DeadPointDistance)) {
     RowMatrixXd qs(static_cast<Eigen::Index>(trajectory.xs.size()), model.nq());
     for (Eigen::Index k = 0; k < qs.rows(); ++k) qs.row(k) = trajectory.xs[static_cast<size_t>(k)].head(model.nq());
     for (const DeadPointTrace& linkage : traceDeadPoints(model, qs))
-      measures.dead_point_distance = std::min(measures.dead_point_distance, linkage.getNearest().distance);
+      measures.dead_point_distance = getSmaller(measures.dead_point_distance, linkage.getNearest().distance);
   }
   if (!requested.count(Measure::Distance)) return;
   Workspace ws(model);
@@ -218,10 +220,10 @@ double getMeasure(Measure measure, const std::vector<int>& motors, const MotionM
   double value = measure == Measure::Conditioning ? motion.conditioning : 0;
   for (int m : motors) {
     const MotorMeasures& motor = motion.motors[static_cast<size_t>(m)];
-    if (measure == Measure::PeakTorque) value = std::max(value, motor.peak_torque);
-    if (measure == Measure::RmsTorque) value = std::max(value, motor.rms_torque);
-    if (measure == Measure::Envelope) value = std::max(value, motor.envelope);
-    if (measure == Measure::Heat) value = std::max(value, motor.heat);
+    if (measure == Measure::PeakTorque) value = getLarger(value, motor.peak_torque);
+    if (measure == Measure::RmsTorque) value = getLarger(value, motor.rms_torque);
+    if (measure == Measure::Envelope) value = getLarger(value, motor.envelope);
+    if (measure == Measure::Heat) value = getLarger(value, motor.heat);
     if (measure == Measure::Energy) value += motor.energy;
     if (measure == Measure::ElectricalEnergy) value += motor.electrical_energy;
   }
@@ -235,13 +237,13 @@ double getMeasure(Measure measure, const std::vector<int>& motors, const std::ve
   double value = measure == Measure::Margin ? 1 : isLeast(measure) ? std::numeric_limits<double>::infinity() : 0;
   for (size_t i = 0; i < motions.size(); ++i) {
     if (isLeast(measure)) {
-      value = std::min(value, measure == Measure::Margin     ? motions[i].margin
-                              : measure == Measure::Distance ? motions[i].distance
-                                                             : motions[i].dead_point_distance);
+      value = getSmaller(value, measure == Measure::Margin     ? motions[i].margin
+                                : measure == Measure::Distance ? motions[i].distance
+                                                               : motions[i].dead_point_distance);
       continue;
     }
     const double of_motion = (weights.empty() ? 1 : weights[i]) * getMeasure(measure, motors, motions[i]);
-    value = isSum(measure) ? value + of_motion : std::max(value, of_motion);
+    value = isSum(measure) ? value + of_motion : getLarger(value, of_motion);
   }
   return value;
 }

@@ -10,6 +10,7 @@
 #include "bielle/model/error.h"
 #include "dynamics/assembly_refinement.h"
 #include "math/decompositions.h"
+#include "math/largest.h"
 #include "math/so3.h"
 
 namespace bielle {
@@ -51,11 +52,11 @@ class HardConditions {
     };
     for (size_t c = 0; c < set_.closures.size(); ++c)
       consider("closure '" + set_.closures[c].name + "'",
-               h.segment(set_.offsets[c], getRows(set_.closures[c].kind)).cwiseAbs().maxCoeff());
+               calcLargest(h.segment(set_.offsets[c], getRows(set_.closures[c].kind))));
     int row = set_.rows;
     for (const FrameTarget& target : problem_.frames) {
       const int n = static_cast<int>(target.mask.count());
-      if (n) consider("target '" + target.name + "'", h.segment(row, n).cwiseAbs().maxCoeff());
+      if (n) consider("target '" + target.name + "'", calcLargest(h.segment(row, n)));
       row += n;
     }
     return worst;
@@ -136,9 +137,9 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
         options.step == AssemblyStep::Shortest
             ? calcShortestStep(conditions.H, conditions.h - offset, shrink, options.rank_tolerance)
             : calcStep(conditions.H, conditions.h - offset, wish, wish_gain, weights, shrink, options.rank_tolerance);
-    const double largest = step.size() ? step.cwiseAbs().maxCoeff() : 0;
+    const double largest = calcLargest(step);
     if (!std::isfinite(largest)) return false;
-    const bool met = conditions.rows() == 0 || (conditions.h - offset).cwiseAbs().maxCoeff() <= options.tolerance;
+    const bool met = conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;
     if (met && largest < 1e-9) return true;
     if (largest > options.step_limit) step *= options.step_limit / largest;
     // Halve while the conditions get much worse; slightly worse is allowed, as the preference bends the path.
@@ -151,7 +152,7 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
     result.q = q_new;
     error = (conditions.h - offset).norm();
   }
-  return conditions.rows() == 0 || (conditions.h - offset).cwiseAbs().maxCoeff() <= options.tolerance;
+  return conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;
 }
 
 }  // namespace
@@ -218,7 +219,7 @@ AssemblyResult refineAssembly(const Model& model, const AssemblyProblem& problem
       const MatrixXd WN = weights.asDiagonal() * N;
       if (N.cols() > 0) step += N * WN.colPivHouseholderQr().solve(VectorXd(weights.cwiseProduct(wish - step)));
     }
-    const double size = step.size() ? step.cwiseAbs().maxCoeff() : 0;
+    const double size = calcLargest(step);
     if (!(size < options.step_limit)) break;
     if (last < kShort && size > 0.5 * last) break;
     result.q = model.integrate(result.q, step);
@@ -227,7 +228,7 @@ AssemblyResult refineAssembly(const Model& model, const AssemblyProblem& problem
   }
   conditions.update(result.q);
   result.gap = conditions.calcLoopGap();
-  const bool met = conditions.rows() == 0 || conditions.h.cwiseAbs().maxCoeff() <= options.tolerance;
+  const bool met = conditions.rows() == 0 || calcLargest(conditions.h) <= options.tolerance;
   if (met && last < kShort) result.status = NumericalStatus::Ok;
   return result;
 }
@@ -350,9 +351,10 @@ VectorXd projectVelocity(const Model& model, Workspace& ws, const ConstraintSet&
 double calcLargestGap(const Workspace& ws, const ConstraintSet& constraints, std::string* worst) {
   double gap = 0;
   for (int c = 0; c < constraints.num_loops; ++c) {
-    const double value = calcClosureResidual(ws, constraints.closures[c]).cwiseAbs().maxCoeff();
-    if (value > gap && worst) *worst = constraints.closures[c].name;
-    gap = std::max(gap, value);
+    const double value = calcLargest(calcClosureResidual(ws, constraints.closures[c]));
+    if (value <= gap || std::isnan(gap)) continue;  // a NaN is the largest
+    if (worst) *worst = constraints.closures[c].name;
+    gap = value;
   }
   return gap;
 }

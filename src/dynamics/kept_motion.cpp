@@ -3,6 +3,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "math/largest.h"
 
 namespace bielle {
 namespace {
@@ -17,8 +18,6 @@ MatrixXd calcJacobian(const Model& model, const Workspace& ws, const ConstraintS
     calcClosureJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
   return J;
 }
-
-double calcLargest(const VectorXd& x) { return x.size() ? x.cwiseAbs().maxCoeff() : 0; }
 
 }  // namespace
 
@@ -57,7 +56,7 @@ double Closing::calcMotion(const Model& model, const Workspace& ws, const ModelV
     out = solve(rows, still);
     VectorXd left = H_ * out;
     left.head(rows_) -= rows;
-    gap = std::max(gap, calcLargest(left));
+    gap = getLarger(gap, calcLargest(left));
   };
   updateVariation(model, ws, change, motion, variation);
   close(calcResidualVariation(ws, closures_, change, variation), motion.q);

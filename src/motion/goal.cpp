@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "math/constants.h"
+#include "math/largest.h"
 #include "model/number_text.h"
 
 namespace bielle {
@@ -52,7 +53,7 @@ double measureHeight(const Goal& goal, const MotionTrack& track) {
 
 double measureRise(const Goal& goal, const MotionTrack& track) {
   double most = track.com[goal.first].z();
-  for (int k = goal.first; k <= goal.last; ++k) most = std::max(most, track.com[k].z());
+  for (int k = goal.first; k <= goal.last; ++k) most = getLarger(most, track.com[k].z());
   return most - track.com[goal.first].z();
 }
 

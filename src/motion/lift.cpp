@@ -8,6 +8,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
 #include "math/decompositions.h"
+#include "math/largest.h"
 #include "motion/posture_lift.h"
 #include "motion/slsqp.h"
 
@@ -17,8 +18,6 @@ namespace {
 constexpr double kRankTolerance = 1e-9;  // of motors and feet in Eq. (2), relative singular values
 constexpr double kTorqueStep = 1e-3;     // N m, of the differences of Eq. (1)
 constexpr double kWeakDirection = 1e-9;  // of the torques in Eq. (1), relative singular values: left alone
-
-double calcLargest(const VectorXd& x) { return x.size() ? x.cwiseAbs().maxCoeff() : 0; }
 
 std::string describe(const char* what, double value, double tolerance) {
   std::ostringstream text;
@@ -94,8 +93,10 @@ class Lifter {
     const VectorXd error = calcTrackingError(k, x);
     node.position_error = calcLargest(error.head(serial_.nv()));
     node.velocity_error = calcLargest(error.tail(serial_.nv()));
-    if (node.position_error > options_.position_tolerance) return failToFollow(k, "the posture", node.position_error);
-    if (node.velocity_error > options_.velocity_tolerance) return failToFollow(k, "the velocity", node.velocity_error);
+    if (!(node.position_error <= options_.position_tolerance))
+      return failToFollow(k, "the posture", node.position_error);
+    if (!(node.velocity_error <= options_.velocity_tolerance))
+      return failToFollow(k, "the velocity", node.velocity_error);
     return true;
   }
 

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "math/largest.h"
+
 namespace bielle {
 namespace {
 
@@ -70,7 +72,7 @@ NumericalStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
   };
   VectorXd miss = calcMiss(drive.here);
   MatrixXd T;
-  for (int i = 0; i < kMaxIterations && miss.cwiseAbs().maxCoeff() > kTolerance; ++i) {
+  for (int i = 0; i < kMaxIterations && !(calcLargest(miss) <= kTolerance); ++i) {
     if (!calcLinkageTangent(linkage, drive.here, T)) break;
     VectorXd d = T * miss;
     d *= std::min(1.0, kLongestStep / d.cwiseAbs().maxCoeff());
@@ -82,7 +84,7 @@ NumericalStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
     std::swap(drive.here, drive.next);
     miss = calcMiss(drive.here);
   }
-  if (miss.cwiseAbs().maxCoeff() <= 1e3 * kTolerance) return NumericalStatus::Ok;
+  if (calcLargest(miss) <= 1e3 * kTolerance) return NumericalStatus::Ok;
   Eigen::Index worst;
   miss.cwiseAbs().maxCoeff(&worst);
   std::ostringstream text;

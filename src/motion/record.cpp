@@ -7,6 +7,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/footsteps.h"
+#include "math/largest.h"
 #include "math/so3.h"
 #include "motion/record_tables.h"
 
@@ -21,8 +22,8 @@ void recordNode(const Model& model, Workspace& ws, const VectorXd& x, int k, Mot
   record.gap.row(k).setZero();
   for (const Closure& closure : model.closures()) {
     const ClosureGap gap = calcClosureGap(ws, closure);
-    record.gap(k, 0) = std::max(record.gap(k, 0), gap.position);
-    record.gap(k, 1) = std::max(record.gap(k, 1), gap.angle);
+    record.gap(k, 0) = getLarger(record.gap(k, 0), gap.position);
+    record.gap(k, 1) = getLarger(record.gap(k, 1), gap.angle);
   }
 }
 
@@ -163,10 +164,10 @@ Slip calcSlip(const Motion& motion, const MotionTrack& track) {
       std::optional<SE3>& start = touch_down[target.contact];
       if (!start) start = X_WF;
       const SE3 moved = start->inverseTimes(X_WF);
-      slip.position = std::max(slip.position, moved.p.norm());
-      if (contact.kind == ContactKind::Surface6D) slip.angle = std::max(slip.angle, log3(moved.R).norm());
+      slip.position = getLarger(slip.position, moved.p.norm());
+      if (contact.kind == ContactKind::Surface6D) slip.angle = getLarger(slip.angle, log3(moved.R).norm());
       if (contact.kind == ContactKind::Edge5D)  // its direction
-        slip.angle = std::max(slip.angle, moved.R.col(0).tail<2>().norm());
+        slip.angle = getLarger(slip.angle, moved.R.col(0).tail<2>().norm());
       stands[target.contact] = true;
     }
     for (size_t c = 0; c < stands.size(); ++c)

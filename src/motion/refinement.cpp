@@ -5,6 +5,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "math/largest.h"
 
 namespace bielle {
 namespace {
@@ -42,14 +43,14 @@ StepError findStepError(const Model& model, const MotionRecord& record) {
     updatePositions(model, ws, record.q_mid.row(k).transpose());
     updateMassMatrix(model, ws);
     const auto calcNorm = [&ws](const VectorXd& a) {
-      return std::sqrt(std::max(0.0, a.dot(ws.M.selfadjointView<Eigen::Lower>() * a)));
+      return std::sqrt(getLarger(0, a.dot(ws.M.selfadjointView<Eigen::Lower>() * a)));
     };
     const VectorXd a = record.a.row(k);
     const double error = calcNorm((record.v.row(k + 1) - record.v.row(k)).transpose() / h - a);
-    if (error > worst.share) worst = {error, k};
-    largest = std::max(largest, calcNorm(a));
+    if (!(error <= worst.share) && !std::isnan(worst.share)) worst = {error, k};
+    largest = getLarger(largest, calcNorm(a));
   }
-  worst.share = largest > 0 ? worst.share / largest : 0;
+  worst.share = largest == 0 ? 0 : worst.share / largest;
   return worst;
 }
 
@@ -76,8 +77,8 @@ double calcStageExcess(const Motion& motion, const MotionRecord& record) {
   for (const ContactFrame& contact : model.contacts())
     reach = std::max(reach, std::hypot(contact.half_length, contact.half_width));
   const Slip slip = calcSlip(motion, makeTrack(model, record));
-  return std::max(calcStepError(model, record) / kLargestStepError,
-                  (slip.position + reach * slip.angle) / kLargestSlip);
+  return getLarger(calcStepError(model, record) / kLargestStepError,
+                   (slip.position + reach * slip.angle) / kLargestSlip);
 }
 
 std::optional<RefinedMotion> refineStages(const Motion& solved, const MotionRecord& record) {

@@ -9,6 +9,7 @@
 #include "bielle/dynamics/modes.h"
 #include "bielle/dynamics/rnea.h"
 #include "math/decompositions.h"
+#include "math/largest.h"
 
 namespace bielle {
 namespace {
@@ -43,7 +44,7 @@ StaticHold calcStaticHold(const Model& model, const ConstraintSet& constraints, 
   decomposition.setThreshold(kRankTolerance);
   decomposition.compute(A);
   const VectorXd solution = decomposition.solve(ws.b);
-  return {solution.head(n), (A * solution - ws.b).cwiseAbs().maxCoeff()};
+  return {solution.head(n), calcLargest(A * solution - ws.b)};
 }
 
 std::vector<int> listMotorDofs(const Model& model) {
@@ -85,7 +86,7 @@ VectorXd settleSprings(const Model& model, const std::vector<const JointForce*>&
     const StaticHold hold = calcStaticHold(model, constraints, q, dofs);
     const VectorXd lack = hold.tau.tail(springs.size());
     if (hold.residual > tolerance) break;
-    if (lack.cwiseAbs().maxCoeff() < tolerance) return q;
+    if (calcLargest(lack) < tolerance) return q;
     for (size_t i = 0; i < springs.size(); ++i) {
       angles[i] -= lack[i] / springs[i]->stiffness;
       problem.q_ref[springs[i]->idx_q] = angles[i];

@@ -11,6 +11,7 @@
 #include "bielle/model/error.h"
 #include "formats/aside_file.h"
 #include "formats/text_file.h"
+#include "math/largest.h"
 #include "results/ground_json.h"
 #include "results/json_text.h"
 #include "results/result_files.h"
@@ -174,7 +175,7 @@ void setFigures(const Model& model, MotionResult& result) {
   const MotionRecord& record = result.record;
   result.peak_torques.clear();
   for (size_t m = 0; m < record.u_names.size(); ++m)
-    result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
+    result.peak_torques.emplace_back(record.u_names[m], calcLargest(record.u.col(m)));
   std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
                    [](const auto& a, const auto& b) { return a.second > b.second; });
   const VectorXd rms = calcRmsEfforts(model, record);
@@ -187,8 +188,8 @@ void setFigures(const Model& model, MotionResult& result) {
       result.continuous_torques.emplace_back(motor.name, motor.continuous_effort);
   }
   result.energy = calcElectricalEnergy(model, record, result.objective.regeneration);
-  result.gap_position = record.gap.col(0).maxCoeff();
-  result.gap_angle = record.gap.col(1).maxCoeff();
+  result.gap_position = calcLargest(record.gap.col(0));
+  result.gap_angle = calcLargest(record.gap.col(1));
   result.com_start = record.com(0, 2);
   result.com_lowest = record.com.col(2).minCoeff();
   result.dead_points = traceDeadPoints(model, record.q);

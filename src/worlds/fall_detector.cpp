@@ -47,11 +47,12 @@ std::string FallDetector::find(double time, double plan_time, const VectorXd& q)
   const auto getUp = [](const VectorXd& at) {
     return Vector3d(Eigen::Quaterniond(at[6], at[3], at[4], at[5]).toRotationMatrix().row(2));
   };
-  const double tilt = std::acos(std::clamp(getUp(q).dot(getUp(q_)), -1.0, 1.0));
+  const Vector3d up = getUp(q), planned_up = getUp(q_);
+  const double tilt = std::atan2(up.cross(planned_up).norm(), up.dot(planned_up));
   const double height = (p.z() - ground_.find(p.x(), p.y()).height) /
                         (planned.z() - planned_ground_.find(planned.x(), planned.y()).height);
-  if (tilt > criterion_.tilt) return "the trunk leans far from its planned attitude at " + formatTime(time);
-  if (height < criterion_.height) return "the trunk is far below its planned height at " + formatTime(time);
+  if (!(tilt <= criterion_.tilt)) return "the trunk leans far from its planned attitude at " + formatTime(time);
+  if (!(height >= criterion_.height)) return "the trunk is far below its planned height at " + formatTime(time);
   return {};
 }
 
@@ -61,7 +62,11 @@ double FallDetector::calcDeviation(const Joint& joint, const VectorXd& q) const 
 
 const Joint* FallDetector::findStrayJoint(const VectorXd& q) {
   joint_deviation_ = 0;
-  for (const Joint& joint : model_.joints()) joint_deviation_ = std::max(joint_deviation_, calcDeviation(joint, q));
+  for (const Joint& joint : model_.joints()) {
+    const double deviation = calcDeviation(joint, q);
+    if (!(deviation <= joint_deviation_)) joint_deviation_ = deviation;
+    if (std::isnan(deviation)) return &joint;
+  }
   if (joint_deviation_ <= criterion_.joint) return nullptr;
   const bool back = linkages_ && followsBack(q);
   for (const Joint& joint : model_.joints()) {

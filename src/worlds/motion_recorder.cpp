@@ -7,6 +7,7 @@
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/names.h"
+#include "math/largest.h"
 #include "motion/record_tables.h"
 
 namespace bielle::worlds {
@@ -51,8 +52,8 @@ void MotionRecorder::addNode(const std::vector<PredictedFoothold>& footholds) {
   record_.gap.row(node_).setZero();
   for (const Closure& closure : model_.closures()) {
     const ClosureGap gap = calcClosureGap(ws_, closure);
-    record_.gap(node_, 0) = std::max(record_.gap(node_, 0), gap.position);
-    record_.gap(node_, 1) = std::max(record_.gap(node_, 1), gap.angle);
+    record_.gap(node_, 0) = getLarger(record_.gap(node_, 0), gap.position);
+    record_.gap(node_, 1) = getLarger(record_.gap(node_, 1), gap.angle);
   }
   if (node_ > 0)
     record_.a.row(node_ - 1) =
@@ -88,8 +89,8 @@ void MotionRecorder::addClosureForces() {
 
 void MotionRecorder::noteAdvance(double seconds) {
   happened.world_seconds += seconds;
-  happened.largest_gap = std::max(happened.largest_gap, world_.gap());
-  for (const FootReport& foot : world_.feet()) happened.largest_slip = std::max(happened.largest_slip, foot.slip);
+  happened.largest_gap = getLarger(happened.largest_gap, world_.gap());
+  for (const FootReport& foot : world_.feet()) happened.largest_slip = getLarger(happened.largest_slip, foot.slip);
 }
 
 Execution MotionRecorder::describe(double since) const {

@@ -83,10 +83,11 @@ void Perception::addErrors(const World& world) {
   const Matrix3d R = getAttitude(m.q), truth = getAttitude(q);
   const double position = (m.q.head<3>() - q.head<3>()).norm();
   const double velocity = (R * m.v.head<3>() - truth * v.head<3>()).norm();
-  const double tilt = std::acos(std::clamp(R.row(2).dot(truth.row(2)), -1.0, 1.0));
+  const Vector3d up = R.row(2), true_up = truth.row(2);
+  const double tilt = std::atan2(up.cross(true_up).norm(), up.dot(true_up));
   const auto add = [](double value, double& sum, double& largest) {
     sum += value * value;
-    largest = std::max(largest, value);
+    if (!(value <= largest)) largest = value;  // a NaN too
   };
   add(position, errors_.position_rms, errors_.position_max);
   add(velocity, errors_.velocity_rms, errors_.velocity_max);

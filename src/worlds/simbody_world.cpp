@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dynamics/joint_force.h"
+#include "math/largest.h"
 #include "worlds/simbody_tree.h"
 
 namespace bielle::worlds {
@@ -305,7 +306,7 @@ double SimbodyWorld::gap() const {
     const SimTK::Vec3 opening =
         joint < 0 ? locate(closure.body1, closure.X_B1.p) - locate(closure.body2, closure.X_B2.p)
                   : locate(model_.joints()[joint].parent, model_.joints()[joint].X_PJ.p) - locate(joint, {0, 0, 0});
-    gap = std::max(gap, opening.norm());
+    gap = getLarger(gap, opening.norm());
   }
   return gap;
 }

@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
+#include "math/largest.h"
 
 namespace bielle::worlds {
 
@@ -84,7 +85,7 @@ Books World::books() const {
 double World::gap() const {
   updatePlacements(model_, ws_, q_);
   double gap = 0;
-  for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureGap(ws_, closure).position);
+  for (const Closure& closure : model_.closures()) gap = getLarger(gap, calcClosureGap(ws_, closure).position);
   return gap;
 }
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
-namespace bielle::validation {
+namespace bielle {
 
 inline double getLarger(double a, double b) { return std::isnan(a) || b < a ? a : b; }
 inline double getSmaller(double a, double b) { return std::isnan(a) || a < b ? a : b; }
@@ -18,4 +18,4 @@ double calcLargest(const Eigen::MatrixBase<Derived>& x, Eigen::Index* place) {
   return x.cwiseAbs().template maxCoeff<Eigen::PropagateNaN>(place);
 }
 
-}  // namespace bielle::validation
+}  // namespace bielle
