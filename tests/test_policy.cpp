@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/control/policy.h"
+#include "bielle/control/predictive_controller.h"
 #include "bielle/dynamics/ball_cuts.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/motion/serial_model.h"
@@ -97,17 +98,15 @@ TEST_CASE("policy: its gains are those of the solver's last sweep") {
   }
 }
 
-TEST_CASE("policy: its gains on states whose loops are open are those on the difference that the solver sees") {
-  SolvedSquat& squat = getSquat();
-  const Model& model = squat.robot.model;
+namespace {
+
+// K d(x (-) x_k) at x_k by differences, the loops of x open.
+RowMatrixXd calcDifferences(const Solution& solution, int node, const VectorXd& x) {
+  const Model& model = solution.motion.problem->model();
   const int nq = model.nq(), nv = model.nv();
-  const Policy policy = makePolicy(squat.solution);
-  NodeEvaluator evaluator(*squat.solution.motion.problem);
-  constexpr int kNode = 40;
-  const VectorXd& x = squat.solution.trajectory.xs[kNode];
-  evaluator.evaluate(kNode, x, squat.solution.trajectory.us[kNode]);
-  const RowMatrixXd& K = squat.solution.gains[kNode].K;
-  RowMatrixXd gains = policy.stages()[kNode].K, differences(model.nu(), 2 * nv);
+  NodeEvaluator evaluator(*solution.motion.problem);
+  evaluator.evaluate(node, x, solution.trajectory.us[node]);
+  RowMatrixXd differences(model.nu(), 2 * nv);
   constexpr double kStep = 0.01;  // along one coordinate the difference is linear
   for (int i = 0; i < 2 * nv; ++i) {
     VectorXd moved = x;
@@ -115,12 +114,98 @@ TEST_CASE("policy: its gains on states whose loops are open are those on the dif
       model.integrate(x.head(nq), kStep * VectorXd::Unit(nv, i), moved.head(nq));
     else
       moved[nq + i - nv] += kStep;
-    differences.col(i) = K * evaluator.difference(moved) / kStep;
+    differences.col(i) = solution.gains[node].K * evaluator.difference(moved) / kStep;
   }
+  return differences;
+}
+
+}  // namespace
+
+TEST_CASE("policy: its gains on states whose loops are open are those on the difference that the solver sees") {
+  const Solution& solution = getSquat().solution;
+  constexpr int kNode = 40;
+  REQUIRE(solution.gains[kNode].x == solution.trajectory.xs[kNode]);
+  RowMatrixXd gains = makePolicy(solution).stages()[kNode].K;
+  const RowMatrixXd differences = calcDifferences(solution, kNode, solution.gains[kNode].x);
   const double scale = differences.cwiseAbs().maxCoeff();
   CHECK((gains - differences).cwiseAbs().maxCoeff() < 1e-11 * scale);
-  gains(3, nv - 2) += 1e-9 * scale;
+  gains(3, gains.cols() / 2 - 2) += 1e-9 * scale;
   CHECK_FALSE((gains - differences).cwiseAbs().maxCoeff() < 1e-11 * scale);
+}
+
+TEST_CASE(
+    "policy: gains of a solve that was cut off are about the states of its last sweep, not those that it led to") {
+  SquatOptions options;
+  options.depth = 0.85;
+  SolveOptions how;
+  how.solver.max_iterations = 2;
+  const Solution solution = solve(makeSquat(getSquat().robot.model, options), how);
+  REQUIRE(solution.summary.termination == FddpTermination::MaxIterations);
+  constexpr int kNode = 80;
+  const VectorXd &about = solution.gains[kNode].x, &after = solution.trajectory.xs[kNode];
+  REQUIRE((after - about).norm() > 1e-3);
+  const RowMatrixXd gains = makePolicy(solution).stages()[kNode].K;
+  const double scale = gains.cwiseAbs().maxCoeff();
+  CHECK((gains - calcDifferences(solution, kNode, about)).cwiseAbs().maxCoeff() < 1e-11 * scale);
+  CHECK((gains - calcDifferences(solution, kNode, after)).cwiseAbs().maxCoeff() > 1e-6 * scale);
+}
+
+namespace {
+
+// Bases of the tangent space at a closed configuration, by the coordinates of the robot: what unit gains are mapped to.
+RowMatrixXd calcBases(const RobotProblem& problem, const VectorXd& q) {
+  VectorXd x = problem.initialState();
+  x.head(q.size()) = q;
+  RobotEvaluator evaluator(problem);
+  const int nv = problem.model().nv(), size = problem.tangentSize(0);
+  RowMatrixXd bases;
+  problem.mapGains(evaluator.evaluate(0, x, VectorXd::Zero(problem.model().nu())), RowMatrixXd::Identity(size, size),
+                   bases);
+  return bases.topLeftCorner(size / 2, nv);
+}
+
+// The gains of the second stage of a robot that is to stand, after its configuration was measured.
+RowMatrixXd findGains(const Model& model, const VectorXd& q) {
+  LocomotionOptions gait;
+  gait.contact_kp = 0;
+  PredictiveOptions options;
+  options.threads = 1;
+  CommandedWalk walk(
+      model, gait, {}, [](double) { return VelocityCommand(); }, makeStandingRobot(model));
+  const double stage = walk.timeStep();
+  PredictiveController controller(std::move(walk), options);
+  VectorXd u(model.nu());
+  for (double time : {0.0, stage}) controller.update({time, q, VectorXd::Zero(model.nv())}, u);
+  REQUIRE(controller.counts().failed == 0);
+  return controller.policy().stages()[1].K;
+}
+
+}  // namespace
+
+// The ankles of this robot, as it stands, are where their bases turn round.
+TEST_CASE("policy: gains of predictive control belong to the states about which they were found") {
+  const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/rsu_biped");
+  const Model& model = robot.model;
+  const VectorXd rest = makeStandingPosture(model);
+  StageSpec stage;
+  stage.constraints = makeConstraintSet(model);
+  const RobotProblem problem(model, rest, VectorXd::Zero(model.nv()), {stage, {}}, Formulation::Reduced);
+  const RowMatrixXd expected = findGains(model, rest), bases = calcBases(problem, rest);
+  RobotEvaluator evaluator(problem);
+  evaluator.evaluate(0, problem.initialState(), VectorXd::Zero(model.nu()));
+  constexpr double kOff = 2e-3;
+  int turned = 0;
+  for (int i = 6; i < problem.tangentSize(0) / 2; ++i)
+    for (const double off : {-kOff, kOff}) {
+      const VectorXd q = evaluator.integrate(off * VectorXd::Unit(problem.tangentSize(0), i)).head(model.nq());
+      turned += (calcBases(problem, q).cwiseProduct(bases).rowwise().sum().array() < 0).any();
+      const RowMatrixXd found = findGains(model, q);
+      for (int column = 0; column < expected.cols(); ++column) {
+        CAPTURE(i, off, column, expected.col(column).norm(), found.col(column).norm());
+        CHECK((found - expected).col(column).norm() < 0.1 * expected.col(column).norm() + 1e-3 * expected.norm());
+      }
+    }
+  CHECK(turned >= 4);
 }
 
 TEST_CASE("policy: gains that look ahead are those of an earlier stage of their phase") {

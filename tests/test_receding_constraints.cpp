@@ -110,6 +110,25 @@ TEST_CASE("solves of one iteration, for receding horizons, linearize once each a
   CHECK(calcError() < 0.01 * first);
 }
 
+TEST_CASE("a receding step keeps the evaluations about which its gains are") {
+  auto problem = makeBoundedCartPole();
+  const int iterations = GENERATE(1, 3);
+  ShootingTrajectory t = makeGuess(problem), linearized, last = t;
+  FddpObserver observer;
+  observer.callback = [&](const FddpIteration&, const ShootingTrajectory& trajectory) {
+    linearized = std::exchange(last, trajectory);
+    return FddpAction::Continue;
+  };
+  Receding solver(problem, makeOptions(iterations));
+  REQUIRE(solver.step(t, observer).iterations == iterations);
+  const size_t stages = t.us.size();
+  for (size_t k = 0; k <= stages; ++k) {
+    CAPTURE(iterations, k);
+    CHECK(solver.getLinearized(static_cast<int>(k)).x == linearized.xs[k]);
+    if (k > 0) CHECK(linearized.xs[k] != t.xs[k]);
+  }
+}
+
 TEST_CASE("in receding horizons a row that binds does not come free and is violated in every other iteration") {
   Constrained<PlantProblem<Linear>> problem(makeLinear());
   ShootingTrajectory t = makeGuess(problem);

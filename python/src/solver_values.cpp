@@ -80,7 +80,8 @@ void bindSummary(py::module_& module) {
       "Feedback of a stage about a node state x_k and a control u_k: u = u_k + k + K dx, dx from x_k to x in the "
       "tangent space of the problem. K is added: it has the sign of a negative feedback.")
       .field("k", &Gains::k, "(nu,); vanishes at an optimum")
-      .field("K", &Gains::K, "(nu, ndx); rows of controls at their bounds are zero");
+      .field("K", &Gains::K, "(nu, ndx); rows of controls at their bounds are zero")
+      .field("x", &Gains::x, "x_k, of the iterate that the last sweep was about");
   Value<Multipliers>(module, "Multipliers", "Multipliers of the constraints, node by node.")
       .field("values", &Multipliers::values, "N + 1 of (constraint size,)")
       .field("penalty", &Multipliers::penalty, "penalty of violated constraints");

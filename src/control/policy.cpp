@@ -27,7 +27,8 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
       Policy::Stage stage;
       fillStage(problem, node, time, x, trajectory.us[node], next, stage);
       stage.phase = phase_index;
-      if (!gains.empty()) problem.mapGains(evaluator.evaluate(node, x, trajectory.us[node]), gains[node].K, stage.K);
+      if (!gains.empty())  // in the bases of the states that they are about, which need not be those of the trajectory
+        problem.mapGains(evaluator.evaluate(node, gains[node].x, trajectory.us[node]), gains[node].K, stage.K);
       stages.push_back(std::move(stage));
       time += spec.dt;
     }

@@ -344,20 +344,14 @@ void WindowPlanner::makePolicy(const Receding& solver, int stage, Solution& solu
     if (earlier) {
       out.K = *earlier;
     } else {
-      problem_.mapGains(getEvaluation(solver, node), solver.getGains(node).K, out.K);
+      const auto& linearized = static_cast<const RobotEvaluation&>(solver.getLinearized(node));
+      problem_.mapGains(linearized, solver.getGains(node).K, out.K);
       if (out.phase == solution.stages.front().phase) keepGains(out.phase, out.K);
     }
     solution.u_hold = out.u;
     before = &out;
     ++stage, ++node;
   }
-}
-
-// Of a node of the trajectory: the solver's, or one of its own.
-const RobotEvaluation& WindowPlanner::getEvaluation(const Receding& solver, int node) {
-  if (const NodeEvaluation* evaluation = solver.getEvaluation(node))
-    return static_cast<const RobotEvaluation&>(*evaluation);
-  return evaluator_.evaluate(grid_.stages()[node], trajectory_.xs[node], trajectory_.us[node]);
 }
 
 }  // namespace bielle

@@ -74,7 +74,6 @@ class WindowPlanner {
   const RowMatrixXd* findEarlierGains(const Policy::Stage* before, int phase) const;
   void keepGains(int phase, const RowMatrixXd& K);
   void makePolicy(const Receding& solver, int stage, Solution& solution);
-  const RobotEvaluation& getEvaluation(const Receding& solver, int node);
 
   // window_feet.cpp
   bool stands(int stage, int contact) const;

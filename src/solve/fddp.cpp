@@ -31,7 +31,10 @@ FddpResult solve(const ShootingProblem& problem, ShootingTrajectory guess, const
   out.summary = FddpSolve(options, problem, out.trajectory, observer, memory).run();
   out.multipliers = memory.lagrangian.multipliers();
   const std::vector<LqSweep::Node>& nodes = memory.backward.sweep().nodes();
-  for (size_t k = 0; k + 1 < nodes.size(); ++k) out.gains.push_back(nodes[k]);
+  for (size_t k = 0; k + 1 < nodes.size(); ++k) {
+    out.gains.push_back(nodes[k]);
+    out.gains.back().x = memory.evaluations.getUpdated()[k]->x;
+  }
   return out;
 }
 

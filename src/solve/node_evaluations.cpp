@@ -50,6 +50,7 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
     }
   }
   std::fill(fresh_.begin() + first, fresh_.end(), true);
+  swapped_ = false;
   const int num_tasks = static_cast<int>(tasks_.size()), size = problem.batchSize();
   const int num_batches = (num_tasks + size - 1) / size;
   ParallelErrors errors;
@@ -102,6 +103,7 @@ void NodeEvaluations::exchange(size_t node, std::unique_ptr<NodeEvaluation>& oth
 
 void NodeEvaluations::swapTrial() {
   iterate_.swap(trial_);
+  swapped_ = true;
   std::fill(fresh_.begin(), fresh_.end(), true);
 }
 

@@ -36,6 +36,8 @@ class NodeEvaluations {
   }
   const EvaluationList& trial() const { return trial_; }
   void swapTrial();
+  /// N + 1, that were the iterate after the last update().
+  const EvaluationList& getUpdated() const { return swapped_ ? trial_ : iterate_; }
   /// For trials whose evaluations are not kept.
   const EvaluationList& rolling() const { return rolling_; }
   /// Scratch of a thread of the team.
@@ -51,6 +53,7 @@ class NodeEvaluations {
   std::vector<EvaluateTask> tasks_;
   std::vector<char> fresh_;  // N + 1: the evaluation is up to date with the iterate
   std::vector<char> moved_fresh_;
+  bool swapped_ = false;   // since the last update()
   bool advanced_ = false;  // since the last resize()
   double seconds_ = 0;
 };

@@ -162,6 +162,9 @@ void Receding::setMultipliers(const Multipliers& multipliers) {
 }
 
 const Gains& Receding::getGains(int stage) const { return memory_->backward.sweep().nodes()[stage]; }
+const NodeEvaluation& Receding::getLinearized(int node) const {
+  return *memory_->evaluations.getUpdated().at(static_cast<size_t>(node));
+}
 void Receding::exchangeEvaluation(int node, std::unique_ptr<NodeEvaluation>& other) {
   if (getEvaluation(node)) memory_->evaluations.exchange(static_cast<size_t>(node), other);
 }

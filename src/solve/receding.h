@@ -72,6 +72,8 @@ class Receding {
 
   /// Of a stage of the last sweep, about the iterate linearized last; valid until the next step() or prepare().
   const Gains& getGains(int stage) const;
+  /// Of a node of that iterate, whose tangent space is that of the gains; valid likewise, until advance() or move().
+  const NodeEvaluation& getLinearized(int node) const;
   /// Of a node of the trajectory that the last step() ended with, or null if it was not evaluated last; valid likewise.
   const NodeEvaluation* getEvaluation(int node) const;
   /// The same to keep, in exchange for one by makeEvaluation() of the problem; nothing happens where it would be null.

@@ -40,6 +40,7 @@ namespace bielle {
 struct Gains {
   VectorXd k;     ///< nu_k, the unit of the control
   RowMatrixXd K;  ///< nu_k x ndx_k, in the tangent space of the problem at xs_k
+  VectorXd x;     ///< xs_k, as solve() gives it; empty in a sweep
 };
 
 /// How constraints are enforced; without effect on problems that have none.
@@ -150,7 +151,7 @@ struct FddpResult {
   ShootingTrajectory trajectory;  ///< the last iterate; of a solve that was stopped, the best one so far
   Multipliers multipliers;        ///< of the constraints there, Eq. (13)
   /// N, of the last sweep; empty if there was none. They are about the trajectory if the solve converged without a last
-  /// step, i.e. summary.log.back().step is 0, else about the iterate before.
+  /// step, i.e. summary.log.back().step is 0, else about the iterate before: Gains::x has its states.
   std::vector<Gains> gains;
   FddpSummary summary;
 };
