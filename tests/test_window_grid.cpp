@@ -1,6 +1,7 @@
 // The nodes of a window of predictive control that stand for several stages.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
 
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
@@ -146,6 +147,75 @@ TEST_CASE("window grid: with as many fine nodes as there are nodes, each is a st
   }
 }
 
+namespace {
+
+// The nodes of the first window over a squat whose stages have been changed. \param change  of a stage, by its number
+std::vector<Node> listNodes(const std::function<void(int, StageSpec&)>& change) {
+  const Model& model = getBipetto();
+  PredictiveOptions options;
+  options.fine_nodes = 10;
+  const Motion motion = makePredictiveMotion(model, planSquat(model, {}, makeStandingRobot(model)), {}, options);
+  const int stages = motion.problem->numStages() - countMostStages(options);
+  for (int k = 0; k < stages; ++k) {
+    StageSpec spec = motion.problem->spec(k);
+    change(k, spec);
+    motion.problem->replaceStage(k, std::move(spec));
+  }
+  ShootingTrajectory solved = motion.guess;
+  solved.xs.resize(stages + 1);
+  solved.us.resize(stages);
+  const auto horizon = makeMotionHorizon(motion, solved, options);
+  WindowGrid grid(*horizon, options);
+  grid.move(0);
+  return grid.nodes();
+}
+
+}  // namespace
+
+TEST_CASE("window grid: stages whose names are the same are not joined unless their weights and limits are, too") {
+  constexpr int kOther = 44;  // in the middle of a node of four stages, unless it differs
+  const auto standsAlone = [](const std::function<void(StageSpec&)>& change) {
+    for (const Node& node : listNodes([&](int k, StageSpec&spec) {
+           if (k == kOther) change(spec);
+         }))
+      if (node.begin <= kOther && kOther < node.end()) return node.length == 1;
+    return false;
+  };
+  CHECK_FALSE(standsAlone([](StageSpec&) {}));
+  CHECK(standsAlone([](StageSpec& spec) { spec.state.q_ref[8] += 0.1; }));
+  CHECK(standsAlone([](StageSpec& spec) { spec.state.q_ref[2] -= 0.1; }));
+  CHECK(standsAlone([](StageSpec& spec) { spec.state.v_ref[9] = 1; }));
+  CHECK(standsAlone([](StageSpec& spec) { spec.state.weights[8] *= 2; }));
+  CHECK(standsAlone([](StageSpec& spec) { spec.state.weight *= 2; }));
+  CHECK(standsAlone([](StageSpec& spec) { spec.control.reference[2] = 1; }));
+  CHECK(standsAlone([](StageSpec& spec) { spec.control.weights[2] *= 2; }));
+  CHECK(standsAlone([](StageSpec& spec) { spec.effort_limits[0] = 1; }));
+  // The heading turns while the robot walks.
+  CHECK_FALSE(standsAlone([](StageSpec& spec) { spec.state.q_ref.segment<4>(3) << 0, 0, 0.1, std::sqrt(0.99); }));
+}
+
+TEST_CASE("window grid: terms without a name join stages only where they are the same") {
+  const auto countStages = [](const std::function<void(int, StageSpec&)>& change) {
+    return listNodes(change).back().end();
+  };
+  const int named = countStages([](int, StageSpec&) {}), nodes = PredictiveOptions().nodes;
+  REQUIRE(named > nodes + 30);
+  // Each stage has a height of its own.
+  CHECK(countStages([](int, StageSpec& spec) {
+          for (Cost& cost : spec.costs) cost.name.clear();
+        }) == nodes);
+  const std::shared_ptr<const Residual> shared = makeComVelocity(Vector3d::Zero());
+  const auto takeTerms = [&](int k, double weight, double upper, StageSpec& spec) {
+    for (Cost& cost : spec.costs) cost = {"", 1, Activation::makeQuadratic(weight * Vector3d::Ones()), shared};
+    spec.path_constraints.resize(1);
+    const Vector3d ones = Vector3d::Ones();
+    if (k > 0) spec.path_constraints[0] = {"", shared, -ones, upper * ones, ones};
+  };
+  CHECK(countStages([&](int k, StageSpec& spec) { takeTerms(k, 1, 1, spec); }) == named);
+  CHECK(countStages([&](int k, StageSpec& spec) { takeTerms(k, 1 + k, 1, spec); }) == nodes);
+  CHECK(countStages([&](int k, StageSpec& spec) { takeTerms(k, 1, 1 + k, spec); }) == nodes);
+}
+
 TEST_CASE("window grid: a squat's bottom and a jump's impact are nodes of their own") {
   const Model& model = getBipetto();
   PredictiveOptions options;
@@ -159,7 +229,7 @@ TEST_CASE("window grid: a squat's bottom and a jump's impact are nodes of their 
     solved.us.resize(stages);
     std::vector<StageSpec> specs;
     for (int k = 0; k < motion.problem->numStages(); ++k) specs.push_back(motion.problem->spec(k));
-    const auto horizon = makeMotionHorizon(Motion(motion), solved, options);
+    const auto horizon = makeMotionHorizon(motion, solved, options);
     WindowGrid grid(*horizon, options);
     for (int first = 0; first <= stages; first += 5) {
       grid.move(first);

@@ -59,13 +59,14 @@ void bindCosts(py::module_& module) {
           py::arg("weights"), py::arg("lower"), py::arg("upper"),
           "1/2 sum w d^2, where d is how far r is outside of its bounds; all (n,), in the unit of r.");
   Value<Cost>(module, "Cost", "weight * activation(residual).")
-      .field("name", &Cost::name, "for reports")
+      .field("name", &Cost::name,
+             "for reports; far nodes of predictive control join stages whose terms have the same names")
       .field("weight", &Cost::weight, "finite, not negative")
       .field("activation", &Cost::activation, "Activation")
       .field("residual", &Cost::residual, "residual of the library (bielle.residuals), or a Residual written in Python")
       .field("defines", &Cost::defines, "it defines the motion, and keeps its weight for every objective");
   Value<PathConstraint>(module, "PathConstraint", "lower <= r <= upper; equal bounds make an equation.")
-      .field("name", &PathConstraint::name, "for messages")
+      .field("name", &PathConstraint::name, "for messages, and likewise")
       .field("residual", &PathConstraint::residual, "residual of the library (bielle.residuals), or written in Python")
       .field("lower", &PathConstraint::lower, "(n,), -inf: open")
       .field("upper", &PathConstraint::upper, "(n,), inf: open")

@@ -11,10 +11,38 @@ namespace {
 // Eq. (1).
 int getMostStages(int distance, int fine) { return distance < fine ? 1 : distance < 3 * fine ? 2 : 4; }
 
+bool areSame(ConstVectorRef a, ConstVectorRef b) { return a.size() == b.size() && a == b; }
+
+bool areSame(const Activation& a, const Activation& b) {
+  return a.kind == b.kind && areSame(a.weights, b.weights) && areSame(a.lower, b.lower) && areSame(a.upper, b.upper) &&
+         areSame(a.losses, b.losses) && a.share == b.share && a.smoothing == b.smoothing;
+}
+bool areSame(const Cost& a, const Cost& b) {
+  return a.residual == b.residual && a.weight == b.weight && areSame(a.activation, b.activation);
+}
+bool areSame(const PathConstraint& a, const PathConstraint& b) {
+  return a.residual == b.residual && areSame(a.lower, b.lower) && areSame(a.upper, b.upper) &&
+         areSame(a.scale, b.scale);
+}
+bool areSame(const ControlCost& a, const ControlCost& b) {
+  return a.weight == b.weight && areSame(a.weights, b.weights) && areSame(a.reference, b.reference);
+}
+
+// A name says that it is the same thing at another time, wherever its reference is by then.
 template <typename Terms>
-bool haveSameNames(const Terms& a, const Terms& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](const auto& one, const auto& other) { return one.name == other.name; });
+bool areAlike(const Terms& a, const Terms& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& one, const auto& other) {
+    return one.name == other.name && (!one.name.empty() || areSame(one, other));
+  });
+}
+
+// But for the heading, which turns while the robot walks.
+bool areAlike(const Model& model, const StateCost& a, const StateCost& b) {
+  if (a.weight != b.weight || !areSame(a.weights, b.weights)) return false;
+  if (a.weight == 0 || !model.hasFreeFlyer()) return areSame(a.q_ref, b.q_ref) && areSame(a.v_ref, b.v_ref);
+  const int joints = model.nq() - 7, others = model.nv() - 6;
+  return areSame(a.q_ref.head<3>(), b.q_ref.head<3>()) && areSame(a.q_ref.tail(joints), b.q_ref.tail(joints)) &&
+         areSame(a.v_ref.head<5>(), b.v_ref.head<5>()) && areSame(a.v_ref.tail(others), b.v_ref.tail(others));
 }
 
 StageSpec stretch(const StageSpec& first, int length) {
@@ -87,8 +115,10 @@ bool WindowGrid::areAlike(int stage, int next) const {
   const RobotProblem& problem = horizon_.getProblem();
   const StageSpec &a = problem.spec(getStage(stage)), &b = problem.spec(getStage(next));
   return a.kind == StageKind::Dynamics && b.kind == StageKind::Dynamics && a.dt == b.dt && a.step == b.step &&
-         horizon_.getPhase(stage) == horizon_.getPhase(next) && haveSameNames(a.costs, b.costs) &&
-         haveSameNames(a.path_constraints, b.path_constraints);
+         horizon_.getPhase(stage) == horizon_.getPhase(next) && a.constraints.contacts == b.constraints.contacts &&
+         bielle::areAlike(problem.model(), a.state, b.state) && areSame(a.control, b.control) &&
+         areSame(a.effort_limits, b.effort_limits) && bielle::areAlike(a.costs, b.costs) &&
+         bielle::areAlike(a.path_constraints, b.path_constraints);
 }
 
 void WindowGrid::restore(const Node& node) {

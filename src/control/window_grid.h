@@ -9,7 +9,9 @@
 namespace bielle {
 
 // A node that stands for several stages has the costs, the constraints and the place in the problem of the first of them, and
-// a step as long as all of them. It joins stages that are alike: of one phase, with costs and constraints of the same names.
+// a step as long as all of them. It joins stages that are alike: of one phase, with the same contacts, limits of torques and
+// weights of state and control, the same references of both but for the heading, and costs and constraints of the same names,
+// whose references may differ; those without a name must be the same.
 // Nodes keep their place in time while the window moves, and are cut in two when they are too near. Their length is at most
 //     1 stage within the first `fine` stages of the window, 2 within the next 2 fine, 4 beyond.                           (1)
 class WindowGrid {
