@@ -93,6 +93,44 @@ TEST_CASE("predictive control: a squat stands to its end and beyond, to the same
   CHECK(a.record.u == b.record.u);
 }
 
+namespace {
+
+// All numbers of a stage that a window changes or might change.
+std::vector<VectorXd> listNumbers(const StageSpec& spec) {
+  std::vector<VectorXd> out{Vector3d(spec.dt, spec.state.weight, spec.control.weight), spec.state.q_ref,
+                            spec.state.v_ref, spec.state.weights, spec.control.reference};
+  for (const Cost& cost : spec.costs)
+    out.insert(out.end(), {VectorXd::Constant(1, cost.weight), cost.activation.weights});
+  for (const PathConstraint& c : spec.path_constraints) out.insert(out.end(), {c.lower, c.upper, c.scale});
+  for (const Closure& closure : spec.constraints.closures) out.push_back(Eigen::Vector2d(closure.kp, closure.kd));
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("predictive control: the motion that it is given stays as it is") {
+  const Model& model = getBipetto();
+  PredictiveOptions options = makeShortWindow(1);
+  options.fine_nodes = 10;
+  options.own_thread = GENERATE(false, true);
+  const Motion motion = makePredictiveMotion(model, planSquat(model, makeShortSquat(), makeStandingRobot(model)),
+                                             ProblemOptions(), options);
+  std::vector<StageSpec> before;
+  for (int k = 0; k <= motion.problem->numStages(); ++k) before.push_back(motion.problem->spec(k));
+  PredictiveController controller(motion, getShortSquat().solution.trajectory, options);
+  ExecutionOptions execution;
+  execution.duration = 20 * kStage;
+  carryOut(getShortSquat(), controller, execution);
+  controller.waitForSolve();
+  CHECK(controller.counts().solves > 5);
+  for (int k = 0; k <= motion.problem->numStages(); ++k) {
+    CAPTURE(k);
+    const StageSpec& after = motion.problem->spec(k);
+    CHECK(listNumbers(after) == listNumbers(before[k]));
+    for (size_t i = 0; i < after.costs.size(); ++i) CHECK(after.costs[i].residual == before[k].costs[i].residual);
+  }
+}
+
 TEST_CASE("predictive control: on the plan its torques are those of the plan") {
   const Model& model = getBipetto();
   const Solved& squat = getShortSquat();

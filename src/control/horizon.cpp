@@ -34,15 +34,26 @@ StateCost makeEndCost(const Model& model, const VectorXd& q, const VectorXd& joi
   return {1, q, VectorXd::Zero(nv), weights};
 }
 
+// A problem of its own, whose stages are replaced as windows move on: copies of a motion share theirs.
+std::unique_ptr<RobotProblem> copyProblem(const RobotProblem& problem) {
+  if (problem.formulation() != Formulation::Reduced || problem.hasFreeTimings())
+    throw std::invalid_argument("PredictiveController: the problem is not reduced, or its durations are free");
+  std::vector<StageSpec> specs;
+  for (int k = 0; k <= problem.numStages(); ++k) specs.push_back(problem.spec(k));
+  const Model& model = problem.model();
+  const VectorXd& x0 = problem.initialState();
+  return std::make_unique<RobotProblem>(model, x0.head(model.nq()), x0.tail(model.nv()), std::move(specs),
+                                        Formulation::Reduced);
+}
+
 class MotionHorizon : public Horizon {
  public:
-  MotionHorizon(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options)
-      : motion_(std::move(motion)),
-        problem_(*motion_.problem),
+  MotionHorizon(const Motion& motion, const ShootingTrajectory& plan, const PredictiveOptions& options)
+      : own_(copyProblem(*motion.problem)),
+        problem_(*own_),
         last_(problem_.numStages() - countMostStages(options)),
+        last_dt_(problem_.spec(last_).dt),
         plan_(plan) {
-    if (problem_.formulation() != Formulation::Reduced || problem_.hasFreeTimings())
-      throw std::invalid_argument("PredictiveController: the problem is not reduced, or its durations are free");
     if (static_cast<int>(plan.us.size()) != last_ || plan.xs.size() != plan.us.size() + 1)
       throw std::invalid_argument("PredictiveController: the plan does not belong to the motion");
     double time = 0;
@@ -51,10 +62,10 @@ class MotionHorizon : public Horizon {
       time += problem_.spec(k).dt;
     }
     int phase = 0;
-    for (const ContactPhase& p : motion_.schedule.phases) phases_.insert(phases_.end(), p.nodes, phase++);
+    for (const ContactPhase& p : motion.schedule.phases) phases_.insert(phases_.end(), p.nodes, phase++);
     const Model& model = problem_.model();
     VectorXd rest = plan.xs.back();
-    rest.head(model.nq()) = settlePosture(model, motion_.schedule.phases.back().contacts, rest.head(model.nq()));
+    rest.head(model.nq()) = settlePosture(model, motion.schedule.phases.back().contacts, rest.head(model.nq()));
     rest.tail(model.nv()).setZero();
     const VectorXd u = calcStaticTorques(model, problem_.spec(last_).constraints, rest.head(model.nq())).u;
     plan_.xs.resize(problem_.numStages() + 1, rest);
@@ -68,7 +79,7 @@ class MotionHorizon : public Horizon {
   int end() const override { return last_; }
   int getNode(int stage) const override { return std::min(stage, last_); }
   double getStart(int stage) const override {
-    return stage <= last_ ? starts_[stage] : starts_[last_] + (stage - last_) * problem_.spec(last_).dt;
+    return stage <= last_ ? starts_[stage] : starts_[last_] + (stage - last_) * last_dt_;
   }
   int getPhase(int stage) const override { return phases_[getNode(stage)]; }
   const VectorXd& getState(int stage) const override { return plan_.xs[stage]; }
@@ -81,9 +92,10 @@ class MotionHorizon : public Horizon {
   bool isSolved() const override { return true; }
 
  private:
-  Motion motion_;
+  const std::unique_ptr<RobotProblem> own_;
   RobotProblem& problem_;
   const int last_;              // the first copy of the last stage
+  const double last_dt_;        // of one copy, s: a node of the problem may stand for several
   ShootingTrajectory plan_;     // of all stages of the problem
   std::vector<double> starts_;  // of each stage, s
   std::vector<int> phases_;     // likewise
@@ -188,9 +200,9 @@ Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOp
   return makeMotion(model, std::move(plan), problem);
 }
 
-std::unique_ptr<Horizon> makeMotionHorizon(Motion motion, const ShootingTrajectory& plan,
+std::unique_ptr<Horizon> makeMotionHorizon(const Motion& motion, const ShootingTrajectory& plan,
                                            const PredictiveOptions& options) {
-  return std::make_unique<MotionHorizon>(std::move(motion), plan, options);
+  return std::make_unique<MotionHorizon>(motion, plan, options);
 }
 
 std::unique_ptr<Horizon> makeWalkHorizon(CommandedWalk walk, const PredictiveOptions& options) {

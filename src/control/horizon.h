@@ -31,8 +31,8 @@ class Horizon {
   virtual bool isSolved() const = 0;
 };
 
-// A solved motion, then copies of its last stage.
-std::unique_ptr<Horizon> makeMotionHorizon(Motion motion, const ShootingTrajectory& plan,
+// A solved motion, then copies of its last stage. The problem is a copy of the motion's.
+std::unique_ptr<Horizon> makeMotionHorizon(const Motion& motion, const ShootingTrajectory& plan,
                                            const PredictiveOptions& options);
 // A walk whose stages are made when a window reaches them.
 std::unique_ptr<Horizon> makeWalkHorizon(CommandedWalk walk, const PredictiveOptions& options);

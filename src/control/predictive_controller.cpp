@@ -147,9 +147,9 @@ double PredictiveCounts::calcQuantile(double share, double PredictiveSolve::*val
   return bielle::calcQuantile(std::move(values), share);
 }
 
-PredictiveController::PredictiveController(Motion motion, const ShootingTrajectory& plan,
+PredictiveController::PredictiveController(const Motion& motion, const ShootingTrajectory& plan,
                                            const PredictiveOptions& options)
-    : loop_(std::make_unique<Loop>(makeMotionHorizon(std::move(motion), plan, options), options)) {}
+    : loop_(std::make_unique<Loop>(makeMotionHorizon(motion, plan, options), options)) {}
 PredictiveController::PredictiveController(CommandedWalk walk, const PredictiveOptions& options)
     : loop_(std::make_unique<Loop>(makeWalkHorizon(std::move(walk), options), options)) {}
 PredictiveController::~PredictiveController() = default;

@@ -107,10 +107,10 @@ Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOp
 
 class PredictiveController : public Controller {
  public:
-  /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation
+  /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation; its problem is copied
   /// \param plan  the solved motion, without the copies of its last stage: where windows end, and what the first one
   /// starts from   \throws InputError when motors brake and the start is a dead point
-  PredictiveController(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
+  PredictiveController(const Motion& motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
   /// \param walk  of which no stage has been made yet   \throws InputError likewise
   PredictiveController(CommandedWalk walk, const PredictiveOptions& options);
   ~PredictiveController() override;
