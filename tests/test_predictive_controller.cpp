@@ -202,6 +202,54 @@ TEST_CASE("predictive control: a walk by command is made on the way, to the same
 
 namespace {
 
+// Hides the state of a walk from a controller at the instant of one solve in each swing, which therefore fails.
+class Blinking : public Controller {
+ public:
+  explicit Blinking(PredictiveController& inner) : inner_(inner) {}
+  void update(const Measurement& measurement, VectorRef u) override {
+    const bool solves = static_cast<int>(std::lround(1e3 * measurement.time)) % bielle::testing::kStageTicks == 0;
+    const auto feet = std::count(measurement.contacts.begin(), measurement.contacts.end(), char(1));
+    if (solves) swing_ = feet == 1 ? swing_ + 1 : 0;
+    Measurement seen = measurement;
+    const bool blinks_now = solves && swing_ == kMiddle;
+    if (blinks_now) seen.v.setConstant(std::numeric_limits<double>::quiet_NaN());
+    inner_.update(seen, u);
+    if (blinks_now) u = last_;
+    last_ = u;
+    blinks += blinks_now;
+  }
+  int blinks = 0;
+
+ private:
+  static constexpr int kMiddle = 18;  // stages since the foot was in the air
+  PredictiveController& inner_;
+  int swing_ = 0;
+  VectorXd last_;
+};
+
+}  // namespace
+
+TEST_CASE("predictive control: after a solve that fails in the middle of a swing the next one succeeds") {
+  const Model& model = getBipetto();
+  LocomotionOptions gait;
+  gait.contact_kp = 0;
+  gait.foothold_room = 0.4;
+  gait.cone_margin = 0.2;
+  const CommandSource source = [](double) { return VelocityCommand{0.4, 0, 0}; };
+  PredictiveOptions predictive;
+  predictive.threads = 1;
+  PredictiveController controller(CommandedWalk(model, gait, {}, source, makeStandingRobot(model)), predictive);
+  Blinking blinking(controller);
+  ExecutionOptions options;
+  options.duration = 3;
+  const Execution execution = carryOut(getShortSquat(), blinking, options);
+  CHECK(execution.outcome == Outcome::Stood);
+  CHECK(blinking.blinks >= 3);
+  CHECK(controller.counts().failed == blinking.blinks);
+}
+
+namespace {
+
 // Keeps whoever comes through while it is closed, but not for ever.
 class Gate {
  public:
