@@ -8,6 +8,7 @@
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
+#include "bielle/motion/solve.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
 #include "bielle/robots/robot_loader.h"
@@ -179,6 +180,35 @@ TEST_CASE("limits: a joint stays within its range, and uses it", "[long]") {
   CHECK(summary.termination == FddpTermination::Converged);
   CHECK(calcLargest(narrow) <= limit + 1e-6);
   CHECK(calcLargest(narrow) > limit - 1e-5);
+}
+
+TEST_CASE(
+    "limits: a motion that comes near dead points is solved again with a margin that keeps it 0.1 rad from them") {
+  const Model& model = getBipetto();
+  const MotionRequest request = findMotion("", "squat").request;
+  const auto findNearest = [&](const Solution& solution) {
+    double distance = kFarthestDeadPoint;
+    for (const DeadPointTrace& linkage : traceDeadPoints(model, makeRecord(solution.motion, solution.trajectory).q))
+      distance = std::min(distance, linkage.getNearest().distance);
+    return distance;
+  };
+  const auto getMargin = [](const Solution& solution) {
+    return solution.motion.problem_options.limits.dead_point_margin;
+  };
+  const Solution apart = solve(makeMotion(model, request));
+  REQUIRE(apart.converged());
+  CHECK(findNearest(apart) > kNearDeadPoint);
+  CHECK(findNearest(apart) < 1.3 * kNearDeadPoint);
+  CHECK(getMargin(apart) > LimitOptions().dead_point_margin);
+  // Who asks for less than the default gets it.
+  ProblemOptions nearer;
+  nearer.limits.dead_point_margin = 0.14;
+  const Solution near = solve(makeMotion(model, request, nearer));
+  REQUIRE(near.converged());
+  CHECK(findNearest(near) < 0.5 * kNearDeadPoint);
+  CHECK(getMargin(near) == 0.14);
+  CHECK(apart.summary.iterations > near.summary.iterations);
+  CHECK(apart.summary.cost < 1.02 * near.summary.cost);
 }
 
 TEST_CASE("limits: impossible ones are refused by name") {

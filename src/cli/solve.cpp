@@ -232,7 +232,8 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
       "ignore the robot's limits of torque, joint range and velocity, which motions otherwise respect");
   sub.add_option("--dead-point-margin", limits.dead_point_margin,
                  "least transmission of a linkage (joint speed over motor speed), relative to that at the start; the "
-                 "largest is its inverse; 0: no bounds")
+                 "largest is its inverse; 0: no bounds. A motion within 0.1 rad of a dead point is solved again with a "
+                 "larger one, unless less than the default is given")
       ->capture_default_str();
   sub.add_option("--limit", arguments->effort_limits,
                  "motor=largest torque [N m], instead of the robot's; may be repeated")

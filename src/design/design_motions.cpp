@@ -83,6 +83,7 @@ void solve(const Motion& motion, const ShootingTrajectory* start, const FddpOpti
            const std::vector<MotorConversion>& drives, MotionOutcome& out) {
   SolveOptions options;
   options.solver = solver;
+  options.keep_apart = false;
   if (start) options.start = StartingPoint{*start};
   Solution solution = bielle::solve(motion, options);
   out.message = describeFailure(motion.name, solution.summary);

@@ -66,6 +66,25 @@ bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Inde
   return false;
 }
 
+// The least margin with which linkages would keep kNearDeadPoint from the dead points that they come nearer to; 0 where none does, or
+// where the start itself is no farther.
+double findMargin(const Model& model, const MotionRecord& record) {
+  constexpr double kReserve = 1.05;  // transmissions are not straight lines over the distance
+  double margin = 0;
+  for (const Linkage& linkage : listLinkages(model, record.q.row(0).transpose())) {
+    double share = 1;
+    Eigen::Index nearest = 0;
+    for (Eigen::Index k = 0; k < record.q.rows(); ++k) {
+      const double value = calcTransmission(linkage, model, record.q.row(k).transpose());
+      if (std::min(value, 1 / value) < share) share = std::min(value, 1 / value), nearest = k;
+    }
+    const double distance = findDeadPoint(linkage, model, record.q.row(nearest).transpose()).distance;
+    const double needed = kReserve * share * kNearDeadPoint / distance;
+    if (distance < kNearDeadPoint && needed < 1) margin = std::max(margin, needed);
+  }
+  return margin;
+}
+
 }  // namespace
 
 double calcStepError(const Model& model, const MotionRecord& record) { return findStepError(model, record).share; }
@@ -104,6 +123,20 @@ std::optional<Motion> avoidDeadPoints(const Motion& solved, const MotionRecord& 
   if (error.share <= kLargestStepError || !isNearDeadPoint(model, record, error.stage, margin)) return {};
   margin = kWideDeadPointMargin;
   return makeMotion(model, *solved.request, problem);
+}
+
+std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const MotionRecord& record) {
+  const Model& model = solved.problem->model();
+  ProblemOptions problem = solved.problem_options;
+  double& margin = problem.limits.dead_point_margin;
+  if (!problem.limits.enforced || margin < LimitOptions().dead_point_margin) return {};
+  if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
+  const double needed = findMargin(model, record);
+  if (needed <= margin) return {};
+  margin = needed;
+  RefinedMotion apart{makeMotion(model, *solved.request, problem), {}};
+  apart.start = makeStart(record, apart.motion);
+  return apart;
 }
 
 }  // namespace bielle

@@ -1,5 +1,5 @@
 #pragma once
-/// \file Solving again motions whose time step is too coarse.
+/// \file Solving again motions whose time step is too coarse, or that come near dead points.
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,5 +35,11 @@ std::optional<RefinedMotion> refineStages(const Motion& solved, const MotionReco
 /// The length of stages is unchanged. \param solved  whose request it is   \param record  of the motion that is to be improved
 std::optional<Motion> avoidDeadPoints(const Motion& solved, const MotionRecord& record);
 inline constexpr double kWideDeadPointMargin = 0.4;
+
+/// The motion of the same request, with linkages that keep kNearDeadPoint from dead points that the solution comes nearer to, and
+/// that solution to start from: near a dead point the transmission falls with the distance, and the margin of all linkages
+/// becomes as much larger as that has to. Made only if the margin is the default or more and the start leaves room for a
+/// larger one, no duration is free, and the objective is not the peak torque.
+std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const MotionRecord& record);
 
 }  // namespace bielle

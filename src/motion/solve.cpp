@@ -166,6 +166,8 @@ class RequestSolver {
     if (refined) improve(refined->motion, refined->start, again, "with stages half as long", solution, record);
     if (const auto apart = avoidDeadPoints(refined ? refined->motion : solution.motion, record))
       improve(*apart, {apart->guess}, from_guess, "with linkages farther from dead points", solution, record);
+    const auto apart = options_.keep_apart ? keepFromDeadPoints(solution.motion, record) : std::nullopt;
+    if (apart) keepApart(*apart, again, solution, record);
     refuseLongStages(record, solution);
     return solution;
   }
@@ -211,6 +213,24 @@ class RequestSolver {
     if (observer_.warn)
       observer_.warn(how + ": " + getName(improved.summary.termination) +
                      (improved.converged() ? ", but not better" : "") + "; the previous motion is kept");
+  }
+
+  // Solves a motion in place of one that comes near dead points, and takes it if it converges and its stages are no worse.
+  void keepApart(const RefinedMotion& apart, FddpOptions solver, Solution& solution, MotionRecord& record) const {
+    constexpr int kMostIterations = 100;  // it begins at a solution
+    tell("linkages come near dead points: solving again with a margin of " +
+         formatNumber(apart.motion.problem_options.limits.dead_point_margin, "%.2g"));
+    solver.max_iterations = std::min(solver.max_iterations, kMostIterations);
+    Solution kept = attempt(apart.motion, solver, observer_.motion, apart.start);
+    MotionRecord kept_record = makeRecord(kept.motion, kept.trajectory);
+    if (kept.converged() &&
+        calcStageExcess(kept.motion, kept_record) <= std::max(1.0, calcStageExcess(solution.motion, record))) {
+      kept.summary = addUp(solution.summary, std::move(kept.summary));
+      solution = std::move(kept);
+      record = std::move(kept_record);
+      return;
+    }
+    solution.summary = addUp(kept.summary, std::move(solution.summary));
   }
 
   ShootingTrajectory startFromParts() const {

@@ -8,6 +8,8 @@
 ///   (problem_options.h, Eq. 2) and the starting point.
 /// - Stages that turn out too long are halved (refineStages()); if that does not help, linkages are kept farther from their
 ///   dead points (avoidDeadPoints()). A solution whose stages are still too long ends as Failed.
+/// - A solution that comes nearer than kNearDeadPoint to a dead point is solved again from there with a larger margin
+///   (keepFromDeadPoints()); if that does not converge, it stays.
 /// - How far linkages are from their dead points is reported at the start, and added to the message of a failure near one.
 #include <functional>
 #include <optional>
@@ -33,6 +35,8 @@ struct SolveOptions {
   FddpOptions solver = makeMotionSolverOptions();  ///< acceptable_decrease applies to least effort alone
   std::optional<StartingPoint> start{};            ///< if not given, Motion::guess
   bool refine = true;                              ///< whether the motion may be made again
+  bool keep_apart =
+      true;  ///< and so with a larger margin to dead points; not where motions are compared, as of designs
 };
 
 struct SolveObserver {
