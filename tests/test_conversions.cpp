@@ -143,7 +143,8 @@ TEST_CASE("springs between points in MJCF: what it cannot say, other tendons, an
   const std::vector<std::string> warnings = formatMjcf(builder.build(), VectorXd::Zero(1)).warnings;
   REQUIRE(warnings.size() == 2);
   CHECK_THAT(warnings[0], Catch::Contains("point spring 'short': its length without tension would be negative"));
-  CHECK_THAT(warnings[1], Catch::Contains("point spring 'constant': its preload without a stiffness is left out"));
+  CHECK_THAT(warnings[1],
+             Catch::Contains("point spring 'constant': its preload without a stiffness pulls, and is left out"));
 
   const RobotDirectory directory;
   const LoadedRobot other = loadRobot(directory.write("robot.xml", R"(<mujoco>

@@ -2,6 +2,8 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/control/policy.h"
+#include "bielle/dynamics/assembly.h"
+#include "bielle/model/builder.h"
 #include "bielle/motion/walk.h"
 #include "bielle/worlds/bielle_world.h"
 #include "own_robots.h"
@@ -80,6 +82,72 @@ TEST_CASE("simbody world: where loops are cut does not change the motion", "[lon
   const VectorXd other = follow(*fewest, policy, model, 0.1);
   CHECK(model.difference(moved, other).cwiseAbs().maxCoeff() < 1e-5);
   CHECK(fewest->gap() < 1e-7);
+}
+
+TEST_CASE("simbody world: loops at rest do not loosen the one that moves") {
+  // Four-bars side by side without gravity, of which the first one turns.
+  const auto findLargestGap = [](int loops) {
+    ModelBuilder builder("bars");
+    builder.setGravity(Vector3d::Zero());
+    for (int i = 0; i < loops; ++i) {
+      const std::string number = std::to_string(i);
+      const auto add = [&](const std::string& link, const std::string& parent, double x) {
+        Joint joint;
+        joint.name = link + "_joint";
+        joint.kind = JointKind::Continuous;
+        joint.axis = Vector3d::UnitY();
+        joint.X_PJ.p = Vector3d(x, parent == "world" ? i : 0, 0);
+        Inertia inertia;
+        inertia.mass = 1;
+        inertia.com = Vector3d(0.1, 0, 0);
+        inertia.I_com = 0.01 * Matrix3d::Identity();
+        builder.addLink(link, parent, joint, inertia);
+      };
+      add("crank" + number, "world", 0);
+      add("coupler" + number, "crank" + number, 0.15);
+      add("rocker" + number, "world", 0.4);
+      builder.addFrame("end" + number, "coupler" + number, {Matrix3d::Identity(), Vector3d(0.35, 0, 0)});
+      builder.addFrame("tip" + number, "rocker" + number, {Matrix3d::Identity(), Vector3d(0.3, 0, 0)});
+      builder.addClosure("loop" + number, ClosureKind::Ball3D, "end" + number, "tip" + number);
+    }
+    const Model model = builder.build();
+    VectorXd q = model.makeNeutral(), v = VectorXd::Zero(model.nv());
+    for (int i = 0; i < loops; ++i) q.segment<3>(3 * i) << -1, 0.5, -1.6;
+    q = closeConfiguration(model, q).q;
+    v[0] = 8;
+    Workspace ws(model);
+    v = projectVelocity(model, ws, makeConstraintSet(model), q, v);
+    REQUIRE(v.head<3>().norm() > 1);
+    SimbodyWorldOptions options;
+    options.gap = 1e-5;
+    const auto world = makeSimbodyWorld(model, options);
+    world->reset(q, v);
+    double largest = 0;
+    for (int i = 0; i < 200; ++i) {
+      REQUIRE(world->advance(0.005));
+      largest = std::max(largest, world->gap());
+    }
+    CHECK(world->integration().closure_tolerance == options.gap);
+    return largest;
+  };
+  const double alone = findLargestGap(1), among_others = findLargestGap(25);
+  CAPTURE(alone, among_others);
+  CHECK(alone > 1e-7);  // or else nothing is tried
+  CHECK(among_others < std::sqrt(3) * 1e-5);
+}
+
+TEST_CASE("simbody world: no step is longer than is asked for") {
+  SimbodyWorldOptions options;
+  const Model model = testing::makeSprungFivebar();
+  const auto findLongestStep = [&](double time_step) {
+    options.world.time_step = time_step;
+    const auto world = makeSimbodyWorld(model, options);
+    world->reset(findClosedConfiguration(model).q, VectorXd::Zero(model.nv()));
+    REQUIRE(world->advance(0.1));
+    return world->integration().longest_step;
+  };
+  CHECK(findLongestStep(0) > 2e-3);
+  CHECK(findLongestStep(1e-3) == Approx(1e-3));
 }
 
 TEST_CASE("simbody world: a walk goes as in Bielle's world, the more so the finer the steps", "[long]") {

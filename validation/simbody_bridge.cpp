@@ -299,6 +299,7 @@ void SimbodyBridge::integrate(double duration, double accuracy, VectorXd& q, Vec
   SimTK::RungeKuttaMersonIntegrator integrator(s_->system);
   integrator.setAccuracy(accuracy);
   integrator.setConstraintTolerance(accuracy);
+  integrator.setUseInfinityNorm(true);
   integrator.setProjectEveryStep(true);
   integrator.setFinalTime(duration);
   SimTK::TimeStepper stepper(s_->system, integrator);

@@ -124,16 +124,16 @@ class MjcfWriter {
   // A preload moves the rest of the spring, which MuJoCo wants to be 0 or more.
   void writePointSpring(const PointSpring& spring, XMLElement& section) {
     XMLElement& tendon = addElement(section, "spatial", {{"name", spring.name}});
-    if (spring.stiffness != 0) {
-      const double rest = spring.rest - spring.preload / spring.stiffness;
+    const double stiffness = spring.stiffness == 0 && spring.preload < 0 ? kMjcfPreloadStiffness : spring.stiffness;
+    if (stiffness != 0) {
+      const double rest = spring.rest - spring.preload / stiffness;
       if (rest < 0)
         warn("point spring '" + spring.name + "'",
              "its length without tension would be negative: its preload is written as " +
-                 formatMjcf(spring.stiffness * spring.rest) + " N");
-      setAttributes(tendon,
-                    {{"stiffness", formatMjcf(spring.stiffness)}, {"springlength", formatMjcf(std::max(rest, 0.0))}});
-    } else if (spring.preload != 0) {
-      warn("point spring '" + spring.name + "'", "its preload without a stiffness is left out");
+                 formatMjcf(stiffness * spring.rest) + " N");
+      setAttributes(tendon, {{"stiffness", formatMjcf(stiffness)}, {"springlength", formatMjcf(std::max(rest, 0.0))}});
+    } else if (spring.preload > 0) {
+      warn("point spring '" + spring.name + "'", "its preload without a stiffness pulls, and is left out");
     }
     if (spring.damping != 0) setAttributes(tendon, {{"damping", formatMjcf(spring.damping)}});
     for (int end : {1, 2}) addElement(tendon, "site", {{"site", findSpringSite(model_, spring, end)}});

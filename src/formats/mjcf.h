@@ -8,7 +8,8 @@
 /// Motors are actuators of their names, in the order of u, in N m or N. A weld is a `weld`, a ball a `connect`, a hinge
 /// two `connect`s NAME.1 and NAME.2 on its axis. A sole is four spheres at its corners, a point contact one sphere,
 /// named after the contact and numbered from 1; they touch only the ground. References are keyframes. A point spring is a
-/// spatial tendon of its name between two sites, its preload a shift of its spring length. Windings, gears, losses and limits of
+/// spatial tendon of its name between two sites, its preload a shift of its spring length. A preload without a stiffness
+/// gets kMjcfPreloadStiffness, by which a joint that turns by 1 rad changes it by 1e-9 N m. Windings, gears, losses and limits of
 /// speed of motors are in texts "bielle:motor:NAME" of <custom>, in the words of our YAML file, for our own reader.
 #include <string>
 #include <vector>
@@ -17,6 +18,9 @@
 #include "formats/mjcf_coordinates.h"
 
 namespace bielle {
+
+/// N m/rad or N/m
+inline constexpr double kMjcfPreloadStiffness = 1e-9;
 
 struct MjcfOptions {
   double time_step = 2.5e-4;   ///< s

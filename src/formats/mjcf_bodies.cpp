@@ -107,11 +107,10 @@ class BodyWriter {
 
   // A preload moves the rest of the spring.
   void writeJointForce(const Joint& joint, const JointForce& force, XMLElement& e) {
-    if (force.stiffness != 0)
-      setAttributes(e, {{"stiffness", formatMjcf(force.stiffness)},
-                        {"springref", formatMjcf(force.rest + force.preload / force.stiffness)}});
-    else if (force.preload != 0)
-      warn("joint '" + joint.name + "'", "its preload without a spring is left out");
+    const double stiffness = force.stiffness == 0 && force.preload != 0 ? kMjcfPreloadStiffness : force.stiffness;
+    if (stiffness != 0)
+      setAttributes(
+          e, {{"stiffness", formatMjcf(stiffness)}, {"springref", formatMjcf(force.rest + force.preload / stiffness)}});
     if (force.damping != 0) setAttributes(e, {{"damping", formatMjcf(force.damping)}});
     if (force.friction == 0) return;
     setAttributes(e, {{"frictionloss", formatMjcf(force.friction)}});

@@ -12,6 +12,7 @@
 #include "math/decompositions.h"
 #include "worlds/closed_tree.h"
 #include "worlds/contact_law.h"
+#include "worlds/left_out.h"
 
 namespace bielle::worlds {
 namespace {
@@ -76,6 +77,8 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
       places_(contacts_.points.size(), Vector3d::Zero()),
       stop_forces_(contacts_.stops.size(), 0.0),
       factors_(tree_.size()) {
+  integration_.integrator = "leapfrog";
+  warnings_ = listMissingStops(model);
   tau_.setZero(model.nv());
   for (VectorXd* x : {&w_mean_, &dw_, &correction_, &loads_, &half_last_}) x->setZero(tree_.size());
   for (MatrixXd* x : {&damping_, &system_}) x->setZero(tree_.size(), tree_.size());
@@ -105,6 +108,7 @@ bool BielleWorld::move(double duration) {
   while (taken < steps && !(taken > 0 && isInterrupted())) {
     if (!tree_.drift(taken == 0 ? h / 2 : h)) return fail(tree_.failure());
     if (!kick(h)) return fail("the velocities are no longer finite");
+    noteStep(h);
     ++taken;
   }
   const bool is_done = taken == steps;

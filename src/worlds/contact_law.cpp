@@ -8,6 +8,7 @@ namespace {
 
 // A stop gives way by this under a torque of the robot's weight times one metre, or under its weight, rad or m.
 constexpr double kTurn = 0.02, kShift = 1e-3;
+constexpr double kLeastGravity = 1;   // m/s^2; where there is less, soles and stops are as hard as on Earth
 constexpr double kStopDamping = 0.5;  // s/rad; s/m of sliding joints is longer by their ratio of speeds, about 10
 
 // Eq. (1)
@@ -20,6 +21,12 @@ NormalForce calcNormalForce(double stiffness, double damping, double depth, doub
   return {stiffness * depth * factor, stiffness * depth * damping};
 }
 
+// N. From it follows how hard soles and stops are, which does not vanish with the gravity.
+double calcWeight(const Model& model) {
+  const double gravity = model.gravity().norm();
+  return model.mass() * (gravity > kLeastGravity ? gravity : 9.81);
+}
+
 Vector3d shorten(const Vector3d& vector, double length) {
   const double norm = vector.norm();
   return norm > length ? Vector3d(vector * (length / norm)) : vector;
@@ -29,7 +36,7 @@ Vector3d shorten(const Vector3d& vector, double length) {
 
 std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& ground, const ContactOptions& options) {
   const int grid = ground.steps.empty() ? 2 : options.grid;
-  const double sole = model.mass() * model.gravity().norm() / options.sinkage;
+  const double sole = calcWeight(model) / options.sinkage;
   std::vector<ContactPoint> points;
   for (size_t c = 0; c < model.contacts().size(); ++c) {
     const ContactFrame& contact = model.contacts()[c];
@@ -90,19 +97,24 @@ void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce&
 }
 
 std::vector<JointStop> makeJointStops(const Model& model) {
-  const double weight = model.mass() * model.gravity().norm();
+  const double weight = calcWeight(model);
   std::vector<JointStop> stops;
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    if (joint.nv != 1) continue;
-    const double lower = model.lowerLimits()[joint.idx_v], upper = model.upperLimits()[joint.idx_v];
-    if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
-    const bool slides = joint.kind == JointKind::Prismatic;
-    stops.push_back({joint.idx_v, joint.idx_q, lower, upper, weight / (slides ? kShift : kTurn),
-                     slides ? 10 * kStopDamping : kStopDamping});
+    if (!hasStops(joint.kind)) continue;
+    for (int k = 0; k < joint.nv; ++k) {
+      const int dof = joint.idx_v + k;
+      const double lower = model.lowerLimits()[dof], upper = model.upperLimits()[dof];
+      if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
+      const bool slides = joint.kind == JointKind::Prismatic;
+      stops.push_back({dof, joint.idx_q + k, lower, upper, weight / (slides ? kShift : kTurn),
+                       slides ? 10 * kStopDamping : kStopDamping});
+    }
   }
   return stops;
 }
+
+bool hasStops(JointKind kind) { return getNv(kind) == 1 || kind == JointKind::Universal; }
 
 StopForce calcStopForce(const JointStop& stop, double q, double v) {
   const double above = q - stop.upper, below = stop.lower - q;

@@ -65,7 +65,9 @@ struct JointStop {
   double lower = 0, upper = 0;        ///< rad or m
   double stiffness = 0, damping = 0;  ///< N m/rad or N/m; s/rad or s/m
 };
-/// Stops of all joints that have limits and one degree of freedom.
+/// Whether limits of such a joint are stops: its coordinates are angles or lengths, and change at its velocities.
+bool hasStops(JointKind kind);
+/// Of all limits of these joints. Without gravity they are as hard as on Earth.
 std::vector<JointStop> makeJointStops(const Model& model);
 
 struct StopForce {

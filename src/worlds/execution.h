@@ -58,6 +58,7 @@ struct Execution {
   double largest_lag = 0;              ///< with `real_time`: of an instant of control behind the clock, s
   EstimationErrors estimation;
   Books start, end;
+  Integration integration;
   MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means
 
   double meanSpeed() const { return duration > 0 ? distance / duration : 0; }  ///< m/s

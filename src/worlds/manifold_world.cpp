@@ -12,6 +12,7 @@
 #include "math/runge_kutta.h"
 #include "model/number_text.h"
 #include "worlds/contact_law.h"
+#include "worlds/left_out.h"
 
 namespace bielle::worlds {
 namespace {
@@ -72,6 +73,9 @@ ManifoldWorld::ManifoldWorld(const Model& model, const ManifoldWorldOptions& opt
       method_(2 * model.nv() + kWorks),
       derivative_([this](const VectorXd& x, VectorXd& rate) { return evaluate(x, rate); }),
       contacts_(model, ground_, options.contact) {
+  integration_.integrator = "Runge-Kutta of order 8";
+  integration_.tolerance = tolerance_;
+  warnings_ = listMissingStops(model);
   for (VectorXd* x : {&tau_motors_, &tau_}) x->setZero(model.nv());
   for (VectorXd* x : {&x_, &rate_}) x->setZero(2 * model.nv() + kWorks);
   scale_.setZero(2 * model.nv());
@@ -128,6 +132,7 @@ bool ManifoldWorld::step(double duration) {
     const bool is_last = h == left;
     const double asked = h;
     if (!takeStep(h)) return false;
+    noteStep(h);
     time_ = is_last && h == asked ? end : time_ + h;
   }
   updateFeet();

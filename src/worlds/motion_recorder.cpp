@@ -9,6 +9,7 @@
 #include "bielle/model/names.h"
 #include "math/largest.h"
 #include "motion/record_tables.h"
+#include "worlds/contact_law.h"
 
 namespace bielle::worlds {
 namespace {
@@ -23,10 +24,13 @@ double calcExchange(const Books& before, const Books& now) {
 }
 
 bool isWithinStops(const Model& model, const VectorXd& q) {
-  for (const Joint& joint : model.joints())
-    if (joint.nv == 1 &&
-        !(q[joint.idx_q] >= model.lowerLimits()[joint.idx_v] && q[joint.idx_q] <= model.upperLimits()[joint.idx_v]))
+  for (const Joint& joint : model.joints()) {
+    if (!hasStops(joint.kind)) continue;
+    const auto at = q.segment(joint.idx_q, joint.nv).array();
+    if (!(at >= model.lowerLimits().segment(joint.idx_v, joint.nv).array()).all() ||
+        !(at <= model.upperLimits().segment(joint.idx_v, joint.nv).array()).all())
       return false;
+  }
   return true;
 }
 
@@ -99,6 +103,7 @@ Execution MotionRecorder::describe(double since) const {
   out.duration = world_.time();
   out.start = books_.front();
   out.end = books_.back();
+  out.integration = world_.integration();
   out.imbalance = calcImbalance(out.start, out.end);
   out.energy_balance = exchanged_ > 0 ? out.imbalance / exchanged_ : 0;
   out.record = getRecord(since);

@@ -23,6 +23,8 @@ class MujocoModel {
 
   /// Index of a body of the model among MuJoCo's.
   int getBody(int body) const { return bodies_[body]; }
+  /// Index of the first coordinate of velocity of a joint among MuJoCo's.
+  int getDof(int joint) const { return idx_v_[joint]; }
   /// Sets qpos and qvel.
   void setState(ConstVectorRef q, ConstVectorRef v, mjData& data) const;
   /// Sets qfrc_applied to generalized forces tau (nv) at q.

@@ -6,6 +6,8 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "dynamics/loop_conflict.h"
+#include "worlds/contact_law.h"
+#include "worlds/left_out.h"
 #include "worlds/mujoco_ground.h"
 #include "worlds/mujoco_model.h"
 
@@ -41,6 +43,14 @@ class MujocoWorld : public World {
     const mjModel& mj = *mujoco_.get();
     if (options.runge_kutta) mujoco_.get()->opt.integrator = mjINT_RK4;
     boxes_.bind(mj);
+    freeFrictions();
+    setPointSprings();
+    integration_.integrator = options.runge_kutta ? "Runge-Kutta of order 4" : "semi-implicit Euler";
+    warnings_ = listMissingStops(model, [](const Joint& joint, int k) {
+      const bool has_axes = joint.kind == JointKind::FreeFlyer && !isMjcfFree(joint);
+      return hasStops(joint.kind) || joint.kind == JointKind::Planar || (has_axes && k < 3);
+    });
+    for (const std::string& warning : listTurnedArmatures(model)) warnings_.push_back(warning);
     for (size_t c = 0; c < model.contacts().size(); ++c)
       for (int corner = 1; corner <= 4; ++corner) {
         const std::string name = model.contacts()[c].name + "." + std::to_string(corner);
@@ -56,6 +66,8 @@ class MujocoWorld : public World {
   void start() override;
   bool step(double duration) override;
   void noteForces() override;
+  void freeFrictions();
+  void setPointSprings();
   bool takeStep();
   void book(double h);
   void addSoleForces(double share);
@@ -67,6 +79,23 @@ class MujocoWorld : public World {
   std::vector<int> contact_of_geom_;  // of the model, -1 if the geom is not one of a sole
   VectorXd q_before_, v_before_, v_mean_, push_force_, row_velocity_;  // MuJoCo's
 };
+
+// Eq. (2) instead of MuJoCo's own.
+void MujocoWorld::freeFrictions() {
+  for (const JointForce& force : model_.jointForces()) mujoco_.get()->dof_frictionloss[mujoco_.getDof(force.joint)] = 0;
+}
+
+// With a length without tension that may be negative.
+void MujocoWorld::setPointSprings() {
+  mjModel& mj = *mujoco_.get();
+  for (const PointSpring& spring : model_.pointSprings()) {
+    const double stiffness = spring.stiffness > 0 ? spring.stiffness : kMjcfPreloadStiffness;
+    if (spring.stiffness == 0 && spring.preload == 0) continue;
+    const int tendon = mj_name2id(&mj, mjOBJ_TENDON, spring.name.c_str());
+    mj.tendon_stiffness[tendon] = stiffness;
+    mj.tendon_lengthspring[tendon] = spring.rest - spring.preload / stiffness;
+  }
+}
 
 void MujocoWorld::start() {
   mj_resetData(mujoco_.get(), data_.get());
@@ -90,6 +119,7 @@ bool MujocoWorld::step(double duration) {
       message_ = "there are too many boxes under the soles";
     if (!message_.empty() || !takeStep()) break;
     book(h);
+    noteStep(h);
     addSoleForces(1.0 / steps);
     time_ += h;
   }
@@ -103,6 +133,10 @@ bool MujocoWorld::takeStep() {
   const mjModel& mj = *mujoco_.get();
   q_before_ = Eigen::Map<const VectorXd>(data_->qpos, mj.nq);
   v_before_ = Eigen::Map<const VectorXd>(data_->qvel, mj.nv);
+  for (const JointForce& force : model_.jointForces()) {
+    const int dof = mujoco_.getDof(force.joint);
+    mj.dof_damping[dof] = force.damping + force.friction / std::hypot(v_before_[dof], force.friction_speed);
+  }
   try {
     mj_step(&mj, data_.get());
   } catch (const std::exception& error) {

@@ -2,9 +2,14 @@
 /// \file The world of MuJoCo: all joints of the tree, with closures, contacts and stops as its soft constraints.
 ///
 /// MuJoCo (here 2.2.2) finds the acceleration by a convex problem over all constraints at once and takes semi-implicit
-/// Euler steps, or those of Runge and Kutta; friction cones are elliptic. Its constraints are springs and dampers of a time constant T. A closure
-/// opens by T^2 times the acceleration that its force does not cancel: dJ/dt v, which version 2.2.2 leaves out, and a
-/// share 1 - impedance of the rest. Soles creep by the same share.
+/// Euler steps, or those of Runge and Kutta; friction cones are elliptic. Its constraints are springs and dampers of a time
+/// constant T, at least two steps. A closure opens by T^2 times the acceleration that its force does not cancel: dJ/dt v,
+/// which version 2.2.2 leaves out, and a share 1 - impedance of the rest. Soles creep by the same share.
+///
+/// The friction of a joint is that of the model, not MuJoCo's, which sticks: with the speed v before a step it is the damper
+///     friction / sqrt(v^2 + friction_speed^2),                                                                      (2)
+/// which Euler's steps take at their end, so that none is too stiff. Springs between points may have any preload here, those
+/// without a stiffness, too, which a file cannot say (formats/mjcf.h).
 ///
 /// The ground consists of its plane and boxes; those with inclined tops have sides normal to the top.
 #include <memory>

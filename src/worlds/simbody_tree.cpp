@@ -123,9 +123,7 @@ void SimbodyTree::finish() {
         u_index[joint.idx_v + k] = -1;
         continue;
       }
-      int u = u0 + k;
-      if (joint.kind == JointKind::FreeFlyer) u = u0 + (k + 3) % 6;  // Simbody: angular first
-      if (joint.kind == JointKind::Planar) u = u0 + (k + 1) % 3;     // Simbody: angle first
+      int u = u0 + getSimbodySpeed(joint, k);
       if (!first_pins[i].isEmptyHandle()) u = k == 0 ? int(first_pins[i].getFirstUIndex(state)) : u0;
       u_index[joint.idx_v + k] = u;
     }

@@ -4,6 +4,12 @@
 /// The tree becomes Simbody's own mobilizers, the closures its own constraints. Only the model's data and the conventions of
 /// notation.h are Bielle's. Simbody has no rotor inertia: the armature is left out.
 ///
+/// Signs: with the rows G of its constraints, Simbody's equations are M u' + G^T m = f. Its multipliers m, and what its
+/// findConstraintForces(), getConstrainedBodyForcesAsVector() and calcConstraintForcesFromMultipliers() make of them, are thus
+/// the opposite of the forces of constraints on bodies; its reactions of mobilizers and the tension of a Rod are not. All
+/// forces of closures that leave validation/ have been turned into ours, J^T lambda on the right (notation.h); the worlds use
+/// none.
+///
 /// | joint                | mobilizer | u of Simbody from our v                                                     |
 /// |----------------------|-----------|-----------------------------------------------------------------------------|
 /// | revolute, continuous | Pin       | u = v                                                                       |
@@ -44,6 +50,13 @@ inline Matrix3d toEigen(const SimTK::Mat33& m) {
 inline SimTK::Transform toSimTK(const SE3& X) { return {toSimTKRotation(X.R), toSimTK(X.p)}; }
 
 enum class LoopCut { AsModelled, FewestRows };
+
+/// Where Simbody has coordinate k of v of a joint among the u of its mobilizer.
+inline int getSimbodySpeed(const Joint& joint, int k) {
+  if (joint.kind == JointKind::FreeFlyer) return (k + 3) % 6;  // angular first
+  if (joint.kind == JointKind::Planar) return (k + 1) % 3;     // the angle first
+  return k;
+}
 
 struct SimbodyTree {
   /// Bodies, constraints, gravity, joint forces and point springs (TwoPointLinearSpring, TwoPointLinearDamper). Other forces,

@@ -5,6 +5,7 @@
 
 #include "dynamics/joint_force.h"
 #include "math/largest.h"
+#include "worlds/left_out.h"
 #include "worlds/simbody_tree.h"
 
 namespace bielle::worlds {
@@ -15,6 +16,8 @@ using SimTK::SpatialVec;
 using SimTK::Stage;
 using SimTK::State;
 using SimTK::Vec3;
+
+constexpr double kStartGap = 1e-9;  // to which closures are closed at the start, as the tolerance of those under way
 
 // Contacts, stops, motors and push: everything but gravity and the forces of joints.
 class WorldForces : public SimTK::Force::Custom::Implementation {
@@ -45,7 +48,10 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
                             findVelocity(state, point.body, point.p));
   }
   double findCoordinate(const State& state, const JointStop& stop) const {
-    return tree_.bodies[tree_.model.dofs()[stop.dof].joint].getOneQ(state, 0);
+    const Joint& joint = tree_.model.joints()[tree_.model.dofs()[stop.dof].joint];
+    const int body = tree_.model.dofs()[stop.dof].joint, k = stop.dof - joint.idx_v;
+    if (tree_.first_pins[body].isEmptyHandle()) return tree_.bodies[body].getOneQ(state, k);
+    return (k == 0 ? tree_.first_pins[body] : tree_.bodies[body]).getOneQ(state, 0);
   }
   StopForce calcForce(const State& state, const JointStop& stop) const {
     return calcStopForce(stop, findCoordinate(state, stop), getRate(state, stop.dof));
@@ -89,19 +95,23 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
   const Vector3d& push_;
 };
 
-// The speeds of rotors are those of their motors: one constraint for all, much quicker than Simbody's SpeedCouplers.
+// The speeds of rotors are those of their joints: one constraint for all, much quicker than Simbody's SpeedCouplers.
 class RotorCoupling : public SimTK::Constraint::Custom::Implementation {
  public:
   explicit RotorCoupling(SimTK::SimbodyMatterSubsystem& matter, int rotors)
       : SimTK::Constraint::Custom::Implementation(matter, 0, rotors, 0) {}
 
-  // \param speed  of the motor among those of its mobilizer   \param speeds  how many that one has
-  void add(const MobilizedBody& motor, int speed, int speeds, const MobilizedBody& rotor) {
-    addConstrainedMobilizer(motor);
+  // One after the other those of a joint. \param speed  among those of its mobilizer   \param speeds  how many that one has
+  void add(const MobilizedBody& joint, int speed, int speeds, const MobilizedBody& rotor) {
+    if (const int index = joint.getMobilizedBodyIndex(); index != last_) {
+      addConstrainedMobilizer(joint);
+      last_ = index;
+      first_ = next_;
+      next_ += speeds;
+    }
     addConstrainedMobilizer(rotor);
-    motors_.push_back(SimTK::ConstrainedUIndex(next_ + speed));
-    rotors_.push_back(SimTK::ConstrainedUIndex(next_ + speeds));
-    next_ += speeds + 1;
+    joints_.push_back(SimTK::ConstrainedUIndex(first_ + speed));
+    rotors_.push_back(SimTK::ConstrainedUIndex(next_++));
   }
 
  private:
@@ -111,23 +121,31 @@ class RotorCoupling : public SimTK::Constraint::Custom::Implementation {
   Implementation* clone() const override { return new RotorCoupling(*this); }
   void calcVelocityErrors(const State&, const Twists&, const Speeds& u,
                           SimTK::Array_<SimTK::Real>& errors) const override {
-    for (size_t i = 0; i < motors_.size(); ++i) errors[int(i)] = u[motors_[i]] - u[rotors_[i]];
+    for (size_t i = 0; i < joints_.size(); ++i) errors[int(i)] = u[joints_[i]] - u[rotors_[i]];
   }
   void calcVelocityDotErrors(const State&, const Twists&, const Speeds& udot,
                              SimTK::Array_<SimTK::Real>& errors) const override {
-    for (size_t i = 0; i < motors_.size(); ++i) errors[int(i)] = udot[motors_[i]] - udot[rotors_[i]];
+    for (size_t i = 0; i < joints_.size(); ++i) errors[int(i)] = udot[joints_[i]] - udot[rotors_[i]];
   }
   void addInVelocityConstraintForces(const State&, const SimTK::Array_<SimTK::Real>& multipliers, Twists&,
                                      Speeds& forces) const override {
-    for (size_t i = 0; i < motors_.size(); ++i) {
-      forces[motors_[i]] += multipliers[int(i)];
+    for (size_t i = 0; i < joints_.size(); ++i) {
+      forces[joints_[i]] += multipliers[int(i)];
       forces[rotors_[i]] -= multipliers[int(i)];
     }
   }
 
-  std::vector<SimTK::ConstrainedUIndex> motors_, rotors_;
-  int next_ = 0;
+  std::vector<SimTK::ConstrainedUIndex> joints_, rotors_;
+  int last_ = -1;             // the last joint
+  int first_ = 0, next_ = 0;  // where its speeds begin, and those of the next mobilizer
 };
+
+// A ball that has an armature keeps its mobilizer, whose speeds that of a rotor are.
+LoopCut chooseCut(const Model& model, bool as_modelled) {
+  for (const Joint& joint : model.joints())
+    as_modelled |= joint.kind == JointKind::Spherical && model.armature()[joint.idx_v] > 0;
+  return as_modelled ? LoopCut::AsModelled : LoopCut::FewestRows;
+}
 
 std::unique_ptr<SimTK::Integrator> makeIntegrator(SimbodyIntegrator integrator, const SimTK::System& system) {
   if (integrator == SimbodyIntegrator::RungeKuttaMerson)
@@ -154,7 +172,7 @@ class SimbodyWorld : public World {
   SimbodyTree tree_;
   ContactSet contacts_;
   WorldForces* forces_;                                // owned by the tree's system
-  std::vector<std::pair<MobilizedBody, int>> rotors_;  // with the dof of their motor
+  std::vector<std::pair<MobilizedBody, int>> rotors_;  // with the dof of their joint
   std::unique_ptr<SimTK::Integrator> integrator_;
   Works last_;            // powers at the end of the last step, W
   bool changed_ = false;  // torques or push since the last step
@@ -162,7 +180,7 @@ class SimbodyWorld : public World {
 
 SimbodyWorld::SimbodyWorld(const Model& model, const SimbodyWorldOptions& options)
     : World(model, options.world),
-      tree_(model_, model_.closures(), options.as_modelled ? LoopCut::AsModelled : LoopCut::FewestRows),
+      tree_(model_, model_.closures(), chooseCut(model_, options.as_modelled)),
       contacts_(model, ground_, options.contact),
       forces_(new WorldForces(tree_, contacts_, pushed_body_, u_, push_)),
       integrator_(makeIntegrator(options.integrator, tree_.system)) {
@@ -171,29 +189,39 @@ SimbodyWorld::SimbodyWorld(const Model& model, const SimbodyWorldOptions& option
   tree_.finish();
   integrator_->setAccuracy(options.accuracy);
   integrator_->setConstraintTolerance(options.gap);
+  integrator_->setUseInfinityNorm(true);
+  if (options.world.time_step > 0) integrator_->setMaximumStepSize(options.world.time_step);
   integrator_->setReturnEveryInternalStep(true);
   integrator_->setAllowInterpolation(false);
+  integration_.integrator = integrator_->getMethodName();
+  integration_.tolerance = options.accuracy;
+  integration_.closure_tolerance = options.gap;
+  warnings_ = listMissingStops(model);
+  for (const std::string& warning : listTurnedArmatures(model)) warnings_.push_back(warning);
 }
 
 void SimbodyWorld::addRotors() {
-  std::vector<Motor> motors;
-  for (const Motor& motor : model_.motors())
-    if (motor.armature > 0) motors.push_back(motor);
-  if (motors.empty()) return;
-  auto* coupling = new RotorCoupling(tree_.matter, static_cast<int>(motors.size()));
-  for (const Motor& motor : motors) {
-    // The mass of a rotor that turns stays at the origin; one that slides does so horizontally, along x.
-    const SimTK::MassProperties mass(motor.armature, Vec3(0), SimTK::Inertia(motor.armature));
-    const Joint& joint = model_.joints()[motor.joint];
+  const VectorXd& armature = model_.armature();
+  const auto count = (armature.array() > 0).count();
+  if (count == 0) return;
+  auto* coupling = new RotorCoupling(tree_.matter, static_cast<int>(count));
+  const Vector3d level = model_.gravity().isZero() ? Vector3d::UnitX() : model_.gravity().unitOrthogonal();
+  const SimTK::Transform X(SimTK::Rotation(SimTK::UnitVec3(toSimTK(level)), SimTK::XAxis));
+  for (int dof = 0; dof < model_.nv(); ++dof) {
+    if (!(armature[dof] > 0)) continue;
+    // The mass of a rotor that turns stays at the origin; one that slides does so where gravity does not pull it.
+    const SimTK::MassProperties mass(armature[dof], Vec3(0), SimTK::Inertia(armature[dof]));
+    const int i = model_.dofs()[dof].joint;
+    const Joint& joint = model_.joints()[i];
     MobilizedBody rotor;
     if (joint.kind == JointKind::Prismatic)
-      rotor = MobilizedBody::Slider(tree_.matter.updGround(), SimTK::Body::Rigid(mass));
+      rotor = MobilizedBody::Slider(tree_.matter.updGround(), X, SimTK::Body::Rigid(mass), X);
     else
       rotor = MobilizedBody::Pin(tree_.matter.updGround(), SimTK::Body::Rigid(mass));
-    rotors_.emplace_back(rotor, motor.dof);
-    const int dof = motor.dof - joint.idx_v;
-    const bool is_chain = !tree_.first_pins[motor.joint].isEmptyHandle();
-    coupling->add(is_chain && dof == 0 ? tree_.first_pins[motor.joint] : tree_.bodies[motor.joint], is_chain ? 0 : dof,
+    rotors_.emplace_back(rotor, dof);
+    const int k = dof - joint.idx_v;
+    const bool is_chain = !tree_.first_pins[i].isEmptyHandle();
+    coupling->add(is_chain && k == 0 ? tree_.first_pins[i] : tree_.bodies[i], is_chain ? 0 : getSimbodySpeed(joint, k),
                   is_chain ? 1 : joint.nv, rotor);
   }
   SimTK::Constraint::Custom constraint(coupling);
@@ -213,7 +241,14 @@ void SimbodyWorld::start() {
   contacts_.resetAnchors(place);
   contacts_.setStart(place, [&](const JointStop& stop) { return forces_->findCoordinate(state, stop); });
   try {
-    tree_.system.project(state, 1e-9);
+    const SimTK::ProjectOptions within =
+        SimTK::ProjectOptions(kStartGap).setOption(SimTK::ProjectOptions::UseInfinityNorm);
+    SimTK::ProjectResults results;
+    SimTK::Vector no_estimate;
+    tree_.system.realize(state, Stage::Position);
+    tree_.system.projectQ(state, no_estimate, within, results);
+    tree_.system.realize(state, Stage::Velocity);
+    tree_.system.projectU(state, no_estimate, within, results);
     integrator_->initialize(state);
   } catch (const std::exception& error) {
     message_ = error.what();
@@ -257,6 +292,7 @@ void SimbodyWorld::finishStep(double duration) {
   const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Velocity);
   const Works now = forces_->calcPowers(state);
+  if (duration > 0) noteStep(duration);
   work_.motor += 0.5 * duration * (last_.motor + now.motor);
   work_.push += 0.5 * duration * (last_.push + now.push);
   work_.contact += 0.5 * duration * (last_.contact + now.contact);

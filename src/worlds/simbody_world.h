@@ -4,7 +4,7 @@
 /// Simbody has the tree, the closures as constraints, cut so that there are few of them, and gravity
 /// (src/worlds/simbody_tree.h). Contacts, stops, torques and the
 /// push are forces over its kinematics. A rotor is a body pinned to the ground whose speed is constrained to that of its
-/// motor: it weighs the armature and nothing else. The anchors of the contacts (contact_law.h) move after every step that
+/// joint: it weighs the armature and nothing else. The anchors of the contacts (contact_law.h) move after every step that
 /// the integrator has accepted, so that forces are functions of the state during a step. Work is integrated by the
 /// trapezoidal rule over these steps.
 #include <memory>
@@ -20,9 +20,11 @@ enum class SimbodyIntegrator {
 };
 
 struct SimbodyWorldOptions {
-  WorldOptions world;      ///< time_step is not used
+  WorldOptions world;      ///< time_step: the longest step; 0: no limit
   double accuracy = 1e-3;  ///< relative local error of the integrator
-  double gap = 1e-7;       ///< tolerance of the constraints, m
+  /// Tolerance of the constraints: most of any row, m of points and rad (sines) of directions. Simbody's own way, a mean
+  /// square over all rows of the robot, lets a loop that moves open the more, the more others rest.
+  double gap = 1e-7;
   ContactOptions contact;
   SimbodyIntegrator integrator = SimbodyIntegrator::RungeKutta3;
   bool as_modelled = false;  ///< loops cut where the model cuts them: the same motion, with more rows of constraints

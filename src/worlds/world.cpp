@@ -28,6 +28,7 @@ void World::reset(ConstVectorRef q, ConstVectorRef v) {
     throw std::invalid_argument(
         "world: the state has a number that is not finite; give a closed configuration and a velocity");
   message_.clear();
+  integration_.shortest_step = integration_.longest_step = 0;
   time_ = 0;
   work_ = {};
   q_ = q;
@@ -61,6 +62,12 @@ bool World::advance(double duration) {
 bool World::fail(const std::string& why) {
   message_ = why;
   return false;
+}
+
+void World::noteStep(double h) {
+  integration_.longest_step = std::max(integration_.longest_step, h);
+  const double shortest = integration_.shortest_step;
+  integration_.shortest_step = shortest > 0 ? std::min(shortest, h) : h;
 }
 
 double World::countSteps(double duration, double time_step) {

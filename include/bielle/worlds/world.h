@@ -15,10 +15,10 @@ namespace bielle::worlds {
 
 struct WorldOptions {
   Ground ground;         ///< with its coefficient of friction
-  double time_step = 0;  ///< of worlds with fixed steps, s; 0: the world's own
+  double time_step = 0;  ///< of worlds with fixed steps, s; 0: the world's own. The longest step of the others; 0: any
   /// Polled after every step, so that a signal handler can set it: ends an advance(), however short the steps.
   const std::atomic<bool>* interrupt = nullptr;
-  /// Error allowed per step of worlds that control it (makeManifoldWorld()); 0: the world's own.
+  /// Error allowed per step of worlds that control it (makeManifoldWorld(), Simbody's); 0: the world's own.
   double tolerance = 0;
   int pushed_body = 1;  ///< at whose centre of mass World::setPush() acts; 1: the trunk, the body of the first joint
 };
@@ -41,6 +41,14 @@ struct Books {
 /// What each kind of force does on the robot, J (or W).
 struct Works {
   double motor = 0, push = 0, contact = 0, stop = 0, joint = 0;
+};
+
+/// How a world integrates, and the steps that it has taken since reset(). The end of advance() ends a step as well.
+struct Integration {
+  std::string integrator;
+  double tolerance = 0;          ///< error allowed per step, as the world measures it; 0: its steps are fixed
+  double closure_tolerance = 0;  ///< most that a row of a closure may open, m or rad; 0: closed to rounding, or soft
+  double shortest_step = 0, longest_step = 0;  ///< s; 0: none yet
 };
 
 /// What the ground does to a contact of the model.
@@ -75,6 +83,9 @@ class World {
   const VectorXd& velocity() const { return v_; }                ///< nv
   const VectorXd& torques() const { return u_; }                 ///< nu, as they were cut
   const std::vector<FootReport>& feet() const { return feet_; }  ///< per contact of the model
+  /// What the world leaves out of the model or takes otherwise, a sentence each, with its size; empty: nothing.
+  const std::vector<std::string>& warnings() const { return warnings_; }
+  const Integration& integration() const { return integration_; }
   virtual Books books() const;
   virtual double gap() const;  ///< opening of the closures at present: the largest distance of their points, m
 
@@ -90,6 +101,7 @@ class World {
   virtual void noteForces() {}
 
   bool fail(const std::string& why);  ///< sets message_; false
+  void noteStep(double h);            ///< for integration()
   bool isInterrupted() const { return interrupt_ && *interrupt_; }
   /// How many steps of this length, or a little shorter, make up a duration; maybe more than an integer holds.
   static double countSteps(double duration, double time_step);
@@ -111,6 +123,8 @@ class World {
   Vector3d push_ = Vector3d::Zero();
   Works work_;  // since reset()
   std::string message_;
+  std::vector<std::string> warnings_;
+  Integration integration_;
   mutable Workspace ws_;
 
  private:
