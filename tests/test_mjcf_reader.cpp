@@ -139,6 +139,54 @@ TEST_CASE("hinges in place of a ball make its rotation, locked and next to it") 
         }
 }
 
+TEST_CASE("a file of MuJoCo tells how soft its loops are there, which are rigid here") {
+  const RobotDirectory directory;
+  const auto load = [&](const std::string& options, const std::string& attributes) {
+    const std::string text = makeSwing(
+        "", options + "<equality><connect name=\"tie\" body1=\"tip\" anchor=\"0 0 0\" " + attributes + "/></equality>");
+    return loadRobot(directory.write("swing.xml", text)).warnings;
+  };
+  const auto check = [&](const std::string& options, const std::string& attributes, const std::string& text) {
+    const std::vector<std::string> warnings = load(options, attributes);
+    CAPTURE(options, attributes);
+    REQUIRE(warnings.size() == 1);
+    CHECK_THAT(warnings[0],
+               Catch::Contains("<connect> (line 1): it is read as rigid. In MuJoCo, ") && Catch::Contains(text));
+  };
+  // r = (1 - d) g (d_max T)^2 / d^2
+  check("", "", "solref 0.02 1 and solimp 0.9 0.95 0.001 0.5 2 at steps of 2 ms let it give way: 10 % of");
+  check("", "", "by about 0.4 mm (mrad) per g at which");
+  check("<default><equality solref=\"0.004\"/></default>", "", "by about 0.02 mm");
+  check("<option timestep=\"0.01\"/>", "solref=\"0.0005 1\" solimp=\"0.99 0.99\"", "1 % of an acceleration");
+  check("", "solref=\"-10000 -10\"", "under the weight of a robot; solimp");
+  check("<option timestep=\"0.1\"/>", "solref=\"0.0005 1\" solimp=\"0.9999 0.9999\"", "it closes within 200 ms");
+  CHECK(load("<option timestep=\"0.1\"><flag refsafe=\"disable\"/></option>",
+             "solref=\"0.0005 1\" solimp=\"0.9999 0.9999\"")
+            .empty());
+  CHECK(load("<option timestep=\"0.005\"/>", "solref=\"0.0005 1\" solimp=\"0.9999 0.9999\"").empty());
+  CHECK(loadRobot(directory.write("own.xml", formatAssembled(loadRobot("bipetto").model))).warnings.empty());
+}
+
+TEST_CASE("preloads without a stiffness go out and come in again") {
+  ModelParts parts = takeParts(loadRobot("fourbar").model);
+  JointForce force;
+  force.joint = 1, force.idx_q = parts.joints[1].idx_q, force.dof = parts.joints[1].idx_v;
+  force.preload = -2.5, force.damping = 0.1;
+  parts.joint_forces = {force};
+  PointSpring spring;
+  spring.name = "gas", spring.body1 = 0, spring.body2 = 2, spring.point1 = Vector3d(0.1, 0, 0.5);
+  spring.preload = -7;
+  parts.point_springs = {spring};
+  const Model a = ModelBuilder::restore(parts), b = readMujoco(formatAssembled(a));
+  REQUIRE(b.jointForces().size() == 1);
+  CHECK(b.jointForces()[0].preload == Approx(-2.5));
+  CHECK(b.jointForces()[0].stiffness == 0);
+  CHECK(b.jointForces()[0].damping == 0.1);
+  REQUIRE(b.pointSprings().size() == 1);
+  CHECK(b.pointSprings()[0].preload == Approx(-7));
+  CHECK(b.pointSprings()[0].stiffness == 0);
+}
+
 TEST_CASE("files of today's MuJoCo: frames, sites in equalities, inertia by shapes, classes of defaults") {
   // The same arm twice: by hand, and by frames, defaults and shapes.
   const Model a = readMujoco(R"(<mujoco><compiler angle="radian"/><worldbody>

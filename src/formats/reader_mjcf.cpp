@@ -74,8 +74,10 @@ void MjcfReader::readSettings() {
   forEachSection("option", [this](const XMLElement& e) {
     MjcfElement option(e, "", settings_);
     yaml_.gravity = option.getVector("gravity", yaml_.gravity.value_or(Vector3d(0, 0, -9.81)));
+    time_step_ = option.getNumber("timestep", time_step_);
     for (const XMLElement* f : getChildren(e)) {
       MjcfElement flag(*f, "", settings_);
+      if (flag.getText("refsafe", "enable") == "disable") is_safe_ = false;
       if (flag.getText("gravity", "enable") == "disable") has_gravity_ = false;
       if (flag.getText("equality", "enable") == "disable") has_equalities_ = false;
     }

@@ -177,6 +177,7 @@ class MjcfReader {
   const BodyPlace& findBody(MjcfElement& e, const char* attribute);
   const BodyPlace& findSite(MjcfElement& e, const char* attribute);
   void readEquality(const XMLElement& element);
+  void noteSoftness(MjcfElement& e) const;
   void readTie(MjcfElement& e, const std::string& name);
   void joinHinges();
   void addClosures();
@@ -197,7 +198,8 @@ class MjcfReader {
   // <compiler>: whether geoms give mass and those of which groups, least mass and moment of a body, mass of all
   std::string inertia_from_geom_ = "auto", mesh_directory_;
   double first_group_ = 0, last_group_ = 5, least_mass_ = 0, least_moment_ = 0, total_mass_ = 0;
-  bool has_gravity_ = true, has_equalities_ = true;  // flags of <option>
+  bool has_gravity_ = true, has_equalities_ = true, is_safe_ = true;  // flags of <option>
+  double time_step_ = 0.002;                                          // s
   bool balances_inertia_ = false, strips_path_ = false, is_exact_ = false;
   std::set<std::string> taken_, joint_names_,
       named_;  // names of links; of joints; of joints named by an actuator and the like

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "formats/mjcf.h"
 #include "formats/reader_mjcf.h"
 #include "model/joint.h"
 
@@ -208,8 +209,11 @@ void MjcfReader::readForce(MjcfElement& e, bool has_one, double unit, Element& o
     return;
   }
   const double rest = unit * e.getNumber("springref", 0);
-  if (force.stiffness != 0) force.rest = rest;
-  out.has_force = force.stiffness != 0 || force.damping != 0 || force.friction != 0;
+  if (force.stiffness == kMjcfPreloadStiffness)
+    force.preload = force.stiffness * rest, force.stiffness = 0;
+  else if (force.stiffness != 0)
+    force.rest = rest;
+  out.has_force = force.stiffness != 0 || force.preload != 0 || force.damping != 0 || force.friction != 0;
   if (force.friction != 0) e.note("its frictionloss acts like a damper below 0.01 rad/s (m/s): it does not stick");
 }
 

@@ -3,8 +3,10 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "formats/mjcf.h"
 #include "formats/motor_catalogue.h"
 #include "formats/reader_mjcf.h"
+#include "model/number_text.h"
 
 namespace bielle {
 
@@ -26,12 +28,44 @@ void MjcfReader::readEquality(const XMLElement& element) {
   MjcfElement e(element, "", settings_, "equality");
   if (!e.getFlag("active", true)) return e.leaveOut("it is not active, and left out");
   if (!has_equalities_) return e.leaveOut("it is left out, because <flag> disables equalities");
+  noteSoftness(e);
   std::string name = getAttribute(&element, "name");
   if (name.empty()) name = e.tag() + "_" + std::to_string(e.line());
   if (e.tag() == "connect" || e.tag() == "weld") return readTie(e, name);
   if (e.tag() == "joint") return readJointEquality(e, name);
   if (e.tag() == "tendon") return readTendonEquality(e, name);
   e.fail("such equalities are not supported", "use connect, weld, joint or a tendon of joints, or remove it");
+}
+
+// Loops are rigid here. In MuJoCo they are springs and dampers (its documentation, "Computation", section on parameters of the
+// solver): with the stiffness k and the damping b of solref and the impedance d of solimp, a loop that is open by r at a rate v
+// moves at
+//     a = (1 - d) a0 - d (b v + k r)                                                                                 (1)
+// a0 being its acceleration without any force of it. At rest, r = (1 - d) a0 / (d k).
+void MjcfReader::noteSoftness(MjcfElement& e) const {
+  constexpr double kLeastShare = 2e-3, kLeastGap = 1e-6;  // of 1 - d, and of r in m under the gravity of the Earth
+  std::vector<double> ref = e.getNumbers("solref", 1, 2), imp = e.getNumbers("solimp", 1, 5);
+  const std::vector<double> usual_ref{0.02, 1}, usual_imp{0.9, 0.95, 0.001, 0.5, 2};
+  ref.insert(ref.end(), usual_ref.begin() + static_cast<std::ptrdiff_t>(ref.size()), usual_ref.end());
+  imp.insert(imp.end(), usual_imp.begin() + static_cast<std::ptrdiff_t>(imp.size()), usual_imp.end());
+  const auto clamp = [](double impedance) { return std::clamp(impedance, 0.0001, 0.9999); };
+  const double d = clamp(imp[0]), most = clamp(imp[1]);
+  const bool is_direct = ref[0] <= 0;
+  const double time = is_safe_ ? std::max(ref[0], 2 * time_step_) : ref[0];
+  const double k = is_direct ? -ref[0] * d / (most * most) : d / std::pow(most * time * ref[1], 2);
+  const double gap = (1 - d) * 9.81 / (d * k);
+  if (1 - d < kLeastShare && gap < kLeastGap) return;
+  const auto join = [](const std::vector<double>& values) {
+    std::string text;
+    for (double value : values) text += (text.empty() ? "" : " ") + formatNumber(value);
+    return text;
+  };
+  e.note("it is read as rigid. In MuJoCo, solref " + join(ref) + " and solimp " + join(imp) + " at steps of " +
+         formatNumber(1e3 * time_step_) + " ms let it give way: " + formatNumber(100 * (1 - d), "%.2g") +
+         " % of an acceleration that opens it pass, it stands open by about " + formatNumber(1e3 * gap, "%.1g") +
+         " mm (mrad) per g at which its parts would move apart, often tens under the weight of a robot" +
+         (is_direct ? "" : ", and it closes within " + formatNumber(1e3 * time, "%.3g") + " ms") +
+         "; solimp 0.9999 0.9999 and solref 0.0005 1 hold it");
 }
 
 void MjcfReader::readTie(MjcfElement& e, const std::string& name) {
@@ -195,10 +229,13 @@ void MjcfReader::readSpatialTendon(const XMLElement& element) {
   const std::vector<double> lengths = e.getNumbers("springlength", 1, 2);
   // Without one, or with -1, as long as the file stands.
   spring.rest = lengths.empty() || lengths[0] < 0 ? (two.X_WB.p - one.X_WB.p).norm() : lengths[0];
+  if (spring.stiffness == kMjcfPreloadStiffness)
+    spring.preload = -spring.stiffness * spring.rest, spring.stiffness = spring.rest = 0;
   for (const char* without_meaning : {"width", "material", "rgba", "group", "user"}) e.find(without_meaning);
   if (lengths.size() == 2 && lengths[1] != lengths[0])
     return e.leaveOut("its spring is slack between two lengths; it is left out");
-  if (spring.stiffness == 0 && spring.damping == 0) return e.leaveOut("it has no spring or damper, and is left out");
+  if (spring.stiffness == 0 && spring.preload == 0 && spring.damping == 0)
+    return e.leaveOut("it has no spring or damper, and is left out");
   if (e.isLimited("limited", "range")) e.note("the limits of its length are left out"), e.find("range");
   if (e.getNumber("frictionloss", 0) != 0) e.note("its frictionloss is left out");
   spring.name = getAttribute(&element, "name");
