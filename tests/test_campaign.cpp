@@ -275,6 +275,18 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
   CHECK_THAT(runCampaign(late, makeOutput(directory)).err, Contains("key 'phase' (line 2)") && Contains("no phase 99"));
 }
 
+TEST_CASE("campaign: options without effect on some of its runs are told once, before anything runs") {
+  const RobotDirectory directory;
+  const std::string path =
+      directory.write("spec.yaml", std::string("motions: [") + kMotion +
+                                       "]\noptions: {control: [gains, mpc], nodes: 50, seed: [1, 2]}\n");
+  std::set<std::string> warnings;
+  const std::string simulate = (fs::path(BIELLE_COMMAND).parent_path() / "bielle-simulate").string();
+  REQUIRE(tasks::checkCommands(tasks::readCampaignSpec(path), simulate, directory.path() + "/log", warnings));
+  CHECK(warnings == std::set<std::string>{"warning: --nodes has no effect: control is not predictive",
+                                          "warning: --seed has no effect: nothing is random"});
+}
+
 TEST_CASE("campaign: the specifications of the examples are read") {
   const std::vector<std::pair<std::string, size_t>> examples{{"pushes", 32},      {"pushes_predictive", 80},
                                                              {"pushes_felt", 80}, {"solve_times", 1600},

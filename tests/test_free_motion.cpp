@@ -141,6 +141,48 @@ TEST_CASE("free motion: a push of any body is the same in all worlds, and gives 
   CHECK(result.err.find("the robot has no such link") != std::string::npos);
 }
 
+TEST_CASE("free motion: each world tells its steps, and a preload without a spring is the same in all of them") {
+  const FreeScratch scratch;
+  const std::string robot = scratch.write("swing.urdf", R"(<robot name="swing"><link name="world"/>
+    <link name="bob"><inertial><origin xyz="0 0 -0.2"/><mass value="1"/>
+      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="hinge" type="continuous"><parent link="world"/><child link="bob"/><axis xyz="0 1 0"/></joint></robot>)");
+  scratch.write("swing.yaml", "base: fixed\njoint_forces: {hinge: {preload: 2}}\n");
+  const CommandResult result =
+      move(robot, scratch.path / "all",
+           {"--duration", "0.3", "--time-step", "0.0005", "--world", "bielle,simbody,mujoco", "--no-report"});
+  CAPTURE(result.out, result.err);
+  if (result.err.find("there is no world") != std::string::npos) return;
+  REQUIRE(result.status == 0);
+  CHECK(result.err.empty());
+  MatrixXd ends[3];
+  const std::string worlds[] = {"bielle", "simbody", "mujoco"};
+  for (int w = 0; w < 3; ++w) {
+    CAPTURE(worlds[w]);
+    const MotionRecord record = readRecord((scratch.path / "all" / worlds[w] / "trajectory.npz").string());
+    ends[w] = record.q.row(record.q.rows() - 1);
+    CHECK(std::abs(ends[w](0, 0)) > 0.5);
+    CHECK((ends[w] - ends[0]).cwiseAbs().maxCoeff() < 3e-3);  // MuJoCo's are of first order
+    const nlohmann::json summary = parseFreeSummary(scratch.path / "all" / worlds[w]);
+    const nlohmann::json& integration = summary["integration"];
+    CHECK(integration["integrator"].get<std::string>().size() > 4);
+    CHECK(integration["longest_step_s"].get<double>() == Approx(5e-4));
+    CHECK(integration["shortest_step_s"].get<double>() > 0);
+    CHECK(integration["tolerance"].is_null() == (worlds[w] == "mujoco"));
+    CHECK(integration["closure_tolerance"].is_null() == (worlds[w] != "simbody"));
+    CHECK(summary["warnings"].empty());
+  }
+  const CommandResult idle = move(robot, scratch.path / "idle",
+                                  {"--duration", "0.1", "--accuracy", "1e-6", "--world", "mujoco", "--friction", "0.5",
+                                   "--push", "t=0.2,impulse=1", "--seed", "3", "--push-body", "bob", "--no-report"});
+  CAPTURE(idle.err);
+  REQUIRE(idle.status == 0);
+  for (const char* what : {"--accuracy has no effect: the steps of world mujoco", "--friction has no effect",
+                           "--push at 0.2 s has no effect", "--seed has no effect"})
+    CHECK(idle.err.find(what) != std::string::npos);
+  CHECK(parseFreeSummary(scratch.path / "idle")["warnings"].size() == 4);
+}
+
 TEST_CASE("free motion: neutral is another posture than that of the reference, with the feet on the ground") {
   const FreeScratch scratch;
   VectorXd starts[2];
@@ -177,6 +219,11 @@ TEST_CASE("free motion: what does not fit is refused, with the remedy") {
     CHECK(result.err.find(text) != std::string::npos);
   };
   refuse(kFreeFourbar, {"--control", "mpc"}, "is a robot without a plan");
+  refuse(kFreeFourbar, {"--control-period", "0.01"}, "--control-period");
+  refuse(kFreeFourbar, {"--hold", "2"}, "--hold");
+  refuse(kFreeFourbar, {"--noise", "2"}, "--noise");
+  refuse(kFreeFourbar, {"--world", "bielle,bielle"}, "given twice");
+  refuse(kFreeFourbar, {"--time-step", "0.01", "--record-period", "0.005"}, "it is longer than --record-period");
   refuse(kFreeFivebar, {"--spring", "stiffness=5,motor=elbow_left"}, "the robot has no motor 'elbow_left'");
   refuse(kFreeFivebar, {"--spring", "stiffness=-5"}, "negative");
   refuse(kFreeFivebar, {"--spring", "spring=5"}, "there is no 'spring'");

@@ -32,6 +32,10 @@ TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
   CHECK(summary["largest_gap"].get<double>() < 1e-9);
   CHECK(summary["largest_slip"].get<double>() < 0.005);
   CHECK(summary["saturated_share"].get<double>() == 0);
+  CHECK(summary["integration"]["integrator"] == "leapfrog");
+  CHECK(summary["integration"]["longest_step_s"].get<double>() == Approx(2.5e-4));
+  CHECK(summary["integration"]["tolerance"].is_null());
+  CHECK(summary["warnings"].empty());
   // Of the whole, on the clock; world and control are parts of it.
   const nlohmann::json& seconds = summary["seconds"];
   const double whole = seconds["whole"], world = seconds["world"], control = seconds["control"];
@@ -285,6 +289,51 @@ TEST_CASE("simulate: a motion of least energy is carried out as such; one of lea
   CHECK(simulate(peak, {"--control", "open"}).status < 2);
 }
 
+TEST_CASE("simulate: options that others make useless are told, and periods that cannot be met") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "idle").string();
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--accuracy", "1e-6", "--world", "mujoco"}, "--accuracy has no effect: the steps of world mujoco"},
+      {{"--nodes", "50", "--control", "gains"}, "--nodes has no effect: control is not predictive"},
+      {{"--fine-nodes", "20", "--control", "open"}, "--fine-nodes has no effect"},
+      {{"--iterations", "2", "--control", "gains"}, "--iterations has no effect"},
+      {{"--look-ahead", "20", "--control", "open"}, "--look-ahead has no effect: open control has no gains"},
+      {{"--noise", "2"}, "--noise has no effect: ideal sensors have none"},
+      {{"--hold", "2", "--duration", "3"}, "--hold has no effect: --duration ends the motion"},
+      {{"--seed", "4", "--terrain", "ramp=0.1"}, "--seed has no effect: nothing is random"}};
+  for (const auto& [options, told] : cases) {
+    std::vector<std::string> checked = options;
+    checked.push_back("--dry-run");
+    const CommandResult result = simulate(output, checked);
+    CAPTURE(told, result.err);
+    if (result.err.find("there is no world") != std::string::npos) continue;
+    CHECK(result.status == 0);
+    CHECK_THAT(result.err, Catch::StartsWith("bielle: warning: ") && Catch::Contains(told));
+  }
+  for (const std::vector<std::string>& options : {std::vector<std::string>{"--nodes", "50"},
+                                                  {"--accuracy", "1e-6"},
+                                                  {"--hold", "2"},
+                                                  {"--time-step", "0.001"},
+                                                  {"--seed", "4", "--terrain", "tiles=0.01"},
+                                                  {"--noise", "2", "--sensors", "real"}}) {
+    std::vector<std::string> checked = options;
+    checked.push_back("--dry-run");
+    CHECK(simulate(output, checked).err.empty());
+  }
+  const CommandResult result =
+      simulate(output, {"--control", "gains", "--duration", "0.1", "--summary-only", "--push", "t=0.05,impulse=0.1",
+                        "--push", "t=3,impulse=1", "--time-step", "0.0007", "--record-period", "0.0015"});
+  CAPTURE(result.err);
+  REQUIRE(result.status == 0);
+  for (const char* told :
+       {"--push at 0.05 s is cut off: the motion ends at 0.1 s", "--push at 3 s has no effect",
+        "--time-step 0.0007: steps are of 0.0005 s at most", "--record-period 0.0015: rows are recorded every 0.002 s"})
+    CHECK_THAT(result.err, Catch::Contains(told));
+  const nlohmann::json summary = parseSummary(output);
+  CHECK(summary["warnings"].size() == 3);
+  CHECK(summary["integration"]["longest_step_s"].get<double>() == Approx(5e-4));  // half a period
+}
+
 TEST_CASE("simulate: bad input is refused in one line, with status 2") {
   const Scratch scratch;
   const std::string output = (scratch.path / "bad").string();
@@ -308,6 +357,11 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
       {{"--delay", "1", "--jitter", "2"}, "--jitter"},
       {{"--real-time", "--control", "gains"}, "--real-time"},
       {{"--solve-time", "5", "--control", "gains"}, "--solve-time"},
+      {{"--time-step", "0.002"}, "it is longer than --control-period, 0.001 s"},
+      {{"--time-step", "0.005", "--control-period", "0.004", "--dry-run"},
+       "it is longer than --control-period, 0.004 s"},
+      {{"--robot", "bipetto", "--set", "steps=4", "--set", "steps=6"}, "'steps' is given twice"},
+      {{"--robot", "bipetto", "--speed", "0.4", "--set", "speed=0.5"}, "'speed' is given twice"},
       {{"--world", "moon"}, "moon"}};
   for (const auto& [options, named] : cases) {
     const CommandResult result = simulate(output, options);

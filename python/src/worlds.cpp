@@ -9,6 +9,7 @@
 #include "bind.h"
 #include "busy.h"
 #include "engines.h"
+#include "model/number_text.h"
 #include "model_access.h"
 
 namespace bielle::python {
@@ -39,7 +40,7 @@ class HeldWorlds {
  public:
   HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step,
              double tolerance, const std::string& engine)
-      : model_(std::move(model)), many_(count), engine_(engine) {
+      : model_(std::move(model)), many_(count), engine_(engine), time_step_(time_step) {
     if (count && *count < 1) throw py::value_error("count: at least one world");
     const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngine(engine);
     worlds::WorldOptions options{ground, time_step};
@@ -81,6 +82,7 @@ class HeldWorlds {
     if (!(duration > 0 && std::isfinite(duration)))
       throw py::value_error("duration: expected a positive number of seconds");
     const BusyGuard guard(is_busy_, "world");
+    warnOfStep(duration);
     const MatrixXd torques = readRows(u, model_->nu(), "u", true), force = readRows(push, 3, "push", true);
     run([&](World& world, Eigen::Index i) {
       world.setTorques(torques.col(i));
@@ -100,6 +102,20 @@ class HeldWorlds {
     return makeRows(out, shape);
   }
 
+  // Of a single world.
+  py::dict integration() {
+    worlds::Integration integration;
+    observeOnly([&](const World& world) { integration = world.integration(); });
+    py::dict out;
+    out["integrator"] = integration.integrator;
+    out["tolerance"] = integration.tolerance;
+    out["closure_tolerance"] = integration.closure_tolerance;
+    out["shortest_step"] = integration.shortest_step;
+    out["longest_step"] = integration.longest_step;
+    return out;
+  }
+  const std::vector<std::string>& warnings() const { return worlds_.front()->warnings(); }
+
   const std::shared_ptr<Model>& model() const { return model_; }
   const std::optional<int>& count() const { return many_; }
   const std::string& engine() const { return engine_; }
@@ -118,6 +134,15 @@ class HeldWorlds {
   }
 
  private:
+  // Once: the end of a step() ends a step of the world.
+  void warnOfStep(double duration) {
+    if (has_warned_ || time_step_ <= duration * (1 + 1e-9)) return;
+    has_warned_ = true;
+    const std::string text = "time_step: " + formatNumber(time_step_) + " s is longer than a step of " +
+                             formatNumber(duration) + " s, and has no effect";
+    if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) < 0) throw py::error_already_set();
+  }
+
   // One column per world.
   MatrixXd readRows(py::handle value, Eigen::Index size, const std::string& what, bool shared) const {
     const Array array = readArray(value, what);
@@ -173,6 +198,8 @@ class HeldWorlds {
   std::vector<char> ok_;  // of each, since its last step or reset
   std::optional<int> many_;
   std::string engine_;
+  double time_step_ = 0;
+  bool has_warned_ = false;
   std::atomic<bool> is_busy_{false};
 };
 
@@ -227,6 +254,8 @@ void bindWorlds(py::module_& module) {
       module, "World",
       "Physics with contact, in which motors drive a robot and the ground pushes it.\n\n"
       "engine: 'bielle', its own, or 'simbody' and 'mujoco' where it was built with them.\n"
+      "time_step: s, of worlds of fixed steps; the longest one of others; 0: their own. A shorter step() cuts it, and "
+      "warns.\n"
       "tolerance: error per step of 'bielle' and 'simbody', rad, m and relative in velocities; with it, 'bielle' takes "
       "steps of high order and controlled error, for mechanisms in motion; 0: fixed steps, the fastest on feet.\n"
       "With `count`, that many worlds are stepped together on all cores: arguments and results have a leading axis of "
@@ -253,6 +282,12 @@ void bindWorlds(py::module_& module) {
            "Returns the WorldState; its `ok` is False where the integration failed.")
       .def_property_readonly("books", &HeldWorlds::books,
                              "energies now, and work and losses since reset, of a single world (Books), J")
+      .def_property_readonly(
+          "integration", &HeldWorlds::integration,
+          "how a single world integrates: integrator, tolerances (0: none), shortest and longest step "
+          "since reset, s")
+      .def_property_readonly("warnings", &HeldWorlds::warnings,
+                             "what the world leaves out of the model, or takes otherwise")
       .def_property_readonly("message", &HeldWorlds::message,
                              "why the integration of a single world failed; empty while it is sound")
       .def_property_readonly("wrenches", &HeldWorlds::calcWrenches,

@@ -118,6 +118,20 @@ def test_wrong_arguments(model):
         bielle.World(model, count=0)
 
 
+def test_steps_that_cannot_be_met_are_told(model):
+    world = bielle.World(model, time_step=0.001)
+    world.reset(model.standing(), np.zeros(model.nv))
+    with pytest.warns(RuntimeWarning, match="time_step: 0.001 s is longer than a step of 0.0005 s"):
+        world.step(np.zeros(model.nu), 0.0005)
+    integration = world.integration
+    assert integration["integrator"] == "leapfrog" and integration["longest_step"] == pytest.approx(0.0005)
+    assert integration["tolerance"] == 0 and world.warnings == []
+    engines = pytest.importorskip("bielle._engines")
+    if "mujoco" in engines.names:
+        with pytest.raises(ValueError, match="tolerance of world 'mujoco'"):
+            bielle.World(model, engine="mujoco", tolerance=1e-6)
+
+
 @pytest.mark.parametrize("own_thread", [False, True])
 def test_predictive_control(solution, model, own_thread):
     options = bielle.PredictiveOptions(nodes=20, own_thread=own_thread)

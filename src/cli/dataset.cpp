@@ -102,6 +102,7 @@ int run(const DatasetArguments& arguments) {
     for (const DatasetMotion& motion : spec.motions) {
       entries.push_back(readDatasetEntry(motion, outcomes.at(motion.name), cases.directory + "/" + motion.name));
       DatasetEntry& entry = entries.back();
+      for (const std::string& warning : entry.warnings) notes.push_back(motion.name + ": " + warning);
       if (entry.is_good())
         exportMotion(spec, arguments.directory, entry, notes);
       else

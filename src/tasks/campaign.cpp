@@ -322,8 +322,11 @@ CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directo
   countCells(spec);  // \throws that there are too many
   makeOutputDirectory(directory);
   const std::string check = directory + "/check.log";
-  const bool is_checked = checkCommands(spec, options.simulate, check);
+  std::set<std::string> warnings;
+  const bool is_checked = checkCommands(spec, options.simulate, check, warnings);
   fs::remove(check);
+  for (const std::string& warning : warnings)
+    if (options.progress) options.progress(warning);
   std::vector<std::string> motions;
   if (is_checked) motions = solveMotions(spec, directory, options);
   if (motions.empty()) {

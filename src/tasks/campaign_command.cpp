@@ -34,15 +34,26 @@ double calcPhaseTime(const CampaignAxis& axis, const std::string& value, const s
   return std::round(1e6 * (start + (phase - index) * (end - start))) / 1e6;
 }
 
+// What a dry run warns of is added to `warnings`, a line each.
+void readWarnings(const std::string& log, std::set<std::string>& warnings) {
+  constexpr const char* kBegin = "bielle: ";
+  std::ifstream file(log);
+  for (std::string line; std::getline(file, line);)
+    if (line.rfind(std::string(kBegin) + "warning: ", 0) == 0) warnings.insert(line.substr(std::string(kBegin).size()));
+}
+
 // What a dry run complains about, or "" if it does not. None: the user asks for the end.
 std::optional<std::string> findComplaint(const std::string& simulate, const std::vector<std::string>& arguments,
-                                         const std::string& log) {
+                                         const std::string& log, std::set<std::string>& warnings) {
   std::vector<std::string> command = {simulate, "motion", "-o", "none", "--summary-only", "--dry-run"};
   command.insert(command.end(), arguments.begin(), arguments.end());
   tasks::SignalWatch watch;
   const std::optional<int> status = watch.waitForChild(tasks::startChild(command, log));
   if (!status) return std::nullopt;
-  if (*status == 0) return "";
+  if (*status == 0) {
+    readWarnings(log, warnings);
+    return "";
+  }
   std::string complaint = findError(log);
   if (complaint.empty()) {
     std::ifstream file(log);
@@ -111,14 +122,15 @@ std::vector<std::string> CampaignCommands::make(const CampaignCell& cell, const 
   return arguments;
 }
 
-bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log) {
+bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log,
+                   std::set<std::string>& warnings) {
   const CampaignCommands commands(spec, {});
   const std::string impulse = spec.search ? formatImpulse(*spec.search, 1) : "";
   std::set<std::vector<std::string>> tried;  // cells may differ in nothing that options are made of, as in the motion
   const auto check = [&](const CampaignCell& cell, const CampaignAxis& varied) {
     const std::vector<std::string> arguments = commands.make(cell, impulse);
     if (!tried.insert(arguments).second) return true;
-    const std::optional<std::string> complaint = findComplaint(simulate, arguments, log);
+    const std::optional<std::string> complaint = findComplaint(simulate, arguments, log, warnings);
     if (complaint && !complaint->empty()) refuse(spec, varied, *complaint);
     return complaint.has_value();
   };

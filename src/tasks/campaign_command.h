@@ -1,5 +1,6 @@
 #pragma once
 // The command lines of a campaign's runs.
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,9 @@ class CampaignCommands {
 };
 
 // Dry runs of one cell and of those that differ from it in one value, equal ones once. `log`: a file for the outputs.
-// False if the user asks for the end before they are done.
+// False if the user asks for the end before they are done. \param warnings  to which those of the runs are added
 // \throws InputError naming the file and the key that is refused
-bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log);
+bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log,
+                   std::set<std::string>& warnings);
 
 }  // namespace bielle::tasks

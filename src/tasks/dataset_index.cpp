@@ -121,7 +121,10 @@ DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& ou
     readJsonFile(check.string(), "remove it", [&](const Json& json) { entry.passed = json.at("pass"); });
   if (const fs::path summary_file = execution / "summary.json"; fs::exists(summary_file)) {
     entry.result = execution.string();
-    readJsonFile(summary_file.string(), "remove it", [&](const Json& json) { entry.outcome = json.at("outcome"); });
+    readJsonFile(summary_file.string(), "remove it", [&](const Json& json) {
+      entry.outcome = json.at("outcome");
+      entry.warnings = json.value("warnings", std::vector<std::string>());
+    });
   } else if (motion.carried_out) {
     entry.error = outcome.steps.back().error;
   }

@@ -13,6 +13,7 @@ struct DatasetEntry {
   std::string error;  ///< of a motion that was refused
   bool converged = false, passed = false, met = false;  ///< the solver; the check; all goals
   std::string outcome;                                  ///< of a motion that was carried out: stood, fell or failed
+  std::vector<std::string> warnings;                    ///< of how it was carried out
   bool is_good() const { return converged && passed && met && outcome == (motion->carried_out ? "stood" : ""); }
   Json goals = Json::array();
   double duration = 0;                                     ///< s, of the result

@@ -12,18 +12,19 @@ namespace {
 
 struct Entry {
   const char* name;
+  bool controls_error;
   std::unique_ptr<World> (*make)(const Model& model, const WorldOptions& options);
 };
 
 const Entry kWorlds[] = {
-    {"bielle", makeOwnWorld},
+    {"bielle", true, makeOwnWorld},
 #ifdef BIELLE_WITH_MUJOCO
-    {"mujoco",
+    {"mujoco", false,
      [](const Model& model, const WorldOptions& options) {
        return makeMujocoWorld(model, {options, {}});
      }},
 #endif
-    {"simbody",
+    {"simbody", true,
      [](const Model& model, const WorldOptions& options) {
        SimbodyWorldOptions simbody;
        simbody.world = options;
@@ -31,6 +32,15 @@ const Entry kWorlds[] = {
        return makeSimbodyWorld(model, simbody);
      }},
 };
+
+const Entry& getEntry(const std::string& name) {
+  std::string known;
+  for (const Entry& entry : kWorlds) {
+    if (entry.name == name) return entry;
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  throw InputError("", "world '" + name + "'", "there is no such world", "choose one of: " + known);
+}
 
 }  // namespace
 
@@ -40,13 +50,13 @@ std::vector<std::string> listWorlds() {
   return names;
 }
 
+bool controlsError(const std::string& name) { return getEntry(name).controls_error; }
+
 std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options) {
-  std::string known;
-  for (const Entry& entry : kWorlds) {
-    if (entry.name == name) return entry.make(model, options);
-    known += (known.empty() ? "" : ", ") + std::string(entry.name);
-  }
-  throw InputError("", "world '" + name + "'", "there is no such world", "choose one of: " + known);
+  const Entry& entry = getEntry(name);
+  if (options.tolerance > 0 && !entry.controls_error)
+    throw InputError("", "tolerance of world '" + name + "'", "its steps are of a fixed length", "give a time step");
+  return entry.make(model, options);
 }
 
 }  // namespace bielle::worlds

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "control/clock.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "results/option_flags.h"
@@ -139,7 +140,8 @@ void describeWorld(OptionFields& fields, SimulateArguments& a) {
                "a constant force on the trunk, e.g. t=3,impulse=6,direction=90,duration=0.1: start [s], impulse [N "
                "s], direction [degrees; 0: along x, 90: along y] and duration [s]; may be repeated");
   fields.number("time_step", a.time_step, "s", {0, 0.1},
-                "time step of worlds with fixed steps; 0: the world's default");
+                "time step of worlds with fixed steps, at most --control-period; the longest step of others; 0: the "
+                "world's default");
   fields.number("mass_error", a.errors.mass, "1", {0, 0.99},
                 "largest relative error of masses: the simulated robot's masses and inertias are the "
                 "controller's, times a random factor within 1 plus or minus this");
@@ -232,6 +234,53 @@ std::optional<std::string> findGiven(const SimulateArguments& arguments, const s
   return {};
 }
 
+std::vector<std::string> splitWorlds(const std::string& text) {
+  std::vector<std::string> worlds;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) worlds.push_back(part);
+  return worlds;
+}
+
+std::vector<std::string> listIdleOptions(const SimulateArguments& a) {
+  std::vector<std::string> idle;
+  const auto check = [&](bool is_useful, const std::vector<std::string>& names, const std::string& reason) {
+    if (is_useful) return;
+    for (const std::string& name : names)
+      if (const auto flag = findGiven(a, {name})) idle.push_back(*flag + " has no effect: " + reason);
+  };
+  const std::vector<std::string> worlds = splitWorlds(a.world);
+  check(std::any_of(worlds.begin(), worlds.end(), controlsError), {"accuracy"},
+        "the steps of world " + a.world + " are of a fixed length");
+  const PlanControl control = a.wanted_control.value_or(a.control.control);
+  check(control == PlanControl::Predictive, {"nodes", "fine_nodes", "iterations"}, "control is not predictive");
+  check(control != PlanControl::Open, {"look_ahead"}, "open control has no gains");
+  check(a.sensors == Sensing::Real, {"noise"}, "ideal sensors have none");
+  check(a.execution.duration == 0, {"hold"}, "--duration ends the motion");
+  check(!a.pushes.empty(), {"push_body"}, "there is no --push");
+  const bool has_tiles = a.terrain.rfind("tiles", 0) == 0 || a.terrain.rfind("uneven", 0) == 0;
+  check(has_tiles || a.jitter > 0 || a.sensors == Sensing::Real || !a.errors.isZero(), {"seed"}, "nothing is random");
+  return idle;
+}
+
+std::vector<std::string> listIdlePushes(const std::vector<Push>& pushes, double duration) {
+  std::vector<std::string> idle;
+  for (const Push& push : pushes) {
+    const double end = push.time + push.duration;
+    if (end <= duration + kClockTolerance) continue;
+    idle.push_back("--push at " + formatNumber(push.time) + " s " +
+                   (push.time < duration ? "is cut off" : "has no effect") + ": the motion ends at " +
+                   formatNumber(duration) + " s");
+  }
+  return idle;
+}
+
+void requireShortSteps(const SimulateArguments& arguments, const std::string& flag, double period) {
+  if (arguments.time_step > period * (1 + 1e-9))
+    throw InputError("", "--time-step " + formatNumber(arguments.time_step),
+                     "it is longer than " + flag + ", " + formatNumber(period) + " s, at whose end a step ends",
+                     "give at most that, or a longer " + flag);
+}
+
 void parseOptions(SimulateArguments& arguments) {
   for (const std::string& push : arguments.pushes)
     arguments.execution.pushes.push_back(parsePush(push, arguments.execution.control_period));
@@ -262,6 +311,16 @@ void parseOptions(SimulateArguments& arguments) {
   arguments.errors.seed = arguments.seed;
   if (is_real) arguments.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
   makeGround(arguments, {});
+  const std::vector<std::string> worlds = splitWorlds(arguments.world);
+  if (std::set<std::string>(worlds.begin(), worlds.end()).size() < worlds.size())
+    throw InputError("", "--world " + arguments.world, "a world is given twice", "give it once");
+  std::set<std::string> names;
+  if (arguments.speed) names.insert("speed");
+  for (const std::string& setting : arguments.settings) {
+    const std::string name = splitSetting("--set", setting, "steps=8").first;
+    if (!names.insert(name).second)
+      throw InputError("", "--set " + setting, "'" + name + "' is given twice", "give it once");
+  }
 }
 
 void addOptions(CLI::App& app, SimulateArguments& a) {

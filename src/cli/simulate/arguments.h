@@ -59,6 +59,16 @@ void addOptions(CLI::App& app, SimulateArguments& arguments);
 /// The flag of the first of these options that is not as usual.
 std::optional<std::string> findGiven(const SimulateArguments& arguments, const std::vector<std::string>& names);
 
+/// The worlds by their names, which commas separate.
+std::vector<std::string> splitWorlds(const std::string& text);
+
+/// Options that others, or the kind of control, make useless, a sentence each; what depends on motion and robot is up to others.
+std::vector<std::string> listIdleOptions(const SimulateArguments& arguments);
+/// Pushes that come after the end of a motion, or in part.
+std::vector<std::string> listIdlePushes(const std::vector<Push>& pushes, double duration);
+/// Steps cannot be longer than a period at whose ends they end. \throws InputError
+void requireShortSteps(const SimulateArguments& arguments, const std::string& flag, double period);
+
 /// Sets what follows from pushes, delays and sensors, and checks what can be checked without the motion. \throws InputError
 void parseOptions(SimulateArguments& arguments);
 

@@ -111,17 +111,12 @@ void addSprings(const Model& model, const std::string& text, const VectorXd& q, 
                      "its motors are: " + listItems(getNames(model.motors())));
 }
 
-std::vector<std::string> splitWorlds(const std::string& text) {
-  std::vector<std::string> worlds;
-  std::istringstream parts(text);
-  for (std::string part; std::getline(parts, part, ',');) worlds.push_back(part);
-  return worlds;
-}
-
 // What only a plan can use.
 void refuseOptionsOfPlans(const SimulateArguments& arguments) {
-  const auto flag = findGiven(arguments, {"control", "command", "model", "speed", "set", "real_time", "sensors",
-                                          "delay", "live", "solve_time", "mass_error", "rod_error"});
+  const auto flag = findGiven(
+      arguments, {"control",   "command",    "model",      "speed",      "set",  "real_time",     "sensors",
+                  "noise",     "look_ahead", "delay",      "jitter",     "live", "solve_time",    "mass_error",
+                  "rod_error", "nodes",      "fine_nodes", "iterations", "hold", "control_period"});
   if (flag)
     throw InputError("", *flag, "'" + arguments.directory + "' is a robot without a plan, which moves freely",
                      "leave it out, or give the directory of a solved motion");
@@ -148,8 +143,23 @@ std::string makeEnergyText(const MotionRecord& record, const std::vector<Books>&
   return text;
 }
 
+// What has no effect on a free motion of this robot.
+std::vector<std::string> listIdleInFree(const SimulateArguments& arguments, const Model& model,
+                                        const FreeMotionOptions& o) {
+  std::vector<std::string> idle = listIdlePushes(o.pushes, o.duration);
+  if (model.contacts().empty())
+    if (const auto flag = findGiven(arguments, {"terrain", "friction"}))
+      idle.push_back(*flag + " has no effect: the robot has no feet");
+  for (size_t i = 1; i < o.torques.size(); ++i)
+    if (o.torques[i].time >= o.duration)
+      idle.push_back("--torques: from " + formatNumber(o.torques[i].time) +
+                     " s on they have no effect: the motion ends at " + formatNumber(o.duration) + " s");
+  return idle;
+}
+
 struct FreeRun {
   std::string world, directory;
+  std::vector<std::string> warnings;
   FreeMotion motion;
 };
 
@@ -167,6 +177,8 @@ std::vector<std::string> writeRun(const SimulateArguments& arguments, const Load
   result.gap_position = e.largest_gap;
   Json summary = makeHappenedSummary(result);
   summary["world"] = run.world;
+  summary["integration"] = listIntegration(e.integration);
+  summary["warnings"] = run.warnings;
   summary["pushes"] = listPushes(arguments.execution.pushes);
   const int pushed = findPushedBody(model, arguments.push_body);
   const Vector3d& com = model.bodies()[pushed].inertia.com;
@@ -236,7 +248,10 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   SimulateArguments arguments = given;
   ExecutionOptions& execution = arguments.execution;
   if (execution.duration == 0) execution.duration = kDuration;
-  if (!arguments.has_record_period) execution.record_period = std::min(kRecordPeriod, execution.duration / 100);
+  if (!arguments.has_record_period)
+    execution.record_period =
+        std::min(std::max(kRecordPeriod, arguments.time_step), std::max(execution.duration / 100, arguments.time_step));
+  requireShortSteps(arguments, "--record-period", execution.record_period);
   const LoadedRobot robot = [&] {
     try {
       return loadRobot(arguments.directory);
@@ -261,6 +276,10 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   options.torques = readTorques(model, arguments.torques, start.u);
   options.pushes = execution.pushes;
 
+  std::vector<std::string> idle = listIdleOptions(arguments);
+  for (const std::string& each : listIdleInFree(arguments, model, options)) idle.push_back(each);
+  tell(idle);
+
   const std::vector<std::string> names = splitWorlds(arguments.world);
   std::vector<FreeRun> runs;
   std::vector<std::string> paths;
@@ -268,12 +287,17 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   makeOutputDirectory(arguments.output);
   for (const std::string& name : names) {
     WorldOptions world_options{ground, arguments.time_step, &isInterrupted()};
-    world_options.tolerance = arguments.accuracy > 0 ? arguments.accuracy
-                              : name == "simbody"    ? kSimbodyTolerance
-                                                     : kOwnTolerance;
+    if (controlsError(name))
+      world_options.tolerance = arguments.accuracy > 0 ? arguments.accuracy
+                                : name == "simbody"    ? kSimbodyTolerance
+                                                       : kOwnTolerance;
     world_options.pushed_body = pushed_body;
     const std::unique_ptr<World> world = makeWorld(name, model, world_options);
-    FreeRun run{name, names.size() > 1 ? (fs::path(arguments.output) / name).string() : arguments.output, {}};
+    FreeRun run{name, names.size() > 1 ? (fs::path(arguments.output) / name).string() : arguments.output, idle, {}};
+    for (const std::string& warning : world->warnings()) {
+      run.warnings.push_back("world " + name + ": " + warning);
+      tell({run.warnings.back()});
+    }
     Watch watch{Watch::Show()};
     run.motion =
         moveFreely(*world, start.q, start.v, options, [&](double time, double duration, const ExecutionSoFar& so_far) {

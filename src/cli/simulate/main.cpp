@@ -1,4 +1,6 @@
 // bielle-simulate: carries a motion out in a world.
+#include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -61,6 +63,31 @@ Plan obtainPlan(const SimulateArguments& arguments) {
   return makePlan(request, arguments.control);
 }
 
+// Rows are recorded at instants of control.
+void roundPeriods(SimulateArguments& arguments) {
+  ExecutionOptions& execution = arguments.execution;
+  const double ticks = std::max(1.0, std::round(execution.record_period / execution.control_period));
+  const double period = ticks * execution.control_period;
+  if (arguments.has_record_period && std::abs(period - execution.record_period) > 1e-9 * period)
+    tell({"--record-period " + formatNumber(execution.record_period) + ": rows are recorded every " +
+          formatNumber(period) + " s, a multiple of --control-period"});
+  execution.record_period = period;
+}
+
+// What has no effect on this motion and robot.
+std::vector<std::string> listIdleInPlan(const SimulateArguments& arguments, const Plan& plan) {
+  const ExecutionOptions& o = arguments.execution;
+  std::vector<std::string> idle =
+      listIdlePushes(o.pushes, o.duration > 0 ? o.duration : plan.reference().duration() + o.hold);
+  const double steps = std::ceil(o.control_period / arguments.time_step - 1e-9), step = o.control_period / steps;
+  if (arguments.time_step > 0 && step < 0.99 * arguments.time_step)
+    idle.push_back("--time-step " + formatNumber(arguments.time_step) + ": steps are of " + formatNumber(step) +
+                   " s at most, an even part of --control-period");
+  if (arguments.errors.rod > 0 && plan.robot.model.closures().empty())
+    idle.push_back("--rod-error has no effect: the robot has no closures");
+  return idle;
+}
+
 // The robot of the world, which is not quite the one that its controller knows if errors are given.
 Model makeRobot(const Plan& plan, const RobotErrors& errors) {
   const Model& model = plan.robot.model;
@@ -81,22 +108,34 @@ Model makeRobot(const Plan& plan, const RobotErrors& errors) {
 
 int simulate(SimulateArguments arguments, const std::vector<std::string>& command) {
   parseOptions(arguments);
-  if (arguments.dry_run) return kStood;
+  // A motion that is not there yet, as in a dry run for one that will be solved, is none of a robot.
+  if (!isFree(arguments) || (arguments.dry_run && !std::filesystem::exists(arguments.directory)))
+    requireShortSteps(arguments, "--control-period", arguments.execution.control_period);
+  if (arguments.dry_run) {
+    tell(listIdleOptions(arguments));
+    return kStood;
+  }
   if (arguments.robot.empty()) requireApart(arguments.output, {arguments.directory});
   watchInterrupts();
   if (isFree(arguments)) return simulateFreely(arguments, command) ? kStood : kFell;
   requirePlan(arguments);
   const std::string reason = chooseControl(arguments);
+  roundPeriods(arguments);
+  std::vector<std::string> warnings = listIdleOptions(arguments);
   const Plan plan = obtainPlan(arguments);
+  for (const std::string& each : listIdleInPlan(arguments, plan)) warnings.push_back(each);
   const PlanController controller = makeController(plan, arguments.control);
   const Ground ground = makeGround(arguments, plan.ground);
+  const double tolerance = controlsError(arguments.world) ? arguments.accuracy : 0;
   const auto world = makeWorld(arguments.world, makeRobot(plan, arguments.errors),
-                               {ground, arguments.time_step, &isInterrupted(), arguments.accuracy});
+                               {ground, arguments.time_step, &isInterrupted(), tolerance});
+  for (const std::string& each : world->warnings()) warnings.push_back("world " + arguments.world + ": " + each);
+  tell(warnings);
   ExecutionOptions& options = arguments.execution;
   options.fall.only_whirling = controller.prediction != nullptr;
   options.interrupt = &isInterrupted();
   makeOutputDirectory(arguments.output);
-  const CarriedOut carried{arguments, plan, controller.prediction, ground, command};
+  const CarriedOut carried{arguments, plan, controller.prediction, ground, command, warnings};
   const auto writeFiles = [&carried](const Execution& execution) { return write(carried, execution); };
   ExecutionObserver observer;
   if (!arguments.summary_only) {  // a campaign's, which looks at nothing else

@@ -175,6 +175,8 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   const Plan& plan = carried.plan;
   Json summary = makeHappenedSummary(result);
   summary["world"] = arguments.world;
+  summary["integration"] = listIntegration(e.integration);
+  summary["warnings"] = carried.warnings;
   summary["control"] = getName(arguments.control.control);
   summary["believed_model"] = getName(plan.belief);
   if (plan.belief != Belief::Closed)
@@ -284,6 +286,19 @@ Json listBooks(const Execution& e) {
           {"motor_work_J", e.end.motor_work},     {"push_work_J", e.end.push_work},
           {"contact_loss_J", e.end.contact_loss}, {"stop_loss_J", e.end.stop_loss},
           {"other_loss_J", e.end.other_loss},     {"imbalance_J", e.imbalance}};
+}
+
+Json listIntegration(const Integration& integration) {
+  const auto orNull = [](double value) { return value > 0 ? Json(value) : Json(); };
+  return {{"integrator", integration.integrator},
+          {"longest_step_s", integration.longest_step},
+          {"shortest_step_s", integration.shortest_step},
+          {"tolerance", orNull(integration.tolerance)},
+          {"closure_tolerance", orNull(integration.closure_tolerance)}};
+}
+
+void tell(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) std::cerr << "bielle: warning: " << warning << "\n";
 }
 
 Json listPushes(const std::vector<Push>& pushes) {

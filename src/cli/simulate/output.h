@@ -9,6 +9,10 @@ namespace bielle::worlds {
 Json makeHappenedSummary(const MotionResult& result);
 Json listBooks(const Execution& execution);
 Json listPushes(const std::vector<Push>& pushes);
+/// Integrator, steps [s] and tolerances of a world.
+Json listIntegration(const Integration& integration);
+/// To the user, on standard error.
+void tell(const std::vector<std::string>& warnings);
 
 /// What is told besides what happened: who asked for what.
 struct CarriedOut {
@@ -17,6 +21,7 @@ struct CarriedOut {
   const PredictiveController* prediction;  // null under other control
   const Ground& ground;                    // of the world
   const std::vector<std::string>& command;
+  const std::vector<std::string>& warnings;
 };
 
 /// \param reason  of a choice of control other than the usual one, or empty
