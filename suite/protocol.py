@@ -41,7 +41,32 @@ def parse_guesses(text):
     match = re.fullmatch(r"(\d+):(\d+)", text)
     if not match:
         raise argparse.ArgumentTypeError(f"{text} is not FIRST:END, such as 25:50")
+    if int(match[1]) >= int(match[2]):
+        raise argparse.ArgumentTypeError(f"{text} has no guess: END is excluded and must be larger than FIRST")
     return range(int(match[1]), int(match[2]))
+
+
+def parse_time(text):
+    try:
+        return datetime.datetime.strptime(text, "%H:%M").time()
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is no time of a day, such as 23:30") from None
+
+
+def read_runs(path):
+    """(problem, variant, seed, guess) of every run that is there. A last line that was cut off is taken away: it will run again."""
+    content = path.read_bytes()
+    whole = content[:content.rfind(b"\n") + 1]
+    if len(whole) < len(content):
+        print(f"{path}: the last line was cut off; its run is repeated", file=sys.stderr)
+        os.truncate(path, len(whole))
+    done = set()
+    for number, line in enumerate(whole.decode().splitlines(), 1):
+        try:
+            done.add(tuple(json.loads(line)[key] for key in ("problem", "variant", "seed", "guess")))
+        except (ValueError, KeyError, TypeError):
+            sys.exit(f"{path}, line {number}: it is no run; delete the line")
+    return done
 
 
 def write_guess(directory, solved, guess):
@@ -98,14 +123,11 @@ def main():
     parser.add_argument("--seed", type=int, default=0, help="of the guesses")
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=VARIANTS, metavar="NAME",
                         help="some of: " + ", ".join(VARIANTS))
-    parser.add_argument("--until", help="begin no run after this time of today, UTC")
+    parser.add_argument("--until", type=parse_time, metavar="HH:MM", help="begin no run after this time of today, UTC")
     arguments = parser.parse_args()
     lines = (arguments.directory / "index.jsonl").read_text(encoding="utf-8").splitlines()
     entries = [entry for entry in map(json.loads, lines) if entry["good"] and "problem" in entry["files"]]
-    done = set()
-    if arguments.runs.exists():
-        done = {tuple(json.loads(line)[key] for key in ("problem", "variant", "seed", "guess"))
-                for line in arguments.runs.read_text(encoding="utf-8").splitlines()}
+    done = read_runs(arguments.runs) if arguments.runs.exists() else set()
     with open(arguments.runs, "a", encoding="utf-8") as file:
         for trial in arguments.guesses:
             for entry in entries:
@@ -119,7 +141,7 @@ def main():
                     problem = Problem(arguments.directory / entry["files"]["problem"])
                     write_guess(start, solved, make_guess(problem, trial, arguments.seed))
                     for i, variant in enumerate(missing):
-                        if arguments.until and f"{datetime.datetime.utcnow():%H:%M}" >= arguments.until:
+                        if arguments.until and datetime.datetime.utcnow().time() >= arguments.until:
                             return 0
                         outcome = run(arguments.bielle, entry, solved, start, pathlib.Path(directory) / str(i), VARIANTS[variant])
                         line = {"problem": name, "variant": variant, "seed": arguments.seed, "guess": trial, **outcome}

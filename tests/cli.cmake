@@ -62,6 +62,10 @@ add_test(NAME problem COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(problem PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
+# The protocol of the suite: what is left of a run that was cut off.
+add_test(NAME protocol COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_protocol.py ${PROJECT_SOURCE_DIR})
+set_tests_properties(protocol PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+
 # Motions as MCAP files, read by a reader of our own and, where it is found, by @mcap/core.
 add_test(NAME mcap COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command>)
 add_test(NAME mcap_core COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command> core)

@@ -1,0 +1,39 @@
+"""test_protocol.py SOURCE: suite/protocol.py goes on after a line that was cut off, and refuses what it cannot do before any run.
+
+Exit status 77: there is no NumPy."""
+import importlib.util
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+if not importlib.util.find_spec("numpy"):
+    sys.exit(77)
+program = pathlib.Path(sys.argv[1]) / "suite/protocol.py"
+RUN = json.dumps({"problem": "walk", "variant": "exact loops", "seed": 0, "guess": 0}) + "\n"
+
+with tempfile.TemporaryDirectory() as directory:
+    (pathlib.Path(directory) / "index.jsonl").write_text("")  # a suite without problems: nothing is run
+    runs = pathlib.Path(directory) / "runs.jsonl"
+
+    def call(text, *arguments):
+        runs.write_text(text)
+        return subprocess.run([sys.executable, program, directory, runs, *arguments], capture_output=True, text=True)
+
+    def check(done, status, *words):
+        assert done.returncode == status and "Traceback" not in done.stderr, done.stderr
+        assert all(word in done.stderr for word in words), done.stderr
+
+    check(call(RUN), 0)
+    assert runs.read_text() == RUN
+    check(call(RUN + RUN[:12]), 0, "runs.jsonl", "cut off")
+    assert runs.read_text() == RUN
+    check(call(RUN[:12]), 0, "cut off")
+    assert runs.read_text() == ""
+    check(call(RUN + RUN[:12] + "\n" + RUN), 1, "runs.jsonl, line 2")
+    check(call(RUN + "3\n"), 1, "runs.jsonl, line 2")
+    check(call("", "--guesses", "3:1"), 2, "no guess")
+    check(call("", "--guesses", "3"), 2, "FIRST:END")
+    check(call("", "--until", "25:99"), 2, "23:30")
+    check(call("", "--until", "23:59"), 0)
