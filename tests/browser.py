@@ -96,6 +96,10 @@ class Browser:
             raise RuntimeError(expression + ": " + json.dumps(answer["exceptionDetails"])[:500])
         return answer["result"].get("value")
 
+    def resize(self, width, height):
+        """Of the page, in pixels."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+
     def screenshot(self):
         return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
 

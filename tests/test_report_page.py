@@ -309,6 +309,41 @@ class ReportPage(unittest.TestCase):
         self.browser.open(running / "report.html")  # what was kept was for once
         self.assertEqual(self.browser.evaluate("report.transport.time"), 0)
 
+    def test_the_check_is_readable_at_every_width(self):
+        """First what failed, or that nothing did; the whole table is last, with every word of every column whole."""
+        place = self.root / "checked"
+        shutil.copytree(self.squat, place)
+        row = {"name": "least distance of soles to their edges of the ground", "value": 1.234567e-5, "bound": 1.23e-4,
+               "unit": "m or rad", "pass": True, "note": "foot_right at node 123, 1.845 s"}
+        for failing in (0, 1):
+            rows = [dict(row) for _ in range(40)]
+            rows[7].update({"pass": not failing})
+            (place / "check.json").write_text(json.dumps({"pass": not failing, "rows": rows}))
+            run("report", place)
+            self.browser.open(place / "report.html")
+            self.assertIn("1 of 40 rows failed" if failing else "All 40 rows passed",
+                          self.browser.evaluate("document.getElementById('check').innerText"))
+            self.assertEqual(self.browser.evaluate("document.querySelectorAll('#check tbody tr').length"), failing)
+            self.assertEqual(self.browser.evaluate("document.querySelectorAll('#checks tbody tr').length"), 40)
+            top = "(id => document.getElementById(id).getBoundingClientRect().top)"
+            order = [self.browser.evaluate(f"{top}('{name}')") for name in ("check", "plots", "iterations", "options", "checks")]
+            self.assertEqual(order, sorted(order))
+            for width in (500, 1300, 2500):
+                self.browser.resize(width, 900)
+                self.assertLessEqual(self.browser.evaluate("document.documentElement.scrollWidth"), width)
+                # Cells that are narrower than their longest word, and names or notes of more than a few lines.
+                cut, lines = self.browser.evaluate("""(() => {
+                  const cells = Array.from(document.querySelectorAll('#check td, #checks td, #checks th, #check th'));
+                  return [cells.filter(cell => cell.scrollWidth > cell.clientWidth + 1).length,
+                          Math.max(...cells.map(cell => cell.getBoundingClientRect().height)) / 20];
+                })()""")
+                self.assertEqual(cut, 0, width)
+                self.assertLess(lines, 6, width)
+                table = self.browser.evaluate("Array.from(document.querySelectorAll('#checks .scroll')).map("
+                                              "box => box.scrollWidth - box.clientWidth)")
+                self.assertLessEqual(max(table), 0, width)  # no column is out of sight
+        self.browser.resize(1000, 700)
+
     def test_hostile_names_are_text(self):
         run("report", self.root / "hostile")
         self.browser.open(self.root / "hostile/report.html")

@@ -101,7 +101,7 @@ class Report {
   fillPanels(json) {
     fillGoals(document.getElementById('goals'), this.runs);
     fillSummary(document.getElementById('summary'), this.runs);
-    fillCheck(document.getElementById('check'), this.runs);
+    fillCheck(document.getElementById('check'), document.getElementById('checks'), this.runs);
     this.plots = new Plots(document.getElementById('plots'), this.runs, t => this.transport.setTime(t));
     fillIterations(document.getElementById('iterations'), this.runs);
     fillOptions(document.getElementById('options'), this.runs);

@@ -10,12 +10,14 @@ function addTable(parent, head, rows) {
   const body = addElement(table, 'tbody');
   for (const row of rows) {
     const line = addElement(body, 'tr');
-    for (const cell of row)
-      addElement(
+    for (const cell of row) {
+      const shown = addElement(
           line, 'td', (cell && cell.className) || (typeof cell === 'number' ? 'number' : ''),
           typeof cell === 'number'              ? formatNumber(cell, 6) :
               (cell && cell.text !== undefined) ? cell.text :
                                                   String(cell === null || cell === undefined ? '–' : cell));
+      if (cell && cell.note) addElement(shown, 'div', 'note', cell.note);
+    }
   }
   return table;
 }
@@ -146,14 +148,24 @@ function formatCompared(row) {
   return numbers.map(value => ({text: format(value), className: typeof value === 'number' ? 'number' : ''}));
 }
 
-function fillCheck(parent, runs) {
+function addCheckTable(parent, rows) {
+  addTable(
+      parent, ['what, and where it is closest', 'value', 'bound', 'unit', ''],
+      rows.map(row => [{text: row.name, note: row.note}, ...formatCompared(row), row.unit || '', describeVerdict(row)]));
+}
+
+// What failed or was missed; every row is in a table of its own at the end of the page.
+function fillCheck(parent, everything, runs) {
   for (const run of runs.filter(r => r.check)) {
-    parent.hidden = false;
-    if (runs.length > 1) addElement(parent, 'h2', '', run.label);
-    const rows =
-        (run.check.rows ||
-         []).map(row => [row.name, ...formatCompared(row), row.unit || '', describeVerdict(row), row.note || '']);
-    addTable(parent, ['what', 'value', 'bound', 'unit', '', ''], rows);
+    parent.hidden = everything.hidden = document.getElementById('to-checks').hidden = false;
+    const rows = run.check.rows || [], failed = rows.filter(row => describeVerdict(row).className === 'fail');
+    for (const card of runs.length > 1 ? [parent, everything] : []) addElement(card, 'h2', '', run.label);
+    if (failed.length) addCheckTable(parent, failed);
+    const all = addElement(addElement(parent, 'p'), 'a', failed.length ? 'fail' : 'pass',
+        failed.length ? failed.length + ' of ' + rows.length + ' rows failed or were missed' :
+                        'All ' + rows.length + ' rows passed');
+    all.href = '#checks';
+    addCheckTable(everything, rows);
   }
 }
 
