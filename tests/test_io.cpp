@@ -250,7 +250,7 @@ TEST_CASE("files of OpenSim have the rows and columns that their header tells, a
     return parts;
   };
   for (bool all : {false, true}) {
-    const std::vector<std::string> lines = split(all ? formatSto(record) : formatMot(record), '\n');
+    const std::vector<std::string> lines = split((all ? formatSto(record) : formatMot(record)).text, '\n');
     const size_t columns = 1 + record.q_names.size() +
                            (all ? 2 * record.v_names.size() + record.u_names.size() + 6 * record.closure_names.size() +
                                       6 * record.contact_names.size() + 5
@@ -273,6 +273,32 @@ TEST_CASE("files of OpenSim have the rows and columns that their header tells, a
       CHECK(labels[motor - 1] == "u.two_words_and_more");
       CHECK(std::stod(cells[motor]) == record.u(std::min<Eigen::Index>(k, record.u.rows() - 1), 1));
     }
+  }
+}
+
+TEST_CASE("files of OpenSim have times that increase: of nodes before and after an impact the later one") {
+  const ShortSquat squat;
+  MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  CHECK(formatMot(record).warnings.empty());
+  const Eigen::Index impact = 3;
+  for (Eigen::Index k = impact + 1; k < record.time.size(); ++k)
+    record.time[k] -= record.time[impact + 1] - record.time[impact];
+  record.time[impact + 1] = record.time[impact];
+  record.q(impact, 0) = 5, record.q(impact + 1, 0) = 7;
+  for (const OpensimText& table : {formatMot(record), formatSto(record)}) {
+    std::istringstream lines(table.text);
+    std::vector<double> times, first;
+    for (std::string line; std::getline(lines, line);) {
+      std::istringstream cells(line);
+      double time = 0, q = 0;
+      if (cells >> time >> q) times.push_back(time), first.push_back(q);
+    }
+    REQUIRE(times.size() + 1 == static_cast<size_t>(record.time.size()));
+    CHECK(table.text.find("nRows=" + std::to_string(times.size()) + "\n") != std::string::npos);
+    for (size_t k = 1; k < times.size(); ++k) CHECK(times[k] > times[k - 1]);
+    CHECK(first[impact] == 7);
+    REQUIRE(table.warnings.size() == 1);
+    CHECK_THAT(table.warnings[0], Catch::Contains("1 node(s) before impacts"));
   }
 }
 

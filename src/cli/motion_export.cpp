@@ -45,8 +45,9 @@ std::vector<std::string> writeProblem(const ExportRequest& request, const Report
 std::vector<std::string> writeExport(const ExportRequest& request) {
   if (request.format == "mot" || request.format == "sto") {
     const MotionRecord record = readResultRecord(request.directory);
-    writeTextFile(request.path, request.format == "mot" ? formatMot(record) : formatSto(record));
-    return {};
+    const OpensimText table = request.format == "mot" ? formatMot(record) : formatSto(record);
+    writeTextFile(request.path, table.text);
+    return table.warnings;
   }
   const ReportRun run = readRun(request.directory);
   if (request.format == "mcap") {

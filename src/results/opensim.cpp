@@ -21,7 +21,7 @@ void appendCell(double value, std::string& text) {
 }
 
 // `tables` side by side, their columns with or without their prefixes.
-std::string format(const MotionRecord& record, const std::vector<RecordTable>& tables, bool with_prefix) {
+OpensimText format(const MotionRecord& record, const std::vector<RecordTable>& tables, bool with_prefix) {
   std::string labels = "time", rows;
   size_t columns = 1;
   for (const RecordTable& table : tables)
@@ -29,7 +29,10 @@ std::string format(const MotionRecord& record, const std::vector<RecordTable>& t
       labels += "\t" + makeLabel(with_prefix ? table.prefix + "." + column : column);
       ++columns;
     }
+  Eigen::Index count = 0;
   for (Eigen::Index k = 0; k < record.time.size(); ++k) {
+    if (k + 1 < record.time.size() && record.time[k + 1] <= record.time[k]) continue;
+    ++count;
     std::string row;
     appendCell(record.time[k], row);
     for (const RecordTable& table : tables) {
@@ -39,18 +42,24 @@ std::string format(const MotionRecord& record, const std::vector<RecordTable>& t
     }
     rows += row.substr(1) + "\n";
   }
-  return "bielle\nversion=1\nnRows=" + std::to_string(record.time.size()) + "\nnColumns=" + std::to_string(columns) +
-         "\ninDegrees=no\nendheader\n" + labels + "\n" + rows;
+  OpensimText out;
+  out.text = "bielle\nversion=1\nnRows=" + std::to_string(count) + "\nnColumns=" + std::to_string(columns) +
+             "\ninDegrees=no\nendheader\n" + labels + "\n" + rows;
+  if (const Eigen::Index left = record.time.size() - count; left > 0)
+    out.warnings.push_back(std::to_string(left) +
+                           " node(s) before impacts are left out: OpenSim wants times that increase, and an "
+                           "impact takes none");
+  return out;
 }
 
 }  // namespace
 
-std::string formatMot(const MotionRecord& record) {
+OpensimText formatMot(const MotionRecord& record) {
   std::vector<RecordTable> tables = listTables(record);
   tables.erase(tables.begin() + 1, tables.end());  // q comes first
   return format(record, tables, false);
 }
 
-std::string formatSto(const MotionRecord& record) { return format(record, listTables(record), true); }
+OpensimText formatSto(const MotionRecord& record) { return format(record, listTables(record), true); }
 
 }  // namespace bielle
