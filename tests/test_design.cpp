@@ -256,6 +256,54 @@ TEST_CASE("design: searches find a minimum, the same one for the same seed") {
   CHECK_THROWS_AS(minimizeByStages(problem, {{}}, 1), InputError);
 }
 
+TEST_CASE(
+    "design: every search keeps the best point that it saw, whatever its algorithm returns, and says why it ended") {
+  // Where x + y < 1 no loop closes: infinite or no number. The least value there is would be on that border.
+  for (const double open : {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    double least = std::numeric_limits<double>::infinity();
+    const auto rate = [&least, open](const VectorXd& x) {
+      const double value = x[0] + x[1] < 1 ? open : x.squaredNorm();
+      if (value < least) least = value;
+      return value;
+    };
+    SearchProblem problem;
+    problem.lower = Eigen::Vector2d(-1, -1), problem.upper = Eigen::Vector2d(3, 3),
+    problem.start = Eigen::Vector2d(2, 2.5);
+    problem.objective = [&rate](const VectorXd& x, const SearchStage&) { return rate(x); };
+    problem.sloped = [&rate](const VectorXd& x, const SearchStage&) {
+      SlopedValue out;
+      out.value = rate(x);
+      if (!std::isfinite(out.value)) return out;
+      out.terms = {{VectorXd::Constant(1, out.value), 2 * x.transpose()}};
+      out.limits = {VectorXd::Constant(2, 1 - x[0] - x[1]), MatrixXd::Constant(2, 2, -1)};  // a repeated row
+      return out;
+    };
+    for (const SearchAlgorithm algorithm : {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa,
+                                            SearchAlgorithm::Sbplx, SearchAlgorithm::Slsqp, SearchAlgorithm::Mma}) {
+      CAPTURE(getName(algorithm), open);
+      least = std::numeric_limits<double>::infinity();
+      const SearchResult result = minimizeByStages(problem, {{algorithm, 120, 1e-6}}, 3);
+      CHECK(result.value == least);
+      CHECK(result.value <= problem.start.squaredNorm());
+      CHECK(result.x.squaredNorm() == result.value);
+      CHECK(result.x.sum() >= 1);
+      REQUIRE(result.ends.size() == 1);
+      CHECK(result.ends[0].algorithm == algorithm);
+      CHECK_FALSE(result.ends[0].reason.empty());
+    }
+  }
+  SearchProblem bowl;
+  bowl.lower = VectorXd::Constant(1, -1), bowl.upper = VectorXd::Constant(1, 1),
+  bowl.start = VectorXd::Constant(1, 0.7);
+  bowl.objective = [](const VectorXd& x, const SearchStage&) { return x[0] * x[0]; };
+  const SearchResult cut =
+      minimizeByStages(bowl, {{SearchAlgorithm::Sbplx, 4, 1e-9}, {SearchAlgorithm::Sbplx, 400, 1e-3}}, 1);
+  REQUIRE(cut.ends.size() == 2);
+  CHECK(cut.ends[0].reason == "it had all its evaluations");
+  CHECK(cut.ends[0].evaluations == 4);
+  CHECK(cut.ends[1].reason == "its steps are smaller than the tolerance");
+}
+
 TEST_CASE("evaluations: what is not one is refused") {
   LoggedEvaluation e{"slsqp", VectorXd::Constant(2, 0.1), DesignStatus::Feasible, 0.75, 1.5, {}, {}, {0.5, 2}, {3}};
   e.terms.push_back({VectorXd::Constant(2, 0.3), MatrixXd::Constant(2, 2, 0.7)});

@@ -83,9 +83,14 @@ class DesignRunner {
     const auto sloped = [&](const VectorXd& x, const SearchStage& stage) {
       return continuous.pick(evaluate(i, continuous.expand(x), stage));
     };
-    minimizeByStages(
+    const SearchResult result = minimizeByStages(
         {continuous.pick(robot.lower()), continuous.pick(robot.upper()), continuous.start(), objective, sloped},
         spec_.stages, spec_.seed + static_cast<unsigned>(i));
+    if (!options_.progress) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const StageEnd& end : result.ends)
+      options_.progress("search " + std::to_string(i + 1) + ": " + getName(end.algorithm) + " ended after " +
+                        std::to_string(end.evaluations) + " evaluation(s): " + end.reason);
   }
 
   LoggedEvaluation evaluate(size_t i, const VectorXd& x, const SearchStage& stage) {

@@ -65,17 +65,39 @@ void Search::add(const VectorXd& x, double value) {
   if (value < best.value) best.value = value, best.x = x;
 }
 
+namespace {
+
+std::string describeEnd(nlopt::result result) {
+  switch (result) {
+    case nlopt::XTOL_REACHED:
+      return "its steps are smaller than the tolerance";
+    case nlopt::MAXEVAL_REACHED:
+      return "it had all its evaluations";
+    case nlopt::ROUNDOFF_LIMITED:
+      return "rounding leaves it no better step";
+    default:
+      return "the algorithm sees no further progress";
+  }
+}
+
+}  // namespace
+
 void runOptimizer(Search& search, nlopt::opt& optimizer, std::vector<double>& unit) {
+  const int before = search.best.evaluations;
   optimizer.set_maxeval(search.stage->evaluations);
   optimizer.set_xtol_abs(search.stage->tolerance);
   double value = 0;
+  nlopt::result result = nlopt::FAILURE;
   try {
-    optimizer.optimize(unit, value);
+    result = optimizer.optimize(unit, value);
   } catch (const nlopt::forced_stop&) {
     if (search.error) std::rethrow_exception(search.error);
+  } catch (const nlopt::roundoff_limited&) {
+    result = nlopt::ROUNDOFF_LIMITED;
   } catch (const std::runtime_error&) {
-    // Rounding stops a local search near its minimum; the best point is valid.
+    // The best point so far is valid.
   }
+  search.best.ends.push_back({search.stage->algorithm, search.best.evaluations - before, describeEnd(result)});
 }
 
 const char* getName(SearchAlgorithm algorithm) {
@@ -105,7 +127,7 @@ bool needsGradient(SearchAlgorithm algorithm) {
 }
 
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed) {
-  Search search{problem, nullptr, {problem.start, std::numeric_limits<double>::infinity(), 0}, nullptr};
+  Search search{problem, nullptr, {problem.start, std::numeric_limits<double>::infinity(), 0, {}}, nullptr};
   nlopt::srand(seed);  // only for this thread
   for (const SearchStage& stage : stages) {
     search.stage = &stage;

@@ -124,7 +124,10 @@ class EpigraphProblem {
 void runSlopedStage(Search& search) {
   const VectorXd start = search.best.x;
   EpigraphProblem problem(search, start);
-  if (!problem.feasible()) return;
+  if (!problem.feasible()) {
+    search.best.ends.push_back({search.stage->algorithm, 1, "it starts where nothing can be differentiated"});
+    return;
+  }
   std::vector<double> z = problem.makeStart();
   const bool slsqp = search.stage->algorithm == SearchAlgorithm::Slsqp;
   nlopt::opt optimizer(slsqp ? nlopt::LD_SLSQP : nlopt::LD_MMA, static_cast<unsigned>(problem.size()));

@@ -5,6 +5,7 @@
 /// variable t_i for every term of several pieces removes the kinks,
 ///     min_{x, t} sum_i t_i    s.t.  p_ij(x) <= t_i,  g_k(x) <= 0    (a term of one piece is added as it is)        (1)
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "bielle/math/types.h"
@@ -48,15 +49,23 @@ struct SearchProblem {
   std::function<SlopedValue(const VectorXd& x, const SearchStage& stage)> sloped = {};  ///< for stages with gradients
 };
 
+struct StageEnd {
+  SearchAlgorithm algorithm = SearchAlgorithm::Crs;
+  int evaluations = 0;
+  std::string reason;  ///< such as "its steps are smaller than the tolerance"
+};
+
 struct SearchResult {
   VectorXd x;
   double value = 0;
   int evaluations = 0;
+  std::vector<StageEnd> ends;
 };
 
 /// Each stage starts from the best point so far, the first one from the start. A stage with gradients is skipped if
 /// that point is infeasible, and retreats from infeasible points as from worse ones. The same seed gives the same
-/// points, in any thread. Exceptions of the objective propagate.
+/// points, in any thread. Exceptions of the objective propagate. Whatever an algorithm of NLopt returns, the result is the best
+/// point that was evaluated: some of them (2.7.1) call an end at infinity or NaN a success.
 /// \throws std::invalid_argument for algorithms of several objectives
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed);
 
