@@ -205,6 +205,55 @@ TEST_CASE("Drake's bushings in SDF are the joints that they stand for") {
              Catch::Contains("<drake:bushing_frameA> (line 10): there is no link or frame 'none'; correct the name"));
 }
 
+TEST_CASE("<mimic> of SDF 1.11 is a coupler, though libsdformat leaves it out; a later version is told") {
+  const auto swing = [](const std::string& mimic) {
+    return replaceOnce(replaceOnce(makeFourBar("", ""), "version=\"1.9\"", "version=\"1.11\""),
+                       "<child>c</child><axis><xyz>0 1 0</xyz></axis>",
+                       "<child>c</child><axis><xyz>0 1 0</xyz>" + mimic + "</axis>");
+  };
+  const LoadedRobot robot =
+      loadSdf(swing("<mimic joint=\"ja\"><multiplier> -2 </multiplier><offset>0.3</offset>"
+                    "<reference>0.1</reference></mimic>"));
+  CHECK(warnsOf(robot, "version 1.11 is later than 1.9"));
+  CHECK_FALSE(warnsOf(robot, "<mimic>: "));
+  REQUIRE(robot.model.closures().size() == 1);
+  CHECK(robot.model.closures()[0].kind == ClosureKind::Coupler);
+  const AssemblyResult closed = closeConfiguration(robot.model, VectorXd::Constant(robot.model.nq(), 0.2));
+  REQUIRE(closed.status == NumericalStatus::Ok);
+  const auto get = [&](const char* name) { return closed.q[robot.model.joints()[robot.model.findJoint(name)].idx_q]; };
+  CHECK(get("jc") == Approx(-2 * (get("ja") - 0.1) + 0.3));
+  CHECK_FALSE(warnsOf(loadSdf(makeFourBar("")), "is later than"));
+  const auto getSdfError = [&](const std::string& mimic) { return getError([&] { loadSdf(swing(mimic)); }); };
+  CHECK_THAT(getSdfError("<mimic joint=\"none\"/>"),
+             Catch::Contains("joint 'jc': <mimic> (line") && Catch::Contains("'none' is no joint with one coordinate"));
+  CHECK_THAT(getSdfError("<mimic joint=\"ja\"><multiplier>x</multiplier></mimic>"),
+             Catch::Contains("<multiplier> is not a finite number"));
+}
+
+TEST_CASE("inertia that SDF makes up is told, and such as libsdformat would not compute is refused") {
+  const std::string whole = makeFourBar(""), mass = "<mass>2</mass>";
+  const auto change = [&whole](const std::string& from, const std::string& to) {
+    std::string text = whole;
+    return text.replace(text.find(from), from.size(), to);  // of link a
+  };
+  CHECK(warnsOf(loadSdf(change(mass, "")), "link 'a' (line 3): its <inertial> has no <mass>: it is 1 kg, by the spec"));
+  const std::string moments = "<inertia><ixx>1</ixx><iyy>1</iyy><izz>0.5</izz></inertia>";
+  CHECK(warnsOf(loadSdf(change(moments, "")), "its <inertial> has no <inertia>: its moments are 1 kg m²"));
+  CHECK(warnsOf(loadSdf(makeFourBar("<link name=\"d\"/><joint name=\"j\" type=\"fixed\"><parent>a</parent><child>d"
+                                    "</child></joint>")),
+                "): it has no <inertial>: its mass is 1 kg"));
+  CHECK_FALSE(warnsOf(loadSdf(whole), "1 kg"));
+  for (const char* computed : {"<inertial auto=\"true\"><density>7800</density>", "<inertial><density>7800</density>"})
+    CHECK_THAT(getError([&] { loadSdf(change("<inertial>", computed)); }),
+               Catch::Contains("link 'a' (line 3): its inertia is to be computed") && Catch::Contains("give <mass>"));
+  CHECK(warnsOf(loadSdf(change("</inertial>", "<fluid_added_mass/></inertial>")),
+                "<inertial> <fluid_added_mass> (line 3)"));
+  CHECK(warnsOf(
+      loadSdf(replaceOnce(whole, "<child>c</child><axis><xyz>0 1 0</xyz></axis>",
+                          "<child>c</child><axis><xyz>0 1 0</xyz><limit><stiffness>9</stiffness></limit></axis>")),
+      "<limit> <stiffness>"));
+}
+
 TEST_CASE("SDF files that are no robot are errors with a remedy") {
   const auto getSdfError = [](const std::string& text) { return getError([&] { loadSdf(text); }); };
   const std::string whole = makeFourBar("");

@@ -31,6 +31,9 @@ class SdfReader {
   void readFrame(const sdf::Frame& frame);
   void addStart();
   void noteElements(const XMLElement& element);
+  void checkVersion(const XMLElement& root);
+  void checkInertia(const XMLElement& link);
+  void readMimic(const XMLElement& joint);
   [[noreturn]] void fail(const std::string& element, const std::string& problem, const std::string& remedy) const;
   void check(const sdf::Errors& errors) const;
   static SE3 toSE3(const ignition::math::Pose3d& pose);
