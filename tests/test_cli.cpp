@@ -13,6 +13,7 @@
 #include "bielle/motion/squat.h"
 #include "bielle/robots/robot_loader.h"
 #include "cli_command.h"
+#include "model/number_text.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;
@@ -291,6 +292,32 @@ TEST_CASE("eval gives the library's dynamics, forces and derivatives") {
   CHECK((toVector(out["mass_matrix_diagonal"]) - ws.M.diagonal()).norm() < 1e-12);
   CHECK(out["rank"] == 36);
   CHECK_FALSE(json::parse(run({"eval", "bipetto", "--state", "-"}, "{}").out).contains("da_dq"));
+}
+
+TEST_CASE("eval tells that loops are open, and closes them around the joints of the state") {
+  const auto eval = [](std::vector<std::string> more, const std::string& state) {
+    more.insert(more.begin(), {"eval", "fourbar", "--state", "-"});
+    return run(more, state);
+  };
+  const std::string open = R"({"joints": {"crank_joint": {"q": 0.4}}})";
+  const CommandResult told = eval({}, open), closed = eval({"--close"}, open);
+  REQUIRE(told.status == 0);
+  const double gap = json::parse(told.out)["largest_gap"];
+  CHECK(gap > 0.01);
+  CHECK_THAT(told.err, Catch::Contains("standard input: closure") &&
+                           Catch::Contains("is open by " + formatNumber(gap, "%.3g")) && Catch::Contains("--close"));
+  REQUIRE(closed.status == 0);
+  CHECK(closed.err.empty());
+  const json out = json::parse(closed.out);
+  CHECK(out["largest_gap"].get<double>() < 1e-12);
+  const Model model = loadRobot("fourbar").model;
+  CHECK(out["q"][model.joints()[model.findJoint("crank_joint")].idx_q].get<double>() == Approx(0.4).margin(1e-9));
+  // What the state gives as it came out is closed, and stays so to the bit.
+  json again;
+  for (const Joint& joint : model.joints())
+    if (joint.nq == 1) again["joints"][joint.name]["q"] = out["q"][joint.idx_q];
+  CHECK(json::parse(eval({}, again.dump()).out)["q"] == out["q"]);
+  CHECK(eval({}, again.dump()).err.empty());
 }
 
 TEST_CASE("eval understands other ways to write a configuration") {

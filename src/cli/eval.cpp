@@ -1,6 +1,7 @@
 // bielle eval: the constrained dynamics at one state, and their derivatives.
 #include <iostream>
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
@@ -8,6 +9,7 @@
 #include "bielle/motion/motion.h"
 #include "cli/commands.h"
 #include "cli/eval_state.h"
+#include "model/number_text.h"
 #include "results/json_text.h"
 
 namespace bielle::cli {
@@ -16,8 +18,10 @@ namespace {
 struct EvalArguments {
   RobotArgument robot;
   std::string state;
-  bool derivatives = false;
+  bool derivatives = false, close = false;
 };
+
+constexpr double kOpen = 1e-6;  // m or rad: gaps of loops above it are told
 
 // The dynamics at a state, up to date.
 struct Evaluation {
@@ -78,6 +82,7 @@ Json describe(const Model& model, const EvalState& state, const Evaluation& at) 
           {"closure_wrenches", loops},
           {"contact_wrenches", contacts},
           {"closure_residuals", residuals},
+          {"largest_gap", calcLargestGap(at.ws, at.constraints)},
           {"rank", mobility.rank},
           {"mobility", mobility.mobility},
           {"constraint_error", at.cws.residual},
@@ -95,9 +100,15 @@ void requireOk(NumericalStatus status) {
 
 int evaluate(const EvalArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
-  const EvalState state = readState(robot.model, arguments.state, robot.model.makeNeutral());
+  EvalState state = readState(robot.model, arguments.state, robot.model.makeNeutral());
+  const std::string file = arguments.state == "-" ? "standard input" : arguments.state;
+  if (arguments.close) closeState(robot.model, file, state);
   Evaluation at(robot.model, state);
   requireOk(at.status);
+  std::string worst;
+  if (const double gap = calcLargestGap(at.ws, at.constraints, &worst); gap > kOpen)
+    std::cerr << "bielle: warning: " << file << ": closure '" << worst << "' is open by " << formatNumber(gap, "%.3g")
+              << " (m or rad): the robot cannot be in this state; give one whose loops are closed, or --close\n";
   Json json = describe(robot.model, state, at);
   if (arguments.derivatives) {
     requireOk(updateConstrainedDerivatives(robot.model, at.ws, at.cws, at.constraints));
@@ -121,6 +132,8 @@ void addEval(CLI::App& command, Action& action) {
       ->required();
   command.add_option("--state", arguments->state, "JSON file with the state; - for the standard input")->required();
   command.add_flag("--derivatives", arguments->derivatives, "add the derivatives with respect to q, v and u");
+  command.add_flag("--close", arguments->close,
+                   "close the loops first: joints that the state gives stay where they are, if they can");
   addFixedBase(command, arguments->robot);
   command.footer(std::string(kStateHelp) +
                  "The output is JSON: accelerations by joint (rates of v); wrenches of closures and contacts\n"
@@ -130,8 +143,8 @@ void addEval(CLI::App& command, Action& action) {
                  "--derivatives row-major\n"
                  "matrices. Rows and columns are named by `order`: da_* has rows v, dlambda_* rows lambda; *_dq has "
                  "columns v (the tangent of q),\n"
-                 "*_du columns u. The state is not changed: give one whose loops are closed. Where closures are "
-                 "redundant, forces have the least norm.\n"
+                 "*_du columns u. Without --close the state is taken as it is; largest_gap is the largest residual of "
+                 "a loop (m or rad). Where closures are\nredundant, forces have the least norm.\n"
                  "Examples:\n"
                  "  bielle eval bipetto --state state.json --derivatives\n"
                  "  echo '{\"torques\": {\"crank_joint\": 1}}' | bielle eval fourbar --state -");

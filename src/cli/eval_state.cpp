@@ -7,10 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "formats/text_file.h"
 #include "model/listing.h"
+#include "model/number_text.h"
 #include "results/json_text.h"
 
 namespace bielle::cli {
@@ -33,7 +35,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kDeepest = 20;  // elements of a state are not nested deeper; reading them recurses
+constexpr double kFollows = 1e-6;         // weight of joints that are not given, relative to those that are
+constexpr double kToldDifference = 1e-6;  // rad or m: differences from what is given that are told
+constexpr int kDeepest = 20;              // elements of a state are not nested deeper; reading them recurses
 
 class StateReader {
  public:
@@ -187,6 +191,33 @@ EvalState readState(const Model& model, const std::string& path, ConstVectorRef 
     return StateReader(model, "standard input", q).read(text);
   }
   return StateReader(model, path, q).read(readTextFile(path));
+}
+
+void warnOfMisfit(const std::string& file, const Joint& joint, const std::string& what, double given, double taken) {
+  std::cerr << "bielle: warning: " << file << ": joint '" << joint.name << "': its " << what << " "
+            << formatNumber(given) << " does not fit to the loops; it starts with " << formatNumber(taken) << "\n";
+}
+
+void closeState(const Model& model, const std::string& file, EvalState& state) {
+  if (model.closures().empty()) return;
+  AssemblyProblem problem;
+  problem.q_ref = state.q;
+  problem.weights = VectorXd::Constant(model.nv(), state.placed.empty() ? 1 : kFollows);
+  for (int j : state.placed) {
+    const Joint& joint = model.joints()[j];
+    problem.weights.segment(joint.idx_v, joint.nv).setOnes();
+  }
+  const AssemblyResult closed = assemble(model, problem);
+  if (closed.status != NumericalStatus::Ok)
+    throw InputError(file, closed.worst, "its loop does not close near these positions: " + closed.message,
+                     "give other joints, or fewer: those that are not given follow");
+  const VectorXd moved = model.difference(state.q, closed.q);
+  for (int j : state.placed) {
+    const Joint& joint = model.joints()[j];
+    if (moved.segment(joint.idx_v, joint.nv).cwiseAbs().maxCoeff() > kToldDifference)
+      warnOfMisfit(file, joint, "position", state.q[joint.idx_q], closed.q[joint.idx_q]);
+  }
+  state.q = closed.q;
 }
 
 }  // namespace bielle::cli

@@ -17,6 +17,13 @@ struct EvalState {
 // \param q  of the joints that the file does not give
 EvalState readState(const Model& model, const std::string& path, ConstVectorRef q);
 
+// Closes the loops; joints that the file places stay where they are, if they can, and a warning tells which cannot.
+// \throws InputError when the loops do not close nearby
+// \param file  named in messages
+void closeState(const Model& model, const std::string& file, EvalState& state);
+// Tells that a joint does not start with what the file gives.
+void warnOfMisfit(const std::string& file, const Joint& joint, const std::string& what, double given, double taken);
+
 // The part of eval's help that describes the format of a state.
 extern const char* const kStateHelp;
 

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <iostream>
 #include <limits>
 
 #include "bielle/dynamics/assembly.h"
@@ -12,13 +11,12 @@
 #include "cli/simulate/free.h"
 #include "dynamics/loop_conflict.h"
 #include "model/listing.h"
-#include "model/number_text.h"
 
 namespace bielle::worlds {
 namespace {
 
-constexpr double kFollows = 1e-6;         // weight of joints that are not given, relative to those that are
-constexpr double kToldDifference = 1e-6;  // rad, m, rad/s or m/s: differences from what is given that are told
+constexpr double kToldDifference =
+    1e-6;  // rad/s or m/s, relative above 1: differences from what is given that are told
 
 // The base of a robot with feet as high as puts the lowest sole on the ground.
 void lift(const Model& model, VectorXd& q) {
@@ -44,34 +42,6 @@ VectorXd makePosture(const Model& model, const std::string& name) {
   return q;
 }
 
-void warn(const std::string& file, const Joint& joint, const std::string& what, double given, double taken) {
-  std::cerr << "bielle: warning: " << file << ": joint '" << joint.name << "': its " << what << " "
-            << formatNumber(given) << " does not fit to the loops; it starts with " << formatNumber(taken) << "\n";
-}
-
-// Closes the loops; joints that the file places stay where they are, if they can.
-void close(const Model& model, const std::string& file, cli::EvalState& state) {
-  if (model.closures().empty()) return;
-  AssemblyProblem problem;
-  problem.q_ref = state.q;
-  problem.weights = VectorXd::Constant(model.nv(), state.placed.empty() ? 1 : kFollows);
-  for (int j : state.placed) {
-    const Joint& joint = model.joints()[j];
-    problem.weights.segment(joint.idx_v, joint.nv).setOnes();
-  }
-  const AssemblyResult closed = assemble(model, problem);
-  if (closed.status != NumericalStatus::Ok)
-    throw InputError(file, closed.worst, "its loop does not close near these positions: " + closed.message,
-                     "give other joints, or fewer: those that are not given follow");
-  const VectorXd moved = model.difference(state.q, closed.q);
-  for (int j : state.placed) {
-    const Joint& joint = model.joints()[j];
-    if (moved.segment(joint.idx_v, joint.nv).cwiseAbs().maxCoeff() > kToldDifference)
-      warn(file, joint, "position", state.q[joint.idx_q], closed.q[joint.idx_q]);
-  }
-  state.q = closed.q;
-}
-
 // The least velocity with that of the joints that the file moves; one that keeps the loops closed, if it does not.
 void move(const Model& model, const std::string& file, cli::EvalState& state) {
   if (model.closures().empty() || state.moving.empty()) return;
@@ -90,7 +60,7 @@ void move(const Model& model, const std::string& file, cli::EvalState& state) {
     const Joint& joint = model.joints()[j];
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
       if (std::abs(state.v[k] - given[k]) > kToldDifference * (1 + std::abs(given[k])))
-        warn(file, joint, "velocity", given[k], state.v[k]);
+        cli::warnOfMisfit(file, joint, "velocity", given[k], state.v[k]);
   }
 }
 
@@ -103,7 +73,7 @@ FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments) 
   cli::EvalState state = cli::readState(model, arguments.state, posture);
   if (!state.contacts.empty())
     throw InputError(file, "key 'contacts'", "feet of a free motion stand where the ground holds them", "remove it");
-  close(model, file, state);
+  cli::closeState(model, file, state);
   move(model, file, state);
   return {state.q, state.v, state.u};
 }
