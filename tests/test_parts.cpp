@@ -159,6 +159,64 @@ TEST_CASE("parts: every one of the biped stands, closes and moves in as many way
     }
 }
 
+TEST_CASE("parts: a linkage in any plane, drawn at an angle, has a mirror image that moves as it does") {
+  const std::string wing = R"(mounts: {base: link}
+tree:
+  wing: {parent: base, joint: flap, place: [0.02, 0.1, 0.03], axis: AXIS, range: [-2, 2],
+         solids: [{rod: [origin, [0.1, 0.2, 0.1]], radius: 0.01, mass: 0.5}]}
+linkage:
+  base: base
+  normal: NORMAL
+  through: [0.02, 0.1, 0.03]
+  density: 1
+  points: {motor: [0.0, 0.15], crank: [0.04, 0.15], arm: [0.05, 0.02]}
+  fixed: {base: [motor], wing: {points: [arm], angles: {flap: 0.3}}}
+  bars: {crank: {points: [motor, crank], radius: 0.005}, rod: [crank, arm]}
+  hinges: {motor: motor_flap}
+motors: {motor_flap: {armature: 0.001}}
+)";
+  const std::string bird = R"(base: fixed
+tree:
+  body: {parent: world, joint: fix, type: fixed, solids: [{box: [0.1, 0.1, 0.1], mass: 1}]}
+  w: {part: wing.yaml, sides: [_left, _right], mounts: {base: body}}
+)";
+  for (const char* normal : {"x", "y", "z"}) {
+    CAPTURE(normal);
+    const RobotDirectory files;
+    std::string text = replaceOnce(replaceOnce(wing, "AXIS", normal), "NORMAL", normal);
+    if (*normal == 'y') text = replaceOnce(text, "motor: [0.0,", "motor: [-0.01,");
+    files.write("bird/wing.yaml", text);
+    const Model model = loadRobot(files.write("bird/bird.yaml", bird)).model;
+    const double sign = *normal == 'y' ? 1 : -1;
+    for (const double angle : {0.3, 0.1, -0.1}) {
+      CAPTURE(angle);
+      AssemblyProblem problem;
+      problem.q_ref = findClosedConfiguration(model).q;
+      problem.weights = VectorXd::Constant(model.nv(), 1e-6);
+      for (const char* flap : {"flap_left", "flap_right"}) {
+        getCoordinate(model, problem.q_ref, flap) = flap == std::string("flap_left") ? angle : sign * angle;
+        problem.weights[model.joints()[model.findJoint(flap)].idx_v] = 1;
+      }
+      VectorXd q = assemble(model, problem).q;
+      REQUIRE(getCoordinate(model, q, "flap_left") == Approx(angle));
+      REQUIRE(getCoordinate(model, q, "flap_right") == Approx(sign * angle));
+      CHECK(getCoordinate(model, q, "motor_flap_right") ==
+            Approx(sign * getCoordinate(model, q, "motor_flap_left")).margin(1e-9));
+      Workspace ws(model);
+      updatePlacements(model, ws, q);
+      for (const char* body : {"wing", "crank", "rod"}) {
+        const auto place = [&](const std::string& side) {
+          size_t i = 0;
+          while (model.bodies()[i].name != body + side) ++i;
+          return Vector3d(ws.X_WB[i].act(model.bodies()[i].inertia.com));
+        };
+        CHECK((place("_left") - Vector3d(1, -1, 1).cwiseProduct(place("_right"))).norm() < 1e-9);
+      }
+      if (angle == 0.3) CHECK(std::abs(getCoordinate(model, q, "motor_flap_left")) < 1e-7);  // as drawn
+    }
+  }
+}
+
 TEST_CASE("parts: six-bars by circles that meet") {
   const Eigen::Vector2d hip(0, 0), knee(0, -kThigh);
   const Model watt = makeLegBiped({{"knee", "watt"}});

@@ -85,7 +85,7 @@ Solid readSolid(const YamlEntry& entry, const YamlFields& fields, double side) {
     if (const YamlEntry* rpy = find(fields, "rpy")) solid.X_LS.R = readAttitude(*rpy, side);
     return solid;
   }
-  Vector3d axis = readAxis(require(fields, "axis", entry));
+  Vector3d axis = readAxis(require(fields, "axis", entry), 1);
   axis.y() *= side;
   if (motor)
     return makeCylinder(at, axis, kMotorRadius, kMotorLength, readPositive(*motor), readColor(fields, "motor"));
@@ -105,11 +105,15 @@ Matrix3d readAttitude(const YamlEntry& entry, double side) {
   return makeRotation(Vector3d(side, 1, side).cwiseProduct(entry.getVector3()));
 }
 
-Vector3d readAxis(const YamlEntry& entry) {
-  const Vector3d axis = entry.getVector3();
+Vector3d readAxis(const YamlEntry& entry, double side) {
+  Vector3d axis = entry.getVector3();
   if (!(axis.norm() > 1e-9)) entry.fail("it is no direction", "give x, y, z or three numbers that are not all zero");
-  return axis.normalized();
+  axis.normalize();
+  if (!isAcross(axis)) axis.y() *= side;
+  return axis;
 }
+
+bool isAcross(const Vector3d& axis) { return std::abs(axis.y()) == 1; }
 
 std::vector<Solid> readSolids(const YamlEntry& list, double side) {
   std::vector<Solid> solids;

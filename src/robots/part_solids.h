@@ -12,7 +12,10 @@ Vector3d readPlace(const YamlEntry& entry, double side);
 Matrix3d readAttitude(const YamlEntry& entry, double side);
 
 /// A unit vector, by a name or three numbers; not mirrored.
-Vector3d readAxis(const YamlEntry& entry);
+// Of a joint. In a mirror image (`side` is -1) its y changes its sign, unless it is y itself.
+Vector3d readAxis(const YamlEntry& entry, double side);
+// Whether an axis is at right angles to the plane of mirror images: coordinates about it have the same sign on both sides.
+bool isAcross(const Vector3d& axis);
 
 /// Solids of a list, without those whose `when` is zero. \throws InputError
 std::vector<Solid> readSolids(const YamlEntry& list, double side);

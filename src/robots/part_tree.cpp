@@ -30,9 +30,9 @@ UrdfJoint readJoint(const YamlFields& fields, const YamlEntry& owner, double sid
   const bool has_axis = joint.kind == JointKind::Revolute || joint.kind == JointKind::Prismatic ||
                         joint.kind == JointKind::Planar || joint.kind == JointKind::Universal;
   if (axis && !has_axis) axis->fail("the joint has no axis", "remove it");
-  if (has_axis) joint.axis = readAxis(require(fields, "axis", owner));
+  if (has_axis) joint.axis = readAxis(require(fields, "axis", owner), side);
   if (joint.kind == JointKind::Universal)
-    joint.axis2 = readAxis(require(fields, "axis2", owner));
+    joint.axis2 = readAxis(require(fields, "axis2", owner), side);
   else if (axis2)
     axis2->fail("only a universal joint has it", "remove it");
   const YamlEntry* range = find(fields, "range");

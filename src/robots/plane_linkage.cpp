@@ -123,9 +123,11 @@ class PlaneLinkage {
           std::find_if(joints.begin(), joints.end(), [&link](const UrdfJoint& j) { return j.child == link; });
       if (it == joints.end()) return {};
       const auto angle = body.angles.find(it->joint.name);
+      // Of a mirror image the angle about an axis that is the image of itself, as y is not, has the other sign.
+      const double sign = isAcross(it->joint.axis) ? 1 : place_.side;
       const Matrix3d R = angle == body.angles.end()
                              ? Matrix3d::Identity()
-                             : Eigen::AngleAxisd(angle->second, it->joint.axis).toRotationMatrix();
+                             : Eigen::AngleAxisd(sign * angle->second, it->joint.axis).toRotationMatrix();
       X = it->joint.X_PJ * SE3{R, Vector3d::Zero()} * X;
       link = it->parent;
     }
