@@ -28,7 +28,7 @@ LoadedRobot RobotArgument::load() const {
   robot.warnings.insert(robot.warnings.end(), moved.begin(), moved.end());
   for (const std::string& warning : robot.warnings) std::cerr << "bielle: warning: " << warning << "\n";
   const AssemblyResult closed = findClosedConfiguration(robot.model);
-  if (closed.status != NumericalStatus::Ok) throw makeClosingError(robot.model, robot.directory, closed);
+  if (closed.status != NumericalStatus::Ok) throw makeClosingError(robot.model, robot.path(), closed);
   return robot;
 }
 

@@ -46,7 +46,7 @@ VectorXd findPosture(const LoadedRobot& robot, const std::string& reference) {
   const AssemblyResult result =
       reference.empty() ? findClosedConfiguration(model) : assembleReference(model, reference);
   if (result.status != NumericalStatus::Ok)
-    throw InputError(robot.directory, reference.empty() ? "posture" : "reference '" + reference + "'", result.message,
+    throw InputError(robot.path(), reference.empty() ? "posture" : "reference '" + reference + "'", result.message,
                      "choose another one");
   return result.q;
 }
@@ -54,9 +54,9 @@ VectorXd findPosture(const LoadedRobot& robot, const std::string& reference) {
 int findLocked(const LoadedRobot& robot, const std::string& name) {
   const int joint = robot.model.findJoint(name);
   if (joint <= 0)
-    throw InputError(robot.directory, "joint '" + name + "'", "the robot has no such joint", "correct the name");
+    throw InputError(robot.path(), "joint '" + name + "'", "the robot has no such joint", "correct the name");
   if (robot.model.joints()[joint].nv != 1)
-    throw InputError(robot.directory, "joint '" + name + "'", "it has several coordinates",
+    throw InputError(robot.path(), "joint '" + name + "'", "it has several coordinates",
                      "lock joints of one coordinate");
   return joint;
 }

@@ -32,7 +32,7 @@ VectorXd findStart(const LoadedRobot& robot, const std::string& reference) {
   if (reference.empty()) return findClosedConfiguration(robot.model).q;
   const AssemblyResult result = assembleReference(robot.model, reference);
   if (result.status != NumericalStatus::Ok)
-    throw InputError(robot.directory, "reference '" + reference + "'", result.message, "start from another one");
+    throw InputError(robot.path(), "reference '" + reference + "'", result.message, "start from another one");
   return result.q;
 }
 

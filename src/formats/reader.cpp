@@ -9,6 +9,7 @@
 #include "bielle/model/error.h"
 #include "formats/reader_loops.h"
 #include "formats/robot_files.h"
+#include "model/listing.h"
 #include "model/missing_part.h"
 
 namespace bielle {
@@ -99,12 +100,28 @@ void setImportance(const YamlFile& yaml, UrdfFile& urdf) {
   }
 }
 
+// A key of the file that completes a robot replaces what the robot's own files say: what is then no more is told.
+template <typename Spec>
+void warnOfLost(const char* key, const std::vector<Spec>& own, const std::vector<Spec>& former, std::string Spec::*name,
+                YamlFile& yaml) {
+  std::vector<std::string> lost;
+  for (const Spec& spec : former)
+    if (std::none_of(own.begin(), own.end(), [&](const Spec& other) { return other.*name == spec.*name; }))
+      lost.push_back(spec.*name);
+  if (!own.empty() && !lost.empty())
+    yaml.warnings.push_back(yaml.path + ": key '" + key + "': it replaces that of the robot: left out are " +
+                            listItems(lost));
+}
+
 // Keys of the file that completes a robot take precedence over what the robot's own files say.
 void complete(const YamlFile& own, YamlFile& yaml) {
   const auto replace = [](const auto& from, auto& to) {
     if (!from.empty()) to = from;
   };
   yaml.path = own.path;
+  warnOfLost("motors", own.motors, yaml.motors, &MotorSpec::joint, yaml);
+  warnOfLost("closures", own.closures, yaml.closures, &ClosureSpec::name, yaml);
+  warnOfLost("contacts", own.contacts, yaml.contacts, &ContactSpec::name, yaml);
   replace(own.joint_types, yaml.joint_types);
   yaml.frames.insert(yaml.frames.end(), own.frames.begin(), own.frames.end());
   replace(own.closures, yaml.closures);
@@ -344,6 +361,10 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
 RobotSources& getRobotSources() {
   static RobotSources sources;
   return sources;
+}
+
+std::string LoadedRobot::path() const {
+  return (std::filesystem::path(directory) / std::filesystem::path(file).filename()).lexically_normal().string();
 }
 
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {

@@ -42,7 +42,7 @@ MotionRecord readRecordOf(const LoadedRobot& robot, const fs::path& path) {
   if (record.q_names != makePositionNames(model) || record.v_names != makeVelocityNames(model) ||
       record.u_names != getNames(model.motors()) || record.closure_names != getNames(model.closures()) ||
       record.contact_names != getNames(model.contacts()))
-    throw InputError(path.string(), "columns", "they differ from those of the robot in " + robot.directory,
+    throw InputError(path.string(), "columns", "they differ from those of the robot " + robot.path(),
                      "solve again, or restore the robot");
   return record;
 }

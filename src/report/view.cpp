@@ -47,7 +47,7 @@ std::vector<Group> listGroups(const Model& model) {
 VectorXd makeStart(const LoadedRobot& robot) {
   const Model& model = robot.model;
   const AssemblyResult start = findClosedConfiguration(model);
-  if (start.status != NumericalStatus::Ok) throw makeClosingError(model, robot.directory, start);
+  if (start.status != NumericalStatus::Ok) throw makeClosingError(model, robot.path(), start);
   return start.q;
 }
 

@@ -106,6 +106,7 @@ struct LoadedRobot {
   std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
   std::string directory;              ///< where the files were found
   std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
+  std::string path() const;           ///< of the same file in `directory`, as messages name it
 };
 
 /// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf, bipetto.yaml or .xml in the directories of
