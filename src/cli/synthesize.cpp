@@ -30,6 +30,7 @@ constexpr int kAngles = 25;                           // of a range
 constexpr long kDrawings = 1000000, kRobots = 10000;  // usual samples, in closed form and by their mechanism
 constexpr int kRobotEvaluations = 200;                // of a refinement, likewise by its mechanism
 constexpr long kShownSamples = 1000;
+constexpr int kMostKept = 50;
 
 struct SynthesizeArguments {
   std::vector<double> range, motor_x = {-0.1, 0.1}, motor_z = {0.08, 0.25}, crank = {0.02, 0.1}, arm = {0.02, 0.1};
@@ -119,6 +120,16 @@ SoughtLinkage makeSought(const SynthesizeArguments& a, const JointDemand& demand
   return makeVariedLinkages(a.robot, a.parameters, a.joint, demand, a.distance);
 }
 
+// What an earlier search left there and this one does not write again.
+void removeFormer(const std::string& directory, size_t kept) {
+  for (size_t i = kept; i < kMostKept; ++i) {
+    const fs::path former = fs::path(directory) / getLegName(i);
+    std::error_code ignored;  // a directory with something else in it stays
+    if (fs::remove(former / (former.filename().string() + ".yaml"), ignored)) fs::remove(former, ignored);
+  }
+  std::remove((fs::path(directory) / "design.yaml").c_str());
+}
+
 std::string joinCommandLine() {
   std::string text = "bielle";
   for (size_t i = 1; i < getCommandLine().size(); ++i) text += " " + getCommandLine()[i];
@@ -129,7 +140,7 @@ std::vector<Row> makeTable(const SoughtLinkage& sought, const std::vector<FoundL
                            const JointDemand& demand) {
   const bool has_torques = demand.torques.size() > 0;
   const auto [value, unit] = nameValue(demand);
-  std::vector<Row> rows = {{"", unit.empty() ? value : value + " [" + unit + "]", "ratio", sought.margin}};
+  std::vector<Row> rows = {{"", unit.empty() ? value : value + " [" + unit + "]", "|ratio|", sought.margin}};
   if (has_torques) rows[0].insert(rows[0].end(), {"peak [N m]", "[rad/s]"});
   for (const DesignVariable& variable : sought.variables)
     rows[0].push_back(variable.name + (variable.unit == "1" ? "" : " [" + variable.unit + "]"));
@@ -167,6 +178,7 @@ int synthesize(const SynthesizeArguments& arguments) {
     return kFailed;
   }
   makeOutputDirectory(arguments.directory);
+  removeFormer(arguments.directory, found.size());
   for (size_t i = 0; i < found.size(); ++i) {
     const std::string name = getLegName(i);
     const fs::path directory = fs::path(arguments.directory) / name;
@@ -184,7 +196,6 @@ int synthesize(const SynthesizeArguments& arguments) {
     const std::optional<size_t> start =
         writeDesign(design, sought, found, *motion, arguments.joint, arguments.motor, joinCommandLine());
     if (!start) {
-      std::remove(design.c_str());
       std::cerr << "bielle: warning: none of the robots makes the motion from its plan; there is no design.yaml\n";
       return kFailed;
     }
@@ -204,7 +215,9 @@ void addSynthesize(CLI::App& command, Action& action) {
                      "generated robot whose linkage is looked for; default: that of --motion, or leg_biped");
   CLI::Option* range = add_pair("--range", a->range, "angles of the joint [rad]");
   CLI::Option* ratio = command.add_option("--ratio", a->ratio,
-                                          "requested turns of the motor per turn of the joint, over the whole range");
+                                          "requested turns of the motor per turn of the joint, over the whole range, "
+                                          "in either direction");
+  ratio->check(CLI::PositiveNumber);
   CLI::Option* joint =
       command.add_option("--joint", a->joint, "joint of --like, --motion and --parameter, of the same name in all");
   CLI::Option* like = command.add_option("--like", a->like, "robot whose linkage has the requested ratios");
@@ -238,7 +251,7 @@ void addSynthesize(CLI::App& command, Action& action) {
       .add_option("--samples", a->samples,
                   "linkages at random; default: 1000000 by their drawing, 10000 by --parameter")
       ->check(CLI::Range(1L, 1000000000L));
-  command.add_option("--count", a->count, "linkages kept")->check(CLI::Range(1, 50))->capture_default_str();
+  command.add_option("--count", a->count, "linkages kept")->check(CLI::Range(1, kMostKept))->capture_default_str();
   command.add_option("--seed", a->seed, "of the random numbers")->capture_default_str();
   command.add_option("--threads", a->threads, "threads; 0: one per core")->capture_default_str();
   command.add_option("-o,--output", a->directory, "directory of the robots that have them")->required();
