@@ -24,9 +24,9 @@ bielle_step_packages=(libocct-data-exchange-dev libocct-modeling-algorithms-dev 
 bielle_mesh_packages=(libassimp-dev)
 # ezdxf, which writes DXF files (bielle convert) when it is there. Without it everything else works.
 bielle_dxf_packages=(python3-ezdxf)
-# Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, what tests the Python
-# package.
-bielle_test_packages=(catch2 python3 chromium pkg-config python3-pytest
+# Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, a locale with a decimal
+# comma, what tests the Python package.
+bielle_test_packages=(catch2 python3 locales chromium pkg-config python3-pytest
   python3-mypy python3-nbconvert python3-ipykernel python3-matplotlib)
 
 # Another compiler, by which .ci/run compiles a part.

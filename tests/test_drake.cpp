@@ -275,11 +275,11 @@ TEST_CASE("Drake's URDF in its words, and what they lose") {
         "<drake:joint name=\"cross\" type=\"universal\">", "<drake:joint name=\"knob\" type=\"ball\">",
         "<limit lower=\"-1\" effort=\"7\" velocity=\"3\"/>", "<dynamics damping=\"0.5\" friction=\"0.25\"/>",
         "<drake:ball_constraint_body_A name=\"ground_\"/>", "<drake:ball_constraint_p_AP value=\"3 0 0\"/>",
-        "<drake:ball_constraint_p_BQ value=\"0 0.5 0\"/>", "<drake:ball_constraint_p_AP value=\"0 0.55000000000000004",
+        "<drake:ball_constraint_p_BQ value=\"0 0.5 0\"/>", "<drake:ball_constraint_p_AP value=\"0 0.55",
         "<drake:linear_spring_damper_free_length value=\"0.25\"/>",
         "<drake:linear_spring_damper_stiffness value=\"10\"/>", "<drake:linear_spring_damper_damping value=\"2\"/>",
         "<type>transmission_interface/SimpleTransmission</type>",
-        "<actuator name=\"swing\">\n      <drake:rotor_inertia value=\"0.0050000000000000001\"/>\n      "
+        "<actuator name=\"swing\">\n      <drake:rotor_inertia value=\"0.005\"/>\n      "
         "<drake:gear_ratio value=\"5\"/>"})
     CHECK_THAT(text.urdf, Catch::Contains(part));
   CHECK(text.urdf.find("effort=\"0\"") == std::string::npos);  // of which Drake would make no motor

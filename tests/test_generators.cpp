@@ -14,6 +14,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "leg_biped.h"
 #include "math/so3.h"
+#include "mechanisms.h"
 #include "robot_directory.h"
 #include "robots/cleobot.h"
 #include "robots/delta.h"
@@ -272,6 +273,14 @@ TEST_CASE("files that name a generator: parameters by number and choice, a fixed
     CHECK(model.hasFreeFlyer() == (name != "springy"));
     CHECK(model.nu() == 12);
   }
+  // What a key replaces is told.
+  files.write("geared/geared.yaml", "model: ../mine\nmotors:\n  hipz_left: {effort: 20}\n  hipz_right: {effort: 20}\n");
+  const LoadedRobot geared = loadRobot(files.path() + "/geared");
+  CHECK(geared.model.nu() == 2);
+  REQUIRE(geared.warnings.size() == 1);
+  CHECK_THAT(geared.warnings[0],
+             Catch::Contains("geared.yaml: key 'motors': it replaces that of the robot: left out are") &&
+                 Catch::Contains("hipy_left") && !Catch::Contains("hipz_left"));
 }
 
 TEST_CASE("writer: robots that were read are written and read again") {
@@ -285,6 +294,38 @@ TEST_CASE("writer: robots that were read are written and read again") {
     CHECK(copy.model.name() == model.name());
     checkSame(model, copy.model);
   }
+}
+
+TEST_CASE("writer: every number comes back to the last bit, attitudes to rounding") {
+  std::mt19937 rng(5);
+  for (const MechanismKind& kind : listMechanismKinds())
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      // Universal joints about oblique axes, which its files cannot express.
+      if (kind.joint == JointKind::Universal || kind.base == MechanismBase::FreeFlyer) continue;
+      CAPTURE(kind, repeat);
+      const Model model = makeSprungMechanism(rng, kind.joint, kind.closure, kind.base).model;
+      const RobotDirectory directory;
+      writeRobot(model, directory.path() + "/copy", "");
+      const Model copy = loadRobot(directory.path() + "/copy").model;
+      REQUIRE(copy.numBodies() == model.numBodies());
+      for (size_t i = 1; i < model.bodies().size(); ++i) {
+        const Joint &a = model.joints()[i], &b = copy.joints()[copy.findJoint(a.name)];
+        const Inertia &m = model.bodies()[i].inertia,
+                      &n = copy.bodies()[static_cast<size_t>(&b - copy.joints().data())].inertia;
+        CHECK(a.X_PJ.p == b.X_PJ.p);
+        CHECK((a.X_PJ.R - b.X_PJ.R).cwiseAbs().maxCoeff() < 1e-14);
+        CHECK(m.mass == n.mass);
+        CHECK(m.com == n.com);
+        CHECK(MatrixXd(m.I_com.triangularView<Eigen::Upper>()) == MatrixXd(n.I_com.triangularView<Eigen::Upper>()));
+      }
+      for (size_t c = 0; c < model.closures().size(); ++c) {
+        CHECK(model.closures()[c].X_B1.p == copy.closures()[c].X_B1.p);
+        CHECK(model.closures()[c].X_B2.p == copy.closures()[c].X_B2.p);
+        CHECK(model.closures()[c].offset == copy.closures()[c].offset);
+      }
+      for (size_t s = 0; s < model.pointSprings().size(); ++s)
+        CHECK(model.pointSprings()[s].stiffness == copy.pointSprings()[s].stiffness);
+    }
 }
 
 TEST_CASE("writer: names are escaped, what the files cannot say is refused") {

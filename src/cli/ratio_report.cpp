@@ -1,7 +1,6 @@
 #include "cli/ratio_report.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <ostream>
@@ -11,6 +10,7 @@
 #include "formats/aside_file.h"
 #include "formats/text_file.h"
 #include "model/listing.h"
+#include "model/number_text.h"
 #include "results/plot.h"
 
 namespace fs = std::filesystem;
@@ -59,13 +59,6 @@ Json describeSamples(const std::vector<RatioSample>& samples, int swept) {
   Json list = Json::array();
   for (const RatioSample& sample : samples) list.push_back(describeSample(sample, swept));
   return list;
-}
-
-// The shortest text that reads back to the same number; empty for infinity.
-std::string formatExact(double value) {
-  if (!std::isfinite(value)) return "";
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
 std::string formatCsv(const Linkage& linkage, const std::vector<RatioSample>& samples, int swept) {

@@ -17,7 +17,7 @@ constexpr double kLeastShown = 0.01;      // rad/s and N m: less is rest
 
 Json packFinite(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
-double roundShown(double value) { return std::stod(formatNumber(value, "%.5g")); }
+double roundShown(double value) { return parseNumber(formatNumber(value, "%.5g")).value_or(value); }
 
 // Whether the margin from dead points is a constraint, which is shown as such.
 bool isMarginBound(const DesignEvaluator& evaluator) {

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <numeric>
-#include <sstream>
 
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
@@ -201,7 +200,7 @@ void writeMotion(std::ostream& out, const Model& model, const Model& best, const
 
 std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRun& run) {
   const Parametrization& robot = evaluator.robot();
-  std::ostringstream out;
+  TextStream out;
   out << "# Design of " << robot.startModel().name() << "\n\nMade by `bielle design` from "
       << fs::path(spec.path).filename().string() << ", motions " << getName(spec.mode)
       << ". The robot is in `best`; rows of motors that change by less than a thousandth are left out.\n\n";

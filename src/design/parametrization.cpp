@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include "bielle/model/error.h"
 #include "bielle/robots/robot_loader.h"
@@ -262,7 +261,7 @@ void Parametrization::finish() {
     const DesignVariable& variable = variables_[i];
     const Eigen::Index k = static_cast<Eigen::Index>(i);
     lower_[k] = variable.lower, upper_[k] = variable.upper;
-    std::ostringstream bounds;
+    TextStream bounds;
     bounds << variable.lower << " .. " << variable.upper;
     const std::string element = "variable '" + variable.name + "'";
     if (!names.insert(variable.name).second) throw InputError(source_, element, "it is given twice", "rename one");
@@ -271,7 +270,7 @@ void Parametrization::finish() {
       throw InputError(source_, element, "its bounds " + bounds.str() + " are in the wrong order",
                        "give the lower one first");
     if (!(start_[k] >= variable.lower && start_[k] <= variable.upper)) {
-      std::ostringstream problem;
+      TextStream problem;
       problem << "the robot has " << describeValue(variable, start_[k]) << ", outside its bounds " << bounds.str();
       throw InputError(source_, element, problem.str(),
                        variable.motors.empty() ? "widen the bounds" : "widen the bounds, or give `start`");

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <random>
-#include <sstream>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
@@ -12,6 +11,7 @@
 #include "math/decompositions.h"
 #include "math/largest.h"
 #include "math/so3.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -188,7 +188,7 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, cons
   if (closed) {
     result.message = "closed";
   } else {
-    std::ostringstream text;
+    TextStream text;
     text << worst << " stays open by " << gap << " (m or rad) after " << result.iterations
          << " iterations; the targets may be out of reach, or the start may be on the wrong branch of the mechanism";
     result.message = text.str();

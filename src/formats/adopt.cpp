@@ -24,11 +24,7 @@ constexpr double kOver = 0.005;                                 // from the cent
 constexpr int kShifts = 20;
 constexpr double kRotor = 1e-3, kLever = 0.02, kSole = 0.1;
 
-std::string format(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", std::abs(value) < 1e-9 ? 0.0 : value);
-  return text;
-}
+std::string format(double value) { return formatNumber(std::abs(value) < 1e-9 ? 0.0 : value, "%.4g"); }
 
 double round(double length) { return std::round(length * 1e4) / 1e4; }
 
@@ -117,7 +113,7 @@ class Adopter {
 
   void writeFrames() {
     const auto write = [this](const char* key, const Vector3d& v) {
-      out_ << Key << key << Value << BeginSeq << formatRounded(v.x()) << formatRounded(v.y()) << formatRounded(v.z())
+      out_ << Key << key << Value << BeginSeq << formatExact(v.x()) << formatExact(v.y()) << formatExact(v.z())
            << EndSeq;
     };
     out_ << Key << "frames" << Value << BeginMap;

@@ -3,28 +3,11 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
-#include "model/number_text.h"
 
 namespace bielle {
 
-std::string formatRobotNumber(double value, const char* format) {
-  const std::string text = formatNumber(value, format);
-  return text == "-0" ? "0" : text;
-}
-
-std::string formatRounded(double value) {
-  constexpr double kWhole = 1e4;  // whose last digit is over 1e-12
-  return formatRobotNumber(std::abs(value) < kWhole ? std::round(value * 1e12) / 1e12 : value, "%.15g");
-}
-
-std::string formatRounded(const Vector3d& v, const char* separator) {
-  return formatRounded(v.x()) + separator + formatRounded(v.y()) + separator + formatRounded(v.z());
-}
-
-std::string formatExact(double value) { return formatNumber(value + 0.0, "%.17g"); }  // + 0.0: no negative zero
-
-std::string formatExact(const Vector3d& v) {
-  return formatExact(v.x()) + " " + formatExact(v.y()) + " " + formatExact(v.z());
+std::string formatExact(const Vector3d& v, const char* separator) {
+  return formatExact(v.x()) + separator + formatExact(v.y()) + separator + formatExact(v.z());
 }
 
 bool hasImpliedFreeFlyer(const Model& model) {

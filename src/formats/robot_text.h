@@ -3,19 +3,12 @@
 #include <string>
 
 #include "bielle/model/model.h"
+#include "model/number_text.h"
 
 namespace bielle {
 
-/// A mass, an inertia or whatever else has no scale: twelve digits unless `format` (of printf, for one double) says others.
-std::string formatRobotNumber(double value, const char* format = "%.12g");
-
-/// A length, an angle or a direction, rounded to 1e-12.
-std::string formatRounded(double value);
-std::string formatRounded(const Vector3d& v, const char* separator = " ");
-
-/// Every digit of a number: what is read back is the same.
-std::string formatExact(double value);
-std::string formatExact(const Vector3d& v);
+/// Every digit (model/number_text.h): what is read back is the same. Loops that close by construction stay closed.
+std::string formatExact(const Vector3d& v, const char* separator = " ");
 
 /// The root link is carried by the free-flyer that the reader makes: nothing else is on the ground.
 bool hasImpliedFreeFlyer(const Model& model);

@@ -16,7 +16,7 @@ namespace {
 using YAML::BeginMap, YAML::BeginSeq, YAML::EndMap, YAML::EndSeq, YAML::Emitter, YAML::Flow, YAML::Key, YAML::Value;
 
 Emitter& operator<<(Emitter& out, const Vector3d& v) {
-  return out << Flow << BeginSeq << formatRounded(v.x()) << formatRounded(v.y()) << formatRounded(v.z()) << EndSeq;
+  return out << Flow << BeginSeq << formatExact(v.x()) << formatExact(v.y()) << formatExact(v.z()) << EndSeq;
 }
 
 // The letter of a direction that is an axis of its frame, or 0.
@@ -69,7 +69,7 @@ class YamlWriter {
   }
 
   Emitter& add(const std::string& key, const std::string& value) { return out_ << Key << key << Value << value; }
-  void add(const std::string& key, double value) { add(key, formatRobotNumber(value)); }
+  void add(const std::string& key, double value) { add(key, formatExact(value)); }
   void addUnless(double without, const std::string& key, double value) {
     if (value != without) add(key, value);
   }
@@ -172,10 +172,10 @@ class YamlWriter {
       out_ << Key << c.name << Value << Flow << BeginMap;
       add("frame", findFrameName(model_, c.body, c.X_BF, c.name + "_sole"));
       add("type", getName(c.kind));
-      if (c.kind == ContactKind::Edge5D) out_ << Key << "length" << Value << formatRounded(2 * c.half_length);
+      if (c.kind == ContactKind::Edge5D) out_ << Key << "length" << Value << formatExact(2 * c.half_length);
       if (c.kind == ContactKind::Surface6D)
-        out_ << Key << "sole" << Value << Flow << BeginSeq << formatRounded(2 * c.half_length)
-             << formatRounded(2 * c.half_width) << EndSeq;
+        out_ << Key << "sole" << Value << Flow << BeginSeq << formatExact(2 * c.half_length)
+             << formatExact(2 * c.half_width) << EndSeq;
       out_ << EndMap;
     });
   }
@@ -185,8 +185,8 @@ class YamlWriter {
     for (const Joint& joint : model_.joints())
       if (joint.position_importance != 1 || joint.velocity_importance != 1) joints.push_back(&joint);
     writeMap("importance", "", joints, [this](const Joint* joint) {
-      out_ << Key << joint->name << Value << Flow << BeginSeq << formatRobotNumber(joint->position_importance)
-           << formatRobotNumber(joint->velocity_importance) << EndSeq;
+      out_ << Key << joint->name << Value << Flow << BeginSeq << formatExact(joint->position_importance)
+           << formatExact(joint->velocity_importance) << EndSeq;
     });
   }
 
@@ -197,14 +197,14 @@ class YamlWriter {
       for (const auto& [name, values] : reference.joints) {
         out_ << Key << name << Value;
         if (values.size() != 1) out_ << Flow << BeginSeq;
-        for (double value : values) out_ << formatRounded(value);
+        for (double value : values) out_ << formatExact(value);
         if (values.size() != 1) out_ << EndSeq;
       }
       if (!reference.joints.empty()) out_ << EndMap;
       if (!reference.height_frame.empty()) {
         out_ << Key << "height" << Value << Flow << BeginMap;
         add("frame", reference.height_frame);
-        add("value", formatRounded(reference.height)) << EndMap;
+        add("value", formatExact(reference.height)) << EndMap;
       }
       if (!reference.feet.empty()) out_ << Key << "feet" << Value << BeginMap;
       for (const auto& [name, place] : reference.feet) out_ << Key << name << Value << place;
@@ -227,9 +227,9 @@ std::vector<std::pair<const char*, std::string>> getMotorData(const Motor& motor
   const MotorDrive &drive = motor.drive, ideal;
   std::vector<std::pair<const char*, std::string>> data;
   const auto add = [&data](const char* key, double value, double unless) {
-    if (value != unless) data.emplace_back(key, formatRobotNumber(value));
+    if (value != unless) data.emplace_back(key, formatExact(value));
   };
-  if (motor.torque_loss) data.emplace_back("torque_loss", formatRobotNumber(*motor.torque_loss));
+  if (motor.torque_loss) data.emplace_back("torque_loss", formatExact(*motor.torque_loss));
   add("continuous_effort", motor.continuous_effort, HUGE_VAL);
   if (!drive.type.empty()) data.emplace_back("catalogue_type", drive.type);
   add("ratio", drive.ratio, ideal.ratio);

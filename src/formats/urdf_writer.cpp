@@ -12,8 +12,8 @@ namespace bielle {
 namespace {
 
 void addOrigin(XMLElement& e, const SE3& X) {
-  XMLElement& origin = addElement(e, "origin", {{"xyz", formatRounded(X.p)}});
-  if (!X.R.isIdentity(1e-15)) setAttributes(origin, {{"rpy", formatRounded(calcRollPitchYaw(X.R))}});
+  XMLElement& origin = addElement(e, "origin", {{"xyz", formatExact(X.p)}});
+  if (!X.R.isIdentity(1e-15)) setAttributes(origin, {{"rpy", formatExact(calcRollPitchYaw(X.R))}});
 }
 
 class UrdfWriter {
@@ -69,7 +69,7 @@ class UrdfWriter {
  private:
   std::string getMaterial(const Eigen::Vector4d& rgba) {
     std::string color;
-    for (int i = 0; i < 4; ++i) color += (i ? " " : "") + formatRounded(rgba[i]);
+    for (int i = 0; i < 4; ++i) color += (i ? " " : "") + formatExact(rgba[i]);
     const auto it = colors_.emplace(color, "color_" + std::to_string(colors_.size() + 1)).first;
     return it->second;
   }
@@ -80,17 +80,15 @@ class UrdfWriter {
     if (body.inertia.mass > 0) {
       const Matrix3d& I = body.inertia.I_com;
       XMLElement& inertial = addElement(link, "inertial");
-      addElement(inertial, "origin", {{"xyz", formatRounded(body.inertia.com)}});
-      addElement(inertial, "mass", {{"value", formatRobotNumber(body.inertia.mass)}});
-      const double least = 1e-12 * I.diagonal().maxCoeff();  // products below it are rounding
-      const auto format = [&](double value) { return formatRobotNumber(std::abs(value) < least ? 0 : value); };
+      addElement(inertial, "origin", {{"xyz", formatExact(body.inertia.com)}});
+      addElement(inertial, "mass", {{"value", formatExact(body.inertia.mass)}});
       addElement(inertial, "inertia",
-                 {{"ixx", format(I(0, 0))},
-                  {"iyy", format(I(1, 1))},
-                  {"izz", format(I(2, 2))},
-                  {"ixy", format(I(0, 1))},
-                  {"ixz", format(I(0, 2))},
-                  {"iyz", format(I(1, 2))}});
+                 {{"ixx", formatExact(I(0, 0))},
+                  {"iyy", formatExact(I(1, 1))},
+                  {"izz", formatExact(I(2, 2))},
+                  {"ixy", formatExact(I(0, 1))},
+                  {"ixz", formatExact(I(0, 2))},
+                  {"iyz", formatExact(I(1, 2))}});
     }
     for (const Visual& visual : model_.visuals())
       if (visual.body == i) writeVisual(visual, addElement(link, "visual"));
@@ -104,16 +102,16 @@ class UrdfWriter {
     const Vector3d& size = visual.size;
     switch (visual.shape) {
       case Visual::Shape::Box:
-        addElement(geometry, "box", {{"size", formatRounded(size)}});
+        addElement(geometry, "box", {{"size", formatExact(size)}});
         break;
       case Visual::Shape::Cylinder:
-        addElement(geometry, "cylinder", {{"radius", formatRounded(size[0])}, {"length", formatRounded(size[1])}});
+        addElement(geometry, "cylinder", {{"radius", formatExact(size[0])}, {"length", formatExact(size[1])}});
         break;
       case Visual::Shape::Sphere:
-        addElement(geometry, "sphere", {{"radius", formatRounded(size[0])}});
+        addElement(geometry, "sphere", {{"radius", formatExact(size[0])}});
         break;
       case Visual::Shape::Mesh:
-        addElement(geometry, "mesh", {{"filename", visual.mesh}, {"scale", formatRounded(size)}});
+        addElement(geometry, "mesh", {{"filename", visual.mesh}, {"scale", formatExact(size)}});
         break;
     }
     addElement(e, "material", {{"name", getMaterial(visual.rgba)}});
@@ -129,12 +127,11 @@ class UrdfWriter {
     cylinder.shape = Visual::Shape::Cylinder;
     cylinder.size = {shape.radius, 2 * half.z(), 0};
     if (half.isZero())
-      addElement(geometry, "sphere", {{"radius", formatRounded(shape.radius)}});
+      addElement(geometry, "sphere", {{"radius", formatExact(shape.radius)}});
     else if (half.head<2>().isZero() && shape.radius > 0 && fitShape(cylinder)->radius > 0)
-      addElement(geometry, "cylinder",
-                 {{"radius", formatRounded(shape.radius)}, {"length", formatRounded(2 * half.z())}});
+      addElement(geometry, "cylinder", {{"radius", formatExact(shape.radius)}, {"length", formatExact(2 * half.z())}});
     else
-      addElement(geometry, "box", {{"size", formatRounded(2 * (half + Vector3d::Constant(shape.radius)))}});
+      addElement(geometry, "box", {{"size", formatExact(2 * (half + Vector3d::Constant(shape.radius)))}});
   }
 
   void writeJoint(int i) {
@@ -150,7 +147,7 @@ class UrdfWriter {
     addOrigin(e, joint.X_PJ);
     addElement(e, "parent", {{"link", model_.bodies()[joint.parent].name}});
     addElement(e, "child", {{"link", model_.bodies()[i].name}});
-    if (joint.nv == 1 || joint.kind == JointKind::Planar) addElement(e, "axis", {{"xyz", formatRounded(joint.axis)}});
+    if (joint.nv == 1 || joint.kind == JointKind::Planar) addElement(e, "axis", {{"xyz", formatExact(joint.axis)}});
     writeLimits(joint, e);
     if (warnings_) writeMimicAndDynamics(i, e);
   }
@@ -169,9 +166,9 @@ class UrdfWriter {
     const double effort = warnings_ ? getEffortLimit(joint) : HUGE_VAL;
     if (!ranged && !slow && std::isinf(effort) && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
     XMLElement& limit = addElement(e, "limit");
-    if (ranged) setAttributes(limit, {{"lower", formatRounded(lower[0])}, {"upper", formatRounded(upper[0])}});
-    setAttributes(limit, {{"effort", formatRobotNumber(std::isfinite(effort) ? effort : 0)},
-                          {"velocity", formatRobotNumber(slow ? velocity[0] : 0)}});
+    if (ranged) setAttributes(limit, {{"lower", formatExact(lower[0])}, {"upper", formatExact(upper[0])}});
+    setAttributes(limit, {{"effort", formatExact(std::isfinite(effort) ? effort : 0)},
+                          {"velocity", formatExact(slow ? velocity[0] : 0)}});
   }
 
   double getEffortLimit(const Joint& joint) const {
@@ -192,7 +189,7 @@ class UrdfWriter {
                                       {"upper", upper[0]},
                                       {"effort", getEffortLimit(joint)},
                                       {"velocity", velocity[0]}})
-      if (std::isfinite(value)) setAttributes(limit, {{name, formatRobotNumber(value, "%.17g")}});
+      if (std::isfinite(value)) setAttributes(limit, {{name, formatExact(value)}});
     if (!limit.FirstAttribute()) e.DeleteChild(&limit);
   }
 
@@ -200,15 +197,13 @@ class UrdfWriter {
     if (const auto it = mimics_.find(i); it != mimics_.end())
       addElement(e, "mimic",
                  {{"joint", model_.joints()[it->second.joint].name},
-                  {"multiplier", formatRobotNumber(it->second.multiplier, "%.17g")},
-                  {"offset", formatRobotNumber(it->second.offset, "%.17g")}});
+                  {"multiplier", formatExact(it->second.multiplier)},
+                  {"offset", formatExact(it->second.offset)}});
     for (const JointForce& force : model_.jointForces()) {
       if (force.joint != i) continue;
       const std::string element = "joint '" + model_.joints()[i].name + "'";
       if (force.damping != 0 || force.friction != 0)
-        addElement(e, "dynamics",
-                   {{"damping", formatRobotNumber(force.damping, "%.17g")},
-                    {"friction", formatRobotNumber(force.friction, "%.17g")}});
+        addElement(e, "dynamics", {{"damping", formatExact(force.damping)}, {"friction", formatExact(force.friction)}});
       if (force.friction != 0 && force.friction_speed != JointForce().friction_speed)
         warn(element, "its friction_speed is left out");
       if (force.friction != 0 && for_drake_) warn(element, "its friction is written, but Drake ignores it");

@@ -9,6 +9,7 @@
 
 #include "bielle/model/error.h"
 #include "formats/text_file.h"
+#include "model/number_text.h"
 
 namespace bielle {
 
@@ -40,8 +41,7 @@ bool YamlEntry::isList() const { return node_->IsSequence(); }
 bool YamlEntry::isWord(const std::string& word) const { return node_->IsScalar() && node_->Scalar() == word; }
 
 bool YamlEntry::isText() const {
-  double value;
-  return node_->IsScalar() && !node_->Scalar().empty() && !YAML::convert<double>::decode(*node_, value);
+  return node_->IsScalar() && !node_->Scalar().empty() && !parseNumber(node_->Scalar());
 }
 
 std::string YamlEntry::getText() const {
@@ -50,10 +50,10 @@ std::string YamlEntry::getText() const {
 }
 
 double YamlEntry::getNumber(bool may_be_infinite) const {
-  double value = 0;
   if (!node_->IsScalar()) fail("it is not a number", "give one number");
-  const bool begins_a_name = std::isalpha(static_cast<unsigned char>(node_->Scalar().c_str()[0])) != 0;
-  if ((symbols_ && begins_a_name) || !YAML::convert<double>::decode(*node_, value)) {
+  const std::optional<double> number = parseNumber(node_->Scalar());
+  double value = number.value_or(0);
+  if (!number) {
     if (!symbols_) fail("it is not a number", "give one number");
     try {
       value = symbols_->calcNumber(node_->Scalar());

@@ -76,10 +76,7 @@ std::string formatOption(const OptionValue& value) {
   if (const bool* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
   if (const int* whole = std::get_if<int>(&value)) return std::to_string(*whole);
   if (const std::string* name = std::get_if<std::string>(&value)) return *name;
-  const double number = std::get<double>(value);
-  double read = 0;
-  const std::string brief = formatNumber(number);
-  return parse(brief, read) && read == number ? brief : formatNumber(number, "%.17g");
+  return formatExact(std::get<double>(value));
 }
 
 OptionValue parseOption(const std::string& text) {

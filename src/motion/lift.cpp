@@ -2,13 +2,13 @@
 
 #include <cmath>
 #include <memory>
-#include <sstream>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
 #include "math/decompositions.h"
 #include "math/largest.h"
+#include "model/number_text.h"
 #include "motion/posture_lift.h"
 #include "motion/slsqp.h"
 
@@ -20,7 +20,7 @@ constexpr double kTorqueStep = 1e-3;     // N m, of the differences of Eq. (1)
 constexpr double kWeakDirection = 1e-9;  // of the torques in Eq. (1), relative singular values: left alone
 
 std::string describe(const char* what, double value, double tolerance) {
-  std::ostringstream text;
+  TextStream text;
   text << what << " has an error of " << value << ", more than " << tolerance;
   return text.str();
 }

@@ -1,7 +1,8 @@
 #include "motion/posture_lift.h"
 
 #include <cmath>
-#include <sstream>
+
+#include "model/number_text.h"
 
 #include "math/largest.h"
 
@@ -87,7 +88,7 @@ NumericalStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
   if (calcLargest(miss) <= 1e3 * kTolerance) return NumericalStatus::Ok;
   Eigen::Index worst;
   miss.cwiseAbs().maxCoeff(&worst);
-  std::ostringstream text;
+  TextStream text;
   text << "joint '" << linkage.joint_names[worst] << "' must reach " << target[worst]
        << ", but its linkage only reaches " << target[worst] - miss[worst];
   return fail(NumericalStatus::NotClosed, linkage.joint_names[worst], text.str());

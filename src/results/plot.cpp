@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 #include "formats/aside_file.h"
 #include "formats/process.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -140,7 +140,7 @@ bool drawPlots(const std::string& path, const std::vector<Plot>& plots) {
   AsideFile figure(path), source(path + ".gnuplot");  // the script is never committed and thus removed
   const bool tall = !plots.empty() && (plots[0].scale == PlotScale::Polar || !plots[0].shades.squares.empty());
   const int height = (tall ? kTallHeight : kPlotHeight) * static_cast<int>(plots.size());
-  std::ostringstream script;
+  TextStream script;
   script.precision(kDigits);
   script << "set terminal svg size " << kWidth << "," << height << " font 'Helvetica,13' background 'white'\n"
          << "set output " << quote(figure.aside()) << "\nset encoding utf8\nset multiplot layout " << plots.size()

@@ -1,7 +1,6 @@
 #include "results/workshop_sheet.h"
 
 #include <cmath>
-#include <sstream>
 
 #include "formats/pivots.h"
 #include "model/number_text.h"
@@ -29,7 +28,7 @@ std::string formatSheet(const Model& model) {
 }
 
 std::string formatSheetTable(const Model& model) {
-  std::ostringstream out;
+  TextStream out;
   const auto write = [&out](const char* kind, const std::string& of, const std::string& from, const std::string& to,
                             double value, const char* unit) {
     out << kind << "," << formatField(of) << "," << formatField(from) << "," << formatField(to) << ","

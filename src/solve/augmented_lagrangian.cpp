@@ -4,9 +4,10 @@
 #include <cmath>
 #include <iomanip>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 #include <utility>
+
+#include "model/number_text.h"
 
 namespace bielle {
 
@@ -293,7 +294,7 @@ void AugmentedLagrangian::move(const std::vector<NodeSource>& sources) {
 }
 
 std::string AugmentedLagrangian::describeWorst(const ShootingProblem& problem) const {
-  std::ostringstream out;
+  TextStream out;
   out << problem.getConstraintName(at_.worst_node, at_.worst_row) << " at node " << at_.worst_node;
   if (std::isnan(at_.violation))
     out << " is not a number";

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
-#include <sstream>
 
 #include "formats/text_file.h"
+#include "model/number_text.h"
 #include "results/plot.h"
 #include "tasks/cells.h"
 
@@ -131,7 +131,7 @@ void printSpeeds(std::ostream& page, const ArchitectureSpec& spec, const std::ve
 std::string formatCsv(const ArchitectureSpec& spec, const std::vector<Contender>& contenders,
                       const ArchitectureResults& results) {
   const std::vector<Row> rows = listRows(spec);
-  std::ostringstream csv;
+  TextStream csv;
   csv.precision(9);
   csv << "robot,motion,outcome,iterations";
   for (const Row& row : rows) csv << "," << quoteCsv(row.key);
@@ -208,7 +208,7 @@ std::vector<std::string> writeArchitectures(const std::string& directory, const 
                                             const std::vector<Contender>& contenders,
                                             const ArchitectureResults& results, std::vector<std::string>& notes) {
   std::vector<std::string> paths;
-  std::ostringstream page;
+  TextStream page;
   page << "# Robots compared\n\nMade by `bielle compare` from " << std::filesystem::path(spec.path).filename().string()
        << ". " << kExplanation << describeConstant(spec.drives) << ", " << formatCell(100 * spec.drives.regeneration, 0)
        << " % of the braking energy regenerated; cost of transport: energy over weight and distance.\n\n";

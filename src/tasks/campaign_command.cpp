@@ -6,6 +6,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
+#include "model/number_text.h"
 #include "tasks/cases.h"
 #include "tasks/cells.h"
 #include "tasks/child.h"
@@ -23,7 +24,7 @@ const CampaignAxis* findAxis(const CampaignSpec& spec, Kind kind) {
 
 // The time at which the share behind the point of a phase has passed, s.
 double calcPhaseTime(const CampaignAxis& axis, const std::string& value, const std::string& directory) {
-  const double phase = std::stod(value), index = std::floor(phase);
+  const double phase = parseNumber(value).value(), index = std::floor(phase);
   const MotionSummary summary = readSummary(directory);
   if (index < 0 || index >= static_cast<double>(summary.phases.size()))
     axis.entry.fail("the plan in " + directory + " has no phase " + formatExact(index),

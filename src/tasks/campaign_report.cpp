@@ -5,9 +5,9 @@
 #include <map>
 #include <numeric>
 #include <optional>
-#include <sstream>
 
 #include "formats/text_file.h"
+#include "model/number_text.h"
 #include "results/plot.h"
 #include "tasks/cells.h"
 
@@ -49,7 +49,7 @@ std::string formatField(const Json& value) {
 }
 
 std::string formatCsv(const CampaignResults& results) {
-  std::ostringstream csv;
+  TextStream csv;
   for (const std::string& column : results.columns) csv << quoteCsv(column) << ",";
   std::vector<std::string> fields;
   for (const CampaignRun& run : results.runs)
@@ -160,7 +160,7 @@ std::map<std::string, int> countOutcomes(const CampaignResults& results) {
 }
 
 std::string formatPage(const CampaignResults& results, bool has_map) {
-  std::ostringstream page;
+  TextStream page;
   page << "# Campaign\n\n" << results.runs.size() << " runs:";
   const char* comma = " ";
   for (const auto& [outcome, count] : countOutcomes(results)) {
@@ -216,7 +216,8 @@ Plot makeMap(const CampaignResults& results, const Groups& groups, size_t direct
     for (const std::string& value : condition) label += (label.empty() ? "" : ", ") + value;
     Curve curve{label, getCurveColor(plot.curves.size()), {}, CurveStyle::LinesPoints};
     std::map<double, std::vector<double>> impulses;
-    for (const SurvivedImpulse& one : found) impulses[std::stod(one.values[direction])].push_back(one.impulse);
+    for (const SurvivedImpulse& one : found)
+      impulses[parseNumber(one.values[direction]).value()].push_back(one.impulse);
     for (const auto& [angle, all] : impulses)
       curve.points.emplace_back(angle, std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size()));
     curve.points.push_back(curve.points.front());
@@ -239,7 +240,7 @@ std::vector<SurvivedImpulse> findSurvivedImpulses(const CampaignResults& results
     const std::vector<std::string> values(results.runs[i].values.begin(), results.runs[i].values.end() - 1);
     std::map<double, bool> stood;
     for (; i < results.runs.size() && isSame(results.runs[i], values); ++i)
-      stood[std::stod(results.runs[i].values.back())] = results.runs[i].stood();
+      stood[parseNumber(results.runs[i].values.back()).value()] = results.runs[i].stood();
     SurvivedImpulse found{values, 0, false};
     for (const auto& [impulse, survived] : stood) {
       if (!survived) {

@@ -18,6 +18,7 @@
 #include "formats/aside_file.h"
 #include "formats/process.h"
 #include "formats/text_file.h"
+#include "model/number_text.h"
 #include "results/json_text.h"
 #include "tasks/case_task.h"
 
@@ -79,8 +80,7 @@ std::string describeOutcome(const CaseOutcome& outcome) {
   const StepOutcome& last = outcome.steps.back();
   double seconds = 0;
   for (const StepOutcome& step : outcome.steps) seconds += step.seconds;
-  char time[32];
-  std::snprintf(time, sizeof time, " (%.1f s)", seconds);
+  const std::string time = formatNumber(seconds, " (%.1f s)");
   if (last.status >= 128) return "terminated by signal " + std::to_string(last.status - 128) + time;
   if (last.status == kNotStarted) return std::string("the command could not be started") + time;
   if (last.status == kNoResult) return "no result: " + last.error + time;
@@ -249,9 +249,7 @@ std::string makeIdentity(const std::vector<fs::path>& files) {
     for (std::istreambuf_iterator<char> c(file), end; c != end; ++c)
       hash = (hash ^ static_cast<unsigned char>(*c)) * 0x100000001b3;
   }
-  char text[32];
-  std::snprintf(text, sizeof text, " %016llx", static_cast<unsigned long long>(hash));
-  return getBuildInfo().bielle + text;
+  return getBuildInfo().bielle + formatText(" %016llx", static_cast<unsigned long long>(hash));
 }
 
 RunOutcome runCases(const std::string& directory, const std::vector<Case>& cases, const RunOptions& options) {

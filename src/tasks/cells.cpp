@@ -1,24 +1,14 @@
 #include "tasks/cells.h"
 
-#include <charconv>
 #include <cmath>
-#include <sstream>
+
+#include "model/number_text.h"
 
 namespace bielle::tasks {
 
-std::string formatExact(double value) {
-  if (!std::isfinite(value)) return "";
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
-
 std::string formatCell(double value, int digits) {
   if (!std::isfinite(value)) return "–";
-  std::ostringstream text;
-  text.setf(std::ios::fixed);
-  text.precision(digits);
-  text << value;
-  return text.str();
+  return formatText("%.*f", digits, value);
 }
 
 std::string quoteCsv(const std::string& text) {

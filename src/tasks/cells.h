@@ -9,8 +9,6 @@ constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 // With the given number of decimals; a dash for NaN.
 std::string formatCell(double value, int digits);
-// The shortest text that reads back to the same number; empty for NaN.
-std::string formatExact(double value);
 // A text as a field of a CSV table.
 std::string quoteCsv(const std::string& text);
 

@@ -11,6 +11,7 @@
 #include "bielle/motion/registry.h"
 #include "formats/text_file.h"
 #include "formats/yaml_entry.h"
+#include "model/number_text.h"
 #include "tasks/campaign_spec.h"
 #include "tasks/cells.h"
 
@@ -129,7 +130,7 @@ void addMotions(const YamlEntry& entry, DatasetNames& names, DatasetSpec& spec) 
         if (value.find('/') != std::string::npos)
           motion.robot = (fs::absolute(spec.path).parent_path() / value).lexically_normal().string();
       } else if (axis.kind == AxisKind::Payload) {
-        motion.payload = std::stod(value);
+        motion.payload = parseNumber(value).value();
         if (motion.payload > 0) carried = "_payload_" + value;
       } else {
         auto& values = axis.kind == AxisKind::Setting  ? motion.set

@@ -137,7 +137,7 @@ std::string makeEnergyText(const MotionRecord& record, const std::vector<Books>&
                              b.stop_loss,
                              b.other_loss,
                              calcImbalance(books.front(), b)};
-    for (size_t c = 0; c < std::size(values); ++c) text += (c ? "," : "") + formatNumber(values[c], "%.17g");
+    for (size_t c = 0; c < std::size(values); ++c) text += (c ? "," : "") + formatExact(values[c]);
     text += "\n";
   }
   return text;
