@@ -8,6 +8,7 @@
 #include "bielle/formats/reader.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
+#include "change_model.h"
 #include "control/foot_model.h"
 #include "count_allocations.h"
 #include "math/so3.h"
@@ -16,6 +17,7 @@
 namespace bielle {
 namespace {
 
+using bielle::testing::changeModel;
 using bielle::testing::loadOwn;
 
 constexpr double kReadingPeriod = 2e-3;  // s
@@ -180,6 +182,47 @@ TEST_CASE("estimator: feet that stand are at rest, unless they roll") {
     feet.calmFeet({1, 1}, VectorXd::Zero(6), speeds);
     CHECK((speeds == size * unit) == stays);
     if (!stays) CHECK(getLargest(speeds) < 1e-3 * size);  // twelve motors, two feet
+  }
+}
+
+TEST_CASE("estimator: an edge bears no moment about itself, and a foot may roll about it") {
+  const Model model = changeModel(loadOwn("bipetto").model, [](ModelParts& parts) {
+    for (ContactFrame& contact : parts.contacts) contact.kind = ContactKind::Edge5D, contact.half_width = 0;
+  });
+  const VectorXd q = makeStandingPosture(model), rest = VectorXd::Zero(model.nv());
+  const PassiveJoints joints(model, q);
+  FootModel feet(model);
+  feet.update(joints, q, rest, rest, VectorXd::LinSpaced(model.nu(), -1, 1));
+  for (size_t c = 0; c < 2; ++c) {
+    const Vector6d& wrench = feet.getWrench(c);
+    CHECK(std::abs(wrench[3]) < 1e-9);
+    CHECK(std::abs(wrench[4]) > 0.01);
+  }
+  // All motions in which both feet stand still or roll about their edges.
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  MatrixXd T = MatrixXd::Zero(model.nv(), 6 + model.nu());
+  T.topLeftCorner<6, 6>().setIdentity();
+  for (int m = 0; m < model.nu(); ++m) joints.expand(VectorXd::Unit(model.nu(), m), T.col(6 + m));
+  MatrixXd A(10, 6 + model.nu());  // rows of both edges
+  for (int c = 0; c < 2; ++c) {
+    const ContactFrame& contact = model.contacts()[c];
+    const SE3 X_WF = getPlacement(ws, contact.body, contact.X_BF);
+    MatrixXd J = MatrixXd::Zero(6, model.nv());
+    for (int k : model.supportDofs(contact.body)) J.col(k) = ws.J.col(k);
+    for (Eigen::Index k = 0; k < J.cols(); ++k) J.col(k).head<3>() += J.col(k).tail<3>().cross(X_WF.p);
+    J.topRows<3>() = X_WF.R.transpose() * J.topRows<3>();
+    J.bottomRows<3>() = X_WF.R.transpose() * J.bottomRows<3>();
+    A.middleRows<3>(5 * c) = (J * T).topRows<3>();
+    A.middleRows<2>(5 * c + 3) = (J * T).bottomRows<2>();
+  }
+  const MatrixXd kernel = A.fullPivLu().kernel();
+  REQUIRE(kernel.cols() == model.nu() + 6 - 10);
+  for (Eigen::Index k = 0; k < kernel.cols(); ++k) {
+    const VectorXd motion = 0.05 * kernel.col(k).normalized();
+    VectorXd speeds = motion.tail(model.nu());
+    feet.calmFeet({1, 1}, motion.head<6>(), speeds);
+    CHECK(getLargest(speeds - motion.tail(model.nu())) < 1e-4);
   }
 }
 

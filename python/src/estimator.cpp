@@ -91,7 +91,8 @@ void bindEstimatorOptions(py::module_& module) {
       .field("planned_contact", &EstimatorOptions::planned_contact,
              "normal force of a standing foot relative to the weight")
       .field("surprising_contact", &EstimatorOptions::surprising_contact, "the same where no contact is planned")
-      .field("slip", &EstimatorOptions::slip, "a foot has slipped if its deviation, 6 on average, exceeds this");
+      .field("slip", &EstimatorOptions::slip,
+             "a sole has slipped if its deviation, 6 on average, exceeds this; points and edges, half of it");
 }
 
 }  // namespace

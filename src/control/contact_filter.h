@@ -58,7 +58,7 @@ Vector6d calcInnovation(const ContactFilterState& state, size_t foot, const SE3&
 /// State and covariance. No function allocates but the constructor.
 class ContactFilter {
  public:
-  /// \param sizes  of what a foot fixes: 6, or 3 if it is a point
+  /// \param sizes  of what a foot fixes: 6, or 3 if it is a point, as which an edge may count
   ContactFilter(const std::vector<int>& sizes, const ContactFilterNoise& noise, const Vector3d& gravity);
 
   /// \param deviations  of x, n, r, e_g, e_a (15); feet have to be put down
@@ -71,6 +71,7 @@ class ContactFilter {
   double correct(size_t foot, const SE3& X_IF);
 
   const ContactFilterState& state() const { return state_; }
+  int getSize(size_t foot) const { return sizes_[foot]; }
   const MatrixXd& covariance() const { return P_; }
 
  private:

@@ -154,7 +154,7 @@ void Estimator::Parts::updateFeet(const std::vector<int>& planned) {
     unrest[c] = 1 + 9 * std::clamp(1 - force / (2 * options.surprising_contact), 0.0, 1.0);
     if (!contacts[c]) continue;
     const SE3 seen = getSeenFoot(c);
-    if (!stood || filter.correct(c, seen) > options.slip) filter.putDown(c, seen);
+    if (!stood || filter.correct(c, seen) > options.slip * filter.getSize(c) / 6) filter.putDown(c, seen);
   }
 }
 

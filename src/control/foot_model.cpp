@@ -87,14 +87,16 @@ void FootModel::calmFeet(const std::vector<char>& standing, ConstVectorRef twist
   speeds = motion_.tail(model_.nu()).cwiseProduct(scales_.tail(model_.nu()));
 }
 
-// J_i T D about the middle of the foot, in the axes of the world.
+// J_i T D about the middle of the foot, in the axes of the world. An edge bears no moment about itself, and may roll.
 void FootModel::updateRows(const PassiveJoints& joints, size_t c) {
   const ContactFrame& contact = model_.contacts()[c];
   const Vector3d p = ws_.X_WB[contact.body].act(contact.X_BF.p);
   const int rows = countRows(contact.kind);
+  const Vector3d edge = ws_.X_WB[contact.body].R * contact.X_BF.R.col(0);
   for (int k : model_.supportDofs(contact.body)) {
     Vector6d column = ws_.J.col(k);
     column.head<3>() += column.tail<3>().cross(p);
+    if (contact.kind == ContactKind::Edge5D) column.tail<3>() -= edge.dot(column.tail<3>()) * edge;
     column.tail<3>() *= kLength;
     if (k < trunk_)
       A_.block(offsets_[c], k, rows, 1) += scales_[k] * column.head(rows);

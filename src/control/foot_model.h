@@ -8,7 +8,7 @@
 /// with D = diag(w, w/L) for forces and moments on the trunk, diag(1, 1/L) for those of motors, moments in f over L too,
 /// L = 0.2 m, w = 0.1. The trunk's six rows weigh all feet together, the rows of its motors each leg. What pushes the trunk is
 /// in its rows alone and no force of the ground: where the motors tell f, they decide (w = 1 took 100 N on the trunk for 60 N
-/// on a foot in the air).
+/// on a foot in the air). J_i of an edge has no rotation about it: an edge bears no moment there, and rolls freely.
 ///
 /// Standing feet are at rest. With A = (A_b, A_m) of trunk and motors, the speeds w of the motors that agree with that, given
 /// the twist V of the trunk, and are nearest to observed ones are
@@ -33,7 +33,7 @@ class FootModel {
   void update(const PassiveJoints& joints, ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, ConstVectorRef u);
   /// Eq. (3) at the q of the last update(). \param standing  per contact   \param twist  of the trunk (6, or 0 on a fixed base)
   void calmFeet(const std::vector<char>& standing, ConstVectorRef twist, VectorRef speeds);
-  /// Wrench of the ground on a foot in its contact frame, N and N m; of points without a moment.
+  /// Wrench of the ground on a foot in its contact frame, N and N m; of points without a moment, of edges without one about x.
   const Vector6d& getWrench(size_t contact) const { return wrenches_[contact]; }
   /// Placements of bodies at q.
   const Workspace& workspace() const { return ws_; }

@@ -50,7 +50,8 @@ struct EstimatorOptions {
   double foot_turn = 2e-3;            ///< rad
 
   double planned_contact = 0.08, surprising_contact = 0.25;  ///< normal forces of standing feet relative to the weight
-  double slip = 60;  ///< a foot has slipped if y' S^-1 y of its deviation, 6 on average, exceeds this
+  double slip =
+      60;  ///< a sole has slipped if y' S^-1 y of its deviation, 6 on average, exceeds this; others at half of it
 };
 
 /// Independent of any simulator: the same object can run on a robot. update() neither allocates nor throws.
