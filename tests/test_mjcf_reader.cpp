@@ -164,7 +164,9 @@ TEST_CASE("a file of MuJoCo tells how soft its loops are there, which are rigid 
              "solref=\"0.0005 1\" solimp=\"0.9999 0.9999\"")
             .empty());
   CHECK(load("<option timestep=\"0.005\"/>", "solref=\"0.0005 1\" solimp=\"0.9999 0.9999\"").empty());
-  CHECK(loadRobot(directory.write("own.xml", formatAssembled(loadRobot("bipetto").model))).warnings.empty());
+  const std::string own = formatAssembled(loadRobot("bipetto").model);
+  for (const std::string& warning : loadRobot(directory.write("own.xml", own)).warnings)
+    CHECK_THAT(warning, !Catch::Contains("read as rigid"));
 }
 
 TEST_CASE("preloads without a stiffness go out and come in again") {
