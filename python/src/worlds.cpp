@@ -9,7 +9,6 @@
 #include "bind.h"
 #include "busy.h"
 #include "engines.h"
-#include "model/number_text.h"
 #include "model_access.h"
 
 namespace bielle::python {
@@ -138,8 +137,9 @@ class HeldWorlds {
   void warnOfStep(double duration) {
     if (has_warned_ || time_step_ <= duration * (1 + 1e-9)) return;
     has_warned_ = true;
-    const std::string text = "time_step: " + formatNumber(time_step_) + " s is longer than a step of " +
-                             formatNumber(duration) + " s, and has no effect";
+    const std::string text = py::str("time_step: {:g} s is longer than a step of {:g} s, and has no effect")
+                                 .format(time_step_, duration)
+                                 .cast<std::string>();
     if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) < 0) throw py::error_already_set();
   }
 
