@@ -8,6 +8,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "bielle/ocp/cost.h"
 #include "bielle/robots/robot_loader.h"
+#include "change_model.h"
 #include "check_residual.h"
 #include "math/so3.h"
 #include "published_robots.h"
@@ -122,6 +123,30 @@ TEST_CASE("forces of edges against differences, and the cone of a sole that has 
                  all = sole_node.calc(*makeWrenchCone(of_sole, c, 0.1, 0, 0.6), q, v, wrench);
   REQUIRE(edge.size() == 11);
   CHECK(edge.minCoeff() == Approx(std::min(all.head<5>().minCoeff(), all.tail<10>().minCoeff())));
+}
+
+TEST_CASE("force residuals: a point has no centre of pressure, and a reference is as long as the force") {
+  const Model sole = loadRobot("bipetto").model;
+  for (const ContactKind kind : {ContactKind::Point3D, ContactKind::Edge5D, ContactKind::Surface6D}) {
+    const Model model = changeModel(sole, [kind](ModelParts& parts) {
+      parts.contacts[0].kind = kind;
+      if (kind != ContactKind::Surface6D) parts.contacts[0].half_width = 0;
+    });
+    const ConstraintSet set = makeConstraintSet(model, {{}});
+    const int c = set.num_loops, entries = kind == ContactKind::Point3D ? 3 : 6;
+    CAPTURE(entries);
+    CHECK(makeContactForce(set, c, VectorXd::Zero(entries))->size() == entries);
+    for (const int other : {3, 5, 6})
+      if (other != entries)
+        CHECK_THROWS_WITH(
+            makeContactForce(set, c, VectorXd::Zero(other)),
+            Catch::Contains("contact '" + model.contacts()[0].name + "'") && Catch::Contains(std::to_string(entries)));
+    if (kind == ContactKind::Point3D)
+      CHECK_THROWS_WITH(makeCenterOfPressure(set, c), Catch::Contains("contact '" + model.contacts()[0].name + "'") &&
+                                                          Catch::Contains("a sole (6d) or an edge (5d)"));
+    else
+      CHECK(makeCenterOfPressure(set, c)->size() == 2);
+  }
 }
 
 TEST_CASE("every residual against differences, on Bipetto in motion") {

@@ -149,25 +149,27 @@ void bindForceResiduals(py::module_& m) {
       m, "contact_force",
       +[](const ConstraintSet& set, int contact, Object reference, ForceAxes axes) -> Made {
         const int closure = requireContact(set, contact);
-        return makeContactForce(set, closure, readVector(reference, getRows(set.closures[closure].kind), "reference"),
-                                axes);
+        return makeContactForce(set, closure, readVector(reference, countForces(set, closure), "reference"), axes);
       },
       py::arg("constraints"), py::arg("contact"), py::arg("reference"), py::arg("axes") = ForceAxes::Contact,
-      "Force of a contact minus a reference (6,) or (3,), N and N m. contact: its index among those in force.");
+      "Force of a contact minus a reference, (3,) of a point and else (6,), N and N m. contact: its index among those "
+      "in "
+      "force.");
   def(
       m, "center_of_pressure",
       +[](const ConstraintSet& set, int contact, ForceAxes axes) -> Made {
         return makeCenterOfPressure(set, requireContact(set, contact), axes);
       },
       py::arg("constraints"), py::arg("contact"), py::arg("axes") = ForceAxes::Contact,
-      "Centre of pressure of a 6D contact about its origin (2,), m.");
+      "Centre of pressure of a sole or an edge about its origin (2,), m. Points have none: InputError.");
   def(
       m, "wrench_cone",
       +[](const ConstraintSet& set, int contact, double half_length, double half_width, double friction) -> Made {
         return makeWrenchCone(set, requireContact(set, contact), half_length, half_width, friction);
       },
       py::arg("constraints"), py::arg("contact"), py::arg("half_length"), py::arg("half_width"), py::arg("friction"),
-      "Wrench cone of a rectangular sole (17,), or of a point (5,): inside when all rows are positive, N and N m.");
+      "Wrench cone of a rectangular sole (17,), an edge (11,) or a point (5,): inside when all rows are positive, N "
+      "and N m.");
 }
 
 void bindJointResiduals(py::module_& m) {

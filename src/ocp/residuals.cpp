@@ -369,9 +369,18 @@ int countForces(const ConstraintSet& set, int constraint) {
 }
 std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
                                            ForceAxes axes) {
+  if (const int entries = countForces(set, constraint); reference.size() != entries)
+    throw InputError(
+        "", "contact '" + set.closures[constraint].name + "'",
+        "its reference has " + std::to_string(reference.size()) + " entries, its force " + std::to_string(entries),
+        "give 3 of a point, 6 of a sole or an edge");
   return std::make_unique<ContactForce>(set, constraint, reference, axes);
 }
 std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint, ForceAxes axes) {
+  const Closure& closure = set.closures[constraint];
+  if (closure.kind != ClosureKind::Weld6D && closure.kind != ClosureKind::Hinge5D)
+    throw InputError("", "contact '" + closure.name + "'", "it bears no moment, and so has no centre of pressure",
+                     "ask for that of a sole (6d) or an edge (5d)");
   return std::make_unique<CenterOfPressure>(set, constraint, axes);
 }
 std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,

@@ -113,7 +113,7 @@ RowMatrixXd makePressureCentres(const Model& model, const MotionRecord& record) 
   for (int k = 0; k < record.u.rows(); ++k)
     for (int c = 0; c < contacts; ++c) {
       const auto wrench = record.contact_wrenches.row(k).segment<6>(6 * c);
-      if (model.contacts()[c].kind != ContactKind::Surface6D || !(wrench[2] > 1e-6)) continue;
+      if (model.contacts()[c].kind == ContactKind::Point3D || !(wrench[2] > 1e-6)) continue;
       centres(k, 2 * c) = -wrench[4] / wrench[2];
       centres(k, 2 * c + 1) = wrench[3] / wrench[2];
     }

@@ -98,10 +98,10 @@ enum class ForceAxes { Contact, World, Ground };
 /// Entries of the force of a contact: 3 of a point, else those of a wrench.
 int countForces(const ConstraintSet& set, int constraint);
 /// Rows of the force of a contact minus a reference, N and N m (6 or 3). `constraint` is the index in the
-/// ConstraintSet.
+/// ConstraintSet. \throws InputError unless the reference has countForces() entries
 std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
                                            ForceAxes axes = ForceAxes::Contact);
-/// Centre of pressure of a 6D contact about the origin of its frame (x, y) (2), m.
+/// Centre of pressure about the origin of the frame of a sole or an edge, there y = 0 (2), m. \throws InputError for a point
 std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint,
                                                ForceAxes axes = ForceAxes::Contact);
 /// Wrench cone of a rectangular sole, whose origin is in the middle of the sole: inside when
