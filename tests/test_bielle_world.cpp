@@ -12,6 +12,7 @@
 #include "own_robots.h"
 #include "world_trials.h"
 #include "worlds/make_world.h"
+#include "worlds/motion_recorder.h"
 
 namespace bielle::worlds {
 namespace {
@@ -53,6 +54,32 @@ TEST_CASE("bielle world: a robot is dropped, and the books balance") {
 
 TEST_CASE("bielle world: a robot is pushed, and the work of the push is booked") {
   testing::checkPushed(*makeTestWorld(), getBipetto(), kBielleTolerances);
+}
+
+TEST_CASE("bielle world: soles and edges rest on the side of a step") {
+  testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
+    return makeBielleWorld(model, {options, {}});
+  });
+}
+
+TEST_CASE("bielle world: how far a loaded foot turns and sinks is recorded, and told") {
+  const Model model = testing::makeBlock(ContactKind::Surface6D, {0, 0, 0.05});
+  const auto world = makeBielleWorld(model);
+  const auto observe = [&](double pitch, double depth) {
+    VectorXd q = model.makeNeutral();
+    q.head<7>() << 0, 0, 0.05 * std::sin(pitch) - depth, 0, std::sin(pitch / 2), 0, std::cos(pitch / 2);
+    world->reset(q, VectorXd::Zero(model.nv()));
+    MotionRecorder recorder(*world, 1);
+    recorder.addNode();
+    REQUIRE(world->advance(2.5e-4));
+    recorder.noteAdvance(0);
+    CHECK(recorder.happened.largest_tilt.value == Approx(pitch).margin(2e-3));
+    CHECK(recorder.happened.largest_depth.value == Approx(depth).epsilon(0.1));
+    return describeFeet(model, recorder.happened);
+  };
+  CHECK(observe(0.1, 1e-3).empty());
+  CHECK(observe(0.3, 1e-3).find("contact foot was turned from the ground by 0.30 rad") == 0);
+  CHECK(observe(0.1, 8e-3).find("contact foot sank into the ground by 0.008 m") == 0);
 }
 
 TEST_CASE("bielle world: a push of another body than the trunk moves it as steps of controlled error do") {

@@ -58,7 +58,24 @@ std::string describeBreak(const World& world) {
          (isLinear(model, motor) ? " N" : " N m");
 }
 
+// A sole that rolls over its edge turns by less before it lets go, and the softest ground of ours gives way by less.
+constexpr double kMostTilt = 0.2, kMostDepth = 5e-3;  // rad, m
+
 }  // namespace
+
+std::string describeFeet(const Model& model, const Execution& e) {
+  const auto describe = [&](const FootExtreme& extreme, const char* verb, const std::string& by) {
+    return "contact " + model.contacts()[extreme.contact].name + " " + verb + " the ground by " + by + " at " +
+           formatNumber(extreme.time, "%.3f s") + " while it carried the robot";
+  };
+  std::string text;
+  if (e.largest_tilt.value > kMostTilt)
+    text = describe(e.largest_tilt, "was turned from", formatNumber(e.largest_tilt.value, "%.2f rad"));
+  if (e.largest_depth.value > kMostDepth)
+    text += (text.empty() ? "" : "; ") +
+            describe(e.largest_depth, "sank into", formatNumber(e.largest_depth.value, "%.3f m"));
+  return text;
+}
 
 Vector3d calcPush(const std::vector<Push>& pushes, double time) {
   Vector3d force = Vector3d::Zero();
@@ -158,6 +175,7 @@ Execution carryOut(const Plan& plan, Controller& controller, World& world, const
                 : advances && tick == ticks ? Outcome::Stood
                                             : Outcome::Stopped;
   out.message = breaks ? describeBreak(world) : fall;
+  if (out.outcome == Outcome::Stood) out.message = describeFeet(model, out);
   return out;
 }
 

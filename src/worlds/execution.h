@@ -39,13 +39,26 @@ struct ExecutionOptions {
 enum class Outcome { Running, Stood, Ended, Fell, BrokeOff, Stopped };
 const char* getName(Outcome outcome);
 
+/// The largest of what happened to a foot, and when.
+struct FootExtreme {
+  double value = 0, time = 0;  ///< rad or m; s
+  int contact = -1;            ///< of the model, -1 as long as there was none
+
+  void note(double other, double at, int foot) {
+    if (other > value) *this = {other, at, foot};
+  }
+};
+
 struct Execution {
   Outcome outcome = Outcome::BrokeOff;
-  std::string message;                 ///< what made it count as fallen, or why the world broke off
+  /// What made it count as fallen, why the world broke off, or what is odd about how a foot stood (describeFeet()).
+  std::string message;
   double duration = 0;                 ///< until the end, the fall or the break, s
   double distance = 0;                 ///< of the centre of mass over the ground, from the start to the end, m
   double largest_gap = 0;              ///< of closures, m
   double largest_slip = 0;             ///< of a sole since its touchdown, m
+  FootExtreme largest_tilt;            ///< of a foot that carries a quarter of the weight, from the ground, rad
+  FootExtreme largest_depth;           ///< of such a foot in the ground, m
   double largest_deviation = 0;        ///< of the trunk from its planned place, m
   double largest_joint_deviation = 0;  ///< of a revolute joint from its planned angle, rad
   double imbalance = 0;                ///< Books' Eq. (1), left less right side, J
@@ -70,6 +83,10 @@ struct Execution {
 using ExecutionSoFar = std::function<Execution(double since)>;
 /// Looks on: is called after every row of the record, at `time` of `duration`, s.
 using ExecutionObserver = std::function<void(double time, double duration, const ExecutionSoFar& so_far)>;
+
+/// Names the foot that carried the robot although it was turned from the ground or sank into it by more than the ground's
+/// softness and a landing explain, 0.2 rad or 5 mm; empty if none did.
+std::string describeFeet(const Model& model, const Execution& execution);
 
 /// The force of all pushes at an instant [s], N (world).
 Vector3d calcPush(const std::vector<Push>& pushes, double time);

@@ -37,7 +37,7 @@ bool isWithinStops(const Model& model, const VectorXd& q) {
 }  // namespace
 
 MotionRecorder::MotionRecorder(const World& world, int stages)
-    : world_(world), model_(world_.model()), loops_(makeConstraintSet(model_)), ws_(model_) {
+    : world_(world), model_(world_.model()), loops_(makeConstraintSet(model_)), terrain_(world.ground()), ws_(model_) {
   record_.q_names = makePositionNames(model_);
   record_.v_names = makeVelocityNames(model_);
   record_.u_names = getNames(model_.motors());
@@ -95,6 +95,28 @@ void MotionRecorder::noteAdvance(double seconds) {
   happened.world_seconds += seconds;
   happened.largest_gap = getLarger(happened.largest_gap, world_.gap());
   for (const FootReport& foot : world_.feet()) happened.largest_slip = getLarger(happened.largest_slip, foot.slip);
+  updatePlacements(model_, ws_, world_.configuration());
+  for (size_t c = 0; c < world_.feet().size(); ++c) noteFoot(static_cast<int>(c));
+}
+
+// Of a sole its own normal counts, of an edge its direction; a point cannot turn.
+void MotionRecorder::noteFoot(int c) {
+  constexpr double kLoaded = 0.25;  // of the weight
+  constexpr int kPoints = 5;        // along each side
+  const ContactFrame& contact = model_.contacts()[c];
+  const SE3 X_WF = getPlacement(ws_, contact.body, contact.X_BF);
+  const Vector3d normal = X_WF.R.transpose() * terrain_.find(X_WF.p.x(), X_WF.p.y()).normal;  // in the foot's axes
+  if (normal.dot(world_.feet()[c].wrench.head<3>()) < kLoaded * model_.mass() * model_.gravity().norm()) return;
+  if (contact.kind == ContactKind::Surface6D)
+    happened.largest_tilt.note(std::atan2(normal.head<2>().norm(), normal.z()), world_.time(), c);
+  else if (contact.kind == ContactKind::Edge5D)
+    happened.largest_tilt.note(std::abs(std::atan2(normal.x(), normal.tail<2>().norm())), world_.time(), c);
+  for (int i = 0; i < kPoints; ++i)
+    for (int j = 0; j < kPoints; ++j) {
+      const auto place = [](int k, double half) { return (2.0 * k / (kPoints - 1) - 1) * half; };
+      const Vector3d point(place(i, contact.half_length), place(j, contact.half_width), 0);
+      happened.largest_depth.note(terrain_.touch(X_WF.act(point)).depth, world_.time(), c);
+    }
 }
 
 Execution MotionRecorder::describe(double since) const {

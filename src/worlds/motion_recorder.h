@@ -2,6 +2,7 @@
 /// \file The record of what happens in a world, row by row.
 #include "bielle/dynamics/constrained.h"
 #include "worlds/execution.h"
+#include "worlds/terrain.h"
 
 namespace bielle::worlds {
 
@@ -18,7 +19,7 @@ class MotionRecorder {
   /// After addStage(): forces of the closures at the state of the last node, by the full system, where neither ground nor stops
   /// touch the robot; where rows are redundant, those of least norm.
   void addClosureForces();
-  /// Gaps and slips after the world has advanced, which took so long on the clock, s.
+  /// Gaps, slips, and how feet stand, after the world has advanced, which took so long on the clock, s.
   void noteAdvance(double seconds);
 
   /// Of the centre of mass, from the first node to the last, m.
@@ -31,12 +32,14 @@ class MotionRecorder {
   Execution happened;  ///< for what is noted by others
 
  private:
+  void noteFoot(int contact);
   void addFootholds(const std::vector<PredictedFoothold>& footholds);
   MotionRecord getRecord(double since) const;
 
   const World& world_;
   const Model& model_;
   const ConstraintSet loops_;
+  const Terrain terrain_;
   Workspace ws_;
   ConstrainedWorkspace cws_;
   MotionRecord record_;

@@ -35,6 +35,7 @@ MotionResult makeResult(const CarriedOut& carried, const Execution& execution) {
   setFigures(plan.robot.model, result);
   result.gap_position = execution.largest_gap;  // also between the rows of the record
   result.slip_position = execution.largest_slip;
+  result.slip_angle = execution.largest_tilt.value;
   return result;
 }
 
@@ -182,6 +183,8 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   if (plan.belief != Belief::Closed)
     summary["plan_reachable_until"] = plan.lifted.first_missed < 0 ? nullptr : Json(plan.lifted.first_missed);
   if (carried.prediction) summary["solves"] = listSolves(carried.prediction->counts());
+  // Of feet that carry: how far they turn from the ground and sink into it.
+  summary["contact_slip"]["depth_m"] = e.largest_depth.value;
   for (const auto& [name, value] : plan.summary.options)
     if (const double* speed = std::get_if<double>(&value); name == "speed" && speed)
       summary["commanded_speed"] = *speed;
@@ -213,6 +216,8 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   summary["largest_gap"] = e.largest_gap;
   summary["largest_joint_deviation"] = e.largest_joint_deviation;
   summary["largest_slip"] = e.largest_slip;
+  summary["largest_tilt"] = e.largest_tilt.value;
+  summary["largest_depth"] = e.largest_depth.value;
   summary["energy_balance"] = e.energy_balance;
   summary["books"] = listBooks(e);
   summary["saturated_share"] = e.saturated_share;
@@ -327,13 +332,14 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
                 "  distance            %.3f m, %.3f m/s%s\n"
                 "  trunk deviation     %.4f m at most\n"
                 "  closures            gap %.1e m at most\n"
-                "  soles               slip %.1e m at most\n"
+                "  soles               slip %.1e m, tilt %.1e rad, depth %.1e m at most\n"
                 "  energy balance      %.1e J, %.1e of the energy exchanged\n"
                 "  torques             %.2f %% saturated\n"
                 "  computing time      %.2f s, %.2g times real time; world %.2f s, control %.2f s\n",
                 e.duration, e.distance, e.meanSpeed(), describeSteadySpeed(plan, e).c_str(), e.largest_deviation,
-                e.largest_gap, e.largest_slip, e.imbalance, e.energy_balance, 100 * e.saturated_share, e.whole_seconds,
-                e.realTimeFactor(), e.world_seconds, e.control_seconds);
+                e.largest_gap, e.largest_slip, e.largest_tilt.value, e.largest_depth.value, e.imbalance,
+                e.energy_balance, 100 * e.saturated_share, e.whole_seconds, e.realTimeFactor(), e.world_seconds,
+                e.control_seconds);
   std::cout << text;
   for (const Push& push : arguments.execution.pushes)
     std::cout << "  push                " << formatNumber(push.impulse) << " N s at " << formatNumber(push.time)
