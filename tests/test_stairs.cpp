@@ -60,6 +60,32 @@ TEST_CASE("stairs: the ground is where it was requested") {
   CHECK(down.calcHeight(1.9, 0) == Approx(-0.15));
 }
 
+TEST_CASE("stairs: feet that may land off their footholds stay on their treads") {
+  StairsOptions options;
+  options.gait.foothold_room = 0.02;
+  options.depth = 0.11;        // soles of 0.1
+  const auto getReach = [&] {  // of a sole ahead of its middle, where it lands farthest ahead
+    const MotionPlan plan = planStairs(getBipetto(), options, makeStandingRobot(getBipetto()));
+    double reach = 0;
+    int landings = 0;
+    for (const StageSpec& stage : plan.stages)
+      for (const PathConstraint& constraint : stage.path_constraints)
+        if (constraint.name.rfind("landing of ", 0) == 0) {
+          const ContactFrame& foot = getBipetto().contacts()[0];
+          const double turn = constraint.upper[5] * std::hypot(foot.half_length, foot.half_width);
+          CHECK((constraint.lower + constraint.upper).head<2>().norm() < 1e-12);
+          reach = std::max(reach, foot.half_length + constraint.upper[0] + turn);
+          CHECK(constraint.upper[1] == Approx(0.02));
+          ++landings;
+        }
+    CHECK(landings > 1);
+    return reach;
+  };
+  CHECK(getReach() <= options.depth / 2 + 1e-9);
+  options.depth = 0.3;
+  CHECK(getReach() == Approx(0.05 + 0.02 + 0.02));
+}
+
 TEST_CASE("stairs: what cannot be done is refused by name") {
   const auto make = [](const std::string& option, double value) {
     return makeStairs(getBipetto(), changeOption(StairsOptions(), option, value));

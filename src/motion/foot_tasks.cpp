@@ -53,7 +53,41 @@ void addSwingVelocity(const Model& model, int contact, const Vector6d& V_F, cons
   getTask(contact, FootRole::Swing, stage).velocity = stage.costs.back().residual;
 }
 
-void addLanding(const Model& model, int contact, const SE3& X_WF, double room, double speed, StageSpec& stage) {
+LandingRegion findLandingRegion(const ContactFrame& foot, const SE3& X_WF, double room, const Ground& ground) {
+  constexpr double kLevel = 1e-3, kBeyond = 1e-6;  // m
+  constexpr double kRightAngle = 1.57079632679489662;
+  LandingRegion region{Eigen::Vector2d::Constant(-room), Eigen::Vector2d::Constant(room), room};
+  for (const GroundStep& step : ground.steps) {
+    const double height = step.calcHeight(X_WF.p.x(), X_WF.p.y());
+    if (!step.covers(X_WF.p.x(), X_WF.p.y()) || std::abs(height - X_WF.p.z()) > kLevel) continue;
+    for (int i = 0; i < 4; ++i) {
+      const double angle = step.yaw + i * kRightAngle;
+      const Eigen::Vector2d out(std::cos(angle), std::sin(angle));  // of one side
+      const double side = out.dot(step.top.head<2>()) + (i % 2 == 0 ? step.length : step.width) / 2;
+      Eigen::Vector2d outmost = X_WF.p.head<2>();
+      for (double x : {-foot.half_length, foot.half_length})
+        for (double y : {-foot.half_width, foot.half_width}) {
+          const Eigen::Vector2d corner = X_WF.act(Vector3d(x, y, 0)).head<2>();
+          if (out.dot(corner) > out.dot(outmost)) outmost = corner;
+        }
+      const double left = std::max(0.0, side - out.dot(outmost));
+      const Eigen::Vector2d beyond = outmost + (left + kBeyond) * out;
+      if (std::abs(ground.calcHeight(beyond.x(), beyond.y()) - step.calcHeight(beyond.x(), beyond.y())) < kLevel)
+        continue;  // the ground goes on
+      const Eigen::Vector2d axes(out.dot(X_WF.R.col(0).head<2>()), out.dot(X_WF.R.col(1).head<2>()));
+      const double most = left / 2 / axes.lpNorm<1>();
+      for (int k = 0; k < 2; ++k) {
+        if (axes[k] > kBeyond) region.upper[k] = std::min(region.upper[k], most);
+        if (axes[k] < -kBeyond) region.lower[k] = std::max(region.lower[k], -most);
+      }
+      region.turn = std::min(region.turn, left / 2);
+    }
+  }
+  return region;
+}
+
+void addLanding(const Model& model, int contact, const SE3& X_WF, const LandingRegion& region, double speed,
+                StageSpec& stage) {
   const ContactFrame& foot = model.contacts()[contact];
   const BodyFrame frame = getFrame(foot);
   const bool point = foot.kind == ContactKind::Point3D, edge = foot.kind == ContactKind::Edge5D;
@@ -62,11 +96,12 @@ void addLanding(const Model& model, int contact, const SE3& X_WF, double room, d
                              ? makeEquation("landing of " + foot.name, makeFrameTranslation(frame, X_WF.p), 3, position)
                              : makeEquation("landing of " + foot.name, makeFramePlacement(frame, X_WF), 6,
                                             (Vector6d() << position, angle).finished());
-  place.upper.head<2>().setConstant(room);
   const double reach = std::hypot(foot.half_length, foot.half_width);
-  if (!point && reach > 0) place.upper[5] = room / reach;
+  if (!point && reach > 0) place.upper[5] = region.turn / reach;
   if (edge) place.upper[3] = kFree;  // it rolls
   place.lower = -place.upper;
+  place.upper.head<2>() = region.upper;
+  place.lower.head<2>() = region.lower;
   PathConstraint velocity = makeEquation("landing velocity of " + foot.name, makeFrameVelocity(frame), point ? 3 : 6,
                                          Vector6d::Constant(kVelocity));
   velocity.lower.head<3>().setConstant(-speed);
@@ -75,6 +110,7 @@ void addLanding(const Model& model, int contact, const SE3& X_WF, double room, d
     velocity.upper[3] = kFree;
     velocity.lower[3] = -kFree;
   }
+  const double room = std::max(region.upper.maxCoeff(), -region.lower.minCoeff());
   stage.feet.push_back({contact, FootRole::Landing, room, place.residual, velocity.residual});
   stage.path_constraints.push_back(std::move(place));
   stage.path_constraints.push_back(std::move(velocity));

@@ -10,9 +10,19 @@ void addSwing(const Model& model, int contact, const SE3& X_WF, const Vector6d& 
 // And one of its velocity, m/s and rad/s in world axes, which defines the motion.
 void addSwingVelocity(const Model& model, int contact, const Vector6d& V_F, const Vector6d& weights, StageSpec& stage);
 
-// The sole lies at a place, at rest; of a contact at a point only the point does. It may be `room` m off along x and y of the
-// place, and turned about z such that its corners move by as much; and it comes down at `speed`, m/s.
-void addLanding(const Model& model, int contact, const SE3& X_WF, double room, double speed, StageSpec& stage);
+// How far from its place a foot may land: along x and y of the place, and its corners by turning about z, m.
+struct LandingRegion {
+  Eigen::Vector2d lower = Eigen::Vector2d::Zero(), upper = Eigen::Vector2d::Zero();
+  double turn = 0;
+};
+// All within `room` m, as far as the sole then still has what it has of the ground's box under the place: at most half of what
+// is left up to an edge or a riser, and half for turning.
+LandingRegion findLandingRegion(const ContactFrame& foot, const SE3& X_WF, double room, const Ground& ground);
+
+// The sole lies at a place, at rest; of a contact at a point only the point does. It may be off as far as the region goes, and
+// it comes down at `speed`, m/s.
+void addLanding(const Model& model, int contact, const SE3& X_WF, const LandingRegion& region, double speed,
+                StageSpec& stage);
 
 // How far from its foothold a foot may land with this stage, along x and y, m; infinite where the stage has no landing of it.
 double getLandingRoom(int contact, const StageSpec& stage);

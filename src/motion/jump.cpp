@@ -104,7 +104,7 @@ void addFlightConstraints(const JumpScene& scene, int i, int n, StageSpec& stage
 }
 
 void addTouchdown(const JumpScene& scene, StageSpec& stage) {
-  for (const ContactTarget& target : scene.after) addLanding(scene.model, target.contact, target.X_WT, 0, 0, stage);
+  for (const ContactTarget& target : scene.after) addLanding(scene.model, target.contact, target.X_WT, {}, 0, stage);
 }
 
 StageSpec makeTerminalStage(const JumpScene& scene) {

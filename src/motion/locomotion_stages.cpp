@@ -109,7 +109,8 @@ void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
   if (o.foothold_room > 0)
     addCost(stage, "foothold", o.foothold_weight / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
             makeFramePlacement({foot.body, foot.X_BF}, step.X_WF));
-  addLanding(scene.model, getContact(scene, step.side), step.X_WF, o.foothold_room, o.landing_speed, stage);
+  addLanding(scene.model, getContact(scene, step.side), step.X_WF,
+             findLandingRegion(foot, step.X_WF, o.foothold_room, scene.task.ground), o.landing_speed, stage);
 }
 
 }  // namespace
