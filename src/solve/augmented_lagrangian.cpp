@@ -4,10 +4,9 @@
 #include <cmath>
 #include <iomanip>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
-
-#include "model/number_text.h"
 
 namespace bielle {
 
@@ -294,7 +293,8 @@ void AugmentedLagrangian::move(const std::vector<NodeSource>& sources) {
 }
 
 std::string AugmentedLagrangian::describeWorst(const ShootingProblem& problem) const {
-  TextStream out;
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
   out << problem.getConstraintName(at_.worst_node, at_.worst_row) << " at node " << at_.worst_node;
   if (std::isnan(at_.violation))
     out << " is not a number";

@@ -1,7 +1,7 @@
+#include <cstdio>
 #include <ostream>
 
 #include "bielle/solve/fddp.h"
-#include "model/number_text.h"
 
 namespace bielle {
 
@@ -24,13 +24,17 @@ const char* getName(FddpTermination termination) {
 }
 
 void printFddpHeader(std::ostream& out) {
-  out << formatText("%5s %15s %10s %10s %10s %10s %10s %9s\n", "iter", "cost", "gap", "violation", "gradient", "step",
-                    "regul.", "time [s]");
+  char text[128];
+  std::snprintf(text, sizeof text, "%5s %15s %10s %10s %10s %10s %10s %9s\n", "iter", "cost", "gap", "violation",
+                "gradient", "step", "regul.", "time [s]");
+  out << text;
 }
 
 void printFddpIteration(std::ostream& out, const FddpIteration& line) {
-  out << formatText("%5d %15.8e %10.3e %10.3e %10.3e %10.3e %10.3e %9.3f\n", line.iteration, line.cost, line.gap,
-                    line.violation, line.gradient, line.step, line.regularization, line.seconds);
+  char text[128];
+  std::snprintf(text, sizeof text, "%5d %15.8e %10.3e %10.3e %10.3e %10.3e %10.3e %9.3f\n", line.iteration, line.cost,
+                line.gap, line.violation, line.gradient, line.step, line.regularization, line.seconds);
+  out << text;
 }
 
 std::function<FddpAction(const FddpIteration&, const ShootingTrajectory&)> makeFddpPrinter(std::ostream& out) {
