@@ -65,48 +65,6 @@ double calcImbalance(const Books& start, const Books& end) {
   return std::abs(change - end.motor_work - end.push_work + losses) / largest;
 }
 
-Model makeBlock(ContactKind kind, const Vector3d& com) {
-  ModelBuilder builder("block");
-  Joint base;
-  base.name = "base";
-  base.kind = JointKind::FreeFlyer;
-  builder.addLink("block", "world", base, {10, com, 0.05 * Matrix3d::Identity()});
-  builder.addContact("foot", "block", kind, 0.05, kind == ContactKind::Surface6D ? 0.03 : 0);
-  return builder.build();
-}
-
-void checkOverhangs(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld) {
-  WorldOptions options;
-  options.ground.height = -0.3;
-  options.ground.steps.push_back({{0.5, 0, 0}, 1, 1, 0, 0, 0});  // its side is at x = 0
-  for (const ContactKind kind : {ContactKind::Surface6D, ContactKind::Edge5D})
-    for (const double overhang : {0.0, 0.2, 0.35, 0.45, 0.5})
-      for (const double yaw : {0.0, 0.1, -0.3, 0.785, 1.5708})
-        for (const double share :
-             {0.0, 0.8}) {  // of the way of the load from the middle of what lies on the box to its side
-          const bool is_sole = kind == ContactKind::Surface6D;
-          if (!is_sole && yaw > 1) continue;
-          const double c = std::cos(yaw), s = std::sin(yaw);
-          const double reach = std::abs(0.05 * c) + (is_sole ? std::abs(0.03 * s) : 0),
-                       middle = reach * (1 - 2 * overhang);
-          const double load = (middle + reach) / 2 * (1 - share) - middle;  // ahead of the middle of the sole
-          if (overhang == 0 && share > 0) continue;
-          // An edge bears along itself alone; its block hangs from it, and so does not roll over.
-          const Vector3d com = is_sole ? Vector3d(load * c, -load * s, 0.05) : Vector3d(load / c, 0, -0.05);
-          CAPTURE(int(kind), overhang, yaw, share);
-          const Model model = makeBlock(kind, com);
-          const auto world = makeWorld(model, options);
-          VectorXd q = model.makeNeutral();
-          q.head<7>() << middle, 0, 0, 0, 0, std::sin(yaw / 2), std::cos(yaw / 2);
-          world->reset(q, VectorXd::Zero(model.nv()));
-          for (int i = 0; i < 300; ++i) REQUIRE(world->advance(1e-3));
-          const VectorXd moved = model.difference(q, world->configuration());
-          CHECK(moved.head<3>().norm() < 1e-3);
-          CHECK(moved.tail<3>().norm() < 0.01);
-          CHECK(world->feet()[0].wrench[2] == Approx(10 * 9.81).epsilon(0.01));
-        }
-}
-
 void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances) {
   const PostureHold posture(model);
   world.reset(posture.posture(), VectorXd::Zero(model.nv()));
