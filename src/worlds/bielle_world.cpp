@@ -147,7 +147,6 @@ bool BielleWorld::kick(double h) {
   addForces(w_mean_, loads_, nullptr);
   book(h);
   for (size_t i = 0; i < points.size(); ++i) updateAnchor(contacts_.terrain, places_[i], forces_[i], points[i]);
-  contacts_.moveToEdges([this](int body, const Vector3d& point) { return getPlace(body, point); });
   tree_.kick(dw_);
   half_last_ = 0.5 * dw_;
   return true;

@@ -9,10 +9,6 @@ namespace {
 // A stop gives way by this under a torque of the robot's weight times one metre, or under its weight, rad or m.
 constexpr double kTurn = 0.02, kShift = 1e-3;
 constexpr double kLeastGravity = 1;   // m/s^2; where there is less, soles and stops are as hard as on Earth
-// The ground is at a point of a sole that is at most so far above it, or as deep in it, m. Beside the side of a box the former
-// is also the distance from it: a point that is nearer than it is deep would leave the box through its side.
-constexpr double kOver = 1e-3, kUnder = 5e-3;
-constexpr int kHalvings = 24;         // of the way between two points of a sole
 constexpr double kStopDamping = 0.5;  // s/rad; s/m of sliding joints is longer by their ratio of speeds, about 10
 
 // Eq. (1)
@@ -53,12 +49,7 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
       const auto place = [](int i, int points) { return points > 1 ? 1 - 2.0 * i / (points - 1) : 0; };  // from 1 to -1
       const double x = place(i % along_x, along_x) * contact.half_length,
                    y = place(i / along_x, along_y) * contact.half_width;
-      point.p = point.home = contact.X_BF.act(Vector3d(x, y, 0));
-      const int column = i % along_x, row = i / along_x, here = static_cast<int>(points.size());
-      if (column > 0) point.neighbors[0] = here - 1;
-      if (column + 1 < along_x) point.neighbors[1] = here + 1;
-      if (row > 0) point.neighbors[2] = here - along_x;
-      if (row + 1 < along_y) point.neighbors[3] = here + along_x;
+      point.p = contact.X_BF.act(Vector3d(x, y, 0));
       point.stiffness = sole / count;
       point.damping = options.damping;
       point.shear_stiffness = options.shear_ratio * point.stiffness;
@@ -103,20 +94,6 @@ void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce&
   point.touches = terrain.touch(x).depth > 0;
   point.anchor = x;
   if (point.touches) point.anchor += force.spring / point.shear_stiffness;
-}
-
-bool isAtGround(const Terrain& terrain, const Vector3d& x) {
-  const Terrain::Touch touch = terrain.touch(x - kOver * Vector3d::UnitZ());
-  return touch.depth > 0 && touch.depth < kUnder && touch.normal.z() > 0.5;
-}
-
-double findEdge(const Terrain& terrain, const Vector3d& from, const Vector3d& to) {
-  double over = 0, on = 1;
-  for (int i = 0; i < kHalvings; ++i) {
-    const double share = 0.5 * (over + on);
-    (isAtGround(terrain, from + share * (to - from)) ? on : over) = share;
-  }
-  return on;
 }
 
 std::vector<JointStop> makeJointStops(const Model& model) {

@@ -2,8 +2,7 @@
 /// \file Compliant contact with friction that sticks, for worlds that have no contact of their own.
 ///
 /// A sole touches with the corners of its rectangle or, where the ground has steps, whose edges may lie anywhere under it, with a
-/// grid of points; a point contact with its origin. Points that overhang an edge move onto it (ContactSet::moveToEdges()), so that
-/// the sole rests on the whole of what lies on the ground. A point at x with velocity x' is by
+/// grid of points; a point contact with its origin. A point at x with velocity x' is by
 /// d deep in the ground, whose normal there is n (Terrain::touch); T = 1 - n n^T. With the stiffness k of the point,
 ///
 ///     f_n = k d max(0, 1 + c d'),   d' = -n . x'          while d > 0, else no force                              (1)
@@ -25,7 +24,6 @@
 ///
 /// and what the ground takes, -f . x', less what the springs hold, is dissipated: with t = s - c_t T x', the damper and the
 /// slider take |s - f_t|^2 / c_t + (s - f_t) . (f_t - t) / c_t >= 0 in (2), and (3) lowers e.
-#include <array>
 #include <vector>
 
 #include "bielle/worlds/bielle_world.h"
@@ -42,9 +40,6 @@ struct ContactPoint {
   double shear_stiffness = 0, shear_damping = 0;  ///< k_t, N/m; c_t, N s/m
   Vector3d anchor = Vector3d::Zero();             ///< a, m (world)
   bool touches = false;                           ///< as of the last update of the anchor
-  Vector3d home = Vector3d::Zero();               ///< p on the grid of its sole, m
-  std::array<int, 4> neighbors{-1, -1, -1, -1};   ///< on the grid, -1 where it ends
-  bool rests = false;                             ///< whether the ground is at its home
 };
 
 /// The points of all contacts of a model on a ground, contact by contact; those of a sole share its stiffness.
@@ -63,11 +58,6 @@ ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point,
                               const Vector3d& velocity, bool with_damping = false);
 /// Eq. (3), for the force at x.
 void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point);
-
-/// Whether the ground reaches up to a point x of a sole (world).
-bool isAtGround(const Terrain& terrain, const Vector3d& x);
-/// Where the ground begins on the way from a point that overhangs it to one at it: a share of the way above 0.
-double findEdge(const Terrain& terrain, const Vector3d& from, const Vector3d& to);
 
 /// A stop of a joint: (1) in one coordinate.
 struct JointStop {
@@ -101,29 +91,9 @@ class ContactSet {
   /// Points that have not touched before.
   template <typename GetPlace>
   void resetAnchors(const GetPlace& getPlace) {
-    moveToEdges(getPlace);
     for (ContactPoint& point : points) {
       point.touches = false;
       updateAnchor(terrain, getPlace(point.body, point.p), ContactForce(), point);
-    }
-  }
-  /// Points that overhang an edge move onto it, towards a neighbour at the ground, and back when the ground is under them again.
-  /// Their bristles stay as they are bent. To be called once per step, like updateAnchor().
-  template <typename GetPlace>
-  void moveToEdges(const GetPlace& getPlace) {
-    if (terrain.ground().steps.empty()) return;
-    for (ContactPoint& point : points) point.rests = isAtGround(terrain, getPlace(point.body, point.home));
-    for (ContactPoint& point : points) {
-      Vector3d p = point.home;
-      for (int i : point.neighbors) {
-        if (point.rests || i < 0 || !points[i].rests) continue;
-        const Vector3d from = getPlace(point.body, point.home), to = getPlace(point.body, points[i].home);
-        p += findEdge(terrain, from, to) * (points[i].home - point.home);
-        break;
-      }
-      if (p == point.p) continue;
-      point.anchor += getPlace(point.body, p) - getPlace(point.body, point.p);
-      point.p = p;
     }
   }
   template <typename GetPlace, typename GetCoordinate>

@@ -202,7 +202,6 @@ bool ManifoldWorld::takeStep(double& h) {
     const ContactForce force = calcContactForce(contacts_.terrain, point, x, calcVelocityAt(point.body, x));
     updateAnchor(contacts_.terrain, x, force, point);
   }
-  contacts_.moveToEdges([this](int body, const Vector3d& point) { return getPlace(body, point); });
   return true;
 }
 

@@ -306,7 +306,6 @@ void SimbodyWorld::finishStep(double duration) {
     if (force.elastic > 0) addFootForce(point.contact, x, force.force);
     updateAnchor(contacts_.terrain, x, force, point);
   }
-  contacts_.moveToEdges([&](int body, const Vector3d& point) { return forces_->findPlace(state, body, point); });
 }
 
 void SimbodyWorld::readState() {
