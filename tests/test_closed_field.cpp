@@ -94,6 +94,25 @@ TEST_CASE("closed field: a step has the order of its method, for every joint") {
   }
 }
 
+TEST_CASE("closed field: how independent its rows are does not depend on the way there") {
+  const auto make = [](double angle) { return makePlanarFourBar(0.4, 0.15, 0.35, 0.3, angle); };
+  const Mechanism mechanism = make(1);
+  ClosedField field(mechanism.model);
+  field.select(mechanism.q_closed);
+  const VectorXd zero = VectorXd::Zero(mechanism.model.nv());
+  const auto measure = [&](const VectorXd& q) {
+    field.begin(q);
+    REQUIRE(field.close(zero, zero));
+    return field.independence();
+  };
+  const double before = measure(mechanism.q_closed);
+  bool changes = false;
+  for (double angle : {-2.5, -1.5, -0.5, 0.0, 0.5, 2.0})
+    changes = changes || std::abs(measure(make(angle).q_closed) - before) > 0.01;
+  CHECK(changes);
+  CHECK(measure(mechanism.q_closed) == before);
+}
+
 TEST_CASE("closed field: evaluations do not allocate") {
   std::mt19937 rng(9);
   const Mechanism mechanism =

@@ -191,21 +191,21 @@ bool ClosedField::updateFactors() {
   }
   independence_ = 1;
   if (S_sparse_) {
-    largest_ = std::max(largest_, S_sparse_->diagonal().maxCoeff());
+    const double largest = S_sparse_->diagonal().maxCoeff();
     S_sparse_factor_->factorize(*S_sparse_);
     if (S_sparse_factor_->info() != Eigen::Success) return fail("the rows of its loops are dependent");
     const VectorXd L = S_sparse_factor_->matrixL().nestedExpression().diagonal();
     for (int i = 0; i < rows_; ++i) {
       const double pivot = L[S_sparse_factor_->permutationP().indices()[i]];
-      independence_ = std::min(independence_, pivot * pivot / largest_);
+      independence_ = std::min(independence_, pivot * pivot / largest);
     }
   } else {
-    largest_ = std::max(largest_, S_.diagonal().maxCoeff());
+    const double largest = S_.diagonal().maxCoeff();
     S_factor_.compute(S_);
     if (S_factor_.info() != Eigen::Success) independence_ = 0;
     for (int i = 0; i < rows_; ++i) {
       const double pivot = S_factor_.matrixLLT()(i, i);
-      independence_ = std::min(independence_, pivot * pivot / largest_);
+      independence_ = std::min(independence_, pivot * pivot / largest);
     }
   }
   if (!(independence_ > kSingular)) return fail("the rows of its loops become dependent there: a singular posture");

@@ -64,7 +64,7 @@ class ClosedField {
   const std::string& failure() const { return failure_; }
   int rank() const { return rows_; }
   /// The least part of a row that is independent of those before it, in the metric of M^{-1}, as a square over the largest square of
-  /// any row so far; 1 without loops. It falls where rows turn into others, or vanish.
+  /// any row at the same configuration; 1 without loops. It falls where rows turn into others.
   double independence() const { return independence_; }
   /// Largest residual of all rows, the dependent ones included, at the present state, m or rad.
   double calcGap() const;
@@ -134,7 +134,7 @@ class ClosedField {
   std::unique_ptr<Eigen::SparseMatrix<double>> S_sparse_;
   std::unique_ptr<Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>> S_sparse_factor_;
   VectorXd q_start_, q_, delta_, zeta_, residual_, gamma_, lambda_, r_, v_, a_, x_;
-  double independence_ = 1, largest_ = 0;  // largest: of the diagonals of all S so far
+  double independence_ = 1;
   std::string failure_;
 };
 
