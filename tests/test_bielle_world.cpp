@@ -2,6 +2,7 @@
 // of its steps, and no allocation.
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <random>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/builder.h"
@@ -43,7 +44,94 @@ Flight makeFlight() {
   return flight;
 }
 
+// A limp robot, dropped from 15 cm with a random velocity of its trunk of up to 2 m/s and rad/s, falls for a second.
+struct Fall {
+  double imbalance = 0;  // largest of the books, over the energy at the start
+  std::string message;
+};
+Fall dropLimp(const Model& model, double time_step, unsigned seed) {
+  BielleWorldOptions options;
+  options.world.time_step = time_step;
+  const auto world = makeBielleWorld(model, options);
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> velocity(-2, 2);
+  VectorXd q = makeStandingPosture(model), v = VectorXd::Zero(model.nv());
+  q[2] += 0.15;
+  for (int i = 0; i < 6; ++i) v[i] = velocity(generator);
+  v[2] = -std::abs(v[2]);
+  world->reset(q, v);
+  const Books start = world->books();
+  Fall fall;
+  for (int i = 0; i < 200 && world->advance(0.005); ++i) {
+    const Books now = world->books();
+    const double taken = now.motor_work + now.push_work - now.contact_loss - now.stop_loss - now.other_loss;
+    fall.imbalance =
+        std::max(fall.imbalance, std::abs(now.energy() - start.energy() - taken) / std::abs(start.energy()));
+  }
+  fall.message = world->message();
+  return fall;
+}
+
 }  // namespace
+
+TEST_CASE("bielle world: the books of limp robots that fall balance, at any step") {
+  for (double h : {2.5e-4, 1e-3, 2e-3})
+    for (unsigned seed : {7u, 10u, 14u}) {
+      const Fall fall = dropLimp(getBipetto(), h, seed);
+      CAPTURE(h, seed);
+      CHECK(fall.message == "");
+      CHECK(fall.imbalance < 0.01);
+    }
+}
+
+TEST_CASE("bielle world: the books of several robots that fall balance, or it is said when and why not", "[long]") {
+  int falls = 0, flagged = 0;
+  for (const char* robot : {"bipetto", "cleobot", "rsu_biped", "leg_biped"}) {
+    const Model model = bielle::testing::loadOwn(robot).model;
+    for (double h : {2.5e-4, 1e-3, 2e-3})
+      for (unsigned seed = 0; seed < 8; ++seed) {
+        const Fall fall = dropLimp(model, h, seed);
+        CAPTURE(robot, h, seed, fall.message);
+        CHECK(fall.imbalance < 0.01);
+        ++falls;
+        flagged += !fall.message.empty();
+      }
+  }
+  CAPTURE(falls);
+  CHECK(flagged <= falls / 100);
+}
+
+TEST_CASE("bielle world: one that breaks off says when, in what step and by how much, and leaves others alone") {
+  const Model& model = getBipetto();
+  const auto advance = [&](World& world) {
+    for (int i = 0; i < 40; ++i) world.advance(1e-3);
+  };
+  VectorXd q = makeStandingPosture(model);
+  q[2] += 0.01;
+  const VectorXd v = VectorXd::Zero(model.nv());
+  const auto alone = makeTestWorld();
+  alone->reset(q, v);
+  advance(*alone);
+  std::vector<std::unique_ptr<World>> worlds;
+  for (int i = 0; i < 3; ++i) worlds.push_back(makeTestWorld()), worlds.back()->reset(q, v);
+  for (int i = 0; i < 40; ++i)
+    for (size_t w = 0; w < worlds.size(); ++w) {
+      if (w == 1 && i == 20) worlds[w]->setPush(Vector3d(1e13, 0, 0));
+      worlds[w]->advance(1e-3);
+    }
+  CAPTURE(worlds[1]->message());
+  CHECK_THAT(worlds[1]->message(), Catch::StartsWith("after 0.0200") &&
+                                       Catch::Contains(" s, in a step of 3.91e-06 s: ") &&
+                                       Catch::Contains("m or rad are left open"));
+  CHECK(worlds[1]->time() == Approx(0.02));
+  CHECK(worlds[1]->configuration().allFinite());
+  CHECK(worlds[1]->velocity().allFinite());
+  for (int w : {0, 2}) {
+    CHECK(worlds[w]->message().empty());
+    CHECK(worlds[w]->configuration() == alone->configuration());
+    CHECK(worlds[w]->velocity() == alone->velocity());
+  }
+}
 
 TEST_CASE("bielle world: a robot stands without creeping") {
   testing::checkStanding(*makeTestWorld(), getBipetto(), kBielleTolerances);

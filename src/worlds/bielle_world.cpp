@@ -10,6 +10,8 @@
 #include "dynamics/joint_force.h"
 #include "dynamics/point_spring.h"
 #include "math/decompositions.h"
+#include "math/small_dense.h"
+#include "model/number_text.h"
 #include "worlds/closed_tree.h"
 #include "worlds/contact_law.h"
 #include "worlds/left_out.h"
@@ -17,8 +19,13 @@
 namespace bielle::worlds {
 namespace {
 
-constexpr int kMaxNewton = 8;
+constexpr int kMaxNewton = 20;
 constexpr double kNewtonTolerance = 1e-10;  // of a change of velocity, relative to 1 (m/s, rad/s) and the largest
+constexpr double kLeastShare = 1.0 / 64;    // of a Newton step that must lower the residual
+constexpr int kMostHalvings = 6;            // of a step
+constexpr double kSpan = 20;                // steps between closed ends, to which it returns to halve them
+constexpr double kEnergyError = 3e-4;       // of a step, over the kinetic energy and what forces take of it
+constexpr double kLeastEnergy = 1e-3;       // J/kg of the robot, as that of a sinking by 0.1 mm: below it none counts
 
 // The bodies of all contacts, then the trunk, then those of point springs, two of each.
 std::vector<int> listTips(const Model& model, int pushed_body) {
@@ -33,6 +40,8 @@ std::vector<int> listTips(const Model& model, int pushed_body) {
 VectorXd findPosture(const Model& model) {
   return model.references().empty() ? findClosedConfiguration(model).q : makeStandingPosture(model);
 }
+
+double sum(const Works& w) { return w.motor + w.push + w.contact + w.stop + w.joint; }
 
 class BielleWorld : public World {
  public:
@@ -50,8 +59,16 @@ class BielleWorld : public World {
   void addStops(const VectorXd& w, VectorXd& loads, MatrixXd* damping);
   Vector6d calcTwist(int tip, const VectorXd& w) const;
   void addWrench(int tip, const Vector6d& wrench, VectorXd& loads) const;
+  double takeSteps(double steps, double h);
+  bool takeStep(double h);
+  void rewind();
   bool kick(double h);
+  bool solve(double h);
+  double updateResidual(double h, MatrixXd* damping);
+  void updateCorrection();
   void book(double h);
+  bool balance(double kinetic, double energy);
+  std::string describeTrouble(double since, double h) const;
   bool move(double duration);
   Vector3d getPlace(int body, const Vector3d& point) const { return tree_.getPlacement(body).act(point); }
 
@@ -61,11 +78,26 @@ class BielleWorld : public World {
   std::vector<ContactForce> forces_;  // of the last step, per point
   std::vector<Vector3d> places_;      // where they acted, m (world)
   std::vector<double> stop_forces_;
-  VectorXd tau_;                                           // nv
-  Vector3d com_ = Vector3d::Zero();                        // of the pushed body
-  VectorXd w_mean_, dw_, correction_, loads_, half_last_;  // size
-  MatrixXd damping_, system_;                              // size x size
+  VectorXd tau_;                                                  // nv
+  Vector3d com_ = Vector3d::Zero();                               // of the pushed body
+  VectorXd w_mean_, dw_, correction_, residual_, start_, loads_;  // size
+  MatrixXd damping_, system_;                                     // size x size
+  bool slides_ = false;                                           // whether damping_ is not symmetric
   Eigen::LLT<MatrixXd> factors_;
+  std::vector<int> pivots_;  // size; of system_, where it slides
+  // What a step changes beside the tree.
+  struct Moment {
+    double taken = 0;    // steps of full length in takeSteps()
+    double owed = 0;     // s, the drift that completes the last step
+    double length = 0;   // s, of the last step
+    double energy = 0;   // at its middle, less the works up to there, J
+    VectorXd half_last;  // size, half of its dw
+    Works works;
+    std::vector<ContactPoint> points;
+  };
+  Moment now_, kept_;  // works and points of the former are those of the world
+  enum class Trouble { Loops, Forces, Energy } trouble_ = Trouble::Loops;
+  double amount_ = 0;  // of it: what is left of the change of velocity, m/s or rad/s; J
 };
 
 BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
@@ -76,12 +108,16 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
       forces_(contacts_.points.size()),
       places_(contacts_.points.size(), Vector3d::Zero()),
       stop_forces_(contacts_.stops.size(), 0.0),
-      factors_(tree_.size()) {
+      factors_(tree_.size()),
+      pivots_(tree_.size()) {
   integration_.integrator = "leapfrog";
   warnings_ = listMissingStops(model);
   tau_.setZero(model.nv());
-  for (VectorXd* x : {&w_mean_, &dw_, &correction_, &loads_, &half_last_}) x->setZero(tree_.size());
+  for (VectorXd* x : {&w_mean_, &dw_, &correction_, &residual_, &start_, &loads_, &now_.half_last})
+    x->setZero(tree_.size());
   for (MatrixXd* x : {&damping_, &system_}) x->setZero(tree_.size(), tree_.size());
+  now_.points = contacts_.points;
+  kept_ = now_;
 }
 
 void BielleWorld::start() {
@@ -89,7 +125,9 @@ void BielleWorld::start() {
   q_ = tree_.configuration();
   v_ = tree_.velocity();
   tau_.setZero();
-  half_last_.setZero();
+  now_.half_last.setZero();
+  now_.owed = now_.length = 0;
+  now_.energy = tree_.calcEnergy();
   const auto place = [this](int body, const Vector3d& point) { return getPlace(body, point); };
   contacts_.resetAnchors(place);
   contacts_.setStart(place, [this](const JointStop& stop) { return q_[stop.coordinate]; });
@@ -104,51 +142,161 @@ bool BielleWorld::step(double duration) {
 
 bool BielleWorld::move(double duration) {
   const double steps = countSteps(duration, time_step_), h = duration / steps;
+  const double begin = time_;
   double taken = 0;
-  while (taken < steps && !(taken > 0 && isInterrupted())) {
-    if (!tree_.drift(taken == 0 ? h / 2 : h)) return fail(tree_.failure());
-    if (!kick(h)) return fail("the velocities are no longer finite");
-    noteStep(h);
-    ++taken;
+  while (taken < steps && message_.empty() && !(taken > 0 && isInterrupted())) {
+    taken += takeSteps(std::min(kSpan, steps - taken), h);
+    time_ = begin + (taken == steps ? duration : taken * h);
   }
-  const bool is_done = taken == steps;
-  time_ += is_done ? duration : taken * h;
-  if (!tree_.drift(h / 2)) return fail(tree_.failure());
   reportFeet([this](int body) { return tree_.getPlacement(body); });
-  return is_done;
+  return taken == steps && message_.empty();
+}
+
+// Takes steps of length h, whose ends are closed and balance. Where one cannot be taken, all that led there, since the cause is
+// often a kick some steps before, are taken again in steps of half the length; beyond that place they are as long as before.
+// \returns how many were taken: fewer where it was interrupted, or fails
+double BielleWorld::takeSteps(double steps, double h) {
+  double share = 1, least = 1, passed = 0;  // shortest share so far; no longer steps before this place
+  now_.taken = now_.owed = 0;
+  kept_ = now_;
+  kept_.works = work_;
+  kept_.points = contacts_.points;
+  tree_.keep();
+  for (;;) {
+    const bool ends = now_.taken == steps || (now_.taken > 0 && isInterrupted());
+    if (takeStep(ends ? 0 : share * h)) {
+      if (ends) return now_.taken;
+      noteStep(share * h);
+      now_.taken += share;
+      if (share < 1 && now_.taken >= passed && std::fmod(now_.taken, 2 * share) == 0) share *= 2;
+      continue;
+    }
+    const bool is_shortest = share == least;
+    if (is_shortest && share <= std::ldexp(1.0, -kMostHalvings)) fail(describeTrouble(now_.taken * h, share * h));
+    passed = std::max(passed, now_.taken + share);
+    if (is_shortest) least /= 2;
+    share = least;
+    rewind();
+    if (!message_.empty()) return 0;
+  }
+}
+
+// From the middle of the last step to that of one of length h or, with 0, to the end of the last one. If it fails, the state is
+// on the way.
+bool BielleWorld::takeStep(double h) {
+  trouble_ = Trouble::Loops;
+  if (!tree_.drift(now_.owed + 0.5 * h)) return false;
+  now_.owed = 0.5 * h;
+  if (h > 0) return kick(h);
+  const double energy = tree_.calcEnergy();
+  return balance(energy - tree_.calcPotential(), energy - sum(work_));
+}
+
+void BielleWorld::rewind() {
+  now_ = kept_;
+  work_ = kept_.works;
+  contacts_.points = kept_.points;
+  tree_.restore();
+}
+
+std::string BielleWorld::describeTrouble(double since, double h) const {
+  std::string why = tree_.failure();
+  if (trouble_ == Trouble::Forces)
+    why = "no forces of contacts, stops and dampers fit the velocities: " + formatNumber(amount_, "%.3g") +
+          " m/s or rad/s are left";
+  if (trouble_ == Trouble::Energy) why = "its energy is off by " + formatNumber(amount_, "%.3g") + " J";
+  return "after " + formatNumber(time_ + since, "%.6g") + " s, in a step of " + formatNumber(h, "%.3g") + " s: " + why;
 }
 
 // Eqs. (1) and (2)
 bool BielleWorld::kick(double h) {
   tree_.updateMassMatrix();
-  tree_.updateLoads(tau_, half_last_);
+  if (now_.length > 0) now_.half_last *= h / now_.length;
+  now_.length = h;
+  tree_.updateLoads(tau_, now_.half_last);
   std::vector<ContactPoint>& points = contacts_.points;
   for (size_t i = 0; i < points.size(); ++i) places_[i] = getPlace(points[i].body, points[i].p);
   com_ = getPlace(pushed_body_, model_.bodies()[pushed_body_].inertia.com);
-  dw_.setZero();
-  for (int i = 0; i < kMaxNewton; ++i) {
-    w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
-    loads_ = tree_.loads();
-    damping_.setZero();
-    addForces(w_mean_, loads_, &damping_);
-    system_ = tree_.massMatrix();
-    correction_ = h * loads_;
-    correction_.noalias() -= system_ * dw_;
-    system_ += 0.5 * h * damping_;
-    factors_.compute(system_);
-    if (factors_.info() != Eigen::Success) return false;
-    factors_.solveInPlace(correction_);
-    dw_ += correction_;
-    if (correction_.cwiseAbs().maxCoeff() < kNewtonTolerance * (1 + dw_.cwiseAbs().maxCoeff())) break;
-  }
-  if (!dw_.allFinite()) return false;
+  if (!solve(h)) return false;
   w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
   loads_.setZero();
   addForces(w_mean_, loads_, nullptr);
+  const double before = sum(work_);
   book(h);
+  // At the middle, the mean of before and after the kick.
+  const VectorXd& w = tree_.reducedVelocity();
+  residual_.noalias() = tree_.massMatrix() * w_mean_;
+  const double added = residual_.dot(dw_);
+  residual_.noalias() = tree_.massMatrix() * w;
+  const double kinetic = 0.5 * residual_.dot(w) + 0.5 * added;
+  if (!balance(kinetic + std::abs(added), kinetic + tree_.calcPotential() - 0.5 * (before + sum(work_)))) return false;
   for (size_t i = 0; i < points.size(); ++i) updateAnchor(contacts_.terrain, places_[i], forces_[i], points[i]);
   tree_.kick(dw_);
-  half_last_ = 0.5 * dw_;
+  now_.half_last = 0.5 * dw_;
+  return true;
+}
+
+// Newton's method on Eq. (1), with shorter steps where they do not lower the residual.
+bool BielleWorld::solve(double h) {
+  trouble_ = Trouble::Forces;
+  dw_.setZero();
+  double size = updateResidual(h, &damping_);
+  for (int i = 0; i < kMaxNewton && std::isfinite(size); ++i) {
+    system_ = tree_.massMatrix();
+    system_ += 0.5 * h * damping_;
+    if (slides_)
+      factorizeSmall(system_, pivots_);
+    else
+      factors_.compute(system_);
+    updateCorrection();
+    start_ = dw_;
+    double share = 1, next = 0;
+    for (;; share *= 0.5) {
+      dw_ = start_ + share * correction_;
+      next = updateResidual(h, nullptr);
+      if (next < size || share <= kLeastShare) break;
+    }
+    updateCorrection();  // with the same matrix: good enough to tell whether another one is needed
+    amount_ = correction_.cwiseAbs().maxCoeff();
+    if (amount_ < kNewtonTolerance * (1 + dw_.cwiseAbs().maxCoeff())) {
+      dw_ += correction_;
+      return true;
+    }
+    if (!(next < size)) return false;
+    size = updateResidual(h, &damping_);
+  }
+  return false;
+}
+
+// Right side of Eq. (2), and its size. \param damping  set if it is given
+double BielleWorld::updateResidual(double h, MatrixXd* damping) {
+  w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
+  loads_ = tree_.loads();
+  if (damping) {
+    damping->setZero();
+    slides_ = false;
+  }
+  addForces(w_mean_, loads_, damping);
+  residual_ = h * loads_;
+  residual_.noalias() -= tree_.massMatrix() * dw_;
+  return std::sqrt((residual_.array().square() / tree_.massMatrix().diagonal().array()).sum());
+}
+
+void BielleWorld::updateCorrection() {
+  correction_ = residual_;
+  if (slides_)
+    solveFactorized(system_, pivots_, correction_);
+  else
+    factors_.solveInPlace(correction_);
+}
+
+// Whether the energy less the works is what it was in the middle of the last step: turns that are large for the step, and b at
+// a velocity that was foreseen wrongly, change it.
+bool BielleWorld::balance(double kinetic, double energy) {
+  trouble_ = Trouble::Energy;
+  amount_ = std::abs(energy - now_.energy);
+  if (!(amount_ <= kEnergyError * kinetic + kLeastEnergy * model_.mass())) return false;
+  now_.energy = energy;
   return true;
 }
 
@@ -192,15 +340,16 @@ void BielleWorld::addContacts(const VectorXd& w, VectorXd& loads, MatrixXd* damp
       wrench.head<3>() += forces_[i].force;
       wrench.tail<3>() += x.cross(forces_[i].force);
       if (!damping) continue;
+      slides_ = slides_ || forces_[i].slides;
       const Matrix3d X = skew(x), DX = forces_[i].damping * X;
       D.topLeftCorner<3, 3>() += forces_[i].damping;
       D.topRightCorner<3, 3>() -= DX;
+      D.bottomLeftCorner<3, 3>() += X * forces_[i].damping;
       D.bottomRightCorner<3, 3>() -= X * DX;
     }
     if (!touches) continue;
     addWrench(tip, wrench, loads);
     if (!damping) continue;
-    D.bottomLeftCorner<3, 3>() = D.topRightCorner<3, 3>().transpose();
     const ReducedTree::Columns& columns = tree_.getTip(tip);
     for (size_t o = 0; o < columns.outer.size(); ++o) {
       const Vector6d DJ = D * columns.J.col(o);

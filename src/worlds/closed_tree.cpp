@@ -3,10 +3,11 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "model/joint.h"
+#include "model/number_text.h"
 
 namespace bielle::worlds {
 
-ClosedTree::Cluster::Cluster(const ReducedCluster& l) : cluster(l), scratch(l), state(l), next(l), motion(l) {
+ClosedTree::Cluster::Cluster(const ReducedCluster& l) : cluster(l), scratch(l), state(l), next(l), kept(l), motion(l) {
   for (VectorXd* x : {&d, &a_d}) x->setZero(l.model.nv());
   for (VectorXd* x : {&drift, &zeta}) x->setZero(l.rank);
   rows.setZero(l.closures.rows);
@@ -27,19 +28,20 @@ ClosedTree::ClosedTree(const Model& model, ConstVectorRef q, const std::vector<i
     for (int k = 0; k < joint.nv; ++k) places_[joint.idx_v + k] = {-1, reduction_.free_offsets[i] + k};
   }
   M_.setZero(size(), size());
-  for (VectorXd* x : {&q_, &q_next_}) *x = model.makeNeutral();
+  for (VectorXd* x : {&q_, &q_next_, &q_kept_}) *x = model.makeNeutral();
   for (VectorXd* x : {&v_, &v_foreseen_, &a_d_}) x->setZero(model.nv());
-  for (VectorXd* x : {&w_, &w_foreseen_, &loads_}) x->setZero(size());
+  for (VectorXd* x : {&w_, &w_foreseen_, &loads_, &w_kept_}) x->setZero(size());
 }
 
 bool ClosedTree::set(ConstVectorRef q, ConstVectorRef v) {
   q_ = q;
-  for (Cluster& c : clusters_) {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    Cluster& c = clusters_[i];
     gatherConfiguration(model_, c.cluster, q_, c.state.basis.q);
     c.zeta.setZero();
     c.drift.setZero();  // of the state before
     if (!updateClusterState<double>(c.cluster, c.scratch, c.state.basis.q, c.state)) {
-      failure_ = describeFailure(c.cluster, c.scratch);
+      failed_ = i;
       return false;
     }
     gatherVelocity(c.cluster, v, c.d);
@@ -49,21 +51,29 @@ bool ClosedTree::set(ConstVectorRef q, ConstVectorRef v) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
     w_.segment(reduction_.free_offsets[i], joint.nv) = v.segment(joint.idx_v, joint.nv);
   }
-  updatePositions(model_, ws_, q_);
-  updateVelocity();
+  updateTree();
   return true;
 }
 
-bool ClosedTree::drift(double h) {
-  for (Cluster& c : clusters_) {
+bool ClosedTree::drift(double h, int halvings) {
+  if (driftAtOnce(h)) return true;
+  return halvings > 0 && drift(0.5 * h, halvings - 1) && drift(0.5 * h, halvings - 1);
+}
+
+// Changes nothing if it fails.
+bool ClosedTree::driftAtOnce(double h) {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    Cluster& c = clusters_[i];
     gatherVelocity(c.cluster, v_, c.d);
     c.d *= h;
     // To second order the closures open by h^2/2 times their drift. `drift` has it since updateLoads(), solved.
     c.zeta = -0.5 * h * h * c.drift;
     if (!closeCluster<double>(c.cluster, c.scratch, c.state.basis, c.d, c.zeta, c.next)) {
-      failure_ = describeFailure(c.cluster, c.scratch);
+      failed_ = i;
       return false;
     }
+  }
+  for (Cluster& c : clusters_) {
     auto w = w_.segment(c.cluster.offset, c.cluster.size);
     w.noalias() = c.next.basis.WN.transpose() * c.next.step;
     w /= h;
@@ -77,14 +87,45 @@ bool ClosedTree::drift(double h) {
                    q_next_.segment(joint.idx_q, joint.nq));
   }
   q_.swap(q_next_);
-  updatePositions(model_, ws_, q_);
-  updateVelocity();
+  updateTree();
   return true;
 }
 
-void ClosedTree::updateVelocity() {
+void ClosedTree::keep() {
+  for (Cluster& c : clusters_) c.kept = c.state;
+  q_kept_ = q_;
+  w_kept_ = w_;
+}
+
+void ClosedTree::restore() {
+  for (Cluster& c : clusters_) {
+    c.state = c.kept;
+    c.drift.setZero();  // of another state
+  }
+  q_ = q_kept_;
+  w_ = w_kept_;
+  updateTree();
+}
+
+// Bodies and velocities at q and w.
+void ClosedTree::updateTree() {
+  updatePositions(model_, ws_, q_);
   v_.setZero();
   addReduced(w_, v_);
+}
+
+double ClosedTree::calcPotential() const { return calcPotentialEnergy(model_, ws_); }
+
+double ClosedTree::calcEnergy() {
+  updateVelocities<double>(model_, ws_, v_);
+  return calcKineticEnergy(model_, ws_) + calcPotential();
+}
+
+std::string ClosedTree::failure() const {
+  const Cluster& c = clusters_[failed_];
+  const std::string why = describeFailure(c.cluster, c.scratch);
+  if (c.scratch.closed) return why;
+  return why + "; " + formatNumber(c.scratch.residual.cwiseAbs().maxCoeff(), "%.3g") + " m or rad are left open";
 }
 
 void ClosedTree::updateMassMatrix() {

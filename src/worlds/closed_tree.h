@@ -29,14 +29,22 @@ class ClosedTree {
   /// Sets a closed configuration, and the velocity nearest to v that keeps it closed.
   /// \returns false where the linkages are singular; failure() then names a closure, also below
   bool set(ConstVectorRef q, ConstVectorRef v);
-  /// Moves with the present velocity for a duration h, not zero.
-  bool drift(double h);
+  /// Moves with the present velocity for a duration h, not zero: where a loop does not close, by two halves, which are
+  /// divided again up to kMostHalvings times. If that does not help, the state is somewhere on the way: restore() it.
+  bool drift(double h, int halvings = kMostHalvings);
+  static constexpr int kMostHalvings = 6;
+  /// Keeps configuration and velocity, and returns to those that were kept last.
+  void keep();
+  void restore();
   /// M^, and the columns of the tips, at q.
   void updateMassMatrix();
   /// The part N^T (tau - b - M a_d) of Eq. (1) at the velocity w + dw (size).
   void updateLoads(ConstVectorRef tau, const VectorXd& dw);
   /// w <- w + dw
   void kick(const VectorXd& dw);
+
+  double calcPotential() const;  ///< of gravity and springs of the model, J
+  double calcEnergy();           ///< that and the kinetic one, J
 
   int size() const { return reduction_.size; }
   const MatrixXd& massMatrix() const { return M_; }
@@ -59,14 +67,15 @@ class ClosedTree {
     for (int c = 0; c < cluster.size; ++c)
       visit(cluster.offset + c, clusters_[place.cluster].state.basis.N(place.index, c));
   }
-  const std::string& failure() const { return failure_; }
+  /// Why set() or drift() has just failed, with the closure and how far it is open.
+  std::string failure() const;
 
  private:
   struct Cluster {
     explicit Cluster(const ReducedCluster& cluster);
     const ReducedCluster& cluster;
     ClusterScratch scratch;
-    ClusterState state, next;
+    ClusterState state, next, kept;
     ClusterMotion motion;
     // n; n; m; rank: (J W^{-1} J^T)^{-1} times the drift of the closures; rank
     VectorXd d, a_d, rows, drift, zeta;
@@ -74,7 +83,8 @@ class ClosedTree {
   struct DofPlace {
     int cluster = -1, index = 0;  // row of N of the cluster; without one, index into w
   };
-  void updateVelocity();
+  bool driftAtOnce(double h);
+  void updateTree();
   void addReduced(const VectorXd& dw, VectorXd& v) const;
 
   Model model_;
@@ -88,7 +98,8 @@ class ClosedTree {
   VectorXd q_, q_next_, v_;          // nq, nq, nv
   VectorXd v_foreseen_, a_d_;        // nv
   VectorXd w_, w_foreseen_, loads_;  // size
-  std::string failure_;
+  VectorXd q_kept_, w_kept_;         // nq, size
+  size_t failed_ = 0;                // cluster
 };
 
 }  // namespace bielle::worlds

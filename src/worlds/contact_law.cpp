@@ -71,22 +71,26 @@ ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point,
   const double limit = terrain.ground().friction * normal.force;
   const Vector3d anchor = point.touches ? point.anchor : x;
   const Vector3d shift = x - anchor, sliding = velocity + approach * n;
-  out.spring = shorten(-point.shear_stiffness * (shift - n.dot(shift) * n), limit);
+  const Vector3d held = -point.shear_stiffness * (shift - n.dot(shift) * n);
+  out.spring = shorten(held, limit);
   const Vector3d wanted = out.spring - point.shear_damping * sliding, friction = shorten(wanted, limit);
   out.force = normal.force * n + friction;
   out.elastic =
       0.5 * point.stiffness * touch.depth * touch.depth + 0.5 * out.spring.squaredNorm() / point.shear_stiffness;
+  const double stretch = held.norm(), size = wanted.norm();
+  out.slides = stretch > limit || size > limit;
   if (!with_damping) return out;
   const Matrix3d along = n * n.transpose();
-  out.damping = normal.rate * along;
-  const double size = wanted.norm();
-  if (size <= limit) {
-    out.damping += point.shear_damping * (Matrix3d::Identity() - along);
-  } else {
+  const double limit_rate = terrain.ground().friction * normal.rate;  // the cone narrows as the point lifts
+  Matrix3d shear = point.shear_damping * (Matrix3d::Identity() - along);
+  if (stretch > limit) shear += limit_rate / stretch * held * n.transpose();
+  if (size > limit) {
     const Vector3d direction = wanted / size;
-    out.damping +=
-        point.shear_damping * limit / size * (Matrix3d::Identity() - along - direction * direction.transpose());
+    shear =
+        (limit / size * (shear - direction * (direction.transpose() * shear)) + limit_rate * direction * n.transpose())
+            .eval();
   }
+  out.damping = normal.rate * along + shear;
   return out;
 }
 

@@ -50,7 +50,8 @@ struct ContactForce {
   Vector3d force = Vector3d::Zero();    ///< on the point, N (world)
   Vector3d spring = Vector3d::Zero();   ///< s, N (world)
   double elastic = 0;                   ///< e, J
-  Matrix3d damping = Matrix3d::Zero();  ///< symmetric part of -df/dx', positive semidefinite, N s/m
+  Matrix3d damping = Matrix3d::Zero();  ///< -df/dx', N s/m; not symmetric where the point slides: (1) sets the cone
+  bool slides = false;                  ///< whether s or f_t is at the cone
 };
 /// Eqs. (1), (2) and (4) at a position and a velocity (world).
 /// \param with_damping  whether to fill the derivative
