@@ -5,9 +5,9 @@
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/model/builder.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
 #include "bielle/worlds/bielle_world.h"
 #include "count_allocations.h"
