@@ -172,7 +172,10 @@ def main():
                  f"{one[title][0] / other[title][0]:.2f}", str(GOALS.get(title, GOALS.get(key, ""))), one[title][3])
                 for title, key in keys.items() if title in one and title in other])
     sizes = {revision: count(revision) for revision in (there, here)}
-    page.add(f"""Ratios are those of processor times. Goals were set for what {arguments.against} builds and tests, which has
+    missing = [title for title in keys if title not in SUMS and not (title in one and title in other)]
+    if missing:
+        page.add(f"Not measured against {arguments.against} yet: {'; '.join(missing)}.")
+    page.add(f"""3bf0e583 builds the check before it shows the squat. Ratios are those of processor times. Goals were set for what {arguments.against} builds and tests, which has
 {show_sizes(sizes[there])}; this has {show_sizes(sizes[here])}.""")
     show_tiers(page, arguments.build)
     page.write(False)
