@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -213,7 +214,8 @@ TEST_CASE("campaign: dry runs stop at once when the user asks for it, and equal 
   const tasks::CampaignSpec few = tasks::readCampaignSpec(directory.write(
       "few.yaml", "motions: [" + replaceOnce(squat, "NAME", "a") + ", " + replaceOnce(squat, "NAME", "b") +
                       "]\noptions: {seed: [1, 2]}\npush: {phase: [0.5, 1.5, 2.5], impulse: 1}\n"));
-  CHECK(tasks::checkCommands(few, program, directory.path() + "/log"));
+  std::set<std::string> warnings;
+  CHECK(tasks::checkCommands(few, program, directory.path() + "/log", warnings));
   CHECK(countLines(calls) == 2);
 }
 

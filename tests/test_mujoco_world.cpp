@@ -213,7 +213,7 @@ TEST_CASE("mujoco world: a push in the air gives the robot its impulse and its w
   const Books books = world->books();
   CHECK(books.push_work > 1);
   CHECK(books.contact_loss == 0);
-  CHECK(testing::calcImbalance(start, books) < 0.01);
+  CHECK(testing::calcBalanceError(start, books) < 0.01);
   for (const FootReport& foot : world->feet()) {
     CHECK(!foot.touches);
     CHECK(foot.wrench.isZero(0));

@@ -58,7 +58,7 @@ bool hold(World& world, const PostureHold& posture, double duration, const std::
   return true;
 }
 
-double calcImbalance(const Books& start, const Books& end) {
+double calcBalanceError(const Books& start, const Books& end) {
   const double change = end.energy() - start.energy();
   const double losses = end.contact_loss + end.stop_loss + end.other_loss;
   const double largest = std::max({std::abs(change), std::abs(end.motor_work), std::abs(end.push_work), losses, 1e-12});
@@ -107,14 +107,14 @@ void checkDropped(World& world, const Model& model, const TrialTolerances& toler
   CHECK(calcLoad(world) == 0);
   REQUIRE(hold(world, posture, 0.97));
   const Books end = world.books();
-  CHECK(calcImbalance(start, end) < tolerances.balance);
+  CHECK(calcBalanceError(start, end) < tolerances.balance);
   CHECK(end.contact_loss > 0);
   CHECK(end.stop_loss >= -1e-9);
   CHECK(calcLoad(world) == Approx(model.mass() * model.gravity().norm()).epsilon(0.1));
   // Books that omit half of what the ground took must not balance.
   Books poisoned = end;
   poisoned.contact_loss /= 2;
-  CHECK(calcImbalance(start, poisoned) > 2 * tolerances.balance);
+  CHECK(calcBalanceError(start, poisoned) > 2 * tolerances.balance);
 }
 
 void checkPushed(World& world, const Model& model, const TrialTolerances& tolerances) {
@@ -134,7 +134,7 @@ void checkPushed(World& world, const Model& model, const TrialTolerances& tolera
   end.contact_loss -= start.contact_loss;
   end.stop_loss -= start.stop_loss;
   end.other_loss -= start.other_loss;
-  CHECK(calcImbalance(start, end) < tolerances.balance);
+  CHECK(calcBalanceError(start, end) < tolerances.balance);
 }
 
 void checkStopped(World& world, const Model& model, const TrialTolerances& tolerances) {
@@ -160,10 +160,10 @@ void checkStopped(World& world, const Model& model, const TrialTolerances& toler
   const Books end = world.books();
   CHECK(end.stop_loss > 0.01);
   CHECK(end.contact_loss == Approx(0).margin(1e-9));
-  CHECK(calcImbalance(start, end) < tolerances.balance);
+  CHECK(calcBalanceError(start, end) < tolerances.balance);
   Books poisoned = end;
   poisoned.stop_loss *= 0.5;
-  CHECK(calcImbalance(start, poisoned) > calcImbalance(start, end));
+  CHECK(calcBalanceError(start, poisoned) > calcBalanceError(start, end));
 }
 
 Model makeSprungFivebar() {
@@ -215,11 +215,11 @@ double checkSprung(World& world, const Model& model, double balance) {
   const VectorXd expected = swing(model, q, kDuration, 1e-3);
   REQUIRE((expected - q).cwiseAbs().maxCoeff() > 0.1);
   const double error = (world.configuration() - expected).cwiseAbs().maxCoeff();
-  CHECK(calcImbalance(start, end) < balance);
+  CHECK(calcBalanceError(start, end) < balance);
   // Dampers that are booked by half, or springs that are not, must show.
   Books poisoned = end;
   poisoned.other_loss /= 2;
-  CHECK(calcImbalance(start, poisoned) > 2 * balance);
+  CHECK(calcBalanceError(start, poisoned) > 2 * balance);
   ModelParts slack = takeParts(model);
   slack.point_springs.clear();
   const Model without = ModelBuilder::restore(slack);
@@ -231,7 +231,7 @@ double checkSprung(World& world, const Model& model, double balance) {
   };
   poisoned = end;
   poisoned.potential -= calcSpringEnergy(world.configuration()) - calcSpringEnergy(q);
-  CHECK(calcImbalance(start, poisoned) > 2 * balance);
+  CHECK(calcBalanceError(start, poisoned) > 2 * balance);
   return error;
 }
 

@@ -25,10 +25,10 @@ bool hold(World& world, const PostureHold& posture, double duration,
           const std::function<Vector3d(double time)>& push = {});
 
 // Left less right side of Books' Eq. (1) over the largest of its terms.
-double calcImbalance(const Books& start, const Books& end);
+double calcBalanceError(const Books& start, const Books& end);
 
 struct TrialTolerances {
-  double balance = 0.01;  // of calcImbalance()
+  double balance = 0.01;  // of calcBalanceError()
   double creep = 1e-6;    // of a robot that stands, m in half a second
   double gap = 1e-8;      // m
 };

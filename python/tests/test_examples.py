@@ -34,7 +34,7 @@ def test_page(tmp_path):
     except FileNotFoundError:
         program = re.sub(r"bielle.check\(.*", "", program)
     (tmp_path / "page.py").write_text(program)
-    assert "requested 0.7, achieved 0.7012" in run("page.py", cwd=tmp_path)
+    assert "requested 0.7, achieved 0.7014" in run("page.py", cwd=tmp_path)
 
 
 def test_types():
