@@ -5,13 +5,13 @@
 #include <sstream>
 
 #include "formats/text_file.h"
+#include "model/number_text.h"
 #include "paper/figures.h"
 #include "tasks/cells.h"
 
 namespace bielle::paper {
 
 using tasks::formatCell;
-using tasks::formatExact;
 using tasks::quoteCsv;
 
 namespace {
