@@ -96,8 +96,7 @@ TEST_CASE("closed field: a step has the order of its method, for every joint") {
 
 TEST_CASE("closed field: how independent its rows are does not depend on the way there") {
   std::mt19937 rng(9);
-  const Mechanism mechanism =
-      makeRandomMechanism(rng, JointKind::Prismatic, ClosureKind::Ball3D, MechanismBase::Fixed);
+  const Mechanism mechanism = makeRandomMechanism(rng, JointKind::Prismatic, ClosureKind::Ball3D, MechanismBase::Fixed);
   ClosedField field(mechanism.model);
   field.select(mechanism.q_closed);
   const VectorXd zero = VectorXd::Zero(mechanism.model.nv());

@@ -66,6 +66,26 @@ TEST_CASE("free motion: a linkage swings from a state, and keeps its energy and 
   CHECK(readFile(scratch.path / "swing/energy.csv").find("time,kinetic,potential") == 0);
 }
 
+TEST_CASE(
+    "free motion: whole turns of a far angle are left out where nothing counts them, and the motion is the same") {
+  const FreeScratch scratch;
+  const auto swing = [&](double turns, const std::string& name) {
+    const std::string state =
+        scratch.write(name + ".json",
+                      nlohmann::json{{"joints", {{"crank_joint", {{"q", 1.2 + 2 * M_PI * turns}, {"v", 3}}}}}}.dump());
+    return move(kFreeFourbar, scratch.path / name, {"--state", state, "--duration", "0.1"});
+  };
+  REQUIRE(swing(0, "near").status == 0);
+  const CommandResult far = swing(1e6, "far"), farthest = swing(1e15, "farthest");
+  CAPTURE(far.err, farthest.err);
+  REQUIRE(far.status == 0);
+  CHECK(farthest.status == 0);
+  CHECK(far.err.find("whole turns are left out; it starts with 1.2") != std::string::npos);
+  const MotionRecord a = readRecord((scratch.path / "near/trajectory.npz").string()),
+                     b = readRecord((scratch.path / "far/trajectory.npz").string());
+  CHECK((a.q - b.q).cwiseAbs().maxCoeff() < 1e-7);  // the angle was rounded by 1e-9
+}
+
 TEST_CASE("free motion: several worlds agree, and are compared on one page") {
   const FreeScratch scratch;
   const std::string torques =

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iostream>
 #include <limits>
 
 #include "bielle/dynamics/assembly.h"
@@ -11,6 +12,7 @@
 #include "cli/simulate/free.h"
 #include "dynamics/loop_conflict.h"
 #include "model/listing.h"
+#include "model/number_text.h"
 
 namespace bielle::worlds {
 namespace {
@@ -40,6 +42,31 @@ VectorXd makePosture(const Model& model, const std::string& name) {
   VectorXd q = result.q;
   if (name == "neutral") lift(model, q);
   return q;
+}
+
+// Far angles are rounded by more than loops may be open. Whole turns of a joint are left out where nothing counts them, as springs,
+// ranges and couplers do.
+void leaveOutTurns(const Model& model, const std::string& file, cli::EvalState& state) {
+  constexpr double kFar = 1e5;  // rad
+  for (int j : state.placed) {
+    const Joint& joint = model.joints()[j];
+    if (joint.kind != JointKind::Revolute && joint.kind != JointKind::Continuous) continue;
+    double& angle = state.q[joint.idx_q];
+    if (std::abs(angle) <= kFar) continue;
+    bool is_counted =
+        std::isfinite(model.lowerLimits()[joint.idx_v]) || std::isfinite(model.upperLimits()[joint.idx_v]);
+    for (const JointForce& force : model.jointForces()) is_counted |= force.joint == j && force.stiffness != 0;
+    for (const Closure& closure : model.closures())
+      for (const CouplerTerm& term : closure.terms) is_counted |= term.joint == j;
+    if (is_counted)
+      throw InputError(file, "joint '" + joint.name + "'",
+                       "its angle of " + formatNumber(angle) + " rad is rounded by more than loops may be open",
+                       "give one within " + formatNumber(kFar) + " rad");
+    const double rest = std::remainder(angle, 2 * M_PI);
+    std::cerr << "bielle: warning: " << file << ": joint '" << joint.name << "': of its angle " << formatNumber(angle)
+              << " rad whole turns are left out; it starts with " << formatNumber(rest) << "\n";
+    angle = rest;
+  }
 }
 
 // The least velocity with that of the joints that the file moves; one that keeps the loops closed, if it does not.
@@ -73,6 +100,7 @@ FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments) 
   cli::EvalState state = cli::readState(model, arguments.state, posture);
   if (!state.contacts.empty())
     throw InputError(file, "key 'contacts'", "feet of a free motion stand where the ground holds them", "remove it");
+  leaveOutTurns(model, file, state);
   cli::closeState(model, file, state);
   move(model, file, state);
   return {state.q, state.v, state.u};
