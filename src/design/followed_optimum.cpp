@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "math/decompositions.h"
 #include "design/optimum_path.h"
+#include "math/decompositions.h"
 
 namespace bielle {
 namespace {
