@@ -175,7 +175,7 @@ def main():
     missing = [title for title in keys if title not in SUMS and not (title in one and title in other)]
     if missing:
         page.add(f"Not measured against {arguments.against} yet: {'; '.join(missing)}.")
-    page.add(f"""3bf0e583 builds the check before it shows the squat. Ratios are those of processor times. Goals were set for what {arguments.against} builds and tests, which has
+    page.add(f"""Commits before 94c97371 build the check before they show the squat. Ratios are those of processor times. Goals were set for what {arguments.against} builds and tests, which has
 {show_sizes(sizes[there])}; this has {show_sizes(sizes[here])}.""")
     show_tiers(page, arguments.build)
     page.write(False)
