@@ -195,7 +195,9 @@ bool isDetermined(const Model& model, ConstVectorRef q_reference, const Linkage&
   if (!updateBasis(linkage, s, nullptr, nullptr)) return false;
   updateRows(linkage, s, s.basis->N);
   s.svd.compute(s.both);
-  return s.svd.singularValues().tail(linkage.idle).maxCoeff() < kIdle;
+  // Where there are fewer rows than closed motions, the rest of these is idle anyway.
+  const VectorXd& values = s.svd.singularValues();
+  return values.tail(values.size() - linkage.size()).maxCoeff() < kIdle;
 }
 
 // At the reference, where Q_0 may be zero or infinite.
