@@ -7,7 +7,6 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
 #include "bielle/worlds/bielle_world.h"
 #include "count_allocations.h"
@@ -146,14 +145,14 @@ TEST_CASE("bielle world: a robot is pushed, and the work of the push is booked")
   testing::checkPushed(*makeTestWorld(), getBipetto(), kBielleTolerances);
 }
 
+TEST_CASE("bielle world: soles and edges rest on the sides and corners of steps") {
+  testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
+    return makeBielleWorld(model, {options, {}});
+  });
+}
+
 TEST_CASE("bielle world: how far a loaded foot turns and sinks is recorded, and told") {
-  ModelBuilder builder("block");
-  Joint base;
-  base.name = "base";
-  base.kind = JointKind::FreeFlyer;
-  builder.addLink("block", "world", base, {10, {0, 0, 0.05}, 0.05 * Matrix3d::Identity()});
-  builder.addContact("foot", "block", ContactKind::Surface6D, 0.05, 0.03);
-  const Model model = builder.build();
+  const Model model = testing::makeBlock(ContactKind::Surface6D, {0, 0, 0.05});
   const auto world = makeBielleWorld(model);
   const auto observe = [&](double pitch, double depth) {
     VectorXd q = model.makeNeutral();

@@ -201,6 +201,12 @@ TEST_CASE("manifold world: a robot stands, is dropped, is pushed and meets its s
   testing::checkStopped(*makeTight(model, 1e-6), model, tolerances);
 }
 
+TEST_CASE("manifold world: soles and edges rest on the sides and corners of steps") {
+  testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
+    return makeManifoldWorld(model, {options, {}, 1e-6});
+  });
+}
+
 TEST_CASE("manifold world: springs and dampers between points move a linkage, and are booked") {
   const Model model = testing::makeSprungFivebar();
   CHECK(testing::checkSprung(*makeTight(model, 1e-9), model, 1e-7) < 1e-7);

@@ -55,6 +55,14 @@ TEST_CASE("simbody world: a robot is pushed, and the work of the push is booked"
   testing::checkPushed(*makeSimbodyWorld(getBipetto()), getBipetto(), kSimbodyTolerances);
 }
 
+TEST_CASE("simbody world: soles and edges rest on the sides and corners of steps") {
+  testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
+    SimbodyWorldOptions simbody;
+    simbody.world = options;
+    return makeSimbodyWorld(model, simbody);
+  });
+}
+
 TEST_CASE("simbody world: a stop holds a joint, and takes energy") {
   testing::checkStopped(*makeSimbodyWorld(getBipetto()), getBipetto(), kSimbodyTolerances);
 }

@@ -56,6 +56,9 @@ TEST_CASE("terrain: a point leaves a box by the shortest way, but not into the g
   CHECK((side.normal + Vector3d::UnitX()).norm() < 1e-12);
   CHECK(terrain.touch({0.999, 0.1, 0.05}).normal.z() == 1);  // the next box is beyond this side
   CHECK(terrain.touch({-0.2, 0, -0.01}).depth == Approx(0.01));
+  // One that came from above leaves through the top, however near the side is.
+  CHECK(terrain.touch({0.004, 0.1, 0.05}, {-0.01, 0.1, 0.101}).depth == Approx(0.05));
+  CHECK(terrain.touch({0.004, 0.1, 0.05}, {-0.01, 0.1, 0.099}).depth == Approx(0.004));
 }
 
 TEST_CASE("terrain: ramps start level, up and down") {

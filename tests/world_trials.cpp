@@ -65,6 +65,93 @@ double calcBalanceError(const Books& start, const Books& end) {
   return std::abs(change - end.motor_work - end.push_work + losses) / largest;
 }
 
+Model makeBlock(ContactKind kind, const Vector3d& com) {
+  ModelBuilder builder("block");
+  Joint base;
+  base.name = "base";
+  base.kind = JointKind::FreeFlyer;
+  builder.addLink("block", "world", base, {10, com, 0.05 * Matrix3d::Identity()});
+  builder.addContact("foot", "block", kind, 0.05, kind == ContactKind::Surface6D ? 0.03 : 0);
+  return builder.build();
+}
+
+namespace {
+
+// What of a sole, 0.1 by 0.06 m or as a line, lies on a step, by samples.
+struct Bearing {
+  Vector3d centre = Vector3d::Zero(),
+           rim = Vector3d::Zero();  // of all, and of what is lowest in x; in the frame of the sole, m
+  bool is_any = false;
+};
+Bearing findBearing(ContactKind kind, const GroundStep& step, const Vector3d& place, double yaw) {
+  constexpr int kSamples = 200;
+  const Matrix3d R = Eigen::AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix();
+  std::vector<Vector3d> on;
+  double lowest = 1e9;
+  for (int i = 0; i <= kSamples; ++i)
+    for (int k = 0; k <= (kind == ContactKind::Surface6D ? kSamples : 0); ++k) {
+      const Vector3d p(0.05 * (2.0 * i / kSamples - 1),
+                       kind == ContactKind::Surface6D ? 0.03 * (2.0 * k / kSamples - 1) : 0, 0);
+      const Vector3d at = place + R * p - step.top;
+      if (std::abs(at.x()) > step.length / 2 || std::abs(at.y()) > step.width / 2) continue;
+      on.push_back(p);
+      lowest = std::min(lowest, at.x());
+    }
+  Bearing out;
+  int rims = 0;
+  for (const Vector3d& p : on) {
+    out.centre += p / double(on.size());
+    if ((place + R * p - step.top).x() > lowest + 1e-3) continue;
+    out.rim += p;
+    ++rims;
+  }
+  out.is_any = rims > 0;
+  if (rims > 0) out.rim /= rims;
+  return out;
+}
+
+}  // namespace
+
+void checkOverhangs(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld) {
+  const GroundStep wide = {{0.5, 0, 0}, 1, 1, 0, 0, 0}, corner = {{0.5, 0.49, 0}, 1, 1, 0, 0, 0},
+                   tread = {{0.03, 0, 0}, 0.06, 1, 0, 0, 0}, stone = {{0.035, 0, 0}, 0.07, 0.05, 0, 0, 0};
+  for (const GroundStep& step : {wide, corner, tread, stone}) {
+    WorldOptions options;
+    options.ground.height = -0.3;
+    options.ground.steps = {step};
+    for (const ContactKind kind : {ContactKind::Surface6D, ContactKind::Edge5D})
+      for (const double overhang : {0.0, 0.1, 0.2, 0.35, 0.45, 0.5})
+        for (const double yaw : {0.0, 0.1, -0.3, 0.785, 1.3, 1.5708, 3.0})
+          for (const double share : {0.0, 0.5}) {  // of the way of the load from the middle of what bears to its rim
+            const bool is_sole = kind == ContactKind::Surface6D;
+            if (!is_sole && std::abs(std::cos(yaw)) < 0.9) continue;
+            if (overhang == 0 && share > 0) continue;
+            const double reach = 0.05 * std::abs(std::cos(yaw)) + (is_sole ? 0.03 * std::abs(std::sin(yaw)) : 0);
+            const Vector3d place(reach * (1 - 2 * overhang), 0, 0);
+            const Bearing bearing = findBearing(kind, step, place, yaw);
+            REQUIRE(bearing.is_any);
+            // An edge bears along itself alone; its block hangs from it, and so does not roll over.
+            const Vector3d com =
+                bearing.centre + share * (bearing.rim - bearing.centre) + Vector3d(0, 0, is_sole ? 0.05 : -0.05);
+            CAPTURE(step.top.transpose(), step.length, int(kind), overhang, yaw, share, com.transpose());
+            const Model model = makeBlock(kind, com);
+            const auto world = makeWorld(model, options);
+            VectorXd q = model.makeNeutral();
+            q.head<7>() << place, 0, 0, std::sin(yaw / 2), std::cos(yaw / 2);
+            world->reset(q, VectorXd::Zero(model.nv()));
+            double load = 0;
+            for (int i = 0; i < 300; ++i) {
+              REQUIRE(world->advance(1e-3));
+              if (i >= 200) load += world->feet()[0].wrench[2] / 100;
+            }
+            const VectorXd moved = model.difference(q, world->configuration());
+            CHECK(moved.head<3>().norm() < 1e-3);
+            CHECK(moved.tail<3>().norm() < 0.01);
+            CHECK(load == Approx(10 * 9.81).epsilon(0.02));
+          }
+  }
+}
+
 void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances) {
   const PostureHold posture(model);
   world.reset(posture.posture(), VectorXd::Zero(model.nv()));

@@ -129,7 +129,7 @@ void BielleWorld::start() {
   now_.owed = now_.length = 0;
   now_.energy = tree_.calcEnergy();
   const auto place = [this](int body, const Vector3d& point) { return getPlace(body, point); };
-  contacts_.resetAnchors(place);
+  contacts_.reset([this](int body) { return tree_.getPlacement(body); });
   contacts_.setStart(place, [this](const JointStop& stop) { return q_[stop.coordinate]; });
 }
 
@@ -231,6 +231,7 @@ bool BielleWorld::kick(double h) {
   const double kinetic = 0.5 * residual_.dot(w) + 0.5 * added;
   if (!balance(kinetic + std::abs(added), kinetic + tree_.calcPotential() - 0.5 * (before + sum(work_)))) return false;
   for (size_t i = 0; i < points.size(); ++i) updateAnchor(contacts_.terrain, places_[i], forces_[i], points[i]);
+  contacts_.settle([this](int body) { return tree_.getPlacement(body); });
   tree_.kick(dw_);
   now_.half_last = 0.5 * dw_;
   return true;

@@ -11,6 +11,10 @@ constexpr double kTurn = 0.02, kShift = 1e-3;
 constexpr double kLeastGravity = 1;   // m/s^2; where there is less, soles and stops are as hard as on Earth
 constexpr double kStopDamping = 0.5;  // s/rad; s/m of sliding joints is longer by their ratio of speeds, about 10
 
+// The ground is at a place of a sole that is at most so far above it, or as deep in it, m.
+constexpr double kOver = 2e-4, kUnder = 5e-3;
+constexpr double kSteep = 0.5;  // cosine between a sole and the level: points of steeper ones stay where they are
+
 // Eq. (1)
 struct NormalForce {
   double force = 0, rate = 0;  // rate: d force / d d'
@@ -63,7 +67,7 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
 ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
                               const Vector3d& velocity, bool with_damping) {
   ContactForce out;
-  const Terrain::Touch touch = terrain.touch(x);
+  const Terrain::Touch touch = terrain.touch(x, point.from);
   if (!(touch.depth > 0)) return out;
   const Vector3d& n = touch.normal;
   const double approach = -n.dot(velocity);
@@ -95,9 +99,51 @@ ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point,
 }
 
 void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point) {
-  point.touches = terrain.touch(x).depth > 0;
-  point.anchor = x;
-  if (point.touches) point.anchor += force.spring / point.shear_stiffness;
+  const Terrain::Touch touch = terrain.touch(x, point.from);
+  point.touches = touch.depth > 0;
+  point.anchor = point.from = x;
+  if (!point.touches) return;
+  point.anchor += force.spring / point.shear_stiffness;
+  point.from += touch.depth * touch.normal;
+}
+
+std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<ContactPoint>& points) {
+  std::vector<ContactArea> areas;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const ContactFrame& contact = model.contacts()[points[i].contact];
+    if (contact.kind == ContactKind::Point3D) continue;
+    if (i == 0 || points[i].contact != points[i - 1].contact)
+      areas.push_back({contact.body, contact.X_BF, contact.half_length, contact.half_width, i, {}, {}});
+    areas.back().homes.push_back(contact.X_BF.inverse().act(points[i].p).head<2>());
+  }
+  for (ContactArea& area : areas) area.places.resize(area.homes.size());
+  return areas;
+}
+
+void settle(const Terrain& terrain, const SE3& X_WF, ContactArea& area, std::vector<ContactPoint>& points) {
+  const Matrix3d& R = X_WF.R;
+  const Eigen::Matrix2d along = R.topLeftCorner<2, 2>(), back = along.inverse();
+  const Eigen::Vector2d slope = -R.col(2).head<2>() / R(2, 2), centre = X_WF.p.head<2>();
+  const Vector3d plane(X_WF.p.z() - slope.dot(centre), slope.x(), slope.y());
+  const double x = area.half_length, y = area.half_width;
+  const Terrain::Corners corners = {centre + along * Eigen::Vector2d(x, y), centre + along * Eigen::Vector2d(-x, y),
+                                    centre + along * Eigen::Vector2d(-x, -y), centre + along * Eigen::Vector2d(x, -y)};
+  for (size_t i = 0; i < area.homes.size(); ++i)
+    area.places[i].home = area.places[i].support = centre + along * area.homes[i];
+  if (R(2, 2) > kSteep) terrain.findSupports(corners, plane, kOver, kUnder, area.places);
+  for (size_t i = 0; i < area.homes.size(); ++i) {
+    const Eigen::Vector2d& support = area.places[i].support;
+    const bool is_home = support == area.places[i].home;
+    const Eigen::Vector2d there = is_home ? area.homes[i] : Eigen::Vector2d(back * (support - centre));
+    ContactPoint& point = points[area.first + i];
+    const Vector3d p = area.X_BF.act(Vector3d(there.x(), there.y(), 0));
+    const Vector3d shift = R * (area.X_BF.R.transpose() * (p - point.p));
+    point.p = p;
+    point.anchor += shift;
+    point.from += shift;
+    // What lies on an edge has come from above, though the foot slips over it.
+    if (!is_home) point.from.z() = std::max(point.from.z(), plane[0] + plane.tail<2>().dot(support) + kUnder);
+  }
 }
 
 std::vector<JointStop> makeJointStops(const Model& model) {

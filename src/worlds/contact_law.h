@@ -2,7 +2,8 @@
 /// \file Compliant contact with friction that sticks, for worlds that have no contact of their own.
 ///
 /// A sole touches with the corners of its rectangle or, where the ground has steps, whose edges may lie anywhere under it, with a
-/// grid of points; a point contact with its origin. A point at x with velocity x' is by
+/// grid of points; a point contact with its origin. Points that overhang a step lie on its edge, so that the sole rests on all of it
+/// that the ground bears. A point at x with velocity x' is by
 /// d deep in the ground, whose normal there is n (Terrain::touch); T = 1 - n n^T. With the stiffness k of the point,
 ///
 ///     f_n = k d max(0, 1 + c d'),   d' = -n . x'          while d > 0, else no force                              (1)
@@ -40,11 +41,25 @@ struct ContactPoint {
   double shear_stiffness = 0, shear_damping = 0;  ///< k_t, N/m; c_t, N s/m
   Vector3d anchor = Vector3d::Zero();             ///< a, m (world)
   bool touches = false;                           ///< as of the last update of the anchor
+  Vector3d from = Vector3d::Zero();  ///< outside of the ground: through which of its surfaces the point came, m (world)
+};
+
+/// The points of a sole or an edge, and where they lie on it while the ground is under them.
+struct ContactArea {
+  int body = 0;
+  SE3 X_BF;
+  double half_length = 0, half_width = 0;  ///< m
+  size_t first = 0;                        ///< of its points
+  std::vector<Eigen::Vector2d> homes;      ///< in the frame of the contact, m
+  std::vector<Terrain::Place> places;      ///< as settle() found them
 };
 
 /// The points of all contacts of a model on a ground, contact by contact; those of a sole share its stiffness.
 std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& ground,
                                             const ContactOptions& options = {});
+
+/// Of those points. Contacts of a single point have none.
+std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<ContactPoint>& points);
 
 struct ContactForce {
   Vector3d force = Vector3d::Zero();    ///< on the point, N (world)
@@ -57,8 +72,11 @@ struct ContactForce {
 /// \param with_damping  whether to fill the derivative
 ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
                               const Vector3d& velocity, bool with_damping = false);
-/// Eq. (3), for the force at x.
+/// Eq. (3), for the force at x, and where the point came from.
 void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point);
+
+/// Moves points of an area that overhang a step onto its edge, where they are nearest, and back. Their bristles stay as they are bent.
+void settle(const Terrain& terrain, const SE3& X_WF, ContactArea& area, std::vector<ContactPoint>& points);
 
 /// A stop of a joint: (1) in one coordinate.
 struct JointStop {
@@ -83,19 +101,29 @@ StopForce calcStopForce(const JointStop& stop, double q, double v);
 class ContactSet {
  public:
   ContactSet(const Model& model, const Ground& ground, const ContactOptions& options)
-      : terrain(ground), points(makeContactPoints(model, ground, options)), stops(makeJointStops(model)) {}
+      : terrain(ground), points(makeContactPoints(model, ground, options)), stops(makeJointStops(model)) {
+    if (!ground.steps.empty()) areas_ = makeContactAreas(model, points);
+  }
 
   const Terrain terrain;
   std::vector<ContactPoint> points;
   const std::vector<JointStop> stops;
 
-  /// Points that have not touched before.
-  template <typename GetPlace>
-  void resetAnchors(const GetPlace& getPlace) {
+  /// Points that have not touched before. \param getPlacement  body -> X_WB
+  template <typename GetPlacement>
+  void reset(const GetPlacement& getPlacement) {
     for (ContactPoint& point : points) {
       point.touches = false;
-      updateAnchor(terrain, getPlace(point.body, point.p), ContactForce(), point);
+      point.from = getPlacement(point.body).act(point.p) + kLift * Vector3d::UnitZ();
     }
+    settle(getPlacement);
+    for (ContactPoint& point : points)
+      updateAnchor(terrain, getPlacement(point.body).act(point.p), ContactForce(), point);
+  }
+  /// Of all soles and edges; once per step, after the anchors.
+  template <typename GetPlacement>
+  void settle(const GetPlacement& getPlacement) {
+    for (ContactArea& area : areas_) worlds::settle(terrain, getPlacement(area.body) * area.X_BF, area, points);
   }
   template <typename GetPlace, typename GetCoordinate>
   void setStart(const GetPlace& getPlace, const GetCoordinate& getCoordinate) {
@@ -111,6 +139,8 @@ class ContactSet {
   }
 
  private:
+  static constexpr double kLift = 5e-3;  // soles that start so deep in a top stand on it, m
+  std::vector<ContactArea> areas_;       // on ground with steps
   struct Elastic {
     double all = 0, stops = 0;  // J; the latter a part of the former
   };

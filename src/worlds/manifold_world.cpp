@@ -91,7 +91,7 @@ void ManifoldWorld::start() {
   }
   if (!settle(VectorXd::Zero(model_.nv()), v_)) fail(field_.failure());
   best_independence_ = field_.independence();
-  contacts_.resetAnchors([this](int body, const Vector3d& point) { return getPlace(body, point); });
+  contacts_.reset([this](int body) { return field_.workspace().X_WB[body]; });
   updatePlacements(model_, ws_, q_);
   contacts_.setStart([this](int body, const Vector3d& point) { return ws_.X_WB[body].act(point); },
                      [this](const JointStop& stop) { return q_[stop.coordinate]; });
@@ -202,6 +202,7 @@ bool ManifoldWorld::takeStep(double& h) {
     const ContactForce force = calcContactForce(contacts_.terrain, point, x, calcVelocityAt(point.body, x));
     updateAnchor(contacts_.terrain, x, force, point);
   }
+  contacts_.settle([this](int body) { return field_.workspace().X_WB[body]; });
   return true;
 }
 

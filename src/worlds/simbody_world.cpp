@@ -56,6 +56,10 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
   StopForce calcForce(const State& state, const JointStop& stop) const {
     return calcStopForce(stop, findCoordinate(state, stop), getRate(state, stop.dof));
   }
+  SE3 findPlacement(const State& state, int body) const {
+    const SimTK::Transform& X = tree_.bodies[body].getBodyTransform(state);
+    return SE3(toEigen(X.R()), toEigen(X.p()));
+  }
   Vector3d findPlace(const State& state, int body, const Vector3d& p) const {
     return toEigen(tree_.bodies[body].findStationLocationInGround(state, toSimTK(p)));
   }
@@ -238,7 +242,7 @@ void SimbodyWorld::start() {
   for (const auto& [rotor, dof] : rotors_) u[int(rotor.getFirstUIndex(state))] = u[tree_.u_index[dof]];
   tree_.system.realize(state, Stage::Velocity);
   const auto place = [&](int body, const Vector3d& point) { return forces_->findPlace(state, body, point); };
-  contacts_.resetAnchors(place);
+  contacts_.reset([&](int body) { return forces_->findPlacement(state, body); });
   contacts_.setStart(place, [&](const JointStop& stop) { return forces_->findCoordinate(state, stop); });
   try {
     const SimTK::ProjectOptions within =
@@ -306,16 +310,14 @@ void SimbodyWorld::finishStep(double duration) {
     if (force.elastic > 0) addFootForce(point.contact, x, force.force);
     updateAnchor(contacts_.terrain, x, force, point);
   }
+  contacts_.settle([&](int body) { return forces_->findPlacement(state, body); });
 }
 
 void SimbodyWorld::readState() {
   const SimTK::State& state = integrator_->getState();
   tree_.system.realize(state, Stage::Velocity);
   tree_.readState(state, q_, v_);
-  reportFeet([&](int body) {
-    const SimTK::Transform& X = tree_.bodies[body].getBodyTransform(state);
-    return SE3(toEigen(X.R()), toEigen(X.p()));
-  });
+  reportFeet([&](int body) { return forces_->findPlacement(state, body); });
 }
 
 Books SimbodyWorld::books() const {

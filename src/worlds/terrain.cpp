@@ -12,6 +12,46 @@ namespace {
 
 constexpr int kLargestGrid = 200000;  // cells
 constexpr double kBeyond = 1e-6;      // a side of a box is free if the ground is lower this far beyond it, m
+constexpr double kInside =
+    1e-4;  // what rests on the side of a box lies so far inside it, more than a sole slips in a step, m
+constexpr double kRounding = 1e-9;  // of a point on a top, m
+
+// What of a convex polygon lies on a rectangle, by Sutherland and Hodgman ("Reentrant polygon clipping", 1974).
+class Clipped {
+ public:
+  explicit Clipped(const Terrain::Corners& corners) : count_(corners.size()) {
+    std::copy(corners.begin(), corners.end(), points_.begin());
+  }
+  void clip(const Eigen::Vector2d& axis, double most) {
+    std::array<Eigen::Vector2d, 8> out;
+    size_t count = 0;
+    for (size_t i = 0; i < count_; ++i) {
+      const Eigen::Vector2d &a = points_[i], &b = points_[(i + 1) % count_];
+      const double over_a = axis.dot(a) - most, over_b = axis.dot(b) - most;
+      if (over_a <= 0) out[count++] = a;
+      if ((over_a <= 0) != (over_b <= 0)) out[count++] = a + over_a / (over_a - over_b) * (b - a);
+    }
+    points_ = out;
+    count_ = count;
+  }
+  size_t size() const { return count_; }
+  const Eigen::Vector2d& operator[](size_t i) const { return points_[i]; }
+  Eigen::Vector2d findNearest(const Eigen::Vector2d& point) const {
+    Eigen::Vector2d best = points_[0];
+    for (size_t i = 0; i < count_; ++i) {
+      const Eigen::Vector2d &a = points_[i], side = points_[(i + 1) % count_] - a;
+      const double square = side.squaredNorm();
+      const double share = square > 0 ? std::clamp(side.dot(point - a) / square, 0.0, 1.0) : 0;
+      const Eigen::Vector2d near = a + share * side;
+      if ((near - point).squaredNorm() < (best - point).squaredNorm()) best = near;
+    }
+    return best;
+  }
+
+ private:
+  std::array<Eigen::Vector2d, 8> points_;
+  size_t count_;
+};
 
 void require(bool ok, const char* what, const char* remedy) {
   if (!ok) throw InputError("terrain", what, "it is out of range", remedy);
@@ -19,9 +59,9 @@ void require(bool ok, const char* what, const char* remedy) {
 
 }  // namespace
 
-bool Terrain::Top::covers(double px, double py) const {
+bool Terrain::Top::covers(double px, double py, double margin) const {
   const double dx = px - x, dy = py - y;
-  return std::abs(cos * dx + sin * dy) <= half_length && std::abs(cos * dy - sin * dx) <= half_width;
+  return std::abs(cos * dx + sin * dy) <= half_length - margin && std::abs(cos * dy - sin * dx) <= half_width - margin;
 }
 
 Terrain::Terrain(const Ground& ground) : ground_(ground) {
@@ -79,11 +119,18 @@ void Terrain::fillGrid() {
   }
 }
 
+int Terrain::findColumn(double x) const {
+  return std::clamp(static_cast<int>(std::floor((x - corner_.x()) / cell_)), 0, columns_ - 1);
+}
+
+int Terrain::findRow(double y) const {
+  return std::clamp(static_cast<int>(std::floor((y - corner_.y()) / cell_)), 0, rows_ - 1);
+}
+
 const Terrain::Top* Terrain::findTop(double x, double y) const {
   const double column = (x - corner_.x()) / cell_, row = (y - corner_.y()) / cell_;
   if (tops_.empty() || !(column > -1 && row > -1 && column < columns_ + 1 && row < rows_ + 1)) return nullptr;
-  const int cell = std::clamp(static_cast<int>(std::floor(row)), 0, rows_ - 1) * columns_ +
-                   std::clamp(static_cast<int>(std::floor(column)), 0, columns_ - 1);
+  const int cell = findRow(y) * columns_ + findColumn(x);
   const Top* highest = nullptr;
   double height = ground_.height;
   for (int k = starts_[cell]; k < starts_[cell + 1]; ++k) {
@@ -103,7 +150,7 @@ Terrain::Surface Terrain::find(double x, double y) const {
 Terrain::Touch Terrain::touch(const Vector3d& point) const {
   const Top* top = findTop(point.x(), point.y());
   if (!top) return {ground_.height - point.z(), Vector3d::UnitZ()};
-  Touch touch{(top->calcHeight(point.x(), point.y()) - point.z()) * top->normal.z(), top->normal};
+  Touch touch = touchTop(*top, point);
   const Eigen::Vector2d at = point.head<2>() - Eigen::Vector2d(top->x, top->y);
   const Eigen::Vector2d axes[] = {{top->cos, top->sin}, {-top->sin, top->cos}};
   const double halves[] = {top->half_length, top->half_width};
@@ -114,6 +161,86 @@ Terrain::Touch Terrain::touch(const Vector3d& point) const {
     if (find(beyond.x(), beyond.y()).height < point.z()) touch = {depth, {out.x(), out.y(), 0}};
   }
   return touch;
+}
+
+Terrain::Touch Terrain::touch(const Vector3d& point, const Vector3d& from) const {
+  const Top* top = findTop(point.x(), point.y());
+  return top && top->calcHeight(from.x(), from.y()) <= from.z() + kRounding ? touchTop(*top, point) : touch(point);
+}
+
+template <typename Top>
+Clipped clip(const Top& top, const Terrain::Corners& corners) {
+  const Eigen::Vector2d centre(top.x, top.y), axes[] = {{top.cos, top.sin}, {-top.sin, top.cos}};
+  const double halves[] = {top.half_length - kInside, top.half_width - kInside};
+  Clipped part(corners);
+  for (int axis = 0; axis < 2; ++axis)
+    for (const double sign : {1.0, -1.0}) part.clip(sign * axes[axis], halves[axis] + sign * axes[axis].dot(centre));
+  return part;
+}
+
+void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double over, double under,
+                           std::vector<Place>& places) const {
+  Eigen::Vector2d low = corners[0], high = corners[0];
+  for (const Eigen::Vector2d& corner : corners) {
+    low = low.cwiseMin(corner);
+    high = high.cwiseMax(corner);
+  }
+  const auto calcHeight = [&](const Eigen::Vector2d& at) { return plane[0] + plane.tail<2>().dot(at); };
+  for (Place& place : places) {
+    place.support = place.home;
+    place.top = nullptr;
+    place.distance = calcHeight(place.home) - ground_.height > over ? std::numeric_limits<double>::infinity() : 0;
+  }
+  const auto visit = [&](const auto& take) {
+    if (tops_.empty()) return;
+    for (int row = findRow(low.y()); row <= findRow(high.y()); ++row)
+      for (int column = findColumn(low.x()); column <= findColumn(high.x()); ++column)
+        for (int k = starts_[row * columns_ + column]; k < starts_[row * columns_ + column + 1]; ++k)
+          take(tops_[entries_[k]]);
+  };
+  const auto bears = [&](const Top& top, const Eigen::Vector2d& at) {
+    const double gap = calcHeight(at) - top.calcHeight(at.x(), at.y());
+    return gap <= over && gap >= -under && findTop(at.x(), at.y()) == &top;
+  };
+  visit([&](const Top& top) {
+    for (Place& place : places)
+      if (top.covers(place.home.x(), place.home.y(), kInside) &&
+          calcHeight(place.home) - top.calcHeight(place.home.x(), place.home.y()) <= over)
+        place.distance = 0;
+  });
+  const auto isOff = [](const Place& place) { return place.distance > 0; };
+  if (std::none_of(places.begin(), places.end(), isOff)) return;
+  visit([&](const Top& top) {
+    const Clipped part = clip(top, corners);
+    if (part.size() == 0) return;
+    for (Place& place : places) {
+      if (!isOff(place) || top.covers(place.home.x(), place.home.y(), kInside)) continue;
+      const Eigen::Vector2d near = part.findNearest(place.home);
+      const double distance = (near - place.home).squaredNorm();
+      if (distance >= place.distance || !bears(top, near)) continue;
+      place.support = near;
+      place.top = &top;
+      place.distance = distance;
+    }
+  });
+  // Places that are at the ground, or found an edge and then a corner, are not asked again.
+  visit([&](const Top& top) {
+    const auto isFree = [&](const Place& place) { return place.top == &top; };
+    if (std::none_of(places.begin(), places.end(), isFree)) return;
+    const Clipped part = clip(top, corners);
+    for (size_t i = 0; i < part.size(); ++i) {
+      const auto isHere = [&](const Eigen::Vector2d& at) { return (at - part[i]).squaredNorm() < kInside * kInside; };
+      if (std::any_of(corners.begin(), corners.end(), isHere) || !bears(top, part[i])) continue;
+      Place* nearest = nullptr;
+      for (Place& place : places)
+        if (isFree(place) &&
+            (!nearest || (place.home - part[i]).squaredNorm() < (nearest->home - part[i]).squaredNorm()))
+          nearest = &place;
+      if (!nearest) return;
+      nearest->support = part[i];
+      nearest->top = nullptr;
+    }
+  });
 }
 
 Ground makeRamp(const RampOptions& o) {

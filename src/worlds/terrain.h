@@ -1,5 +1,6 @@
 #pragma once
 /// \file The ground of a world: quick heights and normals, and grounds that no motion was planned for.
+#include <array>
 #include <vector>
 
 #include "bielle/dynamics/ground.h"
@@ -26,6 +27,23 @@ class Terrain {
   /// How deep a point is in the ground, along the normal of the surface through which the way out is shortest: the top of a
   /// box, or one of its sides unless there is ground beyond it.
   Touch touch(const Vector3d& point) const;
+  /// The same for a point that came from another one: out of a top above which it was, however near its sides are.
+  Touch touch(const Vector3d& point, const Vector3d& from) const;
+
+  /// A place of a sole, seen from above.
+  struct Place {
+    Eigen::Vector2d home,
+        support;  ///< where it is; the nearest place of the sole that is at the ground, else home; m (world)
+    const void* top = nullptr;  ///< whose edge bears it
+    double distance = 0;        ///< squared, m^2
+  };
+  using Corners = std::array<Eigen::Vector2d, 4>;
+  /// Moves places of a sole that overhang a step onto its edge; the corners of what lies on the step, first. The ground is at a
+  /// place where it is at most `over` below it and `under` above it.
+  /// \param corners  of the sole, in order, m (world)
+  /// \param plane    heights of the sole: z = plane[0] + plane[1] x + plane[2] y
+  void findSupports(const Corners& corners, const Vector3d& plane, double over, double under,
+                    std::vector<Place>& places) const;
   const Ground& ground() const { return ground_; }
 
  private:
@@ -35,10 +53,15 @@ class Terrain {
     Eigen::Vector2d slope = Eigen::Vector2d::Zero();
     double height = 0;
     Vector3d normal = Vector3d::UnitZ();
-    bool covers(double px, double py) const;
+    bool covers(double px, double py, double margin = 0) const;  // margin: from its sides
     double calcHeight(double px, double py) const { return height + slope.x() * px + slope.y() * py; }
   };
   void fillGrid();
+  Touch touchTop(const Top& top, const Vector3d& point) const {
+    return {(top.calcHeight(point.x(), point.y()) - point.z()) * top.normal.z(), top.normal};
+  }
+  int findColumn(double x) const;
+  int findRow(double y) const;
   // The highest top under a point, above the plane; null if there is none.
   const Top* findTop(double x, double y) const;
 
