@@ -12,11 +12,14 @@
 #include "bielle/formats/robot_writer.h"
 #include "bielle/results/robot_info.h"
 #include "bielle/robots/robot_loader.h"
+#include "change_model.h"
 #include "formats/drake.h"
 #include "formats/mjcf.h"
+#include "formats/mjcf_bodies.h"
 #include "formats/mjcf_coordinates.h"
 #include "formats/sdf.h"
 #include "get_error.h"
+#include "math/so3.h"
 #include "mechanisms.h"
 #include "published_robots.h"
 #include "robot_difference.h"
@@ -71,6 +74,41 @@ TEST_CASE("every robot comes back from MJCF with its mass matrix, closures, moto
       CHECK(back.difference(q, b.q).cwiseAbs().maxCoeff() < 1e-9);
     }
   }
+}
+
+TEST_CASE("feet of every kind come back from MJCF, and soles of spheres at their corners") {
+  const auto checkContact = [](const std::string& xml, const ContactFrame& contact) {
+    const Model back = readMjcfText(xml);
+    REQUIRE(back.contacts().size() == 2);
+    const ContactFrame& found = back.contacts()[back.findContact(contact.name)];
+    CHECK(found.kind == contact.kind);
+    CHECK(found.half_length == Approx(contact.half_length).margin(1e-12));
+    CHECK(found.half_width == Approx(contact.half_width).margin(1e-12));
+    CHECK(found.X_BF.isApprox(contact.X_BF, 1e-12));
+  };
+  const Model sole = loadRobot("bipetto").model;
+  const VectorXd q_ref = findClosedConfiguration(sole).q;
+  for (const ContactKind kind : {ContactKind::Point3D, ContactKind::Edge5D, ContactKind::Surface6D}) {
+    CAPTURE(int(kind));
+    const Model model = changeModel(sole, [kind](ModelParts& parts) {
+      if (kind != ContactKind::Surface6D) parts.contacts[0].half_width = 0;
+      if (kind == ContactKind::Point3D) parts.contacts[0].half_length = 0;
+      parts.contacts[0].kind = kind;
+      parts.contacts[0].X_BF.R = exp3(Vector3d(0.1, 0.2, 0.3));
+    });
+    checkContact(formatMjcf(model, q_ref).xml, model.contacts()[0]);
+  }
+  std::string xml = formatMjcf(sole, q_ref).xml;
+  const ContactFrame& contact = sole.contacts()[0];
+  const size_t from = xml.rfind('<', xml.find("name=\"" + contact.name + ".1\"")), to = xml.find('>', from) + 1;
+  std::string spheres;
+  for (int i = 0; i < 4; ++i) {
+    const Vector3d at = contact.X_BF.act(
+        Vector3d((i < 2 ? 1 : -1) * contact.half_length, (i % 2 == 0 ? 1 : -1) * contact.half_width, 0.005));
+    spheres += "<geom class='sole' size='0.005' name='" + contact.name + "." + std::to_string(i + 1) + "' pos='" +
+               formatMjcf(at) + "'/>";
+  }
+  checkContact(xml.replace(from, to - from, spheres), contact);
 }
 
 TEST_CASE("generated robots come back from MJCF") {

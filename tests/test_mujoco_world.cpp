@@ -85,6 +85,12 @@ TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined, on
   CHECK(load == Approx(model.mass() * model.gravity().norm()).epsilon(0.02));
 }
 
+TEST_CASE("mujoco world: soles and edges rest on the side of a step") {
+  testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
+    return makeMujocoWorld(model, {options, {}});
+  });
+}
+
 TEST_CASE("mujoco world: a ground of more boxes under the soles than it can have is refused") {
   const Model model = loadRobot("bipetto").model;
   MujocoWorldOptions options;

@@ -62,12 +62,10 @@ class MjcfWriter {
     // For distances: no other geom has the bit that it asks for.
     addGeom("shape", {{"contype", "2"}, {"conaffinity", "0"}, {"group", "3"}});
     addGeom("ground", {{"contype", "0"}, {"conaffinity", "1"}, {"rgba", "0.8 0.8 0.8 1"}});
-    XMLElement& sole = addGeom("sole", {{"type", "sphere"},
-                                        {"contype", "1"},
+    XMLElement& sole = addGeom("sole", {{"contype", "1"},
                                         {"conaffinity", "0"},
                                         {"condim", "3"},
                                         {"priority", "1"},
-                                        {"size", formatMjcf(options_.sole_radius)},
                                         {"friction", formatMjcf(options_.friction) + " 0 0"}});
     setStiffness(sole, "", options_.contact_time);
   }

@@ -6,9 +6,9 @@
 /// Coordinates follow the bodies; mjcf_coordinates.h maps those of a joint.
 ///
 /// Motors are actuators of their names, in the order of u, in N m or N. A weld is a `weld`, a ball a `connect`, a hinge
-/// two `connect`s NAME.1 and NAME.2 on its axis. A sole is four spheres at its corners, a point contact one sphere,
-/// named after the contact and numbered from 1; they touch only the ground. References are keyframes. A point spring is a
-/// spatial tendon of its name between two sites, its preload a shift of its spring length. A preload without a stiffness
+/// two `connect`s NAME.1 and NAME.2 on its axis. A sole is a box, an edge a capsule, a point a sphere, which the lowest points
+/// of the contact belong to: NAME.1 with the contact's name; they touch only the ground. References are keyframes. A point spring is
+/// a spatial tendon of its name between two sites, its preload a shift of its spring length. A preload without a stiffness
 /// gets kMjcfPreloadStiffness, by which a joint that turns by 1 rad changes it by 1e-9 N m. Windings, gears, losses and limits of
 /// speed of motors are in texts "bielle:motor:NAME" of <custom>, in the words of our YAML file, for our own reader.
 #include <string>
@@ -28,7 +28,7 @@ struct MjcfOptions {
   double contact_time = 1e-3;  ///< time constant of contacts and joint stops, s
   double impedance = 0.9999;   ///< share of a constraint's acceleration that is met, below 1
   double friction = 0.7;       ///< Coulomb coefficient between soles and ground
-  double sole_radius = 5e-3;   ///< of the spheres of soles, m
+  double sole_radius = 5e-3;   ///< of points and edges, half the thickness of soles, m
   double hinge_lever = 0.02;   ///< distance of the two points of a hinge from its frame, m
   double ground_height = 0;    ///< of the plane that soles touch, m
   MjcfRotations rotations = MjcfRotations::Balls;

@@ -35,6 +35,7 @@ std::string findSpringSite(const Model& model, const PointSpring& spring, int en
 
 namespace {
 
+constexpr double kLeastHalf = 1e-4;  // of a sole: MuJoCo refuses boxes without length or width, m
 // MuJoCo refuses masses and moments of inertia of moving bodies up to 1e-15.
 constexpr double kLeastInertia = 1e-14;
 
@@ -227,15 +228,23 @@ class BodyWriter {
       warn("frame '" + frame.name + "'", "it is left out: another contact has this name");
   }
 
+  // Where the ground ends under a box or a capsule, MuJoCo's contacts lie on its edge; spheres at the corners would fall past it.
   void writeSole(const ContactFrame& contact, XMLElement& e) {
-    const int corners = contact.kind == ContactKind::Point3D ? 1 : contact.kind == ContactKind::Edge5D ? 2 : 4;
-    for (int corner = 0; corner < corners; ++corner) {
-      const Vector3d centre((corner < corners / 2 || corners == 1 ? 1 : -1) * contact.half_length,
-                            (corner % 2 == 0 ? 1 : -1) * contact.half_width, options_.sole_radius);
-      addElement(e, "geom",
-                 {{"class", "sole"},
-                  {"name", contact.name + "." + std::to_string(corner + 1)},
-                  {"pos", formatMjcf(contact.X_BF.act(centre))}});
+    const double radius = options_.sole_radius, length = contact.half_length;
+    const auto getCentre = [&](double x) { return contact.X_BF.act(Vector3d(x, 0, radius)); };
+    XmlAttributes shape = {{"class", "sole"}, {"name", contact.name + ".1"}};
+    if (contact.kind == ContactKind::Surface6D) {
+      const Vector3d size(std::max(length, kLeastHalf), std::max(contact.half_width, kLeastHalf), radius);
+      setAttributes(addPlaced(e, "geom", {contact.X_BF.R, getCentre(0)}, shape),
+                    {{"type", "box"}, {"size", formatMjcf(size)}});
+    } else if (contact.kind == ContactKind::Edge5D) {
+      setAttributes(addElement(e, "geom", shape),
+                    {{"type", "capsule"},
+                     {"size", formatMjcf(radius)},
+                     {"fromto", formatMjcf(getCentre(-length)) + " " + formatMjcf(getCentre(length))}});
+    } else {
+      setAttributes(addElement(e, "geom", shape),
+                    {{"type", "sphere"}, {"size", formatMjcf(radius)}, {"pos", formatMjcf(getCentre(0))}});
     }
     setAttributes(addPlaced(e, "site", contact.X_BF, {{"name", contact.name}}), {{"size", "0.001"}});
   }

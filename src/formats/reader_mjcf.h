@@ -84,11 +84,6 @@ class MjcfReader {
     SE3 X_BG;
   };
 
-  struct Sphere {
-    Vector3d centre;
-    double radius;
-  };
-
   // An equality of two bodies, or a coupler.
   struct Tie {
     ClosureKind kind;
@@ -168,7 +163,7 @@ class MjcfReader {
   static SE3 readPlace(MjcfElement& e, double* half_length);
   static Shape readShape(MjcfElement& e, const SE3& X_BF);
   void readShapes(const std::vector<Child>& children, const BodyPlace& place);
-  void readSite(const Child& child, const BodyPlace& place, const std::map<std::string, Sphere>& spheres,
+  void readSite(const Child& child, const BodyPlace& place, const std::map<std::string, Shape>& shapes,
                 std::set<std::string>& soles);
   static bool placeMesh(const MeshAsset& mesh, Visual& visual);
   void readVisual(const Child& child, const BodyPlace& place);

@@ -66,26 +66,25 @@ MjcfReader::Shape MjcfReader::readShape(MjcfElement& e, const SE3& X_BF) {
   return out;
 }
 
-// Sites become frames. Spheres NAME.1 .. NAME.4, or NAME.1 alone, at a site NAME are the soles that the writer writes;
-// all other geoms are drawn.
+// Sites become frames. A box, capsule or sphere NAME.1 at a site NAME is the sole, edge or point that the writer writes, and
+// spheres NAME.1 .. NAME.4 the sole that it once wrote; all other geoms are drawn.
 void MjcfReader::readShapes(const std::vector<Child>& children, const BodyPlace& place) {
-  std::map<std::string, Sphere> spheres;
+  std::map<std::string, Shape> shapes;
   std::set<std::string> soles;
   for (const Child& child : children) {
     const std::string name = getAttribute(child.element, "name");
     if (getTag(*child.element) != "geom" || name.empty()) continue;
     MjcfElement e(*child.element, child.childclass, settings_);
     for (const char* read : kGeomAttributes) e.find(read);
-    const Shape shape = readShape(e, child.X_BF);
-    if (shape.type == "sphere") spheres[name] = {shape.X_BG.p, shape.size[0]};
+    shapes[name] = readShape(e, child.X_BF);
   }
   for (const Child& child : children)
-    if (getTag(*child.element) == "site") readSite(child, place, spheres, soles);
+    if (getTag(*child.element) == "site") readSite(child, place, shapes, soles);
   for (const Child& child : children)
     if (getTag(*child.element) == "geom" && !soles.count(getAttribute(child.element, "name"))) readVisual(child, place);
 }
 
-void MjcfReader::readSite(const Child& child, const BodyPlace& place, const std::map<std::string, Sphere>& spheres,
+void MjcfReader::readSite(const Child& child, const BodyPlace& place, const std::map<std::string, Shape>& shapes,
                           std::set<std::string>& soles) {
   MjcfElement e(*child.element, child.childclass, settings_);
   for (const char* drawn : {"type", "size", "rgba", "material"}) e.find(drawn);
@@ -100,14 +99,26 @@ void MjcfReader::readSite(const Child& child, const BodyPlace& place, const std:
   }
   addLink(name, place.link, JointKind::Fixed, name + "_frame", place.X_LB * X_BS);
   std::vector<Vector3d> corners;
+  SE3 X_SG;
+  Shape sole;  // of the first number
   for (int i = 1; i <= 4; ++i)
-    if (const auto it = spheres.find(site + "." + std::to_string(i)); it != spheres.end())
-      corners.push_back(X_BS.inverse().act(it->second.centre) - Vector3d(0, 0, it->second.radius));
+    if (const auto it = shapes.find(site + "." + std::to_string(i)); it != shapes.end()) {
+      if (i == 1) sole = it->second, X_SG = X_BS.inverse() * sole.X_BG;
+      if (it->second.type == "sphere")
+        corners.push_back(X_BS.inverse().act(it->second.X_BG.p) - Vector3d(0, 0, it->second.size[0]));
+    }
   ContactSpec contact;
   contact.name = site;
   contact.frame = name;
   if (site.empty()) return;
-  if (corners.size() == 1 && corners[0].isZero(kSamePlace)) {
+  const auto standsOnSite = [&](double height) { return (X_SG.p - Vector3d(0, 0, height)).isZero(kSamePlace); };
+  if (sole.type == "box" && standsOnSite(sole.size[2]) && X_SG.R.isIdentity(kSamePlace)) {
+    contact.half_length = round(sole.size[0]);
+    contact.half_width = round(sole.size[1]);
+  } else if (sole.type == "capsule" && standsOnSite(sole.size[0]) && X_SG.R.col(2).tail<2>().isZero(kSamePlace)) {
+    contact.kind = ContactKind::Edge5D;
+    contact.half_length = round(sole.size[1]);
+  } else if (corners.size() == 1 && corners[0].isZero(kSamePlace)) {
     contact.kind = ContactKind::Point3D;
   } else if (corners.size() == 4) {
     const double length = corners[0].x(), width = corners[0].y();

@@ -11,6 +11,9 @@ namespace {
 
 constexpr size_t kMostBoxes = 32;  // of MuJoCo at once
 constexpr double kDepth = 1;       // boxes reach this far below their tops, m
+// Boxes are narrower than their steps by this, m: MuJoCo 2.2.2 tilts a box whose side is flush with that of the box under it to
+// less than 1e-6 m and 1e-5 rad, which happens where both have round numbers.
+constexpr double kInset = 1e-4;
 
 }  // namespace
 
@@ -19,7 +22,7 @@ MujocoGround::MujocoGround(const Model& model, const Ground& ground) : model_(mo
     Box box{step, {}, {}, {}};
     box.attitude = calcRotation(step);
     box.centre = step.top - box.attitude * Vector3d(0, 0, kDepth / 2);
-    box.half_size << calcTopSize(step) / 2, kDepth / 2;
+    box.half_size << (calcTopSize(step).array() / 2 - kInset).max(kInset), kDepth / 2;
     boxes_.push_back(box);
   }
 }

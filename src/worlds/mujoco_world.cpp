@@ -52,11 +52,7 @@ class MujocoWorld : public World {
     });
     for (const std::string& warning : listTurnedArmatures(model)) warnings_.push_back(warning);
     for (size_t c = 0; c < model.contacts().size(); ++c)
-      for (int corner = 1; corner <= 4; ++corner) {
-        const std::string name = model.contacts()[c].name + "." + std::to_string(corner);
-        const int geom = mj_name2id(&mj, mjOBJ_GEOM, name.c_str());
-        if (geom >= 0) contact_of_geom_[geom] = static_cast<int>(c);
-      }
+      contact_of_geom_[mj_name2id(&mj, mjOBJ_GEOM, (model.contacts()[c].name + ".1").c_str())] = static_cast<int>(c);
     for (VectorXd* x : {&v_before_, &v_mean_, &push_force_}) x->setZero(model.nv());
     q_before_.setZero(mj.nq);
     row_velocity_.setZero(mj.njmax);
