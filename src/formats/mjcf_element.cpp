@@ -10,7 +10,6 @@
 namespace bielle {
 namespace {
 
-constexpr int kListedLines = 8;
 constexpr size_t kMostAttributes = 200, kMostDefaults = 100000;  // per element; copied from class to class
 
 // Actuators of all kinds share their defaults.
@@ -26,19 +25,6 @@ void merge(const XMLElement& element, const std::string& path, MjcfAttributes& a
   if (attributes.size() > kMostAttributes)
     throw InputError(path, describe(element), "it has more than " + std::to_string(kMostAttributes) + " attributes",
                      "remove the unused ones");
-}
-
-std::string formatLines(const std::set<int>& lines) {
-  std::string list;
-  int count = 0;
-  for (int line : lines) {
-    if (count == kListedLines) {
-      list += " and " + std::to_string(lines.size() - kListedLines) + " more";
-      break;
-    }
-    list += (count++ ? ", " : "") + std::to_string(line);
-  }
-  return (lines.size() > 1 ? " (lines " : " (line ") + list + ")";
 }
 
 }  // namespace

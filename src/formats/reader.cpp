@@ -7,6 +7,7 @@
 
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
+#include "formats/reader_dialects.h"
 #include "formats/reader_loops.h"
 #include "formats/robot_files.h"
 #include "model/listing.h"
@@ -163,7 +164,10 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   const std::filesystem::path loops = findLoopClosures(path);
   if (own.closures.empty() && files.yaml.closures.empty() && !loops.empty())
     readLoopClosures(loops.string(), files.urdf, files.yaml);
-  if (!has_settings) return files;
+  if (!has_settings) {
+    warnOfClosingFrames(files.urdf, files.yaml);
+    return files;
+  }
   if (!own.models.empty() || own.generator || own.composed)
     throw InputError(own.path,
                      own.composed    ? "key 'tree'"
@@ -172,6 +176,7 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
                      "there is a URDF beside this file, " + path.string(),
                      "remove the key, or move the file to another directory");
   complete(own, files.yaml);
+  warnOfClosingFrames(files.urdf, files.yaml);
   return files;
 }
 

@@ -154,15 +154,11 @@ class DrakeReader {
   }
 
   // Drake gives them no names; ours are in an attribute that it does not look at.
-  static std::string getName(const XMLElement& e, const std::string& prefix) {
-    const std::string name = getAttribute(&e, "name");
-    return name.empty() ? prefix + std::to_string(e.GetLineNum()) : name;
-  }
-
   void readBallConstraint(const XMLElement& e) {
     const std::string tag = getTag(e);
     ClosureSpec closure;
-    closure.name = getName(e, "ball_");
+    closure.name = getAttribute(&e, "name");
+    if (closure.name.empty()) closure.name = nameClosure("ball_" + std::to_string(e.GetLineNum()), settings_);
     closure.kind = ClosureKind::Ball3D;
     const std::string a = getLink(e, tag + "_body_A"), b = getLink(e, tag + "_body_B");
     const Vector3d p_AP = getChildVector(e, tag + "_p_AP"), p_BQ = getChildVector(e, tag + "_p_BQ");
@@ -174,7 +170,9 @@ class DrakeReader {
   void readSpringDamper(const XMLElement& e) {
     const std::string tag = getTag(e);
     PointSpringSpec spec{getLink(e, tag + "_body_A"), getLink(e, tag + "_body_B"), {}};
-    spec.spring.name = getName(e, "spring_");
+    spec.spring.name = getAttribute(&e, "name");
+    if (spec.spring.name.empty())
+      spec.spring.name = namePointSpring("spring_" + std::to_string(e.GetLineNum()), settings_);
     spec.spring.point1 = getChildVector(e, tag + "_p_AP");
     spec.spring.point2 = getChildVector(e, tag + "_p_BQ");
     spec.spring.rest = getChildNumber(e, tag + "_free_length", false);

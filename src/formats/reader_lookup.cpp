@@ -158,4 +158,18 @@ std::string findRobotFile(const std::string& name_or_path) {
                    "give a path, or one of the known names: " + listItems(listRobots()));
 }
 
+std::string nameClosure(const std::string& made, const YamlFile& file) {
+  return makeUnusedName(made, [&](const std::string& name) {
+    return std::any_of(file.closures.begin(), file.closures.end(),
+                       [&](const auto& other) { return other.name == name; });
+  });
+}
+
+std::string namePointSpring(const std::string& made, const YamlFile& file) {
+  return makeUnusedName(made, [&](const std::string& name) {
+    return std::any_of(file.point_springs.begin(), file.point_springs.end(),
+                       [&](const auto& other) { return other.spring.name == name; });
+  });
+}
+
 }  // namespace bielle

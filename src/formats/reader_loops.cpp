@@ -5,8 +5,6 @@
 #include <set>
 
 #include "bielle/model/error.h"
-#include "math/direction.h"
-#include "model/number_text.h"
 
 namespace fs = std::filesystem;
 
@@ -17,21 +15,6 @@ UrdfJoint* findTreeJoint(UrdfFile& tree, const std::string& name) {
   const auto it = std::find_if(tree.joints.begin(), tree.joints.end(),
                                [&name](const UrdfJoint& joint) { return joint.joint.name == name; });
   return it == tree.joints.end() ? nullptr : &*it;
-}
-
-Vector3d readTriple(const XMLElement& e, const char* attribute, const Vector3d& otherwise, const std::string& path) {
-  const char* text = e.Attribute(attribute);
-  if (!text) return otherwise;
-  std::vector<double> v;
-  if (!parseNumbers(text, v) || v.size() != 3)
-    throw InputError(path, describe(e),
-                     std::string("its attribute '") + attribute + "' is not made of 3 finite numbers", "correct it");
-  return {v[0], v[1], v[2]};
-}
-
-SE3 readEnd(const XMLElement& e, const std::string& path) {
-  const Matrix3d R = makeRotation(readTriple(e, "rpy", Vector3d::Zero(), path));
-  return {R, readTriple(e, "xyz", Vector3d::Zero(), path)};
 }
 
 class LoopClosuresReader {
@@ -191,39 +174,6 @@ std::string addUrdfFrame(UrdfFile& tree, std::string name, const std::string& li
   tree.links[name].name = name;
   tree.joints.push_back(joint);
   return name;
-}
-
-void readLoopJoints(const XMLElement& robot, UrdfFile& tree, YamlFile& settings) {
-  const std::string& path = tree.path;
-  for (const XMLElement* e : getChildren(robot, "loop_joint")) {
-    ClosureSpec closure;
-    closure.name = getAttribute(e, "name");
-    if (closure.name.empty()) closure.name = "loop_" + std::to_string(e->GetLineNum());
-    const std::string type = getAttribute(e, "type");
-    if (type == "continuous" || type == "revolute") {
-      closure.kind = ClosureKind::Hinge5D;
-      const XMLElement* axis = e->FirstChildElement("axis");
-      closure.axis = axis ? readTriple(*axis, "xyz", Vector3d::UnitX(), path) : Vector3d::UnitX();
-    } else if (type == "spherical" || type == "fixed") {
-      closure.kind = type == "fixed" ? ClosureKind::Weld6D : ClosureKind::Ball3D;
-    } else {
-      throw InputError(path, describe(*e), "its type '" + type + "' cannot close a loop",
-                       "use spherical, continuous, revolute or fixed");
-    }
-    const auto addEnd = [&](const char* tag) {
-      const XMLElement* end = e->FirstChildElement(tag);
-      if (!end) throw InputError(path, describe(*e), std::string("it has no <") + tag + ">", "name the link");
-      const std::string link = getAttribute(end, "link");
-      if (!tree.links.count(link))
-        throw InputError(path, describe(*end), "there is no link '" + link + "'",
-                         "declare the link or correct the name");
-      return addUrdfFrame(tree, closure.name + "_" + tag, link, readEnd(*end, path));
-    };
-    closure.frame1 = addEnd("link1");
-    closure.frame2 = addEnd("link2");
-    settings.path = path;
-    settings.closures.push_back(closure);
-  }
 }
 
 fs::path findLoopClosures(const fs::path& urdf) {

@@ -1,9 +1,5 @@
 #pragma once
-/// \file Loops that others add to a URDF: <loop_joint> inside, and loop_closures.yaml beside it.
-///
-/// `<loop_joint name type>` (Drake until 2018, RigidBodyDynamics.jl, Isaac Sim) holds <link1 link xyz rpy> and <link2 ...> together:
-/// `spherical` as a ball, `continuous` or `revolute` as a hinge about <axis xyz> (default x) of the frame in link 1, `fixed` as a
-/// weld.
+/// \file Loops in a file beside a URDF.
 ///
 /// A file loop_closures.yaml is looked for beside the URDF, in the directory above and in `config` there, unless the YAML file of the
 /// robot has closures. It may have
@@ -15,15 +11,11 @@
 #include <filesystem>
 
 #include "formats/robot_files.h"
-#include "formats/xml_document.h"
 
 namespace bielle {
 
 /// A frame of the tree with this name, or with underscores behind it if that is taken; the link itself for the identity.
 std::string addUrdfFrame(UrdfFile& tree, std::string name, const std::string& link, const SE3& X_LF);
-
-/// \throws InputError naming the line for links that do not exist, other types and what is no number
-void readLoopJoints(const XMLElement& robot, UrdfFile& tree, YamlFile& settings);
 
 /// Empty without one.
 std::filesystem::path findLoopClosures(const std::filesystem::path& urdf);

@@ -11,8 +11,8 @@
 #include "bielle/model/error.h"
 #include "formats/log_capture.h"
 #include "formats/mesh.h"
+#include "formats/reader_dialects.h"
 #include "formats/reader_drake.h"
-#include "formats/reader_loops.h"
 #include "formats/robot_files.h"
 #include "formats/xml_document.h"
 
@@ -31,9 +31,10 @@ constexpr NumberRule kNumbers[] = {
     {"box", "size", 3},     {"cylinder", "radius", 1}, {"cylinder", "length", 1},  {"sphere", "radius", 1},
     {"mesh", "scale", 3},   {"color", "rgba", 4},      {"mimic", "multiplier", 1}, {"mimic", "offset", 1}};
 
-const std::map<std::string, JointKind> kKinds = {
-    {"revolute", JointKind::Revolute}, {"continuous", JointKind::Continuous}, {"prismatic", JointKind::Prismatic},
-    {"fixed", JointKind::Fixed},       {"floating", JointKind::FreeFlyer},    {"planar", JointKind::Planar}};
+const std::map<std::string, JointKind> kJointKinds = {
+    {"revolute", JointKind::Revolute},  {"continuous", JointKind::Continuous}, {"prismatic", JointKind::Prismatic},
+    {"fixed", JointKind::Fixed},        {"floating", JointKind::FreeFlyer},    {"planar", JointKind::Planar},
+    {"spherical", JointKind::Spherical}};
 const std::map<std::string, JointKind> kDrakeKinds = {
     {"ball", JointKind::Spherical}, {"planar", JointKind::Planar}, {"universal", JointKind::Universal}};
 
@@ -83,7 +84,7 @@ std::set<std::string> collectNames(const XMLElement& robot, const std::string& t
 }
 
 const std::map<std::string, JointKind>& getKinds(const XMLElement& joint) {
-  return getTag(joint) == "joint" ? kKinds : kDrakeKinds;
+  return getTag(joint) == "joint" ? kJointKinds : kDrakeKinds;
 }
 
 bool isGiven(const XMLElement& element, const char* attribute) {
@@ -299,6 +300,29 @@ std::string warnOfMeshes(const std::vector<std::string>& unread, const std::stri
          "<collision> with boxes, cylinders or spheres";
 }
 
+// Joints of Bullet's and MuJoCo's readers, which urdfdom does not know; their kind is in the tree.
+void hideBalls(XMLElement& robot) {
+  for (XMLElement* e = robot.FirstChildElement("joint"); e; e = e->NextSiblingElement("joint"))
+    if (getAttribute(e, "type") == "spherical") e->SetAttribute("type", "floating");
+}
+
+// A root without mass whose only child floats is the world, on which the file itself puts a free base.
+void takeRootAsWorld(UrdfFile& file) {
+  const UrdfLink& root = file.links.at(file.root);
+  std::vector<UrdfJoint*> below;
+  for (UrdfJoint& joint : file.joints)
+    if (joint.parent == file.root) below.push_back(&joint);
+  if (below.size() != 1 || below[0]->joint.kind != JointKind::FreeFlyer || file.root == "world" ||
+      root.inertia.mass != 0 || !root.visuals.empty() || !root.shapes.empty() || file.links.count("world"))
+    return;
+  file.warnings.push_back(file.path + ": link '" + file.root + "': it is the world: without mass, and joint '" +
+                          below[0]->joint.name + "' floats on it");
+  file.links.erase(file.root);
+  below[0]->parent = file.root = "world";
+  file.links["world"].name = "world";
+  file.has_own_base = true;
+}
+
 void checkForXacro(const XMLElement& element, const std::string& path) {
   if (getTag(element).rfind("xacro:", 0) == 0) refuseXacro(path, describe(element));
   for (const XMLElement* e : getChildren(element)) checkForXacro(*e, path);
@@ -326,6 +350,7 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
       plain;  // printed for urdfdom, which recurses through whatever TinyXML makes of a text that is not well-formed
   document.DeepCopy(&plain);
   if (for_drake) removeDrake(*plain.RootElement());
+  hideBalls(*plain.RootElement());
   urdf::ModelInterfaceSharedPtr model;
   std::string complaints;
   {
@@ -347,7 +372,8 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
   if (!unread.empty()) file.warnings.push_back(warnOfMeshes(unread, path));
   for (const auto& [name, kind] : tree.joints) file.joints.push_back(makeJoint(*model->joints_.at(name), kind, path));
   if (for_drake) readDrakeElements(robot, file, settings);
-  readLoopJoints(robot, file, settings);
+  readDialects(robot, for_drake, file, settings);
+  takeRootAsWorld(file);
   return file;
 }
 

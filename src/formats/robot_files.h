@@ -124,6 +124,16 @@ YamlFile readYaml(const std::string& path);
 const std::vector<std::string>& listSharedKeys();
 void readSharedKeys(const YamlFields& fields, YamlFile& file);
 
+/// A name for what has none in its file: `made`, or, where several are in one line, with a number behind it.
+template <typename IsTaken>
+std::string makeUnusedName(const std::string& made, const IsTaken& isTaken) {
+  std::string name = made;
+  for (int i = 2; isTaken(name); ++i) name = made + "_" + std::to_string(i);
+  return name;
+}
+std::string nameClosure(const std::string& made, const YamlFile& file);
+std::string namePointSpring(const std::string& made, const YamlFile& file);
+
 /// The whole content of a file. \throws InputError when it cannot be read, or is too large
 std::string readRobotText(const std::string& path);
 

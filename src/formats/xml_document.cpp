@@ -72,6 +72,20 @@ std::string describe(const XMLElement& element) {
   return "<" + getTag(element) + "> (line " + std::to_string(element.GetLineNum()) + ")";
 }
 
+std::string formatLines(const std::set<int>& lines) {
+  constexpr int kListedLines = 8;
+  std::string list;
+  int count = 0;
+  for (int line : lines) {
+    if (count == kListedLines) {
+      list += " and " + std::to_string(lines.size() - kListedLines) + " more";
+      break;
+    }
+    list += (count++ ? ", " : "") + std::to_string(line);
+  }
+  return (lines.size() > 1 ? " (lines " : " (line ") + list + ")";
+}
+
 std::vector<const XMLElement*> getChildren(const XMLElement& element, const char* tag) {
   std::vector<const XMLElement*> children;
   for (const XMLElement* e = element.FirstChildElement(tag); e; e = e->NextSiblingElement(tag)) children.push_back(e);

@@ -3,6 +3,7 @@
 #include <tinyxml2.h>
 
 #include <initializer_list>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,8 @@ std::string getTag(const XMLElement& element);
 std::string getAttribute(const XMLElement* element, const char* attribute);
 /// "<joint> (line 3)"
 std::string describe(const XMLElement& element);
+/// " (line 3)", or " (lines 3, 5 and 7 more)"
+std::string formatLines(const std::set<int>& lines);
 /// The elements in another; of one tag only, if it is given.
 std::vector<const XMLElement*> getChildren(const XMLElement& element, const char* tag = nullptr);
 

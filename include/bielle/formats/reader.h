@@ -12,7 +12,7 @@
 ///   whose number of coordinates is changed by the YAML have no limits.
 /// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> its damping and friction, unless
 ///   `joint_forces` names it; meshes need not exist. Files for Drake (formats/drake.h) can also define loops,
-///   springs, motors and other joints; <loop_joint> and a file loop_closures.yaml beside it loops (formats/reader_loops.h).
+///   springs, motors and joints; others add loops, couplers and motors (formats/reader_dialects.h, formats/reader_loops.h).
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
 ///   of rounding.
 ///

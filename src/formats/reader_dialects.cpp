@@ -1,0 +1,395 @@
+#include "formats/reader_dialects.h"
+
+#include <algorithm>
+#include <set>
+
+#include "bielle/model/error.h"
+#include "formats/reader_loops.h"
+#include "math/direction.h"
+#include "model/number_text.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kRotorMass = 1e-9, kRotorInertia = 1e-9;  // kg, kg m^2: nothing without mass has inertia
+
+const std::map<std::string, ClosureKind> kClosureKinds = {
+    {"spherical", ClosureKind::Ball3D}, {"ball", ClosureKind::Ball3D},   {"continuous", ClosureKind::Hinge5D},
+    {"revolute", ClosureKind::Hinge5D}, {"hinge", ClosureKind::Hinge5D}, {"fixed", ClosureKind::Weld6D}};
+
+// Of elements that change no mechanism. What is in neither list is told.
+const std::set<std::string> kHarmless = {"link",   "joint",        "material", "mujoco",
+                                         "sensor", "ros2_control", "version",  "drake:joint"},
+                            kHarmlessOfJoint = {"parent", "child",       "origin",
+                                                "axis",   "limit",       "dynamics",
+                                                "mimic",  "calibration", "safety_controller",
+                                                "safety"},
+                            kHarmlessOfLink = {"inertial", "visual", "collision",
+                                               "contact",  "sensor", "self_collision_checking",
+                                               "material"},
+                            kChangingOfGazebo = {"link",    "model",          "springStiffness", "springReference",
+                                                 "gravity", "turnGravityOff", "static"};
+
+std::string getText(const XMLElement& e) {
+  const char* text = e.GetText();
+  return text ? text : "";
+}
+
+// Such as <joint_properties friction="0.0"/> of onshape-to-robot.
+bool isZero(const XMLElement& e) {
+  const tinyxml2::XMLAttribute* a = e.FirstAttribute();
+  if (!a || e.FirstChild()) return false;
+  for (std::vector<double> v; a; a = a->Next(), v.clear())
+    if (!parseNumbers(a->Value(), v) || std::any_of(v.begin(), v.end(), [](double x) { return x != 0; })) return false;
+  return true;
+}
+
+class DialectReader {
+ public:
+  DialectReader(bool for_drake, UrdfFile& tree, YamlFile& settings)
+      : for_drake_(for_drake), tree_(tree), settings_(settings) {
+    X_WL_[tree.root] = {};
+    for (const UrdfJoint& joint : tree.joints) X_WL_[joint.child] = X_WL_[joint.parent] * joint.joint.X_PJ;
+  }
+
+  void read(const XMLElement& robot) {
+    settings_.path = tree_.path;
+    for (const XMLElement* e : getChildren(robot)) {
+      const std::string tag = getTag(*e);
+      if (tag == "loop_joint" || tag == "constraint" || tag == "loop")
+        readLoop(*e);
+      else if (tag == "coupling")
+        readCoupling(*e);
+      else if (tag == "transmission")
+        readTransmission(*e);
+      else if (tag == "gazebo")
+        readGazebo(*e);
+      else if (!kHarmless.count(tag) && tag.rfind("drake:", 0) != 0)
+        leaveOut(*e);
+      if (tag == "ros2_control")
+        for (const XMLElement* inner : getChildren(*e, "transmission")) readTransmission(*inner);
+      if (tag == "joint" || tag == "link")
+        for (const XMLElement* inner : getChildren(*e))
+          if (!(tag == "joint" ? kHarmlessOfJoint : kHarmlessOfLink).count(getTag(*inner)) &&
+              getTag(*inner).rfind("drake:", 0) != 0)
+            leaveOut(*inner);
+    }
+    for (const auto& [tag, lines] : left_out_)
+      tree_.warnings.push_back(tree_.path + ": <" + tag + ">" + formatLines(lines) +
+                               ": it is left out: no such element is known here");
+  }
+
+ private:
+  [[noreturn]] void fail(const XMLElement& e, const std::string& problem, const std::string& remedy) const {
+    throw InputError(tree_.path, describe(e), problem, remedy);
+  }
+  void warn(const XMLElement& e, const std::string& problem) {
+    tree_.warnings.push_back(tree_.path + ": " + describe(e) + ": " + problem);
+  }
+  void leaveOut(const XMLElement& e) {
+    if (!isZero(e)) left_out_[getTag(e)].insert(e.GetLineNum());
+  }
+
+  const XMLElement& getChild(const XMLElement& e, const char* tag, const char* remedy) const {
+    const XMLElement* child = e.FirstChildElement(tag);
+    if (!child) fail(e, std::string("it has no <") + tag + ">", remedy);
+    return *child;
+  }
+
+  std::vector<double> parse(const XMLElement& e, const std::string& text, size_t count, const std::string& what) const {
+    std::vector<double> v;
+    if (!parseNumbers(text, v) || v.size() != count)
+      fail(e, what + " is not made of " + std::to_string(count) + " finite number" + (count > 1 ? "s" : ""),
+           "correct it");
+    return v;
+  }
+  Vector3d getTriple(const XMLElement& e, const char* attribute, const Vector3d& otherwise) const {
+    const char* text = e.Attribute(attribute);
+    if (!text) return otherwise;
+    const std::vector<double> v = parse(e, text, 3, std::string("its attribute '") + attribute + "'");
+    return {v[0], v[1], v[2]};
+  }
+  SE3 getPlace(const XMLElement* e) const {
+    if (!e) return {};
+    const Matrix3d R = makeRotation(getTriple(*e, "rpy", Vector3d::Zero()));
+    return {R, getTriple(*e, "xyz", Vector3d::Zero())};
+  }
+  Vector3d getDirection(const XMLElement& e) const {
+    const Vector3d axis = getTriple(e, "xyz", Vector3d::UnitX());
+    if (!(axis.norm() > 1e-12)) fail(e, "it is not a direction", "give a non-zero vector");
+    return axis.normalized();
+  }
+
+  // Of an element or, in SDF, of its text.
+  std::string getLink(const XMLElement& e, const char* attribute) const {
+    const std::string link = attribute ? getAttribute(&e, attribute) : getText(e);
+    if (!X_WL_.count(link)) fail(e, "there is no link '" + link + "'", "declare the link or correct the name");
+    return link;
+  }
+  ClosureSpec makeClosure(const XMLElement& e) const {
+    ClosureSpec closure;
+    closure.name = getAttribute(&e, "name");
+    if (closure.name.empty()) closure.name = nameClosure("loop_" + std::to_string(e.GetLineNum()), settings_);
+    const std::string type = getAttribute(&e, "type");
+    const auto kind = kClosureKinds.find(type);
+    if (kind == kClosureKinds.end())
+      fail(e, "its type '" + type + "' cannot close a loop", "use spherical, continuous, revolute or fixed");
+    closure.kind = kind->second;
+    return closure;
+  }
+  void add(ClosureSpec closure, const std::string& link1, const SE3& X_L1, const std::string& link2, const SE3& X_L2) {
+    closure.frame1 = addUrdfFrame(tree_, closure.name + "_link1", link1, X_L1);
+    closure.frame2 = addUrdfFrame(tree_, closure.name + "_link2", link2, X_L2);
+    settings_.closures.push_back(closure);
+  }
+
+  void readLoop(const XMLElement& e) {
+    struct Words {
+      const char *link1, *link2, *origin1, *origin2;
+    };
+    const bool is_plus = getTag(e) == "loop", is_family = e.FirstChildElement("parent") || e.FirstChildElement("child");
+    const Words words = is_plus     ? Words{"predecessor", "successor", nullptr, nullptr}
+                        : is_family ? Words{"parent", "child", "parent_origin", "child_origin"}
+                                    : Words{"link1", "link2", nullptr, nullptr};
+    ClosureSpec closure = makeClosure(e);
+    const XMLElement &end1 = getChild(e, words.link1, "name the link"),
+                     &end2 = getChild(e, words.link2, "name the link");
+    const auto find = [&](const XMLElement& end, const char* origin) {
+      return getPlace(is_plus ? end.FirstChildElement("origin") : is_family ? e.FirstChildElement(origin) : &end);
+    };
+    SE3 X_1 = find(end1, words.origin1), X_2 = find(end2, words.origin2);
+    if (closure.kind == ClosureKind::Hinge5D) {
+      const XMLElement *axis = e.FirstChildElement("axis"), *axis1 = e.FirstChildElement("parent_axis"),
+                       *axis2 = e.FirstChildElement("child_axis");
+      if (!axis) axis = axis1;
+      closure.axis = axis ? getDirection(*axis) : Vector3d::UnitX();
+      if (axis && getAttribute(axis, "frame") == "parent") closure.axis = X_1.R.transpose() * closure.axis;
+      if (axis2)
+        X_2.R = X_2.R * Eigen::Quaterniond::FromTwoVectors(closure.axis, getDirection(*axis2)).toRotationMatrix();
+    }
+    add(closure, getLink(end1, "link"), X_1, getLink(end2, "link"), X_2);
+  }
+
+  void readGazebo(const XMLElement& gazebo) {
+    for (const XMLElement* e : getChildren(gazebo)) {
+      if (getTag(*e) == "joint")
+        readSdfJoint(*e);
+      else if (kChangingOfGazebo.count(getTag(*e)))
+        warn(*e, "it is left out");
+    }
+  }
+
+  void readSdfJoint(const XMLElement& e) {
+    ClosureSpec closure = makeClosure(e);
+    const std::string parent = getLink(getChild(e, "parent", "name the link"), nullptr),
+                      child = getLink(getChild(e, "child", "name the link"), nullptr);
+    SE3 X_CJ;
+    if (const XMLElement* pose = e.FirstChildElement("pose")) {
+      if (!getAttribute(pose, "relative_to").empty())
+        fail(*pose, "its attribute 'relative_to' is not read here", "give the pose in the child link");
+      const std::vector<double> v = parse(*pose, getText(*pose), 6, "it");
+      X_CJ = {makeRotation({v[3], v[4], v[5]}), {v[0], v[1], v[2]}};
+    }
+    const SE3 X_WJ = X_WL_.at(child) * X_CJ;
+    if (closure.kind == ClosureKind::Hinge5D) {
+      const XMLElement& axis = getChild(e, "axis", "give one");
+      const XMLElement& xyz = getChild(axis, "xyz", "give its direction");
+      const std::vector<double> v = parse(xyz, getText(xyz), 3, "it");
+      closure.axis = {v[0], v[1], v[2]};
+      if (!(closure.axis.norm() > 1e-12)) fail(xyz, "it is not a direction", "give a non-zero vector");
+      closure.axis.normalize();
+      const std::string frame = getAttribute(&xyz, "expressed_in");
+      if (frame == "__model__")
+        closure.axis = X_WJ.R.transpose() * closure.axis;
+      else if (!frame.empty())
+        fail(xyz, "its attribute 'expressed_in' is not read here", "give the axis in the frame of the joint");
+      if (axis.FirstChildElement("limit") || axis.FirstChildElement("dynamics"))
+        warn(axis, "limits and damping of a joint that closes a loop are left out");
+    }
+    add(closure, parent, X_WL_.at(parent).inverse() * X_WJ, child, X_CJ);
+  }
+
+  const UrdfJoint* findCarrier(const std::string& link) const {
+    const auto it = std::find_if(tree_.joints.begin(), tree_.joints.end(),
+                                 [&](const UrdfJoint& joint) { return joint.child == link; });
+    return it == tree_.joints.end() ? nullptr : &*it;
+  }
+  // Links from one to the root.
+  std::vector<std::string> listAncestors(std::string link) const {
+    std::vector<std::string> out = {link};
+    while (const UrdfJoint* joint = findCarrier(link)) out.push_back(link = joint->parent);
+    return out;
+  }
+
+  void readCoupling(const XMLElement& e) {
+    ClosureSpec closure;
+    closure.kind = ClosureKind::Coupler;
+    closure.name = getAttribute(&e, "name");
+    if (closure.name.empty()) closure.name = nameClosure("coupling_" + std::to_string(e.GetLineNum()), settings_);
+    const auto ancestors1 = listAncestors(getLink(getChild(e, "predecessor", "name the link"), "link")),
+               ancestors2 = listAncestors(getLink(getChild(e, "successor", "name the link"), "link"));
+    const XMLElement& ratio = getChild(e, "ratio", "give its value");
+    const double value = parse(ratio, getAttribute(&ratio, "value"), 1, "its attribute 'value'")[0];
+    const auto addChain = [&](const std::vector<std::string>& chain, const std::vector<std::string>& other,
+                              double factor) {
+      for (const std::string& link : chain) {
+        if (std::find(other.begin(), other.end(), link) != other.end()) return;
+        const UrdfJoint& joint = *findCarrier(link);
+        if (joint.joint.kind == JointKind::Fixed) continue;
+        if (getNv(joint.joint.kind) != 1)
+          fail(e, "joint '" + joint.joint.name + "' between its links does not have exactly one coordinate",
+               "couple revolute and prismatic joints");
+        closure.coefficients[joint.joint.name] += factor;
+      }
+    };
+    addChain(ancestors1, ancestors2, -value);
+    addChain(ancestors2, ancestors1, 1);
+    settings_.closures.push_back(closure);
+  }
+
+  // One end of a transmission.
+  struct Port {
+    const XMLElement* element = nullptr;
+    std::string name, role;
+    double reduction = 1, offset = 0;
+  };
+  double getNumber(const XMLElement& e, const char* tag, const char* tag2, double otherwise) const {
+    const XMLElement* child = e.FirstChildElement(tag);
+    if (!child && tag2) child = e.FirstChildElement(tag2);
+    return child ? parse(*child, getText(*child), 1, "it")[0] : otherwise;
+  }
+  double getReduction(const XMLElement& e) const {
+    const double reduction = getNumber(e, "mechanicalReduction", "mechanical_reduction", 1);
+    if (reduction == 0) fail(e, "its mechanical reduction is 0", "give turns of the rotor per turn of the joint");
+    return reduction;
+  }
+  std::vector<Port> listPorts(const XMLElement& e, const char* tag) const {
+    std::vector<Port> out;
+    for (const XMLElement* child : getChildren(e, tag)) {
+      Port port{child, getAttribute(child, "name"), getAttribute(child, "role"), getReduction(*child),
+                getNumber(*child, "offset", nullptr, 0)};
+      if (const XMLElement* role = child->FirstChildElement("role")) port.role = getText(*role);
+      out.push_back(port);
+    }
+    // In the order of the file unless their roles say otherwise.
+    if (out.size() == 2 && out[0].role == std::string(tag) + "2" && out[1].role == std::string(tag) + "1")
+      std::swap(out[0], out[1]);
+    return out;
+  }
+  const UrdfJoint& getDriven(const Port& port) const {
+    const auto it = std::find_if(tree_.joints.begin(), tree_.joints.end(),
+                                 [&](const UrdfJoint& joint) { return joint.joint.name == port.name; });
+    if (it == tree_.joints.end()) fail(*port.element, "there is no joint '" + port.name + "'", "correct the name");
+    return *it;
+  }
+
+  void readTransmission(const XMLElement& e) {
+    if (for_drake_) return;
+    std::string type = getAttribute(&e, "type");
+    for (const char* tag : {"type", "plugin"})
+      if (const XMLElement* child = e.FirstChildElement(tag)) type = getText(*child);
+    const std::string kind =
+        type.substr(type.find_last_of("/:") == std::string::npos ? 0 : type.find_last_of("/:") + 1);
+    const std::vector<Port> joints = listPorts(e, "joint"), actuators = listPorts(e, "actuator");
+    const bool is_simple = kind == "SimpleTransmission", is_differential = kind == "DifferentialTransmission";
+    if (!is_simple && !is_differential && kind != "FourBarLinkageTransmission")
+      return warn(e, "it is left out: transmissions '" + type +
+                         "' are not known here; give `motors`, and couplers under "
+                         "`closures`, in the robot's YAML file");
+    const size_t count = is_simple ? 1 : 2;
+    if (joints.size() != count || actuators.size() > count || actuators.size() + is_simple < count)
+      fail(e, "it does not have " + std::to_string(count) + " <joint> and " + std::to_string(count) + " <actuator>",
+           "correct it");
+    for (const Port& port : joints)
+      if (getNv(getDriven(port).joint.kind) != 1)
+        return warn(e, "it is left out: joint '" + port.name + "' does not have exactly one coordinate");
+    if (is_simple)
+      addMotor(e, joints[0].name,
+               getReduction(e) * joints[0].reduction * (actuators.empty() ? 1 : actuators[0].reduction));
+    else
+      addRotors(e, joints, actuators, is_differential);
+  }
+
+  void addMotor(const XMLElement& e, const std::string& joint, double ratio) {
+    for (const MotorSpec& other : settings_.motors)
+      if (other.joint == joint) return warn(e, "it is left out: joint '" + joint + "' already has a motor");
+    MotorSpec motor;
+    motor.joint = joint;
+    motor.drive.ratio = std::abs(ratio);
+    settings_.motors.push_back(motor);
+  }
+
+  void addRotors(const XMLElement& e, const std::vector<Port>& joints, const std::vector<Port>& actuators,
+                 bool is_differential) {
+    const UrdfJoint first = getDriven(joints[0]);
+    const Port &j1 = joints[0], &j2 = joints[1];
+    for (int i = 0; i < 2; ++i) {
+      const Port& actuator = actuators[i];
+      if (actuator.name.empty()) fail(*actuator.element, "it has no name", "give it one");
+      UrdfJoint rotor;
+      rotor.parent = first.parent;
+      rotor.child = rotor.joint.name = actuator.name;
+      rotor.joint.kind = JointKind::Continuous;
+      rotor.joint.X_PJ = first.joint.X_PJ;
+      rotor.joint.axis = first.joint.axis;
+      const auto is_taken = [&](const UrdfJoint& joint) { return joint.joint.name == actuator.name; };
+      if (std::any_of(tree_.joints.begin(), tree_.joints.end(), is_taken) ||
+          !tree_.links
+               .emplace(
+                   actuator.name,
+                   UrdfLink{
+                       actuator.name, {kRotorMass, Vector3d::Zero(), kRotorInertia * Matrix3d::Identity()}, {}, {}})
+               .second)
+        fail(*actuator.element, "there is a link or joint of this name already", "rename it");
+      tree_.joints.push_back(rotor);
+      ClosureSpec coupler;
+      coupler.kind = ClosureKind::Coupler;
+      coupler.name = actuator.name + "_transmission";
+      const double n = actuator.reduction;
+      double c1 = n * j1.reduction, c2 = 0;
+      if (is_differential)
+        c2 = (i == 0 ? 1 : -1) * n * j2.reduction;
+      else if (i == 1)
+        c1 = n, c2 = n * j2.reduction;
+      coupler.coefficients = {{actuator.name, 1}, {j1.name, -c1}};
+      if (c2 != 0) coupler.coefficients[j2.name] = -c2;
+      coupler.offset = 0.0 - c1 * j1.offset - c2 * j2.offset;
+      settings_.closures.push_back(coupler);
+      addMotor(e, actuator.name, 1);
+    }
+    warn(e, "its actuators '" + actuators[0].name + "' and '" + actuators[1].name +
+                "' are rotors without inertia and without limits, since limits of the file are those of joints; "
+                "`motors` in the "
+                "robot's YAML file gives effort, velocity and armature");
+  }
+
+  const bool for_drake_;
+  UrdfFile& tree_;
+  YamlFile& settings_;
+  std::map<std::string, SE3> X_WL_;                // of the links in the root, with all joints at zero
+  std::map<std::string, std::set<int>> left_out_;  // tag -> lines
+};
+
+}  // namespace
+
+void readDialects(const XMLElement& robot, bool for_drake, UrdfFile& tree, YamlFile& settings) {
+  DialectReader(for_drake, tree, settings).read(robot);
+}
+
+void warnOfClosingFrames(UrdfFile& tree, const YamlFile& settings) {
+  const std::string prefix = "closing_";
+  for (const auto& [name, link] : tree.links) {
+    if (name.rfind(prefix, 0) != 0 || name.size() < prefix.size() + 3 || name.substr(name.size() - 2) != "_1") continue;
+    const std::string base = name.substr(0, name.size() - 2), other = base + "_2";
+    const auto is_named = [&](const ClosureSpec& closure) { return closure.frame1 == name || closure.frame2 == name; };
+    if (!tree.links.count(other) || std::any_of(settings.closures.begin(), settings.closures.end(), is_named)) continue;
+    tree.warnings.push_back(
+        tree.path + ": links '" + name + "' and '" + other +
+        "': they look like the ends of a loop, which is open here; close it in the robot's YAML file, for "
+        "example by `closures: [{name: " +
+        base.substr(prefix.size()) + ", type: 3d, frames: [" + name + ", " + other +
+        "]}]` (3d a ball, 5d a hinge about z, 6d a weld)");
+  }
+}
+
+}  // namespace bielle
