@@ -1,4 +1,5 @@
 // Files of MuJoCo, ours and those of its users: what is read, what is left out with a warning, what is refused.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>
@@ -212,6 +213,23 @@ TEST_CASE("files of today's MuJoCo: frames, sites in equalities, inertia by shap
   CHECK(d.mass_matrix < kTolerance);
   CHECK(d.bias < kTolerance);
   CHECK(d.closures < kTolerance);
+}
+
+TEST_CASE("line breaks mean nothing: equalities and tendons without names may share a line") {
+  std::string xml =
+      R"(<mujoco><worldbody><body name="a"><joint name="a" axis="0 1 0"/><geom size="0.1"/><site name="s"/></body>
+    <body name="b"><joint name="b" axis="0 1 0"/><geom size="0.1"/><site name="t" pos="0 0 0.1"/></body>
+    <body name="c"><joint name="c" axis="0 1 0"/><geom size="0.1"/></body></worldbody>
+    <tendon><spatial stiffness="1"><site site="s"/><site site="t"/></spatial><spatial stiffness="2"><site site="s"/><site site="t"/></spatial></tendon>
+    <equality><joint joint1="a" joint2="b"/><joint joint1="b" joint2="c"/></equality></mujoco>)";
+  for (const bool is_one_line : {false, true}) {
+    if (is_one_line) std::replace(xml.begin(), xml.end(), '\n', ' ');
+    const Model model = readMujoco(xml);
+    REQUIRE(model.closures().size() == 2);
+    CHECK(model.closures()[0].name != model.closures()[1].name);
+    REQUIRE(model.pointSprings().size() == 2);
+    CHECK(model.pointSprings()[0].name != model.pointSprings()[1].name);
+  }
 }
 
 TEST_CASE("a robot of MuJoCo becomes one of ours and stays the same") {

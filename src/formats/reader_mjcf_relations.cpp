@@ -30,7 +30,10 @@ void MjcfReader::readEquality(const XMLElement& element) {
   if (!has_equalities_) return e.leaveOut("it is left out, because <flag> disables equalities");
   noteSoftness(e);
   std::string name = getAttribute(&element, "name");
-  if (name.empty()) name = e.tag() + "_" + std::to_string(e.line());
+  if (name.empty())
+    name = makeUnusedName(e.tag() + "_" + std::to_string(e.line()), [this](const std::string& made) {
+      return std::any_of(ties_.begin(), ties_.end(), [&](const Tie& tie) { return tie.name == made; });
+    });
   if (e.tag() == "connect" || e.tag() == "weld") return readTie(e, name);
   if (e.tag() == "joint") return readJointEquality(e, name);
   if (e.tag() == "tendon") return readTendonEquality(e, name);
@@ -239,7 +242,7 @@ void MjcfReader::readSpatialTendon(const XMLElement& element) {
   if (e.isLimited("limited", "range")) e.note("the limits of its length are left out"), e.find("range");
   if (e.getNumber("frictionloss", 0) != 0) e.note("its frictionloss is left out");
   spring.name = getAttribute(&element, "name");
-  if (spring.name.empty()) spring.name = "tendon_" + std::to_string(e.line());
+  if (spring.name.empty()) spring.name = namePointSpring("tendon_" + std::to_string(e.line()), yaml_);
   yaml_.point_springs.push_back(spec);
 }
 
