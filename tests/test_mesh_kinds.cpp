@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "formats/mesh.h"
+#include "formats/mesh_inertia.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -43,8 +44,8 @@ const std::string kPly =
     "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nelement face 8\n"
     "property list uchar int vertex_indices\nend_header\n";
 
-// COLLADA with a node that is moved, and an axis that counts for nothing.
-std::string writeCollada() {
+// COLLADA with a node that is moved, and an axis that counts for nothing. `more`: other nodes of the scene.
+std::string writeCollada(const std::string& more = "") {
   std::ostringstream out;
   out << "<COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\"><asset><unit meter=\"1\"/>"
          "<up_axis>Y_UP</up_axis></asset><library_geometries><geometry id=\"g\"><mesh><source id=\"p\"><float_array "
@@ -59,7 +60,9 @@ std::string writeCollada() {
   for (const auto& [a, b, c] : kFaces) out << a << " " << b << " " << c << " ";
   out << "</p></triangles></mesh></geometry></library_geometries><library_visual_scenes><visual_scene id=\"s\"><node "
          "id=\"n\">"
-         "<matrix>1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_geometry url=\"#g\"/></node></visual_scene>"
+         "<matrix>1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_geometry url=\"#g\"/></node>"
+      << more
+      << "</visual_scene>"
          "</library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>\n";
   return out.str();
 }
@@ -102,6 +105,22 @@ TEST_CASE("meshes of further kinds have the triangles and the shape of the same 
     CHECK((fitted->X_BS.p - shape.X_BS.p).norm() < 1e-6);
     CHECK(fitted->radius == Approx(shape.radius).margin(1e-6));
   }
+}
+
+TEST_CASE("a mirrored instance in a mesh has the volume of the part") {
+  const RobotDirectory files;
+  const auto calcVolume = [&](const std::string& collada) {
+    files.write("parts.dae", collada);
+    return calcMeshInertia(readTriangles("parts.dae", files.path()), MeshSolid::Enclosed).value().mass;
+  };
+  const double wedge = 0.3 * 0.1 / 2 * 0.2;
+  CHECK(calcVolume(writeCollada()) == Approx(wedge));
+  const auto place = [](const char* matrix) {
+    return std::string("<node id=\"m\"><matrix>") + matrix + "</matrix><instance_geometry url=\"#g\"/></node>";
+  };
+  CHECK(calcVolume(writeCollada(place("1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1"))) == Approx(2 * wedge));
+  CHECK(calcVolume(writeCollada(place("1 0 0 5 0 -1 0 0 0 0 1 0 0 0 0 1"))) == Approx(2 * wedge));
+  CHECK(calcVolume(writeCollada(place("-2 0 0 5 0 -1 0 0 0 0 -1 0 0 0 0 1"))) == Approx(3 * wedge));
 }
 
 TEST_CASE("meshes that are cut off, empty or of no known kind give nothing") {

@@ -29,13 +29,29 @@ void append(const T& value, std::vector<char>& out) {
 }
 
 // An empty normal, the corners, and two bytes without meaning.
-void appendTriangle(const aiMesh& mesh, const aiFace& face, std::vector<char>& out) {
+void appendTriangle(const aiMesh& mesh, const aiFace& face, const aiMatrix4x4& X, bool is_mirrored,
+                    std::vector<char>& out) {
   append(std::int32_t(0), out), append(std::int32_t(0), out), append(std::int32_t(0), out);
-  for (unsigned corner = 0; corner < 3; ++corner) {
-    const aiVector3D& p = mesh.mVertices[face.mIndices[corner]];
+  for (const unsigned corner : {0u, is_mirrored ? 2u : 1u, is_mirrored ? 1u : 2u}) {
+    const aiVector3D p = X * mesh.mVertices[face.mIndices[corner]];
     for (const float x : {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)}) append(x, out);
   }
   append(std::uint16_t(0), out);
+}
+
+// The meshes of a node and of those below it. Faces of mirrored instances are turned, so that they are seen from outside like the
+// others: assimp's own step for this leaves them, and a part and its mirror image would cancel in volumes.
+std::uint32_t appendNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& X_parent,
+                         std::vector<char>& out) {
+  const aiMatrix4x4 X = X_parent * node.mTransformation;
+  std::uint32_t count = 0;
+  for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+    const aiMesh& mesh = *scene.mMeshes[node.mMeshes[i]];
+    for (unsigned k = 0; k < mesh.mNumFaces; ++k)
+      if (mesh.mFaces[k].mNumIndices == 3) appendTriangle(mesh, mesh.mFaces[k], X, X.Determinant() < 0, out), ++count;
+  }
+  for (unsigned i = 0; i < node.mNumChildren; ++i) count += appendNode(scene, *node.mChildren[i], X, out);
+  return count;
 }
 
 }  // namespace
@@ -48,17 +64,12 @@ int main(int argc, char** argv) {
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);  // as in ROS
-  const aiScene* scene =
-      importer.ReadFile(argv[1], aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices);
+  const aiScene* scene = importer.ReadFile(argv[1], aiProcess_Triangulate | aiProcess_SortByPType);
   if (!scene) return fail(importer.GetErrorString());
   std::vector<char> out(kHeader, ' ');
   std::uint32_t count = 0;
   append(count, out);
-  for (unsigned i = 0; i < scene->mNumMeshes; ++i) {
-    const aiMesh& mesh = *scene->mMeshes[i];
-    for (unsigned k = 0; k < mesh.mNumFaces; ++k)
-      if (mesh.mFaces[k].mNumIndices == 3) appendTriangle(mesh, mesh.mFaces[k], out), ++count;
-  }
+  count = appendNode(*scene, *scene->mRootNode, aiMatrix4x4(), out);
   if (count == 0) return fail(std::string(argv[1]) + " has no triangles");
   std::memcpy(out.data() + kHeader, &count, sizeof count);
   std::cout.write(out.data(), static_cast<std::streamsize>(out.size()));

@@ -83,8 +83,8 @@ bool write(const json& drawing, const char* path) {
     setName(shapes->AddComponent(robot, product, readPlacement(link.at("at"))), link.at("name"));
   }
   shapes->UpdateAssemblies();
+  Interface_Static::SetCVal("write.step.unit", "MM");  // which the writer reads when it is made
   STEPCAFControl_Writer writer;
-  Interface_Static::SetCVal("write.step.unit", "MM");
   if (!writer.Transfer(document, STEPControl_AsIs)) return false;
   APIHeaderSection_MakeHeader header(writer.ChangeWriter().Model());
   header.SetName(new TCollection_HAsciiString(drawing.at("robot").get<std::string>().c_str()));
