@@ -55,7 +55,8 @@ double calcSdfError(const Model& model, ConstVectorRef q_ref, const std::string&
     if (!joint) joint = robot.JointByName(closure.name + "_closure");
     REQUIRE(joint);
     const bool first = joint->ChildLinkName() == model.bodies()[closure.body1].name;
-    compare(getPlacement(*joint), first ? ws.X_WB[closure.body1] * closure.X_B1 : ws.X_WB[closure.body2] * closure.X_B2);
+    compare(getPlacement(*joint),
+            first ? ws.X_WB[closure.body1] * closure.X_B1 : ws.X_WB[closure.body2] * closure.X_B2);
     const int parent = first ? closure.body2 : closure.body1;
     CHECK(joint->ParentLinkName() == (parent == 0 ? "world" : model.bodies()[parent].name));
     CHECK(joint->Type() == (closure.kind == ClosureKind::Weld6D   ? sdf::JointType::FIXED
@@ -102,9 +103,9 @@ TEST_CASE("SDF: limits, springs and names move or change as told, and planar joi
   builder.addJointForce("a", force);
   builder.addMotor("a", 0, 7, 3);
   const SdfText text = formatSdf(builder.build(), VectorXd::Constant(1, 0.5));
-  for (const char* part : {"<joint name=\"a_joint\" type=\"revolute\">", "<lower>-1.5</lower>", "<upper>1.5</upper>",
-                           "<effort>7</effort>", "<velocity>3</velocity>", "<spring_reference>0</spring_reference>",
-                           "<spring_stiffness>4</spring_stiffness>"})
+  for (const char* part :
+       {"<joint name=\"a_joint\" type=\"revolute\">", "<lower>-1.5</lower>", "<upper>1.5</upper>", "<effort>7</effort>",
+        "<velocity>3</velocity>", "<spring_reference>0</spring_reference>", "<spring_stiffness>4</spring_stiffness>"})
     CHECK_THAT(text.xml, Catch::Contains(part));
   REQUIRE(text.warnings.size() == 3);
   CHECK_THAT(text.warnings[0], Catch::Contains("joint 'a': it is renamed to 'a_joint'"));
@@ -132,5 +133,33 @@ TEST_CASE("SDF and a URDF alone tell what only our files say of joints and motor
     CHECK(tells("motor '" + model.motors()[0].name + "': its torque_loss"));
     CHECK(tells("motor '" + model.motors()[1].name + "': its winding and gear"));
     CHECK(tells("serial joints"));
+  }
+}
+
+TEST_CASE("links next to massless survive in a URDF, with what hangs on them") {
+  for (const double mass : {0.0, 1e-9, 1e-6, 0.5}) {
+    CAPTURE(mass);
+    ModelBuilder builder("leg");
+    Joint x, y;
+    x.kind = y.kind = JointKind::Revolute;
+    x.name = "x", x.axis = Vector3d::UnitX();
+    y.name = "y", y.axis = Vector3d::UnitY();
+    Joint base;
+    base.name = "root_joint", base.kind = JointKind::FreeFlyer;
+    builder.addLink("shin", "world", base, {1, Vector3d::Zero(), 0.01 * Matrix3d::Identity()});
+    builder.addLink("cross", "shin", x, {mass, Vector3d::Zero(), mass * Matrix3d::Identity()});
+    builder.addLink("foot", "cross", y, {0.5, Vector3d::Zero(), 0.01 * Matrix3d::Identity()});
+    const UrdfText urdf = formatUrdf(builder.build());
+    sdf::Root root;
+    const sdf::Errors errors = root.LoadSdfString(urdf.urdf);
+    CAPTURE(errors.empty() ? "" : errors[0].Message());
+    REQUIRE(errors.empty());
+    CHECK(root.Model()->LinkCount() == 3);
+    CHECK(root.Model()->JointCount() == 2);
+    CHECK(root.Model()->LinkByName("cross")->Inertial().MassMatrix().Mass() == Approx(std::max(mass, 2e-6)));
+    const auto names_cross = [](const std::string& warning) {
+      return warning.find("link 'cross': its mass") != std::string::npos;
+    };
+    CHECK(std::any_of(urdf.warnings.begin(), urdf.warnings.end(), names_cross) == (mass < 2e-6));
   }
 }

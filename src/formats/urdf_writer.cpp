@@ -7,9 +7,14 @@
 #include "bielle/formats/robot_writer.h"
 #include "formats/robot_text.h"
 #include "math/direction.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
+
+// Of links for those who read a URDF alone: libsdformat 12.3 leaves out one of at most 1e-6 kg (crosses of universal joints), and
+// all that hangs on it, without an error; DART 6.12 takes 1 kg for one without mass.
+constexpr double kLeastMass = 2e-6, kLeastInertia = 1e-12;  // kg, kg m^2
 
 void addOrigin(XMLElement& e, const SE3& X) {
   XMLElement& origin = addElement(e, "origin", {{"xyz", formatExact(X.p)}});
@@ -77,11 +82,19 @@ class UrdfWriter {
   void writeLink(int i) {
     const Body& body = model_.bodies()[i];
     XMLElement& link = addElement(*robot_, "link", {{"name", body.name}});
-    if (body.inertia.mass > 0) {
-      const Matrix3d& I = body.inertia.I_com;
+    double mass = body.inertia.mass;
+    Matrix3d I = body.inertia.I_com;
+    if (warnings_ && !for_drake_ && i > 0 && mass < kLeastMass) {
+      warn("link '" + body.name + "'", "its mass, " + formatNumber(mass) + " kg, is written as " +
+                                           formatNumber(kLeastMass) +
+                                           " kg, because Gazebo drops lighter links with all that they carry");
+      mass = kLeastMass;
+      if (I.isZero()) I = kLeastInertia * Matrix3d::Identity();
+    }
+    if (mass > 0) {
       XMLElement& inertial = addElement(link, "inertial");
       addElement(inertial, "origin", {{"xyz", formatExact(body.inertia.com)}});
-      addElement(inertial, "mass", {{"value", formatExact(body.inertia.mass)}});
+      addElement(inertial, "mass", {{"value", formatExact(mass)}});
       addElement(inertial, "inertia",
                  {{"ixx", formatExact(I(0, 0))},
                   {"iyy", formatExact(I(1, 1))},
