@@ -60,8 +60,9 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
     CHECK(found[0] == directory.path() + "/swing.xml: " + warning);
   };
   checkWarning(makeSwing("\n<camera name=\"eye\"/>\n<camera name=\"other\"/>"), "<camera> (lines 2, 3): left out");
-  checkWarning(makeSwing("\n<geom type=\"plane\" size=\"1 1 1\"/>"),
-               "<geom> (line 2): a geom of type 'plane' is left out");
+  checkWarning(makeSwing("\n<geom type=\"plane\" size=\"1 1 1\"/>"), "<geom> (line 2): left out");
+  checkWarning(makeSwing("\n<camera/>\n<geom type=\"plane\" size=\"1 1 1\"/>\n<camera/>\n<light/>"),
+               "<geom> (line 3), <camera> (lines 2, 4), <light> (line 5): left out");
   checkWarning(makeSwing("", "\n<sensor>\n<gyro site=\"a\"/></sensor>"), "<sensor> <gyro> (line 3): left out");
   checkWarning(makeSwing("", "\n<tendon><spatial/></tendon>"),
                "<spatial> (line 2): it does not run between two sites, and is left out");

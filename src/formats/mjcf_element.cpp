@@ -10,6 +10,8 @@
 namespace bielle {
 namespace {
 
+const std::string kLeftOut = "left out";  // the usual problem of what changes no mechanism
+
 constexpr size_t kMostAttributes = 200, kMostDefaults = 100000;  // per element; copied from class to class
 
 // Actuators of all kinds share their defaults.
@@ -44,13 +46,22 @@ void MjcfNotes::addAttribute(const std::string& path, const std::string& element
 
 std::vector<std::string> MjcfNotes::format() const {
   std::vector<std::string> out;
-  for (const Kind& kind : order_)
-    out.push_back(kind.path + ": " + kind.element + formatLines(lines_.at(kind)) + ": " + kind.problem);
+  std::map<std::string, std::string> harmless;  // of each file: one line, so that it does not bury the others
+  for (const Kind& kind : order_) {
+    const std::string elements = kind.element + formatLines(lines_.at(kind));
+    if (kind.problem != kLeftOut) {
+      out.push_back(kind.path + ": " + elements + ": " + kind.problem);
+      continue;
+    }
+    std::string& list = harmless[kind.path];
+    list += (list.empty() ? "" : ", ") + elements;
+  }
   for (const auto& [place, found] : attributes_) {
     std::string names;
     for (const std::string& name : found.first) names += (names.empty() ? "'" : ", '") + name + "'";
     out.push_back(place.first + ": " + place.second + formatLines(found.second) + ": left out: " + names);
   }
+  for (const auto& [path, elements] : harmless) out.push_back(path + ": " + elements + ": " + kLeftOut);
   return out;
 }
 

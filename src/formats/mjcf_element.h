@@ -24,7 +24,8 @@ class MjcfNotes {
  public:
   void add(const std::string& path, const std::string& element, int line, const std::string& problem);
   void addAttribute(const std::string& path, const std::string& element, int line, const std::string& attribute);
-  /// "path: element (lines ...): problem", in the order in which they were first added.
+  /// "path: element (lines ...): problem", in the order in which they were first added; elements that are just "left out" are
+  /// one line at the end.
   std::vector<std::string> format() const;
 
  private:

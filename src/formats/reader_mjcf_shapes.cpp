@@ -174,7 +174,7 @@ void MjcfReader::readVisual(const Child& child, const BodyPlace& place) {
     visual.bounds = fitMesh(visual.mesh, std::filesystem::path(settings_.path).parent_path().string(), visual.size);
     if (!visual.bounds) e.note("its mesh cannot be read: it has no shape, so distances ignore it");
   } else {
-    return e.leaveOut("a geom of type '" + shape.type + "' is left out");
+    return e.leaveOut(shape.type == "plane" ? "left out" : "a geom of type '" + shape.type + "' is left out");
   }
   if (touches && addShape(shape.type == "capsule", size, visual, tree_.links[place.link]))
     e.note("its shape is used for distances only, not for contact (feet: the key contacts of a YAML file)");
