@@ -61,8 +61,6 @@ const std::vector<Mistake> kUrdfMistakes = {
     {"<mass value=\"3\"/>", "<mass value=\"three\"/>", "link 'base'", "<mass value=\"three\">", "correct"},
     {"<mass value=\"3\"/>", "<mass value=\"-3\"/>", "link 'base'", "mass is negative (-3", "0 or more"},
     {"<mass value=\"3\"/>", "", "robot 'toy'", "Link [base]", "correct"},
-    {"<mass value=\"3\"/>", "<mass value=\"0\"/>", "link 'base'", "rotational inertia but no mass", "mass"},
-    {"ixx=\"0.01\"", "ixx=\"0.001\"", "link 'arm'", "triangle inequality", "correct <inertia>"},
     {"ixx=\"0.01\"", "ixx=\"-0.01\"", "link 'arm'", "negative principal moment", "correct <inertia>"},
     {"ixx=\"0.01\"", "", "robot 'toy'", "Link [arm]", "correct"},
     {"xyz=\"0.2 0 0\"", "xyz=\"0.2 0\"", "joint 'wrist'", "<origin xyz=\"0.2 0\"> (line 31)", "correct"},
@@ -297,6 +295,24 @@ TEST_CASE("names that are not in UTF-8 are refused where they are, in every form
               directory.writeRobot(replaceOnce(urdf, "\"wrist\"", std::string("\"") + good + "\""), yaml)) == "");
   check(getErrorOfLoading(directory.writeRobot(replaceOnce(urdf, "\"wrist\"", "\"&#xd800;\""), yaml)),
         directory.path() + "/robot.urdf: <joint> (line 30): its attribute 'name'");
+}
+
+TEST_CASE("moments of inertia that no body can have, and those of rotors without mass, are told") {
+  const RobotDirectory directory;
+  const auto load = [&](const char* from, const char* to) {
+    return loadRobot(directory.writeRobot(replaceOnce(kToyUrdf, from, to), kToyYaml));
+  };
+  const LoadedRobot thin = load("ixx=\"0.01\"", "ixx=\"0.001\"");
+  REQUIRE(thin.warnings.size() == 1);
+  CHECK_THAT(thin.warnings[0], Catch::Contains("link 'arm': its principal moments violate the triangle inequality"));
+  const auto getMoment = [](const LoadedRobot& robot) {
+    return robot.model.bodies()[robot.model.findJoint("shoulder")].inertia.I_com.trace();
+  };
+  CHECK(getMoment(thin) == Approx(getMoment(load("<mass value=\"3\"/>", "<mass value=\"3\"/>")) - 0.009));
+  const LoadedRobot rotor = load("<mass value=\"3\"/>", "<mass value=\"0\"/>");
+  REQUIRE(rotor.warnings.size() == 1);
+  CHECK_THAT(rotor.warnings[0],
+             Catch::Contains("link 'base': it has rotational inertia but no mass: 1e-9 kg is taken"));
 }
 
 TEST_CASE("XML entities are refused for what they are") {

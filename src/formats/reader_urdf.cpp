@@ -227,6 +227,14 @@ Visual makeVisual(const urdf::Visual& visual, const std::string& link, const std
   return out;
 }
 
+// Links of rotors often have rotational inertia alone, but nothing without mass has inertia: they get next to none.
+void giveMass(const std::string& path, UrdfLink& link, std::vector<std::string>& warnings) {
+  constexpr double kLeast = 1e-9;  // kg
+  if (link.inertia.mass != 0 || !(link.inertia.I_com.cwiseAbs().maxCoeff() > 0)) return;
+  link.inertia.mass = kLeast;
+  warnings.push_back(path + ": link '" + link.name + "': it has rotational inertia but no mass: 1e-9 kg is taken");
+}
+
 // `unread`: meshes that give its body no shape.
 UrdfLink makeLink(const urdf::Link& link, const std::string& path, std::vector<std::string>& unread) {
   UrdfLink out;
@@ -368,7 +376,10 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
   file.root = tree.root;
   file.warnings = std::move(tree.warnings);
   std::vector<std::string> unread;
-  for (const auto& [name, link] : model->links_) file.links[name] = makeLink(*link, path, unread);
+  for (const auto& [name, link] : model->links_) {
+    file.links[name] = makeLink(*link, path, unread);
+    giveMass(path, file.links[name], file.warnings);
+  }
   if (!unread.empty()) file.warnings.push_back(warnOfMeshes(unread, path));
   for (const auto& [name, kind] : tree.joints) file.joints.push_back(makeJoint(*model->joints_.at(name), kind, path));
   if (for_drake) readDrakeElements(robot, file, settings);

@@ -336,9 +336,11 @@ void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
     // others.
     const double slack = 1e-6 * moments.cwiseAbs().maxCoeff() + 1e-12;
     if (moments[0] < -slack) fail(element, "its inertia matrix has a negative principal moment", "correct <inertia>");
-    if (moments[2] > moments[0] + moments[1] + slack)
-      fail(element, "its principal moments violate the triangle inequality, so no body can have them",
-           "correct <inertia>");
+    // Published robots have such, and their mass matrices are positive definite all the same.
+    if (warnings && moments[2] > moments[0] + moments[1] + slack)
+      warnings->push_back((source_.empty() ? "" : source_ + ": ") + element +
+                          ": its principal moments violate the triangle inequality, so no body can have them; they are "
+                          "used as they are");
     if (inertia.mass == 0 && moments[2] > slack)
       fail(element, "it has rotational inertia but no mass", "give it a mass, or no inertia");
     if (warnings && inertia.mass >= 1000)

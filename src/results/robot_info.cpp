@@ -145,7 +145,21 @@ Json describePointSprings(const Model& model, const std::vector<Posture>& postur
   return springs;
 }
 
-// At the first reference that closes, else at a closed configuration near neutral.
+// Another closed configuration nearby, where loops have the rank that they have almost everywhere.
+Mobility calcRegularMobility(const Model& model, const VectorXd& q) {
+  constexpr double kAside = 0.05;  // rad or m
+  Mobility most = calcMobility(model, q);
+  for (const double sign : {1.0, -1.0}) {
+    const VectorXd v = sign * kAside * VectorXd::LinSpaced(model.nv(), -0.7, 1.1);
+    const AssemblyResult aside = closeConfiguration(model, model.integrate(q, v));
+    if (aside.status != NumericalStatus::Ok) continue;
+    const Mobility there = calcMobility(model, aside.q);
+    if (there.rank > most.rank) most = there;
+  }
+  return most;
+}
+
+// At the first reference that closes, else at a closed configuration near neutral; beside it where it is singular.
 Json describeMobility(const Model& model, const std::vector<Posture>& postures) {
   std::string place = "closed neutral";
   const AssemblyResult found = findClosedConfiguration(model);
@@ -153,12 +167,11 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
   bool closed = found.status == NumericalStatus::Ok;
   for (size_t i = postures.size(); i-- > 1;)
     if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
-  const Mobility mobility = calcMobility(model, q);
-  return {{"posture", place},
-          {"closed", closed},
-          {"rows", mobility.rows},
-          {"rank", mobility.rank},
-          {"mobility", mobility.mobility}};
+  const Mobility mobility = calcMobility(model, q), regular = closed ? calcRegularMobility(model, q) : mobility;
+  if (regular.rank > mobility.rank)
+    place += " (singular: rank " + std::to_string(mobility.rank) + " there, this beside it)";
+  return {{"posture", place},     {"closed", closed},     {"singular", regular.rank > mobility.rank},
+          {"rows", regular.rows}, {"rank", regular.rank}, {"mobility", regular.mobility}};
 }
 
 // Of every linkage.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "bielle/model/error.h"
 #include "model/ball_leaf.h"
 #include "model/joint.h"
 
@@ -15,11 +16,20 @@ using SimTK::Transform;
 using SimTK::UnitVec3;
 using SimTK::Vec3;
 
-SimTK::Body::Rigid makeBody(const Inertia& inertia) {
+SimTK::Body::Rigid makeBody(const Model& model, int i) {
+  const Body& body = model.bodies()[i];
+  const Inertia& inertia = body.inertia;
   const Matrix3d& I = inertia.I_com;
-  const SimTK::Inertia central(Vec3(I(0, 0), I(1, 1), I(2, 2)), Vec3(I(0, 1), I(0, 2), I(1, 2)));
-  const Vec3 com = toSimTK(inertia.com);
-  return SimTK::Body::Rigid(SimTK::MassProperties(inertia.mass, com, central.shiftFromMassCenter(-com, inertia.mass)));
+  try {
+    const SimTK::Inertia central(Vec3(I(0, 0), I(1, 1), I(2, 2)), Vec3(I(0, 1), I(0, 2), I(1, 2)));
+    const Vec3 com = toSimTK(inertia.com);
+    return SimTK::Body::Rigid(
+        SimTK::MassProperties(inertia.mass, com, central.shiftFromMassCenter(-com, inertia.mass)));
+  } catch (const SimTK::Exception::Base&) {
+    throw InputError(model.name(), "body '" + body.name + "'",
+                     "Simbody refuses moments of inertia that no body can have",
+                     "correct its inertia, or compare with MuJoCo, or use another world");
+  }
 }
 
 // Rotation whose column `axis` is the given direction.
@@ -136,7 +146,7 @@ bool SimbodyTree::isCut(int joint) const {
 
 void SimbodyTree::addBody(int i) {
   const Joint& joint = model.joints()[i];
-  const SimTK::Body::Rigid body = makeBody(model.bodies()[i].inertia);
+  const SimTK::Body::Rigid body = makeBody(model, i);
   MobilizedBody& parent = bodies[joint.parent];
   const auto at = [&joint](const Transform& X_JF) { return toSimTK(joint.X_PJ) * X_JF; };
   switch (joint.kind) {
@@ -233,7 +243,7 @@ void SimbodyTree::addCutLoop(const Closure& closure, int joint) {
   const bool first = closure.body1 == joint;
   const SE3 &X_leaf = first ? closure.X_B1 : closure.X_B2, &X_other = first ? closure.X_B2 : closure.X_B1;
   bodies[joint] = MobilizedBody::Weld(bodies[first ? closure.body2 : closure.body1], toSimTK(X_other),
-                                      makeBody(model.bodies()[joint].inertia), toSimTK(X_leaf));
+                                      makeBody(model, joint), toSimTK(X_leaf));
   const Joint& cut = model.joints()[joint];
   constraints.push_back({SimTK::Constraint::Ball(bodies[cut.parent], toSimTK(cut.X_PJ.p), bodies[joint], Vec3(0))});
 }

@@ -13,8 +13,8 @@
 /// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> its damping and friction, unless
 ///   `joint_forces` names it; meshes need not exist. Files for Drake (formats/drake.h) can also define loops,
 ///   springs, motors and joints; others add loops, couplers and motors (formats/reader_dialects.h, formats/reader_loops.h).
-/// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
-///   of rounding.
+/// - Attributes are finite numbers; masses and moments of inertia are not negative, up to 1e-6 of rounding. Moments that no body
+///   can have (triangle inequality), and those without mass, which get 1e-9 kg, are warnings.
 ///
 /// ## The YAML, published keys (example-parallel-robots)
 /// - `closed_loop: [[A, B], ...]` frames 1 and 2 of each closure: links, or joints, which stand for the frame of their
