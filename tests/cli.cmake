@@ -48,6 +48,14 @@ add_test(NAME determinism COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_D
 add_test(NAME determinism_long COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_determinism.py
   $<TARGET_FILE:bielle_command> rest)
 set_tests_properties(determinism determinism_long PROPERTIES LABELS system)
+# Results are read again from their files alone, and know their robot.
+add_test(NAME results_alone COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_results_alone.py
+  $<TARGET_FILE:bielle_command>)
+add_test(NAME results_alone_long COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_results_alone.py
+  $<TARGET_FILE:bielle_command> rest)
+add_test(NAME changed_robot COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_changed_robot.py
+  $<TARGET_FILE:bielle_command>)
+set_tests_properties(results_alone results_alone_long changed_robot PROPERTIES LABELS system)
 add_test(NAME licences COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_licences.py
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(licences PROPERTIES LABELS system)

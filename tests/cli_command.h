@@ -32,10 +32,10 @@ class OutputDirectory {
   ~OutputDirectory() { std::filesystem::remove_all(path_); }
   std::string str() const { return (path_ / "result").string(); }
   nlohmann::json readSummary() const { return nlohmann::json::parse(std::ifstream(path_ / "result/summary.json")); }
-  // The three files, the report and no other; the CSV has a line for every node and the header.
+  // The three files, the two of the robot, the report and no other; the CSV has a line for every node and the header.
   MotionRecord readTrajectory() const {
     CHECK(std::distance(std::filesystem::directory_iterator(path_ / "result"), std::filesystem::directory_iterator()) ==
-          4);
+          6);
     MotionRecord record = readRecord(str() + "/trajectory.npz");
     std::ifstream csv(str() + "/trajectory.csv");
     CHECK(std::count(std::istreambuf_iterator<char>(csv), {}, '\n') == record.time.size() + 1);

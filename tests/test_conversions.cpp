@@ -10,6 +10,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/formats/robot_writer.h"
+#include "bielle/results/result.h"
 #include "bielle/results/robot_info.h"
 #include "bielle/robots/robot_loader.h"
 #include "change_model.h"
@@ -109,6 +110,36 @@ TEST_CASE("feet of every kind come back from MJCF, and soles of spheres at their
                formatMjcf(at) + "'/>";
   }
   checkContact(xml.replace(from, to - from, spheres), contact);
+}
+
+// Of another version of the program, a comment in the text stands for its way of writing.
+TEST_CASE("every robot comes back from a result, and is known again by its text, whatever version wrote it") {
+  for (const std::string& name : listRobots()) {
+    CAPTURE(name);
+    const LoadedRobot robot = loadRobot(name);
+    RunInfo run = makeRunInfo(name, robot);
+    REQUIRE(run.mechanism.urdf != "");
+    CHECK(calcFingerprint(run.mechanism).size() == 16);
+    const RobotDirectory directory;
+    const auto load = [&](const std::string& file) {
+      directory.write("mechanism.urdf", run.mechanism.urdf);
+      directory.write("mechanism.yaml", run.mechanism.yaml);
+      directory.write("summary.json", R"({"robot": ")" + name + R"(", "robot_file": ")" + file +
+                                          R"(", "robot_fingerprint": ")" + calcFingerprint(run.mechanism) + R"("})");
+      return loadRobotOf(directory.path());
+    };
+    const LoadedRobot alone = load("/gone.urdf");
+    const Difference d = compare(robot.model, alone.model, findClosedConfiguration(robot.model).q);
+    CHECK(d.missing == "");
+    CHECK(d.isZero());
+    CHECK(alone.warnings.empty());
+    CHECK(fs::path(alone.file).filename() == "mechanism.urdf");
+    CHECK(load(robot.file).file == robot.file);
+    run.mechanism.yaml = "# of another version\n" + run.mechanism.yaml;
+    const LoadedRobot known = load(robot.file);
+    CHECK(known.file == robot.file);
+    CHECK(known.warnings.empty());
+  }
 }
 
 TEST_CASE("generated robots come back from MJCF") {

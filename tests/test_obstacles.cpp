@@ -38,7 +38,7 @@ void checkGround(const Motion& motion) {
     }
 }
 
-std::vector<Footstep> read(const std::string& text) {
+std::string read(const std::string& text) {
   const RobotDirectory directory;
   return readFootholds(directory.write("footholds_under_test.yaml", text));
 }

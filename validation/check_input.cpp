@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <set>
 
 #include "bielle/formats/reader.h"
@@ -101,9 +100,9 @@ CheckedMotion readMotion(const std::string& directory) {
   CheckedMotion motion;
   motion.summary = readSummary(directory);
   motion.record = readResultRecord(directory);
-  std::error_code error;
-  const bool file_exists = std::filesystem::exists(motion.summary.run.robot_file, error);
-  motion.model = loadRobot(file_exists ? motion.summary.run.robot_file : motion.summary.run.robot).model;
+  const LoadedRobot robot = loadRobotOf(directory);
+  motion.warnings = robot.warnings;
+  motion.model = robot.model;
   if (motion.summary.run.model == Belief::Serial)
     motion.model = makeSerialModel(motion.model, makeStandingPosture(motion.model),
                                    parseSerialArmature(motion.summary.run.serial_armature))

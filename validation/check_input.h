@@ -13,6 +13,7 @@ struct CheckedMotion {
   Model model;
   MotionSummary summary;
   MotionRecord record;
+  std::vector<std::string> warnings;  ///< of its robot (loadRobotOf)
 
   int numStages() const { return static_cast<int>(record.time.size()) - 1; }
   /// Index of the phase of a node; the last node belongs to the last phase.

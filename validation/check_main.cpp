@@ -40,7 +40,9 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? kPasses : kBadInput;
   }
   try {
-    const CheckReport report = checkMotion(readMotion(directory));
+    const CheckedMotion motion = readMotion(directory);
+    for (const std::string& warning : motion.warnings) std::cerr << "bielle: warning: " << warning << std::endl;
+    const CheckReport report = checkMotion(motion);
     writeTextFile((std::filesystem::path(directory) / "check.json").string(), formatReport(report));
     if (json)
       std::cout << formatReport(report);

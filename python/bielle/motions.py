@@ -66,8 +66,8 @@ def solve_sequence(
 
 def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Result]:
     """The function of a motion from its entry in the registry."""
-    options: Dict[str, Any] = described["options"]
     files: List[str] = list(described["files"])
+    options: Dict[str, Any] = {key: o for key, o in described["options"].items() if key not in files}
     common = ["problem", "solver", "warm_start", "callback"]
 
     def function(robot: Union[str, Robot], **keywords: Any) -> Result:

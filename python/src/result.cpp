@@ -114,7 +114,7 @@ MotionResult solveRequest(const Robot& robot, const Request& request, const Prob
   SolveOptions how;
   how.solver = options;
   if (warm_start) how.start = makeStart(*warm_start, motion);
-  return makeResult({robot.name, robot.file, {}}, solve(motion, how, {observer, observer, {}, {}}));
+  return makeResult(makeRunInfo(robot.name, toLoaded(robot)), solve(motion, how, {observer, observer, {}, {}}));
 }
 
 }  // namespace
@@ -131,7 +131,7 @@ void bindResults(py::module_& module) {
       "make_result",
       [](const HeldSolution& held, const Robot& robot) {
         const py::gil_scoped_release release;
-        return makeResult({robot.name, robot.file, {}}, held.solution);
+        return makeResult(makeRunInfo(robot.name, toLoaded(robot)), held.solution);
       },
       py::arg("solution"), py::arg("robot"), "The Result of a Solution.");
 }

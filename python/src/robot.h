@@ -2,6 +2,7 @@
 /// \file A robot as Python holds it: a model, and where it came from.
 #include <memory>
 
+#include "bielle/formats/reader.h"
 #include "model_access.h"
 
 namespace bielle::python {
@@ -18,5 +19,7 @@ struct Robot {
     return *model;
   }
 };
+
+inline LoadedRobot toLoaded(const Robot& robot) { return {robot.get(), robot.warnings, robot.directory, robot.file}; }
 
 }  // namespace bielle::python

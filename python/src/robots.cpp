@@ -43,8 +43,6 @@ py::dict describeGenerators() {
   return out;
 }
 
-LoadedRobot toLoaded(const Robot& robot) { return {robot.get(), robot.warnings, robot.directory, robot.file}; }
-
 py::object describe(const Robot& robot) {
   std::string text;
   {

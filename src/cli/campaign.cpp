@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "cli/case_run.h"
 #include "cli/commands.h"
 #include "cli/task_options.h"
@@ -23,6 +24,8 @@ struct CampaignArguments {
 int run(const CampaignArguments& arguments) {
   const CampaignSpec spec = readCampaignSpec(arguments.spec);
   for (const CampaignMotion& motion : spec.motions) requireApart(arguments.directory, {motion.directory});
+  for (const CampaignMotion& motion : spec.motions)
+    if (motion.solve.empty()) printWarnings(loadRobotOf(motion.directory).warnings);
   CampaignOptions options;
   options.bielle = requireCompanion("bielle-complete");
   options.simulate = requireCompanion("bielle-simulate");

@@ -41,6 +41,8 @@ void addDataset(CLI::App& command, Action& action);
 std::optional<int> runCompanion(const std::string& name, std::vector<std::string> arguments);
 
 // Arguments of every command with a robot.
+void printWarnings(const std::vector<std::string>& warnings);
+
 struct RobotArgument {
   std::string name;
   bool fixed_base = false;

@@ -20,13 +20,17 @@ std::string makeFlag(std::string option) {
 
 }  // namespace
 
+void printWarnings(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) std::cerr << "bielle: warning: " << warning << "\n";
+}
+
 LoadedRobot RobotArgument::load() const {
   LoadOptions options;
   if (fixed_base) options.base = BaseKind::Fixed;
   LoadedRobot robot = loadRobot(name, options);
   const std::vector<std::string> moved = checkReferences(robot);
   robot.warnings.insert(robot.warnings.end(), moved.begin(), moved.end());
-  for (const std::string& warning : robot.warnings) std::cerr << "bielle: warning: " << warning << "\n";
+  printWarnings(robot.warnings);
   const AssemblyResult closed = findClosedConfiguration(robot.model);
   if (closed.status != NumericalStatus::Ok) throw makeClosingError(robot.model, robot.path(), closed);
   return robot;

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "bielle/model/error.h"
+#include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
@@ -29,6 +30,15 @@ fs::path makePath(const ExportArguments& arguments) {
                                                                 : "trajectory." + format);
 }
 
+// Tables of numbers can do without the robot.
+void tellOfRobot(const ExportArguments& arguments) {
+  try {
+    printWarnings(loadRobotOf(arguments.directory).warnings);
+  } catch (const InputError&) {
+    if (arguments.format != "mot" && arguments.format != "sto") throw;
+  }
+}
+
 int exportTrajectory(const ExportArguments& arguments) {
   const fs::path path = makePath(arguments);
   requireApart(path.string(), listResultFiles(arguments.directory));
@@ -39,7 +49,8 @@ int exportTrajectory(const ExportArguments& arguments) {
       throw InputError("", "--output " + request.path, "the robot would have the same name",
                        arguments.format == "problem" ? "give one that ends in .json" : "give one that ends in .npz");
   }
-  for (const std::string& warning : writeExport(request)) std::cerr << "bielle: warning: " << warning << "\n";
+  tellOfRobot(arguments);
+  printWarnings(writeExport(request));
   std::cout << path.string() << "\n";
   if (arguments.format == "problem")
     for (const char* extension : {".npz", ".urdf"})

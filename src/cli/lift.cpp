@@ -1,7 +1,6 @@
 // bielle lift: a motion of the serial model on the closed robot.
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 #include <iostream>
 #include <optional>
 
@@ -14,8 +13,6 @@
 #include "motion/applied_options.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
-
-namespace fs = std::filesystem;
 
 namespace bielle::cli {
 namespace {
@@ -73,10 +70,8 @@ int run(const LiftArguments& arguments) {
                      "only motions with Euler steps, which have accelerations at their nodes, can be lifted",
                      "make one with `bielle solve " + summary.motion + " --model serial --step euler`");
   const MotionRecord record = readResultRecord(arguments.serial_directory);
-  RobotArgument robot_argument;
-  std::error_code error;
-  robot_argument.name = fs::is_regular_file(summary.run.robot_file, error) ? summary.run.robot_file : summary.run.robot;
-  const LoadedRobot robot = robot_argument.load();
+  const LoadedRobot robot = loadRobotOf(arguments.serial_directory);
+  printWarnings(robot.warnings);
   const SerialModel serial =
       makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.run.serial_armature));
   MotionPlan plan = remakeRequest(summary).plan(serial.model, makeStandingRobot(serial.model));
@@ -90,8 +85,8 @@ int run(const LiftArguments& arguments) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::optional<MotionResult> result;
   if (!lifted.trajectory.us.empty())
-    result = makeLiftedResult({summary.run.robot, robot.file, getCommandLine(), Belief::Closed, ""}, robot.model,
-                              motion, lifted, seconds);
+    result =
+        makeLiftedResult(makeRunInfo(summary.run.robot, robot, getCommandLine()), robot.model, motion, lifted, seconds);
   const MotionResult* written = result ? &*result : nullptr;
   printOutcome(arguments, lifted, written, static_cast<int>(trajectory.a.size()));
   for (const std::string& path : writeLift(arguments.directory, arguments.options.method, lifted, written))

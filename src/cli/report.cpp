@@ -61,6 +61,7 @@ int writePages(const ReportArguments& arguments) {
   for (const std::string& directory : arguments.directories)
     for (const std::string& output : {page, arguments.png, arguments.mp4})
       requireApart(output, listResultFiles(directory));
+  for (const std::string& directory : arguments.directories) printWarnings(loadRobotOf(directory).warnings);
   bielle::writeReport(page, arguments.directories);
   std::cout << page << "\n";
   if (!arguments.png.empty()) {

@@ -208,8 +208,8 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   makeOutputDirectory(arguments.directory);
   watchInterrupts();
   const MotionResult result =
-      makeResult({arguments.robot.name, robot.file, getCommandLine(), serial ? Belief::Serial : Belief::Closed,
-                  serial ? arguments.serial_armature : ""},
+      makeResult(makeRunInfo(arguments.robot.name, robot, getCommandLine(), serial ? Belief::Serial : Belief::Closed,
+                             serial ? arguments.serial_armature : ""),
                  bielle::solve(motion, options, makeObserver(arguments)));
   printResult(model, result, writeResult(arguments.directory, result));
   const bool failed = !arguments.no_check && !checkResult(arguments.directory);
@@ -250,7 +250,9 @@ void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) 
   sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
       ->required();
   sub.add_option("-o,--output", arguments->directory,
-                 "directory for trajectory.csv, trajectory.npz, summary.json and report.html; created if necessary")
+                 "directory for trajectory.csv, trajectory.npz, summary.json, the robot (mechanism.urdf, .yaml) and "
+                 "report.html; "
+                 "created if necessary")
       ->required();
 }
 

@@ -156,7 +156,10 @@ std::vector<Row> makeTable(const SoughtLinkage& sought, const std::vector<FoundL
 
 int synthesize(const SynthesizeArguments& arguments) {
   std::optional<ReportRun> motion;
-  if (!arguments.motion.empty()) motion = readRun(arguments.motion);
+  if (!arguments.motion.empty()) {
+    motion = readRun(arguments.motion);
+    printWarnings(motion->robot.warnings);
+  }
   const JointDemand demand = makeDemand(arguments, motion);
   const SoughtLinkage sought = makeSought(arguments, demand, motion);
   const bool is_drawn = arguments.parameters.empty();

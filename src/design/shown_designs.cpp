@@ -63,12 +63,12 @@ void writeDesignFiles(const std::string& directory, const DesignEvaluator& evalu
   std::vector<MotionOutcome> outcomes;
   design.evaluation = evaluator.evaluate(design.x, &outcomes);
   const std::vector<std::string> names = nameMotions(evaluator.motions());
-  const std::string file = fs::absolute(place / (place.filename().string() + ".urdf")).lexically_normal().string();
+  const LoadedRobot written = loadRobot((place / (place.filename().string() + ".urdf")).string());
   for (size_t i = 0; i < names.size(); ++i) {
     design.results.emplace_back();
     if (i >= outcomes.size() || !outcomes[i].solution) continue;
     design.results.back() = design.directory + "/" + names[i];
-    writeResult((place / names[i]).string(), makeResult({design.directory, file, {}}, *outcomes[i].solution));
+    writeResult((place / names[i]).string(), makeResult(makeRunInfo(design.directory, written), *outcomes[i].solution));
   }
 }
 

@@ -363,6 +363,13 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
   return builder.build(warnings);
 }
 
+RobotFiles parseRobotText(const RobotText& text, const std::string& path) {
+  RobotFiles files;
+  files.urdf = parseUrdf(text.urdf, path, files.yaml);
+  files.yaml = parseYaml(text.yaml, path);
+  return files;
+}
+
 RobotSources& getRobotSources() {
   static RobotSources sources;
   return sources;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bielle/formats/reader.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/model.h"
 #include "formats/yaml_entry.h"
 
@@ -146,6 +147,9 @@ struct RobotFiles {
   UrdfFile urdf;
   YamlFile yaml;
 };
+
+/// The files that formatRobot() wrote the text of. \param path  named in errors, and the place of meshes
+RobotFiles parseRobotText(const RobotText& text, const std::string& path);
 
 /// The model of both files.
 /// \param base  overrides the file's key   \param warnings  receives what is valid but suspicious; null for none

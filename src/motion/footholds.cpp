@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <functional>
 
 #include "bielle/model/error.h"
 #include "bielle/motion/stairs.h"
@@ -17,9 +17,10 @@ namespace {
 constexpr double kSamePlace = 1e-3;  // m, rad
 constexpr size_t kMostSteps = 200;
 constexpr double kSunken = 0.05;  // of the plane under the lowest stone, m
+const std::vector<std::string> kKeys = {"foot", "x", "y", "z", "yaw", "pitch", "roll"};
 
 Footstep readFoothold(const YamlEntry& entry) {
-  const YamlFields fields = entry.getFields({"foot", "x", "y", "z", "yaw", "pitch", "roll"});
+  const YamlFields fields = entry.getFields(kKeys);
   const YamlEntry& foot = require(fields, "foot", entry);
   if (!foot.isWord("left") && !foot.isWord("right")) foot.fail("it is not a foot", "give left or right");
   const auto get = [&](const std::string& key) {
@@ -94,28 +95,55 @@ Ground makeGround(const Model& model, const Stance& stance, const std::vector<Fo
   return ground;
 }
 
+// Passes every entry of a list of footholds, which is checked. \param source  of the text, for messages
+void readList(const std::string& source, const std::string& text, const std::function<void(const YamlEntry&)>& pass) {
+  readYamlDocument(source, text, [&](const YamlEntry& document) {
+    const YamlFields fields = document.getFields({"footholds"});
+    const YamlEntry& list = require(fields, "footholds", document);
+    const std::vector<YamlEntry> entries = list.getList();
+    if (entries.empty() || entries.size() > kMostSteps)
+      list.fail("it has no footholds, or more than 200",
+                "give one entry per step, e.g. {foot: right, x: 0.2, y: -0.1}");
+    for (const YamlEntry& entry : entries) {
+      readFoothold(entry);
+      pass(entry);
+    }
+  });
+}
+
+std::vector<Footstep> parseFootholds(const std::string& list) {
+  std::vector<Footstep> footholds;
+  readList("option 'footholds'", "footholds: " + list,
+           [&footholds](const YamlEntry& entry) { footholds.push_back(readFoothold(entry)); });
+  return footholds;
+}
+
 }  // namespace
 
-std::vector<Footstep> readFootholds(const std::string& path) {
-  std::vector<Footstep> footholds;
-  readYamlDocument(path, readTextFile(path, "give a YAML file with a list of footholds"),
-                   [&](const YamlEntry& document) {
-                     const YamlFields fields = document.getFields({"footholds"});
-                     const YamlEntry& list = require(fields, "footholds", document);
-                     for (const YamlEntry& entry : list.getList()) footholds.push_back(readFoothold(entry));
-                     if (footholds.empty() || footholds.size() > kMostSteps)
-                       list.fail("it has no footholds, or more than 200",
-                                 "give one entry per step, e.g. {foot: right, x: 0.2, y: -0.1}");
-                   });
-  return footholds;
+std::string readFootholds(const std::string& path) {
+  std::string list;
+  readList(path, readTextFile(path, "give a YAML file with a list of footholds"), [&list](const YamlEntry& entry) {
+    const YamlFields fields = entry.getFields(kKeys);
+    list += list.empty() ? "[" : ", ";
+    const char* separator = "{";
+    for (const std::string& key : kKeys)
+      if (const YamlEntry* value = find(fields, key)) {
+        list += separator + key + ": " + value->getText();
+        separator = ", ";
+      }
+    list += "}";
+  });
+  return list + "]";
 }
 
 MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const StandingRobot& standing) {
   if (o.footholds.empty())
-    throw InputError("", "footholds", "none are given", "give a file with footholds (`--footholds FILE.yaml`)");
+    throw InputError("", "footholds", "none are given",
+                     "solve the motion with a file, `bielle solve footholds --footholds FILE.yaml`, and carry out its "
+                     "result");
   listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, standing);
-  Course course{"footholds", makeSteps(stance, o.footholds), {}};
+  Course course{"footholds", makeSteps(stance, parseFootholds(o.footholds)), {}};
   course.ground = makeGround(model, stance, course.steps, o.rim);
   MotionPlan plan = planCourse(model, stance, course, o.gait);
   plan.options = listOptions(o).listValues();

@@ -16,18 +16,20 @@
 namespace bielle {
 
 struct FootholdsOptions {
-  std::vector<Footstep> footholds;  ///< relative to the middle of the feet at the start; at least one
-  double rim = 0.02;                ///< of the stones around the soles, m
+  /// The list of such a file in one line, at least one entry. It is text so that a result holds it among its other options, and
+  /// needs no file besides.
+  std::string footholds;
+  double rim = 0.02;  ///< of the stones around the soles, m
   LocomotionOptions gait = makeGaitDefaults();
 
   static LocomotionOptions makeGaitDefaults();
 };
 
-/// What can be set besides the footholds.
 void describe(OptionFields& fields, FootholdsOptions& options);
 
+/// The list in a file, for FootholdsOptions: with the numbers as they are written there.
 /// \throws InputError naming file, entry and line
-std::vector<Footstep> readFootholds(const std::string& path);
+std::string readFootholds(const std::string& path);
 
 /// From where the robot stands. \throws InputError naming the step that is impossible: a sole on the edge of another
 /// stone or in it, a swing that would touch the ground, and see locomotion.h

@@ -104,6 +104,7 @@ LocomotionOptions FootholdsOptions::makeGaitDefaults() {
 }
 
 void describe(OptionFields& f, FootholdsOptions& o) {
+  f.text("footholds", o.footholds, "the list of the file in one line: [{foot: right, x: 0.2, y: -0.1}, ...]");
   f.number("rim", o.rim, "m", {0, 1}, "width of the stones around the soles");
   describe(f, o.gait);
 }

@@ -10,18 +10,16 @@ namespace bielle {
 
 struct MotionPart {
   MotionPlanner planner;
-  // Of a motion with a file: reads it.
-  std::function<void(const std::string& path, MotionRequest&)> read{};
+  // Of a motion with a file: the option that it is, as text.
+  std::function<std::string(const std::string& path)> read{};
 };
 // By name.
 std::map<std::string, MotionPart>& getMotionParts();
 
-// \param others  what is no option by name
 template <typename Options>
-MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&),
-                          const Options& others = {}) {
+MotionPlanner makePlanner(MotionPlan (*plan)(const Model&, const Options&, const StandingRobot&)) {
   return [=](const Model& model, const StandingRobot& standing, const OptionSet& options) {
-    return plan(model, readOptions(options, others), standing);
+    return plan(model, readOptions<Options>(options), standing);
   };
 }
 

@@ -7,25 +7,13 @@
 #include "motion/motion_part.h"
 #include "motion/obstacles.h"
 
-namespace bielle {
-namespace {
-
-void readFootholdsFile(const std::string& path, MotionRequest& request) {
-  FootholdsOptions options;
-  options.footholds = readFootholds(path);
-  request.planner = makePlanner(planFootholds, options);
-}
-
-}  // namespace
-}  // namespace bielle
-
 extern "C" const bool bielle_motions = [] {
   using namespace bielle;
   getMotionParts().insert({{"walk", {makePlanner(planWalk)}},
                            {"side-walk", {makePlanner(planSideWalk)}},
                            {"turn", {makePlanner(planTurn)}},
                            {"stairs", {makePlanner(planStairs)}},
-                           {"footholds", {makePlanner(planFootholds), readFootholdsFile}},
+                           {"footholds", {makePlanner(planFootholds), readFootholds}},
                            {"box", {makePlanner(planBox)}},
                            {"gap", {makePlanner(planGap)}},
                            {"jump", {makePlanner(planJump)}},

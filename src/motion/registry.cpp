@@ -41,7 +41,9 @@ MotionRequest makeFootholdsRequest() {
       {"footholds",
        "YAML file, a list `footholds` of {foot: left or right, x, y, z [m], yaw, pitch, roll [rad]}, "
        "relative to the middle of the feet at the start",
-       [](const std::string& path, MotionRequest& changed) { getPart("footholds").read(path, changed); }});
+       [](const std::string& path, MotionRequest& changed) {
+         changed.options.set("footholds", getPart("footholds").read(path));
+       }});
   return request;
 }
 
@@ -173,6 +175,7 @@ Motion makeMotion(const Model& model, const MotionRequest& request, const Proble
   for (const auto& [motor, value] : limits.efforts) motion.options.emplace_back(kEffortLimit + motor, value);
   for (const auto& [motor, value] : limits.velocities) motion.options.emplace_back(kVelocityLimit + motor, value);
   for (const auto& [motor, value] : limits.powers) motion.options.emplace_back(kPowerLimit + motor, value);
+  if (!limits.enforced) motion.options.emplace_back(kNoLimits, true);
   if (limits.dead_point_margin != LimitOptions().dead_point_margin)
     motion.options.emplace_back(kDeadPointMargin, limits.dead_point_margin);
   return motion;

@@ -26,15 +26,6 @@ std::string getText(const Json& json, const char* key) {
   return it != json.end() && it->is_string() ? it->get<std::string>() : std::string();
 }
 
-LoadedRobot loadRobotOf(const Json& summary, const fs::path& path) {
-  const std::string file = getText(summary, "robot_file"), name = getText(summary, "robot");
-  std::error_code error;
-  if (!file.empty() && fs::exists(file, error)) return loadRobot(file);
-  if (name.empty())
-    throw InputError(path.string(), "key 'robot'", "it is missing", "give a directory that `bielle solve` wrote");
-  return loadRobot(name);
-}
-
 // \throws InputError when the record is not one of this robot
 MotionRecord readRecordOf(const LoadedRobot& robot, const fs::path& path) {
   MotionRecord record = readRecord(path.string());
@@ -56,7 +47,7 @@ ReportRun readRun(const std::string& directory) {
   run.summary = readJson(place / "summary.json");
   std::error_code error;
   if (fs::exists(place / "check.json", error)) run.check = readJson(place / "check.json");
-  run.robot = loadRobotOf(run.summary, place / "summary.json");
+  run.robot = loadRobotOf(directory);
   run.summary.erase("robot_file");  // pages are given away, and need no path of this machine
   const std::string model = getText(run.summary, "model");
   if (!model.empty() && parseBelief(model) == Belief::Serial)

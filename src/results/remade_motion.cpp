@@ -23,8 +23,10 @@ LimitOptions readLimits(const MotionSummary& summary) {
   read(kEffortLimit, limits.efforts);
   read(kVelocityLimit, limits.velocities);
   read(kPowerLimit, limits.powers);
-  for (const auto& [name, value] : summary.options)
+  for (const auto& [name, value] : summary.options) {
     if (name == kDeadPointMargin) limits.dead_point_margin = getNumber(summary, name, value);
+    if (name == kNoLimits) limits.enforced = false;
+  }
   return limits;
 }
 
@@ -33,7 +35,7 @@ Motion remakeMotion(const Model& model, const MotionSummary& summary) {
     throw InputError(summary.file, element, problem, remedy);
   };
   if (summary.run.model != Belief::Closed)
-    refuse("model", "it is that of the serial chain", "solve it without --serial");
+    refuse("model", "it is that of the serial chain", "solve it without --model serial");
   if (!summary.timings.empty())
     refuse("free_timings", "durations are variables of this problem", "solve it without --free-timings");
   if (summary.objective.objective == Objective::PeakTorque)

@@ -81,24 +81,6 @@ Json makeTimings(const MotionResult& result) {
   return timings;
 }
 
-Json makeGoals(const MotionResult& result) {
-  const auto list = [](const Vector3d& p) { return Json{p.x(), p.y(), p.z()}; };
-  Json goals = Json::array();
-  for (const GoalOutcome& outcome : result.goals) {
-    const Goal& goal = outcome.goal;
-    Json json = {{"name", goal.name},           {"kind", getName(goal.kind)},  {"unit", getUnit(goal.kind)},
-                 {"requested", goal.requested}, {"tolerance", goal.tolerance}, {"achieved", outcome.achieved},
-                 {"met", outcome.met()},        {"first_node", goal.first},    {"last_node", goal.last}};
-    if (goal.kind == GoalKind::Speed || goal.kind == GoalKind::Displacement) json["direction"] = list(goal.direction);
-    if (!goal.contacts.empty()) json["contacts"] = goal.contacts;
-    for (const Foothold& foothold : goal.footholds)
-      json["footholds"].push_back(
-          {{"contact", foothold.contact}, {"node", foothold.node}, {"position", list(foothold.position)}});
-    goals.push_back(json);
-  }
-  return goals;
-}
-
 Json makeDeadPoints(const MotionResult& result) {
   Json linkages = Json::array();
   for (const DeadPointTrace& linkage : result.dead_points) {
@@ -122,6 +104,24 @@ Json makeConstraints(const FddpSummary& solver) {
 
 }  // namespace
 
+Json listGoals(const std::vector<GoalOutcome>& outcomes) {
+  const auto list = [](const Vector3d& p) { return Json{p.x(), p.y(), p.z()}; };
+  Json goals = Json::array();
+  for (const GoalOutcome& outcome : outcomes) {
+    const Goal& goal = outcome.goal;
+    Json json = {{"name", goal.name},           {"kind", getName(goal.kind)},  {"unit", getUnit(goal.kind)},
+                 {"requested", goal.requested}, {"tolerance", goal.tolerance}, {"achieved", outcome.achieved},
+                 {"met", outcome.met()},        {"first_node", goal.first},    {"last_node", goal.last}};
+    if (goal.kind == GoalKind::Speed || goal.kind == GoalKind::Displacement) json["direction"] = list(goal.direction);
+    if (!goal.contacts.empty()) json["contacts"] = goal.contacts;
+    for (const Foothold& foothold : goal.footholds)
+      json["footholds"].push_back(
+          {{"contact", foothold.contact}, {"node", foothold.node}, {"position", list(foothold.position)}});
+    goals.push_back(json);
+  }
+  return goals;
+}
+
 Json makeSummary(const MotionResult& result) {
   const BuildInfo build = getBuildInfo();
   Json log = Json::array();
@@ -132,12 +132,13 @@ Json makeSummary(const MotionResult& result) {
   return {{"motion", result.motion},
           {"robot", result.run.robot},
           {"robot_file", result.run.robot_file},
+          {"robot_fingerprint", calcFingerprint(result.run.mechanism)},
           {"model", getName(result.run.model)},
           {"serial_armature", result.run.serial_armature},
           {"formulation", getName(result.formulation)},
           {"step", getName(result.step)},
           {"command", result.run.command},
-          {"goals", makeGoals(result)},
+          {"goals", listGoals(result.goals)},
           {"options", listOptionValues(result.options)},
           {"versions", {{"bielle", build.bielle}, {"eigen", build.eigen}, {"compiler", build.compiler}}},
           {"converged", result.converged()},
@@ -238,23 +239,30 @@ void makeOutputDirectory(const std::string& directory) {
 }
 
 std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result) {
-  return writeResult(directory, result.record, makeSummary(result));
+  return writeResult(directory, result.record, result.run.mechanism, makeSummary(result));
 }
 
-std::vector<std::string> writeResult(const std::string& directory, const MotionRecord& record, const Json& json) {
+std::vector<std::string> writeResult(const std::string& directory, const MotionRecord& record,
+                                     const RobotText& mechanism, const Json& json) {
   makeOutputDirectory(directory);
   std::vector<std::string> paths;
   for (const char* name : {"trajectory.csv", "trajectory.npz", "summary.json"})
     paths.push_back((fs::path(directory) / name).string());
-  AsideFile csv(paths[0]), npz(paths[1]), summary(paths[2]);
+  AsideFile csv(paths[0]), npz(paths[1]), summary(paths[2]), urdf((fs::path(directory) / kMechanismUrdf).string()),
+      yaml((fs::path(directory) / kMechanismYaml).string());
   csv.write(formatCsv(record));
   npz.write(formatNpz(record));
   summary.write(formatJson(json) + "\n");
+  urdf.write(mechanism.urdf);
+  yaml.write(mechanism.yaml);
   // Files derived from the old summary are removed before it, and the new summary is written last, so that an
   // interruption never leaves a mixture of two results.
   std::error_code error;
-  for (const char* name : {"report.html", "lift.json", "check.json", "plan.npz", "summary.json"})
+  for (const char* name :
+       {"report.html", "lift.json", "check.json", "plan.npz", "summary.json", kMechanismUrdf, kMechanismYaml})
     fs::remove(fs::path(directory) / name, error);
+  if (!mechanism.urdf.empty())
+    for (AsideFile* file : {&urdf, &yaml}) file->commit();
   for (AsideFile* file : {&csv, &npz, &summary}) file->commit();
   return paths;
 }
@@ -270,7 +278,8 @@ void writeSummary(const std::string& directory, const Json& summary) {
 
 std::vector<std::string> listResultFiles(const std::string& directory) {
   std::vector<std::string> paths;
-  for (const char* name : {"trajectory.npz", "trajectory.csv", "summary.json", "check.json", "plan.npz"})
+  for (const char* name :
+       {"trajectory.npz", "trajectory.csv", "summary.json", "check.json", "plan.npz", kMechanismUrdf, kMechanismYaml})
     paths.push_back((fs::path(directory) / name).string());
   return paths;
 }

@@ -96,12 +96,18 @@ MotionSummary read(const Json& json) {
   return summary;
 }
 
+bool isLimit(const std::string& name) {
+  for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit, kDeadPointMargin, kNoLimits})
+    if (name.rfind(prefix, 0) == 0) return true;
+  return false;
+}
+
 // The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
 std::vector<std::string> listPartMotions(const OptionValues& options) {
   std::vector<std::string> labels, motions;
   for (const auto& [name, value] : options) {
     const size_t dot = name.find('.');
-    if (dot == std::string::npos) continue;
+    if (dot == std::string::npos || isLimit(name)) continue;  // names of motors may have points
     const std::string label = name.substr(0, dot);
     if (std::find(labels.begin(), labels.end(), label) != labels.end()) continue;
     labels.push_back(label);
@@ -131,11 +137,6 @@ MotionSummary readSummary(const std::string& directory) {
 MotionRequest remakeRequest(const MotionSummary& summary) {
   MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listPartMotions(summary.options))
                                                       : findMotion(summary.file, summary.motion).request;
-  const auto isLimit = [](const std::string& name) {
-    for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit, kDeadPointMargin})
-      if (name.rfind(prefix, 0) == 0) return true;
-    return false;
-  };
   for (const auto& [name, value] : summary.options)
     if (!isLimit(name)) request.options.set(name, value);
   return request;

@@ -29,13 +29,7 @@ Model makeModel(const YamlFile& yaml) {
 
 // As if they had been written and read again: a generated robot is the same by its generator and from its files, and
 // whatever completes a robot, or fixes its base, has the same meaning for it.
-RobotFiles generate(const YamlFile& yaml) {
-  const RobotText text = formatRobot(makeModel(yaml));
-  RobotFiles files;
-  files.urdf = parseUrdf(text.urdf, yaml.path, files.yaml);
-  files.yaml = parseYaml(text.yaml, yaml.path);
-  return files;
-}
+RobotFiles generate(const YamlFile& yaml) { return parseRobotText(formatRobot(makeModel(yaml)), yaml.path); }
 
 }  // namespace
 

@@ -18,6 +18,7 @@
 #include "formats/aside_file.h"
 #include "formats/process.h"
 #include "formats/text_file.h"
+#include "model/hash.h"
 #include "model/number_text.h"
 #include "results/json_text.h"
 #include "tasks/case_task.h"
@@ -241,13 +242,12 @@ std::string makeIdentity(const std::string& program, const std::vector<std::stri
   return makeIdentity(files);
 }
 
-// FNV-1a over all of them.
+// Over all of them.
 std::string makeIdentity(const std::vector<fs::path>& files) {
-  std::uint64_t hash = 0xcbf29ce484222325;
+  std::uint64_t hash = hashText("");
   for (const fs::path& path : files) {
     std::ifstream file(path, std::ios::binary);
-    for (std::istreambuf_iterator<char> c(file), end; c != end; ++c)
-      hash = (hash ^ static_cast<unsigned char>(*c)) * 0x100000001b3;
+    hash = hashText({std::istreambuf_iterator<char>(file), {}}, hash);
   }
   return getBuildInfo().bielle + formatText(" %016llx", static_cast<unsigned long long>(hash));
 }

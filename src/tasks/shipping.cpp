@@ -8,6 +8,7 @@
 #include "formats/robot_files.h"
 #include "formats/text_file.h"
 #include "results/json_text.h"
+#include "results/result_files.h"
 
 namespace fs = std::filesystem;
 
@@ -38,15 +39,21 @@ tasks::Task shipMotion(const std::string& motion, const std::string& place, bool
     return task;
   }
   const MotionSummary summary = readSummary(motion);
-  const std::string robot = fs::is_regular_file(summary.run.robot_file) ? summary.run.robot_file : summary.run.robot;
-  task.robots = listRobotDirectories(robot);
+  // The robot's own files, with its meshes, as long as they are those of the motion.
+  const LoadedRobot robot = loadRobotOf(motion);
+  const bool is_own =
+      !robot.warnings.empty() || robot.file == fs::absolute(fs::path(motion) / kMechanismUrdf).lexically_normal();
+  if (!is_own) task.robots = listRobotDirectories(robot.file);
   makeOutputDirectory(place);
   readJsonFile(summary.file, "solve the motion again", [&](const Json& json) {
     Json shipped = json;
-    shipped["robot_file"] = getShippedRobot(robot);
+    shipped["robot_file"] = is_own ? "" : getShippedRobot(robot.file);
     writeTextFile(place + "/summary.json", formatJson(shipped) + "\n");
   });
   task.inputs.push_back({"motion/summary.json", place + "/summary.json"});
+  for (const char* name : {kMechanismUrdf, kMechanismYaml})
+    if (fs::exists(fs::path(motion) / name))
+      task.inputs.push_back({std::string("motion/") + name, (fs::path(motion) / name).string()});
   for (const char* name : {"trajectory.npz", "trajectory.csv"})
     if (fs::exists(fs::path(motion) / name)) {
       task.inputs.push_back({std::string("motion/") + name, (fs::path(motion) / name).string()});

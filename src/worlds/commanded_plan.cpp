@@ -69,7 +69,7 @@ Plan makeCommandedPlan(const PlanRequest& request, const std::string& file) {
   plan.robot = robot;
   MotionSummary& summary = plan.summary;
   summary.motion = request.motion;
-  summary.run = {request.robot, robot.file, {}};
+  summary.run = makeRunInfo(request.robot, robot);
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;
   summary.options = set.listValues();

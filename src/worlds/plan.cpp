@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "bielle/model/error.h"
 #include "bielle/motion/solve.h"
@@ -25,12 +24,6 @@ void setWherePresent(const std::string& name, double value, OptionSet& options) 
                       option.compare(option.size() - name.size() - 1, std::string::npos, "." + name) == 0;
     if (option == name || ends) options.set(option, value);
   }
-}
-
-LoadedRobot loadRobotOf(const MotionSummary& summary) {
-  std::error_code error;
-  return loadRobot(std::filesystem::is_regular_file(summary.run.robot_file, error) ? summary.run.robot_file
-                                                                                   : summary.run.robot);
 }
 
 Solution solveUnlessInterrupted(const Motion& motion, const SolveOptions& options) {
@@ -157,7 +150,7 @@ Plan readPlan(const std::string& directory, const ControlOptions& control, std::
   const Belief believed = belief.value_or(summary.run.model);
   const bool is_other = is_serial != (believed != Belief::Closed);
   if (is_other) setModel(believed, summary);
-  return finishPlan(loadRobotOf(summary), summary, believed, remakeRequest(summary), is_other ? "" : directory,
+  return finishPlan(loadRobotOf(directory), summary, believed, remakeRequest(summary), is_other ? "" : directory,
                     control);
 }
 
@@ -168,7 +161,7 @@ Plan makePlan(const PlanRequest& request, const ControlOptions& control) {
   const LoadedRobot robot = loadRobot(request.robot);
   MotionSummary summary;
   summary.motion = request.motion;
-  summary.run = {request.robot, robot.file, {}};
+  summary.run = makeRunInfo(request.robot, robot);
   setModel(request.belief, summary);
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;

@@ -41,8 +41,8 @@ int solve(const MotionArguments& arguments, const CommandLine& command, const Ma
   const Motion motion = make(model, makeStandingPosture(model));
   makeOutputDirectory(arguments.directory);
   const Solution solution = bielle::solve(motion);
-  const RunInfo run{arguments.robot, robot.file, command, serial ? Belief::Serial : Belief::Closed,
-                    serial ? kArmature : ""};
+  const RunInfo run =
+      makeRunInfo(arguments.robot, robot, command, serial ? Belief::Serial : Belief::Closed, serial ? kArmature : "");
   const MotionResult result = makeResult(run, solution);
   std::cout << motion.name << " of " << arguments.robot << ": " << getName(solution.summary.termination) << ", "
             << solution.summary.iterations << " iterations, cost " << solution.summary.cost << "\n";
@@ -63,7 +63,7 @@ int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   WalkOptions walk;
   for (const auto& [name, value] : summary.options)
     if (name == "speed") walk.speed = std::get<double>(value);
-  const LoadedRobot robot = loadRobot(summary.run.robot);
+  const LoadedRobot robot = loadRobotOf(arguments.serial_directory);
   const SerialModel serial = makeSerial(robot.model);
   const Motion motion = makeWalk(serial.model, walk, makeStandingPosture(serial.model));
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, readResultRecord(arguments.serial_directory));
@@ -73,8 +73,7 @@ int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::optional<MotionResult> result;
   if (!lifted.trajectory.us.empty())
-    result = makeLiftedResult({summary.run.robot, robot.file, command, Belief::Closed, ""}, robot.model, motion, lifted,
-                              seconds);
+    result = makeLiftedResult(makeRunInfo(summary.run.robot, robot, command), robot.model, motion, lifted, seconds);
   print(writeLift(arguments.directory, arguments.options.method, lifted, result ? &*result : nullptr));
   return lifted.lifted() ? 0 : 1;
 }

@@ -26,7 +26,7 @@ Motion makeSequence(const Model& model, const std::vector<SequencePart>& parts, 
 
 struct MotionRequest;
 
-/// Data of a motion that come from a file (`--NAME FILE`).
+/// An option of a motion that is read from a file (`--NAME FILE`): the request then holds what it says, and needs it no more.
 struct MotionFile {
   std::string name, help;
   std::function<void(const std::string& path, MotionRequest&)> read;  ///< throws InputError
@@ -65,7 +65,7 @@ std::vector<SequencePart> listParts(const MotionRequest& request);
 /// Prefixes of limits given by motor among the options of a motion, followed by the name of the motor.
 inline constexpr const char *kEffortLimit = "limit ", *kVelocityLimit = "velocity-limit ",
                             *kPowerLimit = "power-limit ";
-inline constexpr const char* kDeadPointMargin = "dead-point-margin";
+inline constexpr const char *kDeadPointMargin = "dead-point-margin", *kNoLimits = "no-limits";
 
 /// The motion of a request from the robot's standing posture. The limits given by motor are listed with the other options.
 /// \throws InputError as makeMotion() does

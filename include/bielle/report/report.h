@@ -21,8 +21,8 @@
 
 namespace bielle {
 
-/// The page. The robots are loaded again, by `robot_file` or else by name.
-/// \throws InputError naming the file that is missing or inconsistent (for example a robot that has changed since)
+/// The page, with the robots of the results (loadRobotOf).
+/// \throws InputError naming the file that is missing or inconsistent
 std::string makeReport(const std::vector<std::string>& directories);
 
 /// Writes the page to a temporary file and renames it when complete.

@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "bielle/dynamics/linkage.h"
+#include "bielle/formats/reader.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/motion/lift.h"
 #include "bielle/motion/record.h"
 #include "bielle/motion/serial_model.h"
@@ -61,7 +63,17 @@ struct RunInfo {
   std::vector<std::string> command;  ///< the command line, or empty
   Belief model = Belief::Closed;     ///< or Serial: the robot's linkages were frozen (motion/serial_model.h)
   std::string serial_armature{};     ///< of the serial model, as requested (parseSerialArmature)
+  RobotText mechanism{};             ///< the robot itself, without its meshes; empty where formatRobot() refuses it
 };
+
+/// With the text of the robot.
+/// \param name  or path, as given
+RunInfo makeRunInfo(const std::string& name, const LoadedRobot& robot, const std::vector<std::string>& command = {},
+                    Belief model = Belief::Closed, const std::string& serial_armature = "");
+
+/// Sixteen hexadecimal digits, FNV-1a of both texts, the URDF first; empty for no text. A summary.json has it as
+/// `robot_fingerprint`.
+std::string calcFingerprint(const RobotText& text);
 
 /// What the summary.json of a result tells, and another run reads.
 struct MotionFacts {
@@ -120,6 +132,12 @@ struct MotionSummary : MotionFacts {
 /// \throws InputError naming the file, the entry and what is wrong with it: a motion carried out is no plan
 MotionSummary readSummary(const std::string& directory);
 
+/// The robot of a result of any kind, the closed one: of its file while that is as it was when the motion was solved, else of
+/// mechanism.urdf and mechanism.yaml in the directory. Its warnings tell that the file has changed, and nothing else. Without a
+/// fingerprint in summary.json the file, or another of this name, is believed.
+/// \throws InputError when there is no robot, or the one in the directory was changed
+LoadedRobot loadRobotOf(const std::string& directory);
+
 /// The request recorded in a result, without limits, which are part of the problem and not of the motion.
 /// \throws InputError when there is no such motion or option
 MotionRequest remakeRequest(const MotionSummary& summary);
@@ -129,7 +147,7 @@ MotionRequest remakeRequest(const MotionSummary& summary);
 void makeOutputDirectory(const std::string& directory);
 
 /// Writes trajectory.csv, trajectory.npz and summary.json to temporary files, which are renamed when all are complete,
-/// summary.json last. Returns their paths. \throws InputError naming the file and the reason
+/// summary.json last, and the robot as mechanism.urdf and mechanism.yaml beside them. Returns the paths of the first three. \throws InputError naming the file and the reason
 std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result);
 /// Writes summary.json alone.
 void writeSummary(const std::string& directory, const MotionResult& result);

@@ -167,7 +167,7 @@ std::vector<std::string> writeRun(const SimulateArguments& arguments, const Load
                                   const Ground& ground, const FreeRun& run, const std::vector<std::string>& command) {
   const Execution& e = run.motion.execution;
   MotionResult result;
-  result.run = {arguments.directory, robot.file, command};
+  result.run = makeRunInfo(arguments.directory, robot, command);
   result.motion = "free motion";
   result.schedule.phases.push_back(
       {"free", static_cast<int>(e.record.u.rows()), arguments.execution.record_period, {}});
@@ -195,7 +195,7 @@ std::vector<std::string> writeRun(const SimulateArguments& arguments, const Load
     writeSummary(run.directory, summary);
     return {(fs::path(run.directory) / "summary.json").string()};
   }
-  std::vector<std::string> paths = writeResult(run.directory, e.record, summary);
+  std::vector<std::string> paths = writeResult(run.directory, e.record, result.run.mechanism, summary);
   paths.push_back((fs::path(run.directory) / "energy.csv").string());
   writeTextFile(paths.back(), makeEnergyText(e.record, run.motion.books));
   return paths;

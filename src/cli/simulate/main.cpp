@@ -121,8 +121,9 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   requirePlan(arguments);
   const std::string reason = chooseControl(arguments);
   roundPeriods(arguments);
-  std::vector<std::string> warnings = listIdleOptions(arguments);
   const Plan plan = obtainPlan(arguments);
+  std::vector<std::string> warnings = arguments.robot.empty() ? plan.robot.warnings : std::vector<std::string>();
+  for (const std::string& each : listIdleOptions(arguments)) warnings.push_back(each);
   for (const std::string& each : listIdleInPlan(arguments, plan)) warnings.push_back(each);
   const PlanController controller = makeController(plan, arguments.control);
   const Ground ground = makeGround(arguments, plan.ground);

@@ -23,7 +23,7 @@ namespace {
 MotionResult makeResult(const CarriedOut& carried, const Execution& execution) {
   const Plan& plan = carried.plan;
   MotionResult result;
-  result.run = {plan.summary.run.robot, plan.robot.file, carried.command};
+  result.run = makeRunInfo(plan.summary.run.robot, plan.robot, carried.command);
   result.motion = plan.summary.motion;
   result.formulation = plan.summary.formulation;
   result.options = plan.summary.options;
@@ -244,16 +244,16 @@ void markAsFailed(const std::filesystem::path& directory) {
   }
 }
 
-std::vector<std::string> writeFiles(const CarriedOut& carried, const MotionRecord& record, const Json& summary) {
+std::vector<std::string> writeFiles(const CarriedOut& carried, const MotionResult& result, const Json& summary) {
   const SimulateArguments& arguments = carried.arguments;
   const std::filesystem::path output = arguments.output;
   if (arguments.summary_only) {
     writeSummary(arguments.output, summary);
     return {(output / "summary.json").string()};
   }
-  std::vector<std::string> paths = writeResult(arguments.output, record, summary);
+  std::vector<std::string> paths = writeResult(arguments.output, result.record, result.run.mechanism, summary);
   paths.push_back((output / "plan.npz").string());
-  writeNpz(paths.back(), makePlannedRecord(carried.plan.robot.model, carried.plan.reference(), record));
+  writeNpz(paths.back(), makePlannedRecord(carried.plan.robot.model, carried.plan.reference(), result.record));
   if (!arguments.no_report) {
     paths.push_back((output / "report.html").string());
     writeReport(paths.back(), {arguments.output});
@@ -373,7 +373,7 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
 std::vector<std::string> write(const CarriedOut& carried, const Execution& execution) {
   try {
     const MotionResult result = makeResult(carried, execution);
-    return writeFiles(carried, result.record, makeSummary(result, carried, execution));
+    return writeFiles(carried, result, makeSummary(result, carried, execution));
   } catch (...) {
     markAsFailed(carried.arguments.output);
     throw;

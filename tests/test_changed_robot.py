@@ -1,0 +1,127 @@
+"""test_changed_robot.py BIELLE: a result knows its robot. When the robot's file is edited, every command that reads the result says so
+first and goes on with the robot that the motion was solved for."""
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+
+BIELLE = os.path.abspath(sys.argv[1])
+ROBOT = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "robots", "bipetto")
+SQUAT = ["squat", "--depth", "0.9", "--set", "duration=0.6", "--set", "settle=0", "--set", "time_step=0.02"]
+TOLD = "the robot has changed since the motion in "
+
+
+def run(*arguments, where, status=0):
+    result = subprocess.run([BIELLE, *arguments], cwd=where, capture_output=True, text=True,
+                            env={**os.environ, "OMP_NUM_THREADS": "1"})
+    assert result.returncode == status, (arguments, result.returncode, result.stdout, result.stderr)
+    return result
+
+
+def read(*path):
+    with open(os.path.join(*path), encoding="utf-8") as file:
+        return file.read()
+
+
+def write(text, *path):
+    with open(os.path.join(*path), "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def calc_fingerprint(*texts):
+    number = 0xcbf29ce484222325
+    for byte in "".join(texts).encode():
+        number = (number ^ byte) * 0x100000001b3 % 2**64
+    return f"{number:016x}"
+
+
+def read_numbers(place, name):
+    """Positions and torques, column by column."""
+    rows = [row.split(",") for row in read(place, name, "trajectory.csv").splitlines()]
+    keep = [i for i, column in enumerate(rows[0]) if column.startswith(("q.", "u."))]
+    return [[float(row[i]) for i in keep if row[i]] for row in rows[1:]]
+
+
+def calc_distance(place, a, b):
+    pairs = zip(read_numbers(place, a), read_numbers(place, b))
+    return max(abs(x - y) for row, other in pairs for x, y in zip(row, other))
+
+
+def simulate(place, name):
+    return run("simulate", "squat", "-o", name, "--control", "gains", "--duration", "0.3", where=place)
+
+
+def use_all(place):
+    """Every command that reads a result, with what it says."""
+    write("motions: [squat]\noptions: {control: gains, duration: 0.02}\n", place, "campaign.yaml")
+    for arguments in (["check", "squat"], ["report", "squat", "-o", "page.html"], ["campaign", "campaign.yaml", "-o", "runs"],
+                      *(["export", "squat", "--format", form, "-o", "out-" + form]
+                        for form in ("sto", "mot", "amp", "mjlab", "mcap", "problem")),
+                      ["lift", "serial", "-o", "lifted"]):
+        shutil.rmtree(os.path.join(place, "runs"), ignore_errors=True)
+        yield arguments, run(*arguments, where=place)
+
+
+def main():
+    with tempfile.TemporaryDirectory() as place:
+        shutil.copytree(ROBOT, os.path.join(place, "robot"))
+        solve = ["solve", *SQUAT, "--robot", "robot", "--quiet", "--no-report", "-o"]
+        run(*solve, "squat", where=place)
+        run(*solve, "serial", "--model", "serial", "--no-check", where=place)
+        summary = json.loads(read(place, "squat", "summary.json"))
+        mechanism = [read(place, "squat", name) for name in ("mechanism.urdf", "mechanism.yaml")]
+        assert summary["robot_fingerprint"] == calc_fingerprint(*mechanism), summary["robot_fingerprint"]
+        for arguments, told in use_all(place):
+            assert "has changed" not in told.stderr, (arguments, told.stderr)
+        simulate(place, "as it was")
+
+        original = read(place, "robot", "bipetto.yaml"), read(place, "robot", "bipetto.urdf")
+        mass = original[1].index('<mass value="') + len('<mass value="')
+        heavier = original[1][:mass] + "9" + original[1][mass:]
+        # A comment changes no mechanism.
+        write("# A robot\n" + original[0], place, "robot", "bipetto.yaml")
+        assert "has changed" not in run("check", "squat", where=place).stderr
+        for name, text in (("bipetto.urdf", heavier), ("bipetto.urdf", "<robot"), ("bipetto.yaml", original[0] + "gravity: [0, 0, -1.62]\n")):
+            write(original[0], place, "robot", "bipetto.yaml")
+            write(original[1], place, "robot", "bipetto.urdf")
+            write(text, place, "robot", name)
+            for arguments, told in use_all(place):
+                first, motion = told.stderr.splitlines()[0], "serial" if arguments[0] == "lift" else "squat"
+                assert first.startswith("bielle: warning: ") and TOLD in first, (arguments, told.stderr)
+                assert motion + " was solved for it" in first, (arguments, told.stderr)
+                assert os.path.join(place, "robot", "bipetto.urdf") in first and "mechanism.urdf" in first, first
+                assert "`" + " ".join([BIELLE, *solve, motion][:2]) in first, first
+                assert {heavier: "<mass value=", "<robot": "cannot be read"}.get(text, "gravity: ") in first, first
+            told = simulate(place, "replayed").stderr
+            assert TOLD in told.splitlines()[0], told
+            assert calc_distance(place, "as it was", "replayed") < 1e-9
+            # What was carried out just now is of that robot, too.
+            assert "has changed since the motion in replayed" in run("report", "replayed", "-o", "page.html", where=place).stderr
+        # The remedy makes a motion of the new robot, of which nothing is said.
+        again = run("solve", *SQUAT, "--robot", "robot", "--quiet", "--no-report", "-o", "moon", where=place)
+        assert "has changed" not in run("check", "moon", where=place).stderr + again.stderr
+
+        # Without the robot's files the result is as good.
+        shutil.rmtree(os.path.join(place, "robot"))
+        for arguments, told in use_all(place):
+            assert "has changed" not in told.stderr, (arguments, told.stderr)
+        simulate(place, "replayed")
+        assert calc_distance(place, "as it was", "replayed") < 1e-9
+        # An edited robot in the result is none.
+        write(mechanism[0].replace('<mass value="', '<mass value="9', 1), place, "squat", "mechanism.urdf")
+        refused = run("check", "squat", where=place, status=2).stderr
+        assert "squat/mechanism.urdf" in refused and "the robot that the motion was solved for" in refused, refused
+        os.remove(os.path.join(place, "squat", "mechanism.urdf"))
+        assert "mechanism.urdf" in run("report", "squat", "-o", "page.html", where=place, status=2).stderr
+        # Results of before have neither: their robot is that of the file or name.
+        shutil.copytree(ROBOT, os.path.join(place, "robot"))
+        del summary["robot_fingerprint"]
+        write(json.dumps(summary), place, "squat", "summary.json")
+        os.remove(os.path.join(place, "squat", "mechanism.yaml"))
+        for arguments, told in use_all(place):
+            assert "has changed" not in told.stderr, (arguments, told.stderr)
+
+
+main()
