@@ -30,6 +30,9 @@ if(BIELLE_BUILD_SIMULATION)
   bielle_command_test(free_motion SOURCES test_free_motion.cpp LIBS bielle_results)
   bielle_command_test(campaign SOURCES test_campaign.cpp LIBS bielle_tasks)
   set(area control)
+  add_test(NAME carried_goals COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_carried_goals.py
+    $<TARGET_FILE:bielle_command>)
+  set_tests_properties(carried_goals PROPERTIES LABELS system)
   # Without Work Queue it says that it is skipped. Workers mostly nap.
   add_test(NAME workers COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_workers.py
     $<TARGET_FILE:bielle_command>)

@@ -32,9 +32,9 @@ function makeTitle(runs) {
   return Array.from(new Set(names)).join(' · ');
 }
 
-// Goals of a run: requested and achieved values.
-function getGoals(run) {
-  const goals = Array.isArray(run.summary.goals) ? run.summary.goals : [];
+// Goals of a run, or of its plan: requested and achieved values.
+function getGoals({summary}) {
+  const goals = summary && Array.isArray(summary.goals) ? summary.goals : [];
   return goals.filter(goal => goal && typeof goal === 'object');
 }
 
@@ -64,20 +64,22 @@ function fillBadges(parent, runs) {
   }
 }
 
-// Requested and achieved values side by side.
+// Requested and achieved values side by side; of a motion that was carried out also those of its plan.
 function fillGoals(parent, runs) {
   for (const run of runs.filter(r => getGoals(r).length)) {
     parent.hidden = false;
     if (runs.length > 1) addElement(parent, 'h2', '', run.label);
     const withUnit = (value, goal) =>
         typeof value === 'number' ? formatNumber(value) + (goal.unit === '1' ? '' : ' ' + goal.unit) : '–';
+    const planned = getGoals({summary: run.summary.plan});
+    const getPlanned = goal => planned.filter(other => other.name === goal.name).map(other => withUnit(other.achieved, goal));
     const rows = getGoals(run).map(
         goal =>
             [goal.name,
              goal.kind === 'footholds' ? 'within ' + withUnit(goal.tolerance, goal) : withUnit(goal.requested, goal),
-             withUnit(goal.achieved, goal),
+             ...getPlanned(goal), withUnit(goal.achieved, goal),
              {text: goal.met ? 'met' : 'MISSED', className: goal.met ? 'pass' : 'fail'}]);
-    addTable(parent, ['', 'requested', 'achieved', ''], rows);
+    addTable(parent, ['', 'requested', ...(planned.length ? ['planned'] : []), planned.length ? 'carried out' : 'achieved', ''], rows);
   }
 }
 

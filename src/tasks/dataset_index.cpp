@@ -37,7 +37,7 @@ constexpr const char* kCard = R"(
   `duration_s`, and `files` by format. Motions that are not good are listed, too, and have no files but their result.
   `index.html`: the same with a picture of each motion, for any browser.
   A motion with an `outcome` was carried out in a physics simulation with the options in `simulate`, and its files hold what
-  happened there; it is good only if it `stood`.
+  happened there, on which its `goals` are measured; `plan` has those of the plan. It is good only if it `stood`.
 - `mjlab/NAME.npz`, `amp/NAME.npz`: joints and bodies at a uniform rate, with the robots as files of MuJoCo beside them;
   `mcap/NAME.mcap`: frames, forces and events over time. Each holds the motions that are good.
 - `motions/NAME/motion`: the result of the solver, at its own nodes, with its check; `motions/NAME/step1.log` what it printed.
@@ -53,6 +53,20 @@ was verified from its files alone: equations of motion, closing of the loops, co
 SI units, radians. The world has z upwards; the robot starts near its origin, facing x. Quaternions are w, x, y, z in `mjlab` and
 `amp`. Positions and velocities of bodies are those of the origins of their frames, in the world. Torques are those of the motors.
 )";
+
+// What the index tells of the goals in a summary.
+Json readGoals(const std::string& file) {
+  Json goals = Json::array();
+  readJsonFile(file, "remove it", [&goals](const Json& json) {
+    if (!json.contains("goals")) return;
+    for (const Json& goal : json.at("goals")) {
+      Json entry;
+      for (const char* key : {"name", "unit", "requested", "achieved", "met"}) entry[key] = goal.at(key);
+      goals.push_back(std::move(entry));
+    }
+  });
+  return goals;
+}
 
 std::string formatCard(const DatasetSpec& spec, const std::vector<DatasetEntry>& entries) {
   const auto good = std::count_if(entries.begin(), entries.end(), [](const DatasetEntry& e) { return e.is_good(); });
@@ -91,6 +105,7 @@ Json describeEntry(const DatasetEntry& entry) {
                {"goals", entry.goals},
                {"duration_s", entry.duration},
                {"files", listTexts(entry.files)}};
+  if (!entry.planned.is_null()) json["plan"] = {{"goals", entry.planned}};
   if (!entry.error.empty()) json["error"] = entry.error;
   return json;
 }
@@ -110,13 +125,7 @@ DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& ou
   entry.result = result.string();
   const MotionSummary summary = readSummary(entry.result);
   entry.converged = summary.converged;
-  entry.met = std::all_of(summary.goals.begin(), summary.goals.end(), [](const GoalOutcome& g) { return g.met(); });
-  for (const GoalOutcome& goal : summary.goals)
-    entry.goals.push_back({{"name", goal.goal.name},
-                           {"unit", getUnit(goal.goal.kind)},
-                           {"requested", goal.goal.requested},
-                           {"achieved", goal.achieved},
-                           {"met", goal.met()}});
+  entry.goals = readGoals((result / "summary.json").string());
   if (const fs::path check = result / "check.json"; fs::exists(check))
     readJsonFile(check.string(), "remove it", [&](const Json& json) { entry.passed = json.at("pass"); });
   if (const fs::path summary_file = execution / "summary.json"; fs::exists(summary_file)) {
@@ -125,9 +134,12 @@ DatasetEntry readDatasetEntry(const DatasetMotion& motion, const CaseOutcome& ou
       entry.outcome = json.at("outcome");
       entry.warnings = json.value("warnings", std::vector<std::string>());
     });
+    entry.planned = std::move(entry.goals);
+    entry.goals = readGoals(summary_file.string());
   } else if (motion.carried_out) {
     entry.error = outcome.steps.back().error;
   }
+  entry.met = std::all_of(entry.goals.begin(), entry.goals.end(), [](const Json& goal) { return goal["met"] == true; });
   const VectorXd time = readResultRecord(entry.result).time;
   entry.duration = time[time.size() - 1];
   return entry;

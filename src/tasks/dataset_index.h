@@ -15,8 +15,8 @@ struct DatasetEntry {
   std::string outcome;                                  ///< of a motion that was carried out: stood, fell or failed
   std::vector<std::string> warnings;                    ///< of how it was carried out
   bool is_good() const { return converged && passed && met && outcome == (motion->carried_out ? "stood" : ""); }
-  Json goals = Json::array();
-  double duration = 0;                                     ///< s, of the result
+  Json goals = Json::array(), planned;  ///< measured on the result; where that was carried out, also on its plan
+  double duration = 0;                  ///< s, of the result
   std::vector<std::pair<std::string, std::string>> files;  ///< by format, from the directory of the data set
 };
 

@@ -9,11 +9,11 @@
 #include <iterator>
 
 #include "bielle/report/report.h"
-#include "control/clock.h"
 #include "math/quantile.h"
 #include "model/number_text.h"
 #include "results/npz.h"
 #include "results/result_files.h"
+#include "worlds/carried_goals.h"
 #include "worlds/planned_record.h"
 
 namespace bielle::worlds {
@@ -33,6 +33,7 @@ MotionResult makeResult(const CarriedOut& carried, const Execution& execution) {
   result.record = execution.record;
   result.objective = plan.summary.objective;
   setFigures(plan.robot.model, result);
+  result.goals = worlds::measureCarriedGoals(plan, carried.arguments.control.control, execution.record);
   result.gap_position = execution.largest_gap;  // also between the rows of the record
   result.slip_position = execution.largest_slip;
   result.slip_angle = execution.largest_tilt.value;
@@ -80,6 +81,14 @@ Quantiles calcPolicyLatencies(const PredictiveCounts& counts) {
           1e3 * counts.calcQuantile(1, kLatency)};
 }
 
+// From the measurement on, or with what is prepared before it.
+Quantiles calcSolveTimes(const PredictiveCounts& counts, bool with_preparation) {
+  std::vector<double> times;
+  for (const PredictiveSolve& solve : counts.last)
+    times.push_back(1e3 * (solve.seconds + (with_preparation ? solve.prepare : 0)));
+  return {calcQuantile(times, 0.5), calcQuantile(times, 0.99), calcQuantile(times, 1)};
+}
+
 // A row per solve: when its state was measured, s, the milliseconds of the whole and its parts, step and regularization.
 void addLog(const PredictiveCounts& counts, Json& json) {
   json["log_columns"] = {"time_s", "whole"};
@@ -99,6 +108,7 @@ void addLog(const PredictiveCounts& counts, Json& json) {
 }
 
 Json listSolves(const PredictiveCounts& counts) {
+  const Quantiles whole = calcSolveTimes(counts, true);
   Json json = {{"stages", counts.stages},
                {"count", counts.solves},
                {"missed", counts.missed},
@@ -108,6 +118,7 @@ Json listSolves(const PredictiveCounts& counts) {
                {"median_ms", 1e3 * counts.calcQuantile(0.5)},
                {"p99_ms", 1e3 * counts.calcQuantile(0.99)},
                {"worst_ms", 1e3 * counts.calcQuantile(1)},
+               {"with_preparation", {{"median_ms", whole.median}, {"p99_ms", whole.p99}, {"worst_ms", whole.worst}}},
                {"parts", listParts(counts)},
                {"step",
                 {{"median", counts.calcQuantile(0.5, &PredictiveSolve::step)},
@@ -149,24 +160,18 @@ Json listCommands(const std::vector<TimedCommand>& commands) {
 
 // The mean speed in the steps in which the plan's own counts: without the time that the robot stands, starts and stops. Empty
 // where a plan has none, or the motion did not come that far.
-std::optional<double> calcSteadySpeed(const Plan& plan, const Execution& e) {
-  const VectorXd& time = e.record.time;
-  const auto findRow = [&time](double at) {
-    return static_cast<Eigen::Index>(std::lower_bound(time.begin(), time.end(), at - kClockTolerance) - time.begin());
-  };
-  for (const Goal& goal : plan.goals) {
-    if (goal.kind != GoalKind::Speed) continue;
-    const double start = plan.getTime(goal.first), end = plan.getTime(goal.last);
-    if (time[0] > start + kClockTolerance || time[time.size() - 1] < end - kClockTolerance) return {};
-    const Eigen::Index first = findRow(start), last = findRow(end);
-    const Vector3d way = (e.record.com.row(last) - e.record.com.row(first)).transpose();
-    return goal.direction.dot(way) / (time[last] - time[first]);
-  }
+std::optional<double> findSteadySpeed(const std::vector<GoalOutcome>& outcomes) {
+  for (const GoalOutcome& outcome : outcomes)
+    if (outcome.goal.kind == GoalKind::Speed && std::isfinite(outcome.achieved)) return outcome.achieved;
   return {};
 }
 
-std::string describeSteadySpeed(const Plan& plan, const Execution& e) {
-  const std::optional<double> speed = calcSteadySpeed(plan, e);
+std::vector<GoalOutcome> measureCarriedGoals(const CarriedOut& carried, const Execution& e) {
+  return worlds::measureCarriedGoals(carried.plan, carried.arguments.control.control, e.record);
+}
+
+std::string describeSteadySpeed(const std::vector<GoalOutcome>& outcomes) {
+  const std::optional<double> speed = findSteadySpeed(outcomes);
   return speed ? " with the time that it stands, " + formatNumber(*speed, "%.3f") + " m/s in its steady steps" : "";
 }
 
@@ -210,7 +215,8 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   summary["duration"] = e.duration;
   summary["distance"] = e.distance;
   summary["mean_speed"] = e.meanSpeed();
-  const std::optional<double> steady = calcSteadySpeed(plan, e);
+  if (!plan.goals.empty()) summary["plan"] = {{"goals", listGoals(measurePlannedGoals(plan))}};
+  const std::optional<double> steady = findSteadySpeed(result.goals);
   summary["steady_speed"] = steady ? Json(*steady) : Json();
   summary["largest_deviation"] = e.largest_deviation;
   summary["largest_gap"] = e.largest_gap;
@@ -275,14 +281,25 @@ void printTimes(const PredictiveCounts& counts, const Execution& e) {
   std::cout << text;
 }
 
+void printEstimation(const EstimationErrors& s) {
+  char text[500];
+  std::snprintf(text, sizeof text,
+                "  estimated trunk     rms error %.4f m, %.4f m/s, tilt %.4f rad\n"
+                "  drift               %.4f m of %.3f m\n"
+                "  contacts            wrong for %.2f %% of the time\n",
+                s.position_rms, s.velocity_rms, s.tilt_rms, s.drift, s.way, 100 * s.contact_errors);
+  std::cout << text;
+}
+
 }  // namespace
 
 Json makeHappenedSummary(const MotionResult& result) {
   Json summary = bielle::makeSummary(result);
   for (const char* of_solving :
-       {"formulation", "step", "goals", "converged", "interrupted", "termination", "message", "acceptable", "cost",
-        "iterations", "seconds", "solver_gap", "constraints", "free_timings", "log_columns", "log"})
+       {"formulation", "step", "converged", "interrupted", "termination", "message", "acceptable", "cost", "iterations",
+        "seconds", "solver_gap", "constraints", "free_timings", "log_columns", "log"})
     summary.erase(of_solving);
+  if (result.goals.empty()) summary.erase("goals");
   return summary;
 }
 
@@ -325,6 +342,7 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
   std::cout << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
+  const std::vector<GoalOutcome> goals = measureCarriedGoals(carried, e);
   char text[1000];
   std::snprintf(text, sizeof text,
                 "\n"
@@ -336,7 +354,7 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
                 "  energy balance      %.1e J, %.1e of the energy exchanged\n"
                 "  torques             %.2f %% saturated\n"
                 "  computing time      %.2f s, %.2g times real time; world %.2f s, control %.2f s\n",
-                e.duration, e.distance, e.meanSpeed(), describeSteadySpeed(plan, e).c_str(), e.largest_deviation,
+                e.duration, e.distance, e.meanSpeed(), describeSteadySpeed(goals).c_str(), e.largest_deviation,
                 e.largest_gap, e.largest_slip, e.largest_tilt.value, e.largest_depth.value, e.imbalance,
                 e.energy_balance, 100 * e.saturated_share, e.whole_seconds, e.realTimeFactor(), e.world_seconds,
                 e.control_seconds);
@@ -350,24 +368,22 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
               << " s on: " << plan.lifted.message << "\n";
   if (carried.prediction) {
     const PredictiveCounts& c = carried.prediction->counts();
+    const Quantiles after = calcSolveTimes(c, false), whole = calcSolveTimes(c, true);
     std::snprintf(text, sizeof text,
                   "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
+                  "                      with their preparation %.1f ms, %.1f ms, %.1f ms\n"
                   "                      %d of %d stages %s\n",
-                  c.solves, c.failed, 1e3 * c.calcQuantile(0.5), 1e3 * c.calcQuantile(0.99), 1e3 * c.calcQuantile(1),
+                  c.solves, c.failed, after.median, after.p99, after.worst, whole.median, whole.p99, whole.worst,
                   c.missed, c.stages,
-                  arguments.execution.real_time || arguments.solve_time > 0 ? "had no solve of their own"
-                                                                            : "are shorter than their solve");
+                  arguments.execution.real_time || arguments.solve_time > 0
+                      ? "had no solve of their own"
+                      : "are shorter than their solve with its preparation");
     std::cout << text;
     if (arguments.execution.real_time) printTimes(c, e);
   }
-  if (arguments.sensors != Sensing::Real) return;
-  const EstimationErrors& s = e.estimation;
-  std::snprintf(text, sizeof text,
-                "  estimated trunk     rms error %.4f m, %.4f m/s, tilt %.4f rad\n"
-                "  drift               %.4f m of %.3f m\n"
-                "  contacts            wrong for %.2f %% of the time\n",
-                s.position_rms, s.velocity_rms, s.tilt_rms, s.drift, s.way, 100 * s.contact_errors);
-  std::cout << text;
+  if (arguments.sensors == Sensing::Real) printEstimation(e.estimation);
+  std::cout.flush();
+  tell(listDifferences(measurePlannedGoals(plan), goals));
 }
 
 std::vector<std::string> write(const CarriedOut& carried, const Execution& execution) {
