@@ -190,6 +190,24 @@ TEST_CASE("stages that turn out too long are halved, unless their length was req
   CHECK(calcStepError(model, directory.readTrajectory()) > kAllowedStepError);
 }
 
+TEST_CASE("stages of a given length are kept, and a warning says how far soles move in them") {
+  const OutputDirectory directory;
+  const auto solve = [&directory](const std::string& step) {
+    return run({"solve", "squat", "--robot", "bipetto", "--depth", "0.9", "--duration", "0.6", "--set",
+                "time_step=" + step, "--quiet", "--no-check", "--no-report", "-o", directory.str()});
+  };
+  const char* const kTold = "warning: corners of standing soles move by up to ";
+  const CommandResult coarse = solve("0.06");
+  CHECK_THAT(coarse.out, Catch::Contains(kTold) && Catch::Contains(" mm between nodes, in stages of 0.06 s, as given; "
+                                                                   "leave time_step out, or set time_step=0.03"));
+  CHECK(directory.readSummary()["options"]["time_step"] == 0.06);
+  CHECK_THAT(solve("0.03").out, !Catch::Contains(kTold));  // the remedy
+  const CommandResult sequence = run({"solve", "sequence", "--motions", "squat", "--robot", "bipetto", "--set",
+                                      "squat.depth=0.9", "--set", "squat.duration=0.6", "--set", "squat.time_step=0.06",
+                                      "--quiet", "--no-check", "--no-report", "-o", directory.str()});
+  CHECK_THAT(sequence.out, Catch::Contains(kTold) && Catch::Contains("set a shorter time_step of its motions"));
+}
+
 TEST_CASE("motions that miss their differences where a linkage is near its dead point are planned farther from it") {
   const OutputDirectory directory;
   REQUIRE(run({"solve", "squat", "--robot", "bipetto", "--dead-point-margin", "0.14", "-o", directory.str(), "--quiet",

@@ -89,15 +89,19 @@ double findMargin(const Model& model, const MotionRecord& record) {
 
 double calcStepError(const Model& model, const MotionRecord& record) { return findStepError(model, record).share; }
 
-double calcStageExcess(const Motion& motion, const MotionRecord& record) {
-  if (!record.has_midpoints) return 0;
+double calcSoleMotion(const Motion& motion, const MotionRecord& record) {
   const Model& model = motion.problem->model();
   double reach = 0;  // of a corner, from the middle of the sole
   for (const ContactFrame& contact : model.contacts())
     reach = std::max(reach, std::hypot(contact.half_length, contact.half_width));
   const Slip slip = calcSlip(motion, makeTrack(model, record));
-  return getLarger(calcStepError(model, record) / kLargestStepError,
-                   (slip.position + reach * slip.angle) / kLargestSlip);
+  return slip.position + reach * slip.angle;
+}
+
+double calcStageExcess(const Motion& motion, const MotionRecord& record) {
+  if (!record.has_midpoints) return 0;
+  return getLarger(calcStepError(motion.problem->model(), record) / kLargestStepError,
+                   calcSoleMotion(motion, record) / kLargestSlip);
 }
 
 std::optional<RefinedMotion> refineStages(const Motion& solved, const MotionRecord& record) {

@@ -15,6 +15,9 @@ namespace bielle {
 double calcStepError(const Model& model, const MotionRecord& record);
 inline constexpr double kLargestStepError = 0.004, kAllowedStepError = 0.005;
 
+/// How far a corner of a standing sole moves between the nodes, at most, m.
+double calcSoleMotion(const Motion& motion, const MotionRecord& record);
+
 /// Stages of a solved motion are too long if this exceeds 1: the larger of calcStepError() / kLargestStepError and the
 /// slip of standing soles / kLargestSlip; `bielle check` allows 0.1 mm off the ground. 0 for Euler steps.
 double calcStageExcess(const Motion& motion, const MotionRecord& record);

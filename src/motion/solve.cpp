@@ -169,10 +169,24 @@ class RequestSolver {
     const auto apart = options_.keep_apart ? keepFromDeadPoints(solution.motion, record) : std::nullopt;
     if (apart) keepApart(*apart, again, solution, record);
     refuseLongStages(record, solution);
+    if (!refined && solution.converged()) warnOfMovingSoles(solution, record);
     return solution;
   }
 
  private:
+  // Of stages that are not halved: those of a given length, of sequences, free durations and the least peak torque.
+  void warnOfMovingSoles(const Solution& solution, const MotionRecord& record) const {
+    const double moved = observer_.warn && record.has_midpoints ? calcSoleMotion(solution.motion, record) : 0;
+    if (!(moved > kLargestSlip)) return;
+    const Option* option = motion_.request->options.find("time_step");
+    const bool is_given = option && std::get<double>(option->value) != 0;
+    const double step = solution.motion.schedule.phases.front().dt;
+    observer_.warn("warning: corners of standing soles move by up to " + formatNumber(1e3 * moved, "%.2g") +
+                   " mm between nodes, in stages of " + formatNumber(step) + " s" + (is_given ? ", as given" : "") +
+                   "; " + (is_given ? "leave time_step out, or " : "") +
+                   (option ? "set time_step=" + formatNumber(0.5 * step) : "set a shorter time_step of its motions"));
+  }
+
   void tellDeadPoints() const {
     const LimitOptions& limits = motion_.problem_options.limits;
     const Model& model = motion_.problem->model();
