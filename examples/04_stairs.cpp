@@ -68,6 +68,7 @@ Power calcMeanPower(const Model& model, const MotionRecord& record, double durat
 int main(int argc, char** argv) {
   const std::string directory = argc > 1 ? argv[1] : "stairs";
   StairsOptions options;
+  options.depth = 0.2;
   if (argc > 2) options.stairs = std::atoi(argv[2]);
   std::vector<double> heights;
   for (int i = 3; i < argc; ++i) heights.push_back(std::atof(argv[i]));

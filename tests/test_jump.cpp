@@ -196,6 +196,9 @@ TEST_CASE("jump: what no leg can do does not pass for done, and stays finite", "
   JumpOptions options;
   options.flight = 1;
   options.time_step = 0.01;
+  CHECK_THROWS_WITH(makeJump(getBipetto(), options),
+                    Catch::Contains("shorter flight"));  // legs would have to bend too far
+  options.flight = 0.8;
   Motion motion = makeJump(getBipetto(), options);
   FddpOptions solver;
   solver.max_iterations = 30;

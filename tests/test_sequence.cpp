@@ -106,7 +106,8 @@ TEST_CASE("sequence: each motion goes on from where the one before ends") {
   // Ahead after the turn: the jump, two stairs, five whole steps of the walk.
   const SE3 start = calcMiddle(plan.q_start), end = calcMiddle(plan.q_end);
   CHECK(calcHeading(end) == Approx(1.2));
-  const double ahead = 0.1 + 2 * StairsOptions().depth + 5 * 0.5 * GaitTiming().stepDuration();
+  const double depth = 0.2;  // of the stairs by default, m
+  const double ahead = 0.1 + 2 * depth + 5 * 0.5 * GaitTiming().stepDuration();
   CHECK((end.p - start.p - Vector3d(ahead * std::cos(1.2), ahead * std::sin(1.2), 0.1)).norm() < 1e-9);
   CHECK((plan.guess.xs.back().head<3>() - plan.q_end.head<3>()).norm() < 1e-9);
 }

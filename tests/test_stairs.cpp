@@ -16,6 +16,7 @@ TEST_CASE("stairs: Bipetto goes up and down, every foot on its step", "[long]") 
     CAPTURE(height);
     StairsOptions options;
     options.height = height;
+    options.depth = 0.2;
     options.stairs = 2;
     Motion motion = makeStairs(getBipetto(), options);
     for (const ContactPhase& phase : motion.schedule.phases)

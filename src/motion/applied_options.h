@@ -12,6 +12,9 @@ class PeakProblem;
 /// Effort limits by motor (nu), those of the model or the given replacements. \throws InputError as Limits does
 VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
 
+/// Velocity limits by coordinate (nv), likewise.
+VectorXd getVelocityLimits(const Model& model, const LimitOptions& options);
+
 /// The limits of a model, as its file and the options give them.
 class Limits {
  public:

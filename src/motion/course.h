@@ -13,6 +13,16 @@ struct Course {
 // A box under a sole, which it exceeds by `rim` on all sides, with the sole's inclination.
 GroundStep makeStone(const ContactFrame& sole, const SE3& X_WF, double rim);
 
+// Length of ground that bears both soles in the direction of travel, of the option `option`: as requested, or, where that is 0,
+// 0.2 m, or a quarter more than the sole is long. \throws InputError where it is shorter than the sole and a margin
+double chooseTread(const Model& model, const Stance& stance, const std::string& option, double requested);
+// Its width, which must be enough for both feet. \throws InputError naming `option`
+void checkTreadWidth(const Model& model, const Stance& stance, const std::string& option, double width);
+
+// Whether all soles lie on the ground, edges included: at the start, and on the footholds of all steps.
+// \throws InputError naming the step whose sole does not, or whose ground lies under a foot at the start
+void checkSoles(const Model& model, const Stance& stance, const Course& course);
+
 // Steps of a locomotion on the footholds of the course; the last one brings the feet together.
 // \throws InputError naming the first step whose sole does not lie on the ground or whose swing leads through it, besides
 // the errors of planLocomotion()

@@ -8,6 +8,7 @@
 #include "bielle/motion/stairs.h"
 #include "formats/text_file.h"
 #include "formats/yaml_entry.h"
+#include "math/constants.h"
 #include "math/so3.h"
 #include "motion/course.h"
 
@@ -32,6 +33,8 @@ Footstep readFoothold(const YamlEntry& entry) {
   for (const char* key : {"pitch", "roll"})
     if (std::abs(get(key)) > kSteepest)
       find(fields, key)->fail("the foothold is steeper than " + std::to_string(kSteepest) + " rad", "give radians");
+  if (std::abs(get("yaw")) > kPi)
+    find(fields, "yaw")->fail("the foothold is turned by more than half a turn", "give radians, from -pi to pi");
   Footstep step;
   step.side = foot.isWord("left") ? Side::Left : Side::Right;
   step.X_WF.p << get("x"), get("y"), get("z");

@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "model/number_text.h"
+#include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
 #include "motion/motor_scale.h"
 #include "motion/quintic.h"
@@ -118,6 +120,20 @@ StageSpec makeTerminalStage(const JumpScene& scene) {
   return stage;
 }
 
+// The centre of mass moves on the ground by Eqs. of jump.h as far as legs can bend and stretch.
+void checkHeights(const JumpOptions& o, double gravity, double height) {
+  constexpr double kLowest = 0.4, kHighest = 1.5;  // over the height at the start
+  const JumpFigures f = calcJumpFigures(o, gravity);
+  for (double t = 0; t < f.stand + f.push + f.flight + f.land; t += o.time_step) {
+    if (t >= f.stand + f.push && t <= f.stand + f.push + f.flight) continue;
+    const double over = height + calcJumpHeight(o, gravity, t).height;
+    requireOption(over > kLowest * height && over < kHighest * height, "flight",
+                  "the centre of mass would have to move to " + formatNumber(over, "%.3g") + " m over the feet, from " +
+                      formatNumber(height, "%.3g") + " m at the start, to take off and land",
+                  "give a shorter flight, less stretch, or other durations of push and land");
+  }
+}
+
 JumpScene makeScene(const Model& model, const JumpOptions& o, const StandingRobot& standing) {
   const std::vector<ContactTarget> feet = makeContactTargets(standing, o.contact_kp, o.contact_kd);
   const JumpFigures figures = calcJumpFigures(o, model.gravity().norm());
@@ -165,6 +181,7 @@ void check(const Model& model, const JumpOptions& o) {
   requireOption(o.flight >= 2 * o.time_step && o.flight <= 2, "flight", "it is outside two time steps .. 2 s",
                 "give seconds, e.g. 0.3");
   requireStages(o.stand + o.push + o.flight + o.land + o.settle, o.time_step);
+  requireGravity(model, o.friction);
   if (model.contacts().empty())
     throw InputError(model.name(), "contacts", "a jump needs feet, but the robot has no contact frames",
                      "add `contacts` to its YAML file");
@@ -199,6 +216,7 @@ JumpHeight calcJumpHeight(const JumpOptions& o, double gravity, double t) {
 MotionPlan planJump(const Model& model, const JumpOptions& options, const StandingRobot& standing) {
   check(model, options);
   const JumpScene scene = makeScene(model, options, standing);
+  checkHeights(options, model.gravity().norm(), standing.com.z() - scene.before.front().X_WT.p.z());
   MotionPlan plan;
   plan.name = "jump";
   plan.ground.height = scene.before.front().X_WT.p.z();

@@ -41,6 +41,14 @@ VectorXd getEffortLimits(const Model& model, const LimitOptions& options) {
   return replaceByName(model, efforts, options.efforts, "effort");
 }
 
+VectorXd getVelocityLimits(const Model& model, const LimitOptions& options) {
+  VectorXd limits = model.velocityLimits(), of_motors(model.nu());
+  for (int m = 0; m < model.nu(); ++m) of_motors[m] = limits[model.motors()[m].dof];
+  of_motors = replaceByName(model, of_motors, options.velocities, "velocity");
+  for (int m = 0; m < model.nu(); ++m) limits[model.motors()[m].dof] = of_motors[m];
+  return limits;
+}
+
 namespace {
 
 std::vector<PathConstraint> listRanges(const Model& model, const VectorXd& q0) {
@@ -64,10 +72,7 @@ std::vector<PathConstraint> listRanges(const Model& model, const VectorXd& q0) {
 }
 
 std::vector<PathConstraint> listVelocities(const Model& model, const LimitOptions& options) {
-  VectorXd limits = model.velocityLimits(), of_motors(model.nu());
-  for (int m = 0; m < model.nu(); ++m) of_motors[m] = limits[model.motors()[m].dof];
-  of_motors = replaceByName(model, of_motors, options.velocities, "velocity");
-  for (int m = 0; m < model.nu(); ++m) limits[model.motors()[m].dof] = of_motors[m];
+  const VectorXd limits = getVelocityLimits(model, options);
   std::vector<PathConstraint> bounds;
   for (int k = 0; k < model.nv(); ++k)
     if (std::isfinite(limits[k]))

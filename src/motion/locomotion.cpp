@@ -8,6 +8,7 @@
 #include "bielle/model/error.h"
 #include "math/so3.h"
 #include "model/number_text.h"
+#include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
 #include "motion/kinematic_guess.h"
 #include "motion/locomotion_stages.h"
@@ -31,6 +32,7 @@ void check(const LocomotionOptions& o) {
 // Rejects requests that no motor torques can satisfy.
 void check(const Scene& scene) {
   constexpr double kStretch = 1.15, kCrouch = 0.6;  // of the legs, over their length in the standing posture
+  constexpr double kLowest = 0.4, kHighest = 1.5;   // of the centre of mass over the feet, over its height at the start
   const Model& model = scene.model;
   const ContactFrame& left = model.contacts()[scene.stance.contacts[0]];
   const ContactFrame& right = model.contacts()[scene.stance.contacts[1]];
@@ -47,13 +49,32 @@ void check(const Scene& scene) {
   // Legs as struts from the middle of the hips' plane, half way between two consecutive footholds at touchdown.
   const double strut = (scene.stance.com - scene.stance.feet[0].p).norm(),
                height = scene.stance.com.z() - scene.stance.feet[0].p.z();
+  requireOption(scene.options.swing.height < strut, "swing_height",
+                formatNumber(scene.options.swing.height) + " m is more than the legs are long, " +
+                    formatNumber(strut, "%.3g") + " m",
+                "give metres, e.g. " + formatNumber(0.1 * strut, "%.1g"));
+  if (scene.options.timing.flight > 0)
+    for (const GaitNode& node : scene.gait.nodes) {
+      const GaitPhase& phase = scene.gait.phases[node.phase];
+      const std::array<SE3, 2> feet = scene.task.plan.getStance(phase.steps_done);
+      const double over = node.com.z() - std::min(feet[0].p.z(), feet[1].p.z());
+      if (!phase.flies() && !(over > kLowest * height && over < kHighest * height))
+        refuse(phase.steps_done + 1,
+               "the centre of mass would have to move to " + formatNumber(over, "%.3g") + " m over the feet, from " +
+                   formatNumber(height, "%.3g") + " m at the start, to take off and land",
+               "request a shorter flight, or a longer stance");
+    }
   for (const GaitPhase& phase : scene.gait.phases) {
     if (phase.isDoubleSupport() || phase.flies()) continue;
     const int side = phase.stands(Side::Left) ? 0 : 1, i = phase.steps_done;
     const Vector3d apart = scene.task.plan.steps[i].X_WF.p - scene.task.plan.getStance(i)[side].p;
     if (std::hypot(apart.head<2>().norm() / 2, kCrouch * height + std::abs(apart.z()) / 2) > kStretch * strut)
-      refuse(i + 1, "its foothold is out of reach: the feet would be " + formatNumber(apart.norm()) + " m apart",
-             "request a lower speed, or shorter, lower or more steps");
+      refuse(i + 1,
+             "its foothold is out of reach: the feet would be " + formatNumber(apart.norm()) + " m apart, " +
+                 formatNumber(std::abs(apart.z()), "%.3g") + " m of it in height; these legs bridge " +
+                 formatNumber(2 * std::sqrt(std::pow(kStretch * strut, 2) - std::pow(kCrouch * height, 2)), "%.2g") +
+                 " m on the level, or climb " + formatNumber(2 * (kStretch * strut - kCrouch * height), "%.2g") + " m",
+             "give lengths in metres; request a lower speed, or shorter, lower or more steps");
   }
 }
 
@@ -161,6 +182,7 @@ Stance makeStance(const Model& model, const LocomotionOptions& options, const St
     throw InputError(model.name(), "root joint",
                      "its base is fixed, or moves on a rail, but a motion with steps needs a free one over two feet",
                      "take `squat` or `jump`, which need no steps, or a robot with a free base");
+  requireGravity(model, options.friction);
   Stance stance{standing.q, standing.com, {}, {}, {}, standing.neighbours};
   for (int i = 0; i < 2; ++i) {
     const std::string& name = i == 0 ? options.left : options.right;

@@ -84,7 +84,7 @@ LocomotionOptions StairsOptions::makeGaitDefaults() {
 
 void describe(OptionFields& f, StairsOptions& o) {
   f.number("height", o.height, "m", {}, "height of a step; negative: down");
-  f.number("depth", o.depth, "m", kNotNegative, "depth of a step");
+  f.number("depth", o.depth, "m", kNotNegative, "depth of a step; 0: 0.2 m, or a quarter more than the soles");
   f.number("slope", o.slope, "1", {}, "height over depth; replaces the height unless 0");
   f.integer("stairs", o.stairs, {1, 100}, "number of steps of the staircase");
   f.number("speed", o.speed, "m/s", kPositive, "forward speed; with the depth it determines the duration of a step");
@@ -119,7 +119,8 @@ LocomotionOptions BoxOptions::makeGaitDefaults() {
 
 void describe(OptionFields& f, BoxOptions& o) {
   f.number("height", o.height, "m", {0, 10, true}, "height of the box");
-  f.number("length", o.length, "m", {0, 10}, "length of its top; the feet stand in the middle");
+  f.number("length", o.length, "m", {0, 10},
+           "length of its top; the feet stand in the middle; 0: 0.2 m, or a quarter more than the soles");
   f.number("width", o.width, "m", {0, 100}, "width of the box");
   f.number("distance", o.distance, "m", kNotNegative, "distance from the soles to the box");
   f.flag("down", o.down, "step down again behind the box");

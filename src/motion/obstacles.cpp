@@ -28,15 +28,6 @@ std::vector<Footstep> moveTogether(const Stance& stance, const std::vector<Vecto
   return steps;
 }
 
-void checkBox(const Model& model, const Stance& stance, const BoxOptions& o) {
-  listOptions(o).check();
-  const ContactFrame& foot = model.contacts()[stance.contacts[0]];
-  requireOption(o.length >= 2 * calcHalfLength(model, stance), "length", "the box is shorter than the sole",
-                "give metres, e.g. 0.2");
-  requireOption(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width, "width",
-                "the box is too narrow for the feet", "give metres, e.g. 0.8");
-}
-
 void checkGap(const GapOptions& o) {
   listOptions(o).check();
   requireOption(o.width < kBank, "width", "it is 1.2 m or more", "give metres, e.g. 0.15");
@@ -44,9 +35,12 @@ void checkGap(const GapOptions& o) {
 
 }  // namespace
 
-MotionPlan planBox(const Model& model, const BoxOptions& o, const StandingRobot& standing) {
+MotionPlan planBox(const Model& model, const BoxOptions& options, const StandingRobot& standing) {
+  BoxOptions o = options;
+  listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, standing);
-  checkBox(model, stance, o);
+  o.length = chooseTread(model, stance, "length", o.length);
+  checkTreadWidth(model, stance, "width", o.width);
   const double stride = calcHalfLength(model, stance) + o.distance + o.length / 2;
   const Vector3d top(stride, 0, o.height), behind(2 * stride, 0, 0);
   Course course{"box", moveTogether(stance, {top}), {}};

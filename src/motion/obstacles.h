@@ -9,7 +9,7 @@ namespace bielle {
 /// The feet stand on the middle of the box, half its length behind its front.
 struct BoxOptions {
   double height = 0.1;     ///< of the box, m
-  double length = 0.2;     ///< of its top, m
+  double length = 0;       ///< of its top, m; 0: 0.2, or a quarter more than the soles
   double width = 0.8;      ///< m
   double distance = 0.05;  ///< from the soles at the start to the front of the box, m
   bool down = false;       ///< step down again on the other side, as far from its back

@@ -6,6 +6,7 @@
 #include "bielle/dynamics/linkage.h"
 #include "model/number_text.h"
 #include "motion/applied_options.h"
+#include "motion/feasibility.h"
 #include "motion/join.h"
 #include "motion/refinement.h"
 #include "solve/peak_problem.h"
@@ -303,6 +304,7 @@ FddpOptions makeMotionSolverOptions() {
 }
 
 Solution solve(const Motion& motion, const SolveOptions& options, const SolveObserver& observer) {
+  if (options.keep_apart) checkFeasibility(motion, options.start ? &*options.start : nullptr, observer.warn);
   if (motion.request && options.refine) return RequestSolver(motion, options, observer).solve();
   FddpOptions solver = options.start ? options.solver : dampGuess(options.solver);
   if (motion.problem_options.objective.objective != Objective::Effort) solver.acceptable_decrease = 0;

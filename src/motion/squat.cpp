@@ -5,6 +5,7 @@
 
 #include "bielle/model/error.h"
 #include "math/constants.h"
+#include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
 #include "motion/motor_scale.h"
 #include "motion/statics.h"
@@ -19,6 +20,7 @@ void check(const Model& model, const SquatOptions& o) {
   requireOption(o.time_step <= o.duration / 4, "time_step", "it exceeds a quarter of the motion",
                 "give seconds, e.g. 0.015");
   requireStages(o.duration + 2 * o.settle, o.time_step);
+  requireGravity(model, o.friction);
   if (model.contacts().empty())
     throw InputError(model.name(), "contacts", "a squat needs feet, but the robot has no contact frames",
                      "add `contacts` to its YAML file");

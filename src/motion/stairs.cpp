@@ -3,16 +3,12 @@
 #include <algorithm>
 
 #include "model/number_text.h"
+#include "motion/course.h"
 
 namespace bielle {
 namespace {
 
-void check(const Model& model, const Stance& stance, const StairsOptions& o) {
-  const ContactFrame& foot = model.contacts()[stance.contacts[0]];
-  listOptions(o).check();
-  requireOption(o.depth > 2 * foot.half_length, "depth", "it is shorter than the sole", "give metres, e.g. 0.2");
-  requireOption(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width, "width",
-                "the stairs are too narrow for the feet", "give metres, e.g. 0.8");
+void checkDuration(const StairsOptions& o) {
   const double single = o.depth / o.speed - o.gait.timing.both;
   requireOption(single >= 0.2 && single <= 3, "speed",
                 "a step of this depth takes " + formatNumber(single) + " s on one foot, outside 0.2 .. 3 s",
@@ -51,14 +47,18 @@ Ground makeStairsGround(const StairsOptions& o, const SE3& X_WP) {
 
 MotionPlan planStairs(const Model& model, const StairsOptions& options, const StandingRobot& standing) {
   StairsOptions o = options;
-  if (o.slope != 0) o.height = o.slope * o.depth;
+  listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, standing);
-  check(model, stance, o);
+  o.depth = chooseTread(model, stance, "depth", o.depth);
+  checkTreadWidth(model, stance, "width", o.width);
+  checkDuration(o);
+  if (o.slope != 0) o.height = o.slope * o.depth;
   o.gait.timing.single = o.depth / o.speed - o.gait.timing.both;
   LocomotionTask task;
   task.name = "stairs";
   task.plan = planFootholds(stance, o);
   task.ground = makeStairsGround(o, stance.middle);
+  checkSoles(model, stance, {task.name, task.plan.steps, task.ground});
   task.direction = stance.middle.R * Vector3d::UnitX();
   task.speed = o.speed;
   MotionPlan plan = planLocomotion(model, stance, task, o.gait);

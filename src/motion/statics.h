@@ -4,6 +4,18 @@
 
 namespace bielle {
 
+// What a posture asks of motors with these limits, while all of the robot accelerates alike.
+struct HoldingShare {
+  VectorXd u;            // nu, torques of least squares as in calcStaticTorques()
+  bool balances = true;  // whether any torques do it, with forces that feet on the ground can have
+  // However motors and feet share the load, something needs at least that many times what it can do; 0 where u keeps the limits.
+  double least = 0;
+};
+// \param a  acceleration of a robot with a free base, m/s^2 (world)   \param limits  nu, N m or N, infinite for none
+// \param friction  of the ground
+HoldingShare calcHoldingShare(const Model& model, const ConstraintSet& constraints, ConstVectorRef q, const Vector3d& a,
+                              const VectorXd& limits, double friction);
+
 // The posture q of the reference with its springs bent by the weight, but for those that it names.
 VectorXd settleReference(const Model& model, const Reference& reference, const VectorXd& q);
 

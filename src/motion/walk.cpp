@@ -55,7 +55,7 @@ MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const Stan
 MotionPlan planTurn(const Model& model, const TurnOptions& o, const StandingRobot& standing) {
   const double yaw = o.angle / std::max(1, o.steps - 1);
   requireOption(std::abs(yaw) <= kPi, "angle", "it is more than half a turn per step",
-                "give a smaller one, or more steps");
+                "give radians, a smaller angle, or more steps");
   StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(), 0,
                              yaw > 0 ? Side::Left : Side::Right, o, standing);
   const int nodes = plan.motion.schedule.numStages();

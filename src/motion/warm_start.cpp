@@ -16,9 +16,24 @@ int matchRow(int i, int count, Eigen::Index rows) {
 }
 
 void requireSame(const std::vector<std::string>& recorded, const std::vector<std::string>& names, const char* what) {
-  if (recorded != names)
-    throw InputError("", "warm start", std::string("the recorded motion and the robot have different ") + what,
-                     "give a result of the same robot");
+  if (recorded == names) return;
+  size_t i = 0;
+  while (i < std::min(recorded.size(), names.size()) && recorded[i] == names[i]) ++i;
+  const auto get = [i](const std::vector<std::string>& list) { return i < list.size() ? "'" + list[i] + "'" : "none"; };
+  throw InputError("", "warm start",
+                   std::string("the recorded motion and the robot have different ") + what + ": number " +
+                       std::to_string(i + 1) + " is " + get(recorded) + " there, and " + get(names) + " of the robot",
+                   "give a result of the same robot");
+}
+
+void requireFinite(const RowMatrixXd& values, const std::vector<std::string>& names, const char* what) {
+  for (Eigen::Index k = 0; k < values.rows(); ++k)
+    for (Eigen::Index i = 0; i < values.cols(); ++i)
+      if (!std::isfinite(values(k, i)))
+        throw InputError("", "warm start",
+                         std::string("the ") + what + " of " + names[static_cast<size_t>(i)] +
+                             " is not finite in row " + std::to_string(k),
+                         "give the result of a successful solve");
 }
 
 // From the feet of a phase, on average, to their places.
@@ -78,9 +93,11 @@ StartingPoint makeStart(const MotionRecord& record, const Motion& motion) {
       record.v.rows() != rows || record.u.rows() != rows - 1)
     throw InputError("", "warm start", "the shapes of the recorded q, v and u do not match the robot",
                      "give one row per node, or per stage, and one column per name");
-  if (rows < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() || !record.u.allFinite())
-    throw InputError("", "warm start", "the recorded motion is empty or contains numbers that are not finite",
-                     "give the result of a successful solve");
+  if (rows < 2 || record.u.rows() < 1)
+    throw InputError("", "warm start", "the recorded motion is empty", "give the result of a successful solve");
+  requireFinite(record.q, record.q_names, "position");
+  requireFinite(record.v, record.v_names, "velocity");
+  requireFinite(record.u, record.u_names, "torque");
   const int nodes = motion.problem->numStages() + 1;
   StartingPoint start{motion.guess, record.multipliers};
   ShootingTrajectory& trajectory = start.trajectory;

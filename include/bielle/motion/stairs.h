@@ -10,7 +10,7 @@ namespace bielle {
 
 struct StairsOptions {
   double height = 0.06;  ///< of a step; negative: down, m
-  double depth = 0.2;    ///< of a step, m
+  double depth = 0;      ///< of a step, m; 0: 0.2, or a quarter more than the soles
   double slope = 0;      ///< height over depth, replaces the height unless it is 0, 1
   int stairs = 4;        ///< number of steps of the stairs
   double speed = 0.3;    ///< forward speed of the CoM; with the depth it determines the duration of a step, m/s
@@ -23,7 +23,7 @@ struct StairsOptions {
 /// Without the duration of single support, which follows from depth and speed.
 void describe(OptionFields& fields, StairsOptions& options);
 
-/// The stairs in front of feet whose middle (calcMiddle) is initially X_WP.
+/// The stairs in front of feet whose middle (calcMiddle) is initially X_WP. \pre the depth is given
 Ground makeStairsGround(const StairsOptions& options, const SE3& X_WP);
 
 /// From where the robot stands. \throws InputError when the request is impossible (see locomotion.h)

@@ -1,0 +1,487 @@
+#include "motion/feasibility.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+#include "bielle/model/names.h"
+#include "bielle/motion/footsteps.h"
+#include "math/constants.h"
+#include "math/so3.h"
+#include "model/number_text.h"
+#include "motion/applied_options.h"
+#include "motion/motor_scale.h"
+#include "motion/statics.h"
+
+namespace bielle {
+namespace {
+
+// From here on no other posture on the way helps either. (Of one with serial knees that squats to 0.8, the solver still finds
+// motions with limits that are 1.2 times too low at the start, and none with 1.4.)
+constexpr double kTooWeak = 1.5;
+
+// Velocities are those between postures that are so far apart, since the guess goes from one to the next in small jumps, s.
+constexpr double kApart = 0.1;
+
+std::string quote(const std::string& kind, const std::string& name) { return kind + " '" + name + "'"; }
+
+// A posture of the plan that is compared.
+struct Moment {
+  int node = 0;
+  double time = 0;  // s, with free durations at their longest
+  const ContactPhase* phase = nullptr;
+  double load = 1;      // on the feet, mean over the phase, over the weight
+  bool middle = false;  // of the phase; or its first node
+
+  std::string describe() const { return "in '" + phase->name + "' at " + formatNumber(time, "%.3g") + " s"; }
+};
+
+// What the plan needs of a motor or joint, where that is most of what is allowed.
+struct Need {
+  double needed = 0, allowed = std::numeric_limits<double>::infinity();
+  Moment moment;
+
+  double share() const { return needed / allowed; }
+};
+
+class FeasibilityCheck {
+ public:
+  FeasibilityCheck(const Motion& motion, const std::function<void(const std::string&)>& warn)
+      : motion_(motion),
+        problem_(*motion.problem),
+        model_(problem_.model()),
+        warn_(warn),
+        ws_(model_),
+        gravity_(model_.gravity().norm()) {
+    start_.phase = &motion.schedule.phases.front();
+    updatePositions(model_, ws_, getStart());
+    com_ = calcCom(model_, ws_);
+    listMoments();
+  }
+
+  void check(const StartingPoint* given) {
+    checkTrajectory(given ? given->trajectory : motion_.guess, given ? "start" : "guess");
+    checkSolesApart();
+    checkStartingMotors();
+    if (!warn_) return;
+    doubtUnits();
+    doubtBalance();
+    doubtSlopes();
+    doubtTurns();
+    doubtSpeed();
+    doubtPostures();
+    if (given) doubtLoops(given->trajectory);
+  }
+
+ private:
+  VectorXd getStart() const { return problem_.initialState().head(model_.nq()); }
+  VectorXd getPosture(int node) const { return motion_.guess.xs[static_cast<size_t>(node)].head(model_.nq()); }
+  const ContactFrame& getContact(const ContactTarget& target) const { return model_.contacts()[target.contact]; }
+
+  void tell(const std::string& doubt, const std::string& remedy) const { warn_("warning: " + doubt + "; " + remedy); }
+
+  std::string formatEffort(const Motor& motor, double value) const {
+    return formatNumber(value, "%.3g") + (isLinear(model_, motor) ? " N" : " N m");
+  }
+
+  // The first and the middle node of every phase with feet on the ground.
+  void listMoments() {
+    std::vector<const ContactPhase*> phases;
+    for (const ContactPhase& phase : motion_.schedule.phases)
+      if (phase.dt > 0 || phase.contacts.empty()) phases.push_back(&phase);
+    const auto getFlight = [&](size_t i) {  // s
+      return i < phases.size() && phases[i]->contacts.empty() ? phases[i]->nodes * phases[i]->dt : 0;
+    };
+    int node = 0;
+    double time = 0;
+    size_t i = 0;
+    for (const ContactPhase& phase : motion_.schedule.phases) {
+      const bool timed = i < phases.size() && phases[i] == &phase;
+      const StageSpec& spec = problem_.spec(node);
+      const double dt = phase.dt * (spec.timing.phase >= 0 ? spec.timing.upper : 1);
+      if (timed && !phase.contacts.empty()) {
+        // A flight of the time T takes off, and ends, with the velocity g T / 2, which the ground gives, and takes.
+        const double flights = (i > 0 ? getFlight(i - 1) : 0) + getFlight(i + 1);
+        const double load = 1 + 0.5 * flights / (phase.nodes * phase.dt);
+        moments_.push_back({node, time, &phase, load, false});
+        moments_.push_back({node + phase.nodes / 2, time + phase.nodes / 2 * dt, &phase, load, true});
+      }
+      node += phase.nodes;
+      time += phase.nodes * dt;
+      if (timed) ++i;
+    }
+  }
+
+  // Numbers that are not finite would be reported by whatever they meet first.
+  void checkTrajectory(const ShootingTrajectory& trajectory, const std::string& what) const {
+    const int N = problem_.numStages();
+    const auto refuse = [&](const std::string& problem, const std::string& remedy) {
+      throw InputError(model_.name(), what, problem, remedy);
+    };
+    if (static_cast<int>(trajectory.xs.size()) != N + 1 || static_cast<int>(trajectory.us.size()) != N)
+      refuse("it has " + std::to_string(trajectory.xs.size()) + " states and " + std::to_string(trajectory.us.size()) +
+                 " controls, the motion " + std::to_string(N + 1) + " and " + std::to_string(N),
+             "give one state a node and one control a stage; a recorded motion of another length is resampled as a "
+             "warm start");
+    const std::vector<std::string> q = makePositionNames(model_), v = makeVelocityNames(model_);
+    for (int k = 0; k <= N; ++k) {
+      const VectorXd& x = trajectory.xs[static_cast<size_t>(k)];
+      const VectorXd u = k < N ? trajectory.us[static_cast<size_t>(k)] : VectorXd();
+      if (x.size() != problem_.stateSize() || (k < N && u.size() != problem_.controlSize(k)))
+        refuse("node " + std::to_string(k) + " has " + std::to_string(x.size()) + " states and " +
+                   std::to_string(u.size()) + " controls, the robot " + std::to_string(problem_.stateSize()) + " and " +
+                   std::to_string(k < N ? problem_.controlSize(k) : 0),
+               "give a start of the same robot");
+      const auto refuseNumber = [&](const std::string& name) {
+        refuse("node " + std::to_string(k) + ": " + name + " is not finite", "give finite numbers, or no start");
+      };
+      for (int i = 0; i < x.size(); ++i)
+        if (!std::isfinite(x[i]))
+          refuseNumber(i < model_.nq()                 ? "the position " + q[static_cast<size_t>(i)]
+                       : i < model_.nq() + model_.nv() ? "the velocity " + v[static_cast<size_t>(i - model_.nq())]
+                                                       : "a time scale");
+      for (int i = 0; i < u.size(); ++i)
+        if (!std::isfinite(u[i]))
+          refuseNumber(i < model_.nu() ? "the control of " + model_.motors()[static_cast<size_t>(i)].name
+                                       : "a time scale");
+    }
+  }
+
+  // Two feet cannot stand in the same place.
+  void checkSolesApart() const {
+    constexpr double kTouching = 1e-6, kLevel = 1e-3;  // m
+    const std::vector<ContactTarget>& feet = start_.phase->contacts;
+    for (size_t i = 0; i < feet.size(); ++i)
+      for (size_t j = 0; j < i; ++j) {
+        const ContactFrame &a = getContact(feet[j]), &b = getContact(feet[i]);
+        if (a.body == b.body || std::abs(feet[i].X_WT.p.z() - feet[j].X_WT.p.z()) > kLevel) continue;
+        const double distance = calcSoleDistance(a, feet[j].X_WT, b, feet[i].X_WT);
+        if (distance < -kTouching)
+          throw InputError(model_.name(), "contacts '" + a.name + "' and '" + b.name + "'",
+                           "their soles overlap by " + formatNumber(-distance, "%.3g") + " m where the robot starts",
+                           "place the feet farther apart in the reference, by as much, or give narrower soles");
+      }
+  }
+
+  // Torques that hold a posture of the plan; of single support, while the weight falls past a sole that is not under it as the
+  // linear inverted pendulum does, from the nearest place of the sole.
+  HoldingShare calcShare(const Moment& moment, ConstVectorRef q, const Vector3d& com, const VectorXd& limits) const {
+    Vector3d a = (moment.load - 1) * gravity_ * Vector3d::UnitZ();
+    const std::vector<ContactTarget>& feet = moment.phase->contacts;
+    if (feet.size() == 1 && model_.hasFreeFlyer()) {
+      const ContactFrame& sole = getContact(feet[0]);
+      Vector3d p = feet[0].X_WT.inverse().act(com);
+      const double height = com.z() - feet[0].X_WT.p.z();
+      p = feet[0].X_WT.act(Vector3d(std::clamp(p.x(), -sole.half_length, sole.half_length),
+                                    std::clamp(p.y(), -sole.half_width, sole.half_width), 0));
+      if (height > 0) a.head<2>() = moment.load * gravity_ / height * (com - p).head<2>();
+    }
+    return calcHoldingShare(model_, makeConstraintSet(model_, feet), q, a, limits, motion_.ground.friction);
+  }
+
+  // With the voltage of the supply, at standstill.
+  VectorXd getLimits(int node) const {
+    VectorXd limits = problem_.spec(node).effort_limits;
+    if (limits.size() == 0) limits.setConstant(model_.nu(), std::numeric_limits<double>::infinity());
+    for (int m = 0; m < model_.nu(); ++m)
+      if (const Motor& motor = model_.motors()[static_cast<size_t>(m)];
+          motor.hasEnvelope() && motion_.problem_options.limits.enforced)
+        limits[m] = std::min(limits[m], motor.drive.voltage / motor.voltsPerEffort());
+    return limits;
+  }
+
+  std::string listMotors(const VectorXd& u, const VectorXd& limits) const {
+    std::string list;
+    for (int m = 0; m < model_.nu(); ++m)
+      if (std::abs(u[m]) > limits[m]) {
+        const Motor& motor = model_.motors()[static_cast<size_t>(m)];
+        list += (list.empty() ? "" : ", ") + motor.name + " needs " + formatEffort(motor, std::abs(u[m])) +
+                ", its limit is " + formatEffort(motor, limits[m]);
+      }
+    return list;
+  }
+
+  void checkStartingMotors() {
+    const VectorXd limits = getLimits(0);
+    if (start_.phase->contacts.empty() && model_.hasFreeFlyer()) return;
+    const HoldingShare share = calcShare(start_, getStart(), com_, limits);
+    if (!share.balances || share.least <= 1) return;
+    int weakest = 0;
+    std::string remedy;
+    for (int m = 0; m < model_.nu(); ++m) {
+      if (std::abs(share.u[m]) / limits[m] > std::abs(share.u[weakest]) / limits[weakest]) weakest = m;
+      if (std::abs(share.u[m]) > limits[m])
+        remedy += " --limit " + model_.motors()[static_cast<size_t>(m)].name + "=" +
+                  formatNumber(1.05 * std::abs(share.u[m]), "%.3g");
+    }
+    const std::string problem = "the starting posture cannot be held: " + listMotors(share.u, limits) +
+                                " (however the load is shared, " + formatNumber(share.least, "%.3g") +
+                                " times the limits)";
+    remedy =
+        "give larger limits (" + remedy.substr(1) + "), a start with straighter legs, or ignore them (--no-limits)";
+    held_ = true;
+    if (share.least > kTooWeak)
+      throw InputError(model_.name(), quote("motor", model_.motors()[static_cast<size_t>(weakest)].name), problem,
+                       remedy);
+    if (warn_) tell(problem, remedy);
+  }
+
+  void doubtUnits() const {
+    constexpr double kLowest = 0.02, kHighest = 10, kLightest = 0.02, kHeaviest = 5000;  // m, kg
+    constexpr double kWeakest = 0.5, kStrongest = 30, kTilted = 0.01;                    // m/s^2, rad
+    double ground = com_.z();
+    for (const ContactTarget& foot : start_.phase->contacts) ground = std::min(ground, foot.X_WT.p.z());
+    const double height = com_.z() - ground;
+    if (height > 0 && (height < kLowest || height > kHighest))
+      tell("the centre of mass is " + formatNumber(height) + " m high at the start",
+           "give lengths in m if the robot's file has other ones (`scale` of meshes, millimetres of a CAD program)");
+    if (model_.mass() < kLightest || model_.mass() > kHeaviest)
+      tell("the robot has a mass of " + formatNumber(model_.mass()) + " kg",
+           "give masses in kg if they are in other units");
+    if (gravity_ < kWeakest || gravity_ > kStrongest)
+      tell("gravity is " + formatNumber(gravity_) + " m/s^2", "give it in m/s^2 if it is not meant so");
+    const double tilt = std::acos(std::clamp(-model_.gravity().z() / gravity_, -1.0, 1.0));
+    if (tilt > kTilted)
+      tell("gravity points " + formatNumber(tilt, "%.3g") + " rad beside down",
+           "motions are planned for level ground: give [0, 0, -9.81] if that is not meant");
+  }
+
+  // Whether the weight falls into the area between the soles.
+  void doubtBalance() const {
+    constexpr int kDirections = 720;
+    constexpr double kBeyond = 1e-3;  // m
+    if (!model_.hasFreeFlyer() || start_.phase->contacts.empty()) return;
+    double most = -std::numeric_limits<double>::infinity();
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = 2 * kPi * i / kDirections;
+      const Vector3d out(std::cos(angle), std::sin(angle), 0);
+      double beyond = std::numeric_limits<double>::infinity();
+      for (const ContactTarget& foot : start_.phase->contacts)
+        for (double x : {-1, 1})
+          for (double y : {-1, 1}) {
+            const ContactFrame& sole = getContact(foot);
+            const Vector3d corner = foot.X_WT.act(Vector3d(x * sole.half_length, y * sole.half_width, 0));
+            const Vector3d foothold = com_ + (corner.z() - com_.z()) / model_.gravity().z() * model_.gravity();
+            beyond = std::min(beyond, out.dot(foothold - corner));
+          }
+      most = std::max(most, beyond);
+    }
+    if (most > kBeyond)
+      tell("the robot falls over where it starts: its centre of mass is " + formatNumber(most, "%.3g") +
+               " m beyond its soles",
+           "give a reference in which it is above them");
+  }
+
+  // A foot that stands alone on an inclined foothold must not slip.
+  void doubtSlopes() const {
+    const Vector3d up = -model_.gravity() / gravity_;
+    double most = 0;
+    const ContactPhase* steepest = nullptr;
+    for (const ContactPhase& phase : motion_.schedule.phases) {
+      if (phase.contacts.size() != 1 || getContact(phase.contacts[0]).kind != ContactKind::Surface6D) continue;
+      const Vector3d f = phase.contacts[0].X_WT.R.transpose() * up;
+      const double needed = std::sqrt(2) * std::max(std::abs(f.x()), std::abs(f.y())) / f.z() / (1 - kConeMargin);
+      if (needed <= most) continue;
+      most = needed;
+      steepest = &phase;
+    }
+    if (most > motion_.ground.friction)
+      tell(getContact(steepest->contacts[0]).name +
+               " would slip on an inclined foothold on which it stands alone: it needs a friction of " +
+               formatNumber(most, "%.3g") +
+               " (with the pyramids and the margin of docs/constraints.md), the ground has " +
+               formatNumber(motion_.ground.friction),
+           "give a less inclined foothold, or `friction`");
+  }
+
+  // Feet that turn far against each other, or in a step: angles may have been meant as degrees.
+  void doubtTurns() const {
+    constexpr double kFar = 1;       // rad
+    std::map<int, double> headings;  // by contact, where each stood last
+    double most = 0;
+    std::string turned;
+    for (const ContactPhase& phase : motion_.schedule.phases)
+      for (const ContactTarget& target : phase.contacts) {
+        if (getContact(target).kind == ContactKind::Point3D) continue;
+        const double heading = calcHeading(target.X_WT);
+        for (const auto& [contact, last] : headings) {
+          const double turn = std::abs(std::remainder(heading - last, 2 * kPi));
+          if (turn <= most) continue;
+          most = turn;
+          turned = getContact(target).name +
+                   (contact == target.contact ? "" : " against " + model_.contacts()[contact].name);
+        }
+        headings[target.contact] = heading;
+      }
+    if (most > kFar)
+      tell(turned + " turns by " + formatNumber(most, "%.3g") + " rad",
+           "give radians if degrees were meant, or turn less at a time");
+  }
+
+  // R. McN. Alexander, "The gaits of bipedal and quadrupedal animals", 1984: at a Froude number v^2 / (g l) of 1 the weight does
+  // not hold the body on the arc about a straight leg any more.
+  void doubtSpeed() const {
+    for (const ContactPhase& phase : motion_.schedule.phases)
+      if (phase.contacts.empty()) return;
+    for (const Goal& goal : motion_.goals) {
+      if (goal.kind != GoalKind::Speed) continue;
+      const double length = com_.z() - start_.phase->contacts.front().X_WT.p.z();
+      const double froude = goal.requested * goal.requested / (gravity_ * length);
+      if (froude > 1)
+        tell("a walk of " + formatNumber(goal.requested) + " m/s has a Froude number of " +
+                 formatNumber(froude, "%.2g") + ", walks have less than 1: up to " +
+                 formatNumber(std::sqrt(gravity_ * length), "%.2g") + " m/s",
+             "request a lower speed, or a run");
+    }
+  }
+
+  // Motors, joints and legs in the planned postures, of the guess.
+  void doubtPostures() {
+    std::vector<Need> efforts(static_cast<size_t>(model_.nu())), speeds(static_cast<size_t>(model_.nv()));
+    const VectorXd velocity_limits = motion_.problem_options.limits.enforced
+                                         ? getVelocityLimits(model_, motion_.problem_options.limits)
+                                         : VectorXd::Constant(model_.nv(), std::numeric_limits<double>::infinity());
+    Need reach;
+    std::string foot;
+    const Moment* before = nullptr;
+    for (const Moment& moment : moments_) {
+      const VectorXd q = getPosture(moment.node);
+      updatePositions(model_, ws_, q);
+      if (needReach(moment, reach, foot)) {
+        before = nullptr;  // such a posture says nothing of motors
+        continue;
+      }
+      if (moment.middle && !held_) needEfforts(moment, q, efforts);
+      if (before && moment.time - before->time < kApart) continue;
+      if (before) needSpeeds(*before, moment, velocity_limits, speeds);
+      before = &moment;
+    }
+    if (reach.needed > 0)
+      tell("no posture was found in which the legs reach: " + foot + " stays " + formatNumber(reach.needed, "%.2g") +
+               " m (or rad) off its place " + reach.moment.describe(),
+           "request shorter, lower or less turned steps");
+    tellEfforts(efforts);
+    tellSpeeds(speeds);
+  }
+
+  // Whether feet of the guess are off their places.
+  bool needReach(const Moment& moment, Need& reach, std::string& foot) {
+    constexpr double kOff = 5e-3;  // m, rad
+    bool off = false;
+    for (const ContactTarget& target : moment.phase->contacts) {
+      const ContactFrame& contact = getContact(target);
+      const SE3 error = target.X_WT.inverseTimes(getPlacement(ws_, contact.body, contact.X_BF));
+      double size = error.p.norm();
+      if (contact.kind == ContactKind::Surface6D) size = std::max(size, log3(error.R).norm());
+      if (!(size > kOff)) continue;
+      off = true;
+      if (size <= reach.needed) continue;
+      reach = {size, 0, moment};
+      foot = contact.name;
+    }
+    return off;
+  }
+
+  void needEfforts(const Moment& moment, const VectorXd& q, std::vector<Need>& efforts) {
+    const VectorXd limits = getLimits(moment.node);
+    const HoldingShare share = calcShare(moment, q, calcCom(model_, ws_), limits);
+    if (!share.balances || share.least <= 1) return;
+    for (size_t m = 0; m < efforts.size(); ++m) {
+      const Need need{std::abs(share.u[static_cast<Eigen::Index>(m)]), limits[static_cast<Eigen::Index>(m)], moment};
+      if (need.share() > std::max(1.0, efforts[m].share())) efforts[m] = need;
+    }
+  }
+
+  void needSpeeds(const Moment& before, const Moment& after, const VectorXd& limits, std::vector<Need>& speeds) const {
+    const VectorXd v = model_.difference(getPosture(before.node), getPosture(after.node)) / (after.time - before.time);
+    for (size_t k = 0; k < speeds.size(); ++k) {
+      const Need need{std::abs(v[static_cast<Eigen::Index>(k)]), limits[static_cast<Eigen::Index>(k)], before};
+      if (need.share() > std::max(1.0, speeds[k].share())) speeds[k] = need;
+    }
+  }
+
+  void tellEfforts(const std::vector<Need>& efforts) const {
+    for (size_t m = 0; m < efforts.size(); ++m)
+      if (efforts[m].needed > 0) {
+        const Motor& motor = model_.motors()[m];
+        tell(quote("motor", motor.name) + " may be too weak: the posture planned " + efforts[m].moment.describe() +
+                 " needs " + formatEffort(motor, efforts[m].needed) + ", its limit is " +
+                 formatEffort(motor, efforts[m].allowed),
+             "give a larger limit (--limit " + motor.name + "=" + formatNumber(1.05 * efforts[m].needed, "%.3g") +
+                 "), or request a slower or shorter motion");
+      }
+  }
+
+  void tellSpeeds(const std::vector<Need>& speeds) const {
+    for (size_t k = 0; k < speeds.size(); ++k)
+      if (speeds[k].needed > 0) {
+        const Joint& joint = model_.joints()[static_cast<size_t>(model_.dofs()[k].joint)];
+        const std::string unit = joint.kind == JointKind::Prismatic ? " m/s" : " rad/s";
+        tell(quote("joint", joint.name) + " may be too slow: from one planned posture to the next, " +
+                 speeds[k].moment.describe() + ", it needs " + formatNumber(speeds[k].needed, "%.3g") + unit +
+                 ", its limit is " + formatNumber(speeds[k].allowed, "%.3g") + unit,
+             "request a slower or shorter motion, longer phases, or a larger limit");
+      }
+  }
+
+  // Of a start: that of another robot has open loops here.
+  void doubtLoops(const ShootingTrajectory& start) {
+    constexpr double kOpen = 1e-3;  // m, rad
+    const ConstraintSet loops = makeConstraintSet(model_);
+    double most = 0;
+    std::string widest;
+    for (const size_t k : {size_t{0}, start.xs.size() / 2, start.xs.size() - 1}) {
+      updatePositions(model_, ws_, start.xs[k].head(model_.nq()));
+      for (const Closure& closure : loops.closures) {
+        const ClosureGap gap = calcClosureGap(ws_, closure);
+        const double open = std::max(gap.position, gap.angle);
+        if (open <= most) continue;
+        most = open;
+        widest = closure.name + "' at node " + std::to_string(k);
+      }
+    }
+    if (most > kOpen)
+      tell("the start has open loops, by " + formatNumber(most, "%.2g") + " m (or rad) in '" + widest,
+           "it is of another robot, or of this one before it was changed: give a result of this robot");
+  }
+
+  const Motion& motion_;
+  const RobotProblem& problem_;
+  const Model& model_;
+  const std::function<void(const std::string&)>& warn_;
+  Workspace ws_;
+  double gravity_;  // m/s^2
+  Vector3d com_;    // at the start
+  Moment start_;
+  std::vector<Moment> moments_;
+  bool held_ = false;  // told that motors cannot hold the start
+};
+
+}  // namespace
+
+void requireGravity(const Model& model, double friction) {
+  constexpr double kMost = 300;  // m/s^2, more than a centrifuge; in mm/s^2 that of the Earth is 9810
+  const Vector3d& g = model.gravity();
+  const auto refuse = [&](const std::string& problem) {
+    throw InputError(model.name(), "gravity", problem,
+                     "give it in m/s^2, e.g. `gravity: [0, 0, -9.81]` in the robot's YAML file");
+  };
+  if (!(g.norm() > 0)) refuse("there is none, and nothing presses the feet on the ground");
+  if (g.norm() > kMost) refuse("it is " + formatNumber(g.norm()) + " m/s^2");
+  const double slope = g.z() < 0 ? std::hypot(g.x(), g.y()) / -g.z() : std::numeric_limits<double>::infinity();
+  if (slope > friction)
+    refuse(g.z() < 0 ? "it points aside: on level ground feet need a friction of " + formatNumber(slope, "%.3g") +
+                           ", the ground has " + formatNumber(friction)
+                     : std::string("it does not point down"));
+}
+
+void checkFeasibility(const Motion& motion, const StartingPoint* given,
+                      const std::function<void(const std::string&)>& warn) {
+  FeasibilityCheck(motion, warn).check(given);
+}
+
+}  // namespace bielle
