@@ -183,6 +183,16 @@ SolveObserver makeObserver(const SolveArguments& arguments) {
   return observer;
 }
 
+// Errors of the recorded motion name the directory of the result.
+StartingPoint readStart(const std::string& directory, const Motion& motion) {
+  const MotionRecord record = readResultRecord(directory);
+  try {
+    return makeStart(record, motion);
+  } catch (const InputError& error) {
+    throw InputError(directory, error.element(), error.problem(), error.remedy());
+  }
+}
+
 int solve(const SolveArguments& arguments, MotionRequest request) {
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] = splitSetting("--set", setting, "com_weight=1e5");
@@ -204,7 +214,7 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   const Motion motion = makeMotion(model, request, problem);
   SolveOptions options;
   options.solver = arguments.solver;
-  if (!arguments.warm_start.empty()) options.start = makeStart(readResultRecord(arguments.warm_start), motion);
+  if (!arguments.warm_start.empty()) options.start = readStart(arguments.warm_start, motion);
   makeOutputDirectory(arguments.directory);
   watchInterrupts();
   const MotionResult result =
