@@ -314,3 +314,23 @@ TEST_CASE("feasibility: a walk beyond the speed of walks is doubtful") {
   walk.gait.timing.single = 0.1;
   CHECK_THAT(listDoubts(makeWalk(getRsuBiped(), walk)), Catch::Contains("Froude number") && Catch::Contains("run"));
 }
+
+TEST_CASE("feasibility: feet that planned postures leave off their places are doubtful") {
+  Motion walk = makeWalk(getRsuBiped(), {});
+  for (VectorXd& x : walk.guess.xs) x = walk.guess.xs.front();  // nobody moves
+  CHECK_THAT(listDoubts(walk), Catch::Contains("no posture was found in which the legs reach") &&
+                                   Catch::Contains("m (or rad) off its place in '"));
+}
+
+TEST_CASE("feasibility: a robot in other units, and a box too narrow for both feet, are told with their sizes") {
+  const Model heavy = changeModel(getRsuBiped(), [](ModelParts& parts) {
+    for (Body& body : parts.bodies) body.inertia.mass *= 1000;
+  });
+  CHECK_THAT(listDoubts(makeSquat(heavy, {})), Catch::Contains("a mass of") && Catch::Contains("kg"));
+  BoxOptions box;
+  box.width = 0.1;
+  const std::string error = getError([&] { makeBox(getRsuBiped(), box); });
+  CHECK_THAT(error, Catch::Contains("'width'") && Catch::Contains("both feet, which need"));
+  box.width = std::stod(error.substr(error.find("give ") + 5));
+  CHECK_NOTHROW(makeBox(getRsuBiped(), box));
+}
