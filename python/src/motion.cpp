@@ -35,6 +35,16 @@ FddpObserver makeObserver(const py::object& callback) {
   return observer;
 }
 
+SolveObserver makeSolveObserver(const py::object& callback) {
+  const FddpObserver observer = makeObserver(callback);
+  const auto warn = [](const std::string& line) {
+    const std::string mark = "warning: ", text = line.substr(line.rfind(mark, 0) == 0 ? mark.size() : 0);
+    const py::gil_scoped_acquire lock;
+    if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) < 0) throw py::error_already_set();
+  };
+  return {observer, observer, {}, warn};
+}
+
 std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,
                                            const ProblemOptions& options) {
   auto held = std::make_shared<HeldMotion>();
@@ -178,11 +188,11 @@ std::shared_ptr<HeldSolution> solve(const std::shared_ptr<HeldMotion>& held, con
                                     const py::object& callback, const py::object& start, bool refine) {
   SolveOptions options{solver, {}, refine};
   if (!start.is_none()) options.start = readStart(*held, start);
-  const FddpObserver observer = makeObserver(callback);
+  const SolveObserver observer = makeSolveObserver(callback);
   auto out = std::make_shared<HeldSolution>();
   {
     const py::gil_scoped_release release;
-    out->solution = bielle::solve(held->motion, options, {observer, observer, {}, {}});
+    out->solution = bielle::solve(held->motion, options, observer);
   }
   out->motion = findSolved(held, out->solution.motion);
   return out;

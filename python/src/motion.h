@@ -45,5 +45,7 @@ MotionPlan completePlan(const Model& model, MotionPlan plan);
 /// Lets `callback(iteration)` observe a solve that runs without the interpreter's lock, and signals end it: their
 /// exceptions leave it. False from the callback stops it.
 FddpObserver makeObserver(const py::object& callback);
+// And passes what is doubtful to Python's warnings.
+SolveObserver makeSolveObserver(const py::object& callback);
 
 }  // namespace bielle::python

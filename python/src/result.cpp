@@ -108,13 +108,13 @@ void bindResult(py::module_& module) {
 MotionResult solveRequest(const Robot& robot, const Request& request, const ProblemOptions& problem,
                           const FddpOptions& options, const std::optional<MotionRecord>& warm_start,
                           const py::object& callback) {
-  const FddpObserver observer = makeObserver(callback);
+  const SolveObserver observer = makeSolveObserver(callback);
   const py::gil_scoped_release release;
   const Motion motion = makeMotion(robot.get(), request.make(), problem);
   SolveOptions how;
   how.solver = options;
   if (warm_start) how.start = makeStart(*warm_start, motion);
-  return makeResult(makeRunInfo(robot.name, toLoaded(robot)), solve(motion, how, {observer, observer, {}, {}}));
+  return makeResult(makeRunInfo(robot.name, toLoaded(robot)), solve(motion, how, observer));
 }
 
 }  // namespace

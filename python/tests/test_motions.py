@@ -251,3 +251,17 @@ def test_figures(squat, model):
     with pytest.raises(ValueError, match="'nobody' is not among"):
         bielle.plot.coordinates(squat, ["nobody"], axes=axes)
     plot.close("all")
+
+
+def test_what_is_doubtful_is_a_warning_and_what_cannot_succeed_an_error():
+    robot = bielle.load_robot("rsu_biped")
+
+    def solve(knees):
+        limits = bielle.LimitOptions(efforts={"knee_left": knees, "knee_right": knees})
+        return bielle.solve_squat(robot, depth=0.8, problem=bielle.ProblemOptions(limits=limits),
+                                  solver=bielle.SolverOptions(max_iterations=1))  # fmt: skip
+
+    with pytest.warns(RuntimeWarning, match="knee_left needs .* N m, its limit is 12 N m"):
+        solve(12)
+    with pytest.raises(bielle.InputError, match="motor 'knee.*--limit knee_left="):
+        solve(6)
