@@ -235,7 +235,7 @@ TEST_CASE("predictive control: after a solve that fails in the middle of a swing
   gait.contact_kp = 0;
   gait.foothold_room = 0.4;
   gait.cone_margin = 0.2;
-  const CommandSource source = [](double) { return VelocityCommand{0.4, 0, 0}; };
+  const CommandSource source = [](double time) { return VelocityCommand{time < 2 ? 0.4 : 0, 0, 0}; };
   PredictiveOptions predictive;
   predictive.threads = 1;
   PredictiveController controller(CommandedWalk(model, gait, {}, source, makeStandingRobot(model)), predictive);

@@ -320,18 +320,102 @@ TEST_CASE("simulate: options that others make useless are told, and periods that
     checked.push_back("--dry-run");
     CHECK(simulate(output, checked).err.empty());
   }
-  const CommandResult result =
-      simulate(output, {"--control", "gains", "--duration", "0.1", "--summary-only", "--push", "t=0.05,impulse=0.1",
-                        "--push", "t=3,impulse=1", "--time-step", "0.0007", "--record-period", "0.0015"});
+  const CommandResult result = simulate(output, {"--control", "gains", "--duration", "0.1", "--summary-only",
+                                                 "--time-step", "0.0007", "--record-period", "0.0015"});
   CAPTURE(result.err);
   REQUIRE(result.status == 0);
   for (const char* told :
-       {"--push at 0.05 s is cut off: the motion ends at 0.1 s", "--push at 3 s has no effect",
-        "--time-step 0.0007: steps are of 0.0005 s at most", "--record-period 0.0015: rows are recorded every 0.002 s"})
+       {"--time-step 0.0007: steps are of 0.0005 s at most", "--record-period 0.0015: rows are recorded every 0.002 s"})
     CHECK_THAT(result.err, Catch::Contains(told));
   const nlohmann::json summary = parseSummary(output);
-  CHECK(summary["warnings"].size() == 3);
+  CHECK(summary["warnings"].size() == 1);
   CHECK(summary["integration"]["longest_step_s"].get<double>() == Approx(5e-4));  // half a period
+}
+
+TEST_CASE(
+    "simulate: what a push near the end leads to is what a longer simulation shows; one that is over later is "
+    "refused") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "pushed").string();
+  int stood = 0, fell = 0;
+  for (const double time : {0.9, 1.45, 1.7})
+    for (const int impulse : {1, 3, 6, 12, 20}) {
+      std::vector<std::string> options = {
+          "--control", "gains", "--summary-only", "--push",
+          "t=" + std::to_string(time) + ",impulse=" + std::to_string(impulse) + ",direction=0"};
+      const int status = simulate(output, options, getSquat()).status;
+      const nlohmann::json summary = parseSummary(output);
+      options.insert(options.end(), {"--hold", "4"});
+      CAPTURE(time, impulse, summary["outcome"].dump(), summary["duration"].dump());
+      CHECK(simulate(output, options, getSquat()).status == status);
+      CHECK(status == (summary["outcome"] == "stood" ? 0 : 1));
+      CHECK(summary["extension"].get<double>() ==
+            Approx(std::max(0.0, summary["duration"].get<double>() - 1.8)).margin(1e-9));
+      (status == 0 ? stood : fell) += 1;
+    }
+  CHECK(stood >= 3);
+  CHECK(fell >= 3);
+  for (const auto& [options, remedy] :
+       {std::pair<std::vector<std::string>, std::vector<std::string>>{{"--push", "t=1.75,impulse=1"},
+                                                                      {"--hold", "2.05"}},
+        {{"--push", "t=0.45,impulse=1", "--duration", "0.5"}, {"--duration", "1.55"}}}) {
+    std::vector<std::string> all = options;
+    all.insert(all.end(), {"--control", "gains", "--summary-only"});
+    const CommandResult refused = simulate(output, all, getSquat());
+    CAPTURE(refused.err);
+    CHECK(refused.status == 2);
+    CHECK_THAT(refused.err, Catch::Contains("the simulation ends at") && Catch::Contains(remedy[0] + " " + remedy[1]));
+    all.insert(all.end(), remedy.begin(), remedy.end());
+    if (remedy[0] == "--hold") CHECK(simulate(output, all, getSquat()).status == 0);
+  }
+}
+
+TEST_CASE("simulate: the robot of the world alone may carry a load, or be another file of the same joints") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "loaded").string();
+  const std::vector<std::string> usual = {"--control", "gains", "--duration", "0.05"};
+  const auto carry = [&](std::vector<std::string> options) {
+    options.insert(options.end(), usual.begin(), usual.end());
+    const CommandResult result = simulate(output, options, getSquat());
+    CAPTURE(result.out, result.err);
+    REQUIRE(result.status == 0);
+    return readRecord(output + "/trajectory.npz");
+  };
+  // What the ground carries, N.
+  const auto weigh = [](const MotionRecord& record) {
+    const Eigen::Index last = record.contact_wrenches.rows() - 1;
+    return record.contact_wrenches(last, 2) + record.contact_wrenches(last, 8);
+  };
+  const MotionRecord bare = carry({});
+  CHECK_FALSE(parseSummary(output).contains("payload"));
+  const MotionRecord loaded = carry({"--payload", "3", "--payload-at", "thigh_left,0.01,0.02,-0.03"});
+  const nlohmann::json payload = parseSummary(output)["payload"];
+  CHECK((payload["mass_kg"] == 3 && payload["link"] == "thigh_left"));
+  CHECK(payload["at_m"] == std::vector<double>{0.01, 0.02, -0.03});
+  CHECK(weigh(loaded) - weigh(bare) == Approx(3 * 9.81).epsilon(0.15));  // it sinks a little, for 0.05 s
+
+  // A file of the robot with the same load on its trunk does the same; it is the robot of the result.
+  const std::string heavy = (scratch.path / "heavy").string();
+  REQUIRE(runCommand({BIELLE_COMMAND, "convert", BIELLE_SOURCE_DIR "/robots/bipetto", "--payload", "3", "--payload-at",
+                      "0.05", "0", "0.1", "-o", heavy})
+              .status == 0);
+  const MotionRecord other = carry({"--robot", heavy}), same = carry({"--payload", "3", "--payload-at", "0.05,0,0.1"});
+  CHECK(other.q.row(other.q.rows() - 1).isApprox(same.q.row(same.q.rows() - 1), 1e-6));
+  CHECK_FALSE(other.q.row(other.q.rows() - 1).isApprox(bare.q.row(bare.q.rows() - 1), 1e-6));
+  carry({"--robot", heavy});
+  CHECK_THAT(parseSummary(output)["robot_file"].get<std::string>(), Catch::Contains("heavy"));
+
+  for (const auto& [options, told] : std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>>{
+           {{"--robot", BIELLE_SOURCE_DIR "/robots/cleobot"}, {"cleobot", "of the same joints, motors and contacts"}},
+           {{"--robot", heavy, "--speed", "0.3"}, {"--speed", "a solved motion has its own"}},
+           {{"--payload", "3", "--payload-at", "tail,0,0,0"}, {"link 'tail' does not exist", "name a link that moves"}},
+           {{"--payload", "3", "--payload-at", "0,0"}, {"--payload-at 0,0", "e.g. --payload-at trunk,0.15,0,0.1"}},
+           {{"--payload", "3", "--payload-at", "0,x,0"}, {"--payload-at 0,x,0", "it is not a place"}}}) {
+    const CommandResult refused = simulate(output, options, getSquat());
+    CAPTURE(refused.err);
+    CHECK(refused.status == 2);
+    for (const std::string& word : told) CHECK_THAT(refused.err, Catch::Contains(word));
+  }
 }
 
 TEST_CASE("simulate: bad input is refused in one line, with status 2") {

@@ -98,7 +98,7 @@ def simulate(
         with tempfile.TemporaryDirectory() as output:
             return simulate(result, output, progress, **options, summary_only=True)
     arguments = [str(result), "-o", str(directory), *make_arguments(options)]
-    run_program("bielle-simulate", arguments, progress, statuses=(0, 1))  # 1: it fell
+    run_program("bielle-simulate", arguments, progress, statuses=(0, 1, 3))  # 1: it fell; 3: not decided
     worlds = str(options.get("world", "")).split(",")
     if len(worlds) > 1:
         return {world: json.loads((Path(directory) / world / "summary.json").read_text()) for world in worlds}

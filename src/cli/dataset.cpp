@@ -71,6 +71,7 @@ std::string describeShortfall(const DatasetEntry& entry) {
   if (!entry.converged) return "the solver did not converge";
   if (!entry.passed) return "the check did not pass";
   if (!entry.met) return "a goal was missed";
+  if (entry.outcome == "not decided") return "it is not decided whether it stands";
   return entry.outcome == "fell" ? "it fell in simulation" : "the simulation failed";
 }
 

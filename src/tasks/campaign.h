@@ -21,9 +21,9 @@ struct CampaignOptions {
   std::function<void(const std::string&)> progress;
 };
 
-constexpr const char *kStood = "stood", *kFell = "fell", *kRefused = "refused";
+constexpr const char *kStood = "stood", *kFell = "fell", *kUndecided = "not decided", *kRefused = "refused";
 
-/// One finished run. Under `outcome` of its result: stood, fell, failed, or, not in the log, refused.
+/// One finished run. Under `outcome` of its result: stood, fell, not decided, failed, or, not in the log, refused.
 struct CampaignRun {
   std::vector<std::string> values;  ///< of the columns
   std::string command;              ///< arguments of `bielle simulate` after the motion

@@ -16,6 +16,7 @@ constexpr const char *kTexts[] = {"outcome", "outcome_message"},
                      *kNumbers[] = {"duration",     "distance",    "mean_speed",     "largest_deviation",
                                     "largest_slip", "largest_gap", "energy_balance", "saturated_share"};
 constexpr const char* kBrokeOff = "failed";
+constexpr int kNotDecided = 3;  // exit status
 
 // JSON has no NaN: a number that is none is null, which is right only where the world broke off.
 bool isNumber(const Json& value, bool broke_off) {
@@ -26,8 +27,8 @@ Json readRunSummary(const std::string& text, int status) {
   const Json summary = parseJson(text);
   const Json result = pickCampaignResult(summary);
   const std::string outcome = result["outcome"];
-  if ((status == 0) != (outcome == kStood))
-    throw std::runtime_error("it " + outcome + ", and the exit status was " + std::to_string(status));
+  if (status != (outcome == kStood ? 0 : outcome == kUndecided ? kNotDecided : 1))
+    throw std::runtime_error("its outcome is '" + outcome + "', and the exit status was " + std::to_string(status));
   return result;
 }
 
@@ -42,7 +43,7 @@ Json pickCampaignResult(const Json& summary) {
     result[field] = summary[field];
   }
   const std::string outcome = result["outcome"];
-  if (outcome != kStood && outcome != kFell && outcome != kBrokeOff)
+  if (outcome != kStood && outcome != kFell && outcome != kUndecided && outcome != kBrokeOff)
     throw std::runtime_error("there is no outcome '" + outcome + "'");
   for (const char* field : kNumbers) {
     if (!summary.contains(field) || !isNumber(summary[field], outcome == kBrokeOff))
@@ -58,7 +59,8 @@ Json readCampaignResult(const tasks::Task& task, int status) {
   if (status == kNotStarted) throw std::runtime_error("it could not be started" + describeLog(log));
   if (status >= 128)
     throw std::runtime_error("terminated by signal " + std::to_string(status - 128) + describeLog(log));
-  if (status >= 2 || status < 0) throw std::runtime_error("exit status " + std::to_string(status) + describeLog(log));
+  if (status == 2 || status > kNotDecided || status < 0)
+    throw std::runtime_error("exit status " + std::to_string(status) + describeLog(log));
   try {
     return readRunSummary(tasks::readOutput(tasks::getOutput(task, "out/summary.json"), kLongestSummary), status);
   } catch (const std::exception& problem) {

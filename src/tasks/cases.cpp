@@ -76,6 +76,9 @@ void writeOutcome(const std::string& path, const Json& request, const CaseOutcom
   writeTextFile(path, formatJson({{"request", request}, {"outcome", steps}}) + "\n");
 }
 
+// A step did what was asked: with success, without (1), or, of a motion carried out, without a decision (3).
+bool hasEnded(int status) { return status <= 1 || status == 3; }
+
 std::string describeOutcome(const CaseOutcome& outcome) {
   if (outcome.kept) return "kept";
   const StepOutcome& last = outcome.steps.back();
@@ -85,7 +88,7 @@ std::string describeOutcome(const CaseOutcome& outcome) {
   if (last.status >= 128) return "terminated by signal " + std::to_string(last.status - 128) + time;
   if (last.status == kNotStarted) return std::string("the command could not be started") + time;
   if (last.status == kNoResult) return "no result: " + last.error + time;
-  if (last.status >= 2) return "refused: " + last.error + time;
+  if (!hasEnded(last.status)) return "refused: " + last.error + time;
   for (const StepOutcome& step : outcome.steps)
     if (step.status != 0) return std::string("done with a failure") + time;
   return std::string("done") + time;
@@ -173,7 +176,7 @@ class CaseRunner {
       }
     CaseOutcome& outcome = outcome_.cases[entry.index];
     outcome.steps.push_back({status, end.seconds, error});
-    if (status < 2 && outcome.steps.size() < cases_[entry.index].steps.size()) {
+    if (hasEnded(status) && outcome.steps.size() < cases_[entry.index].steps.size()) {
       startStep(entry.index);
       return;
     }

@@ -12,8 +12,8 @@ struct DatasetEntry {
       result;         ///< directory of its result, or of what it became when it was carried out; empty if there is none
   std::string error;  ///< of a motion that was refused
   bool converged = false, passed = false, met = false;  ///< the solver; the check; all goals
-  std::string outcome;                                  ///< of a motion that was carried out: stood, fell or failed
-  std::vector<std::string> warnings;                    ///< of how it was carried out
+  std::string outcome;                ///< of a motion that was carried out: stood, fell, not decided or failed
+  std::vector<std::string> warnings;  ///< of how it was carried out
   bool is_good() const { return converged && passed && met && outcome == (motion->carried_out ? "stood" : ""); }
   Json goals = Json::array(), planned;  ///< measured on the result; where that was carried out, also on its plan
   double duration = 0;                  ///< s, of the result

@@ -10,6 +10,7 @@
 #include "math/constants.h"
 #include "model/number_text.h"
 #include "motion/motor_scale.h"
+#include "worlds/balance.h"
 #include "worlds/motion_recorder.h"
 #include "worlds/robot_errors.h"
 
@@ -61,6 +62,13 @@ std::string describeBreak(const World& world) {
 // A sole that rolls over its edge turns by less before it lets go, and the softest ground of ours gives way by less.
 constexpr double kMostTilt = 0.2, kMostDepth = 5e-3;  // rad, m
 
+constexpr double kMostExtension = 5,
+                 kBalancePeriod = 5e-3;  // until it is decided, between looks at the balance before, s
+
+int countPeriods(double duration, double period) {
+  return std::max(1, static_cast<int>(std::lround(duration / period)));
+}
+
 }  // namespace
 
 std::string describeFeet(const Model& model, const Execution& e) {
@@ -101,6 +109,8 @@ const char* getName(Outcome outcome) {
       return "failed";
     case Outcome::Stopped:
       return "was stopped";
+    case Outcome::Undecided:
+      return "not decided";
   }
   return "?";
 }
@@ -110,9 +120,11 @@ Execution carryOut(const Plan& plan, Controller& controller, World& world, const
   const Policy& reference = plan.reference();
   const Model& model = world.model();
   const double duration = o.duration > 0 ? o.duration : reference.duration() + o.hold;
-  const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
-  const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
-  MotionRecorder recorder(world, (ticks + ticks_per_row - 1) / ticks_per_row);
+  const int ticks = countPeriods(duration, o.control_period);
+  const int most_ticks = ticks + countPeriods(kMostExtension, o.control_period);
+  const int ticks_per_row = countPeriods(o.record_period, o.control_period);
+  const int ticks_per_look = countPeriods(kBalancePeriod, o.control_period);
+  MotionRecorder recorder(world, (most_ticks + ticks_per_row - 1) / ticks_per_row);
   Execution& happened = recorder.happened;
 
   Perception perception(reference.model(), plan.schedule, sensors);
@@ -128,11 +140,12 @@ Execution carryOut(const Plan& plan, Controller& controller, World& world, const
     world.reset(q, projectVelocity(model, ws, makeConstraintSet(model), q, measurement.v));
   }
   FallDetector detector(model, reference, world.configuration(), o.fall, world.ground(), plan.ground);
+  Balance balance(world, plan.schedule);
   perception.reset(world, measurement.q, measurement.v);
-  happened.update_seconds.reserve(static_cast<size_t>(ticks));
+  happened.update_seconds.reserve(static_cast<size_t>(most_ticks));
   recorder.addNode(controller.footholds());
   int cut = 0, tick = 0;
-  bool advances = true, is_stopped = false;
+  bool advances = true, is_stopped = false, stands = false;
   std::string fall;
   const Pace pace;
   const auto describe = [&](double since) {
@@ -143,7 +156,7 @@ Execution carryOut(const Plan& plan, Controller& controller, World& world, const
     so_far.estimation = perception.errors();
     return so_far;
   };
-  for (; tick < ticks && !is_stopped && fall.empty(); ++tick) {
+  for (; tick < most_ticks && !stands && !is_stopped && fall.empty(); ++tick) {
     if (o.real_time) happened.largest_lag = std::max(happened.largest_lag, pace.await(world.time()));
     const double start = pace.elapsed();
     measurement = perception.update(world, controller.getPlanTime(world.time()));
@@ -164,18 +177,36 @@ Execution carryOut(const Plan& plan, Controller& controller, World& world, const
     fall = detector.find(world.time(), controller.getPlanTime(world.time()), world.configuration());
     happened.largest_deviation = std::max(happened.largest_deviation, detector.deviation());
     happened.largest_joint_deviation = std::max(happened.largest_joint_deviation, detector.jointDeviation());
-    if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && !is_stopped && fall.empty()) continue;
+    const bool is_pushed = !calcPush(o.pushes, measurement.time).isZero(0);
+    if (is_pushed || tick % ticks_per_look == 0 || tick + 1 >= ticks)
+      balance.update(controller.getPlanTime(world.time()), controller.footholds(), is_pushed);
+    stands = tick + 1 >= ticks && balance.stands();
+    const bool ends = stands || tick + 1 == most_ticks || is_stopped || !fall.empty();
+    if ((tick + 1) % ticks_per_row != 0 && !ends) continue;
     recorder.addNode(controller.footholds());
-    if (observer && !is_stopped && fall.empty() && tick + 1 < ticks) observer(world.time(), duration, describe);
+    if (observer && !ends) observer(world.time(), std::max(duration, world.time()), describe);
   }
   Execution out = describe(0);
-  const bool breaks = !world.message().empty();
-  out.outcome = breaks                      ? Outcome::BrokeOff
-                : !fall.empty()             ? Outcome::Fell
-                : advances && tick == ticks ? Outcome::Stood
-                                            : Outcome::Stopped;
-  out.message = breaks ? describeBreak(world) : fall;
-  if (out.outcome == Outcome::Stood) out.message = describeFeet(model, out);
+  out.extension = std::max(0, tick - ticks) * o.control_period;
+  if (!world.message().empty()) {
+    balance.update(controller.getPlanTime(world.time()), controller.footholds(), false);
+    out.outcome = balance.falls() ? Outcome::Fell : Outcome::BrokeOff;
+    out.message = describeBreak(world);
+    if (balance.falls())
+      out.message = balance.describe() + " at " + formatNumber(out.duration, "%.3f s") +
+                    ", where the world broke off: " + out.message;
+  } else if (!fall.empty()) {
+    out.outcome = Outcome::Fell;
+    out.message = fall;
+  } else if (!advances || is_stopped) {
+    out.outcome = Outcome::Stopped;
+  } else if (!stands) {
+    out.outcome = Outcome::Undecided;
+    out.message = balance.describe();
+  } else {
+    out.outcome = Outcome::Stood;
+    out.message = describeFeet(model, out);
+  }
   return out;
 }
 

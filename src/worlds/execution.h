@@ -23,7 +23,8 @@ struct Push {
 };
 
 struct ExecutionOptions {
-  double duration = 0;           ///< s; 0: that of the plan and `hold`
+  /// s; 0: that of the plan and `hold`. Goes on for up to 5 s until it is decided whether the robot stands (worlds/balance.h).
+  double duration = 0;
   double hold = 1;               ///< s
   double control_period = 1e-3;  ///< s
   double record_period = 5e-3;   ///< s
@@ -36,7 +37,7 @@ struct ExecutionOptions {
   const std::atomic<bool>* interrupt = nullptr;
 };
 
-enum class Outcome { Running, Stood, Ended, Fell, BrokeOff, Stopped };
+enum class Outcome { Running, Stood, Ended, Fell, BrokeOff, Stopped, Undecided };
 const char* getName(Outcome outcome);
 
 /// The largest of what happened to a foot, and when.
@@ -51,9 +52,11 @@ struct FootExtreme {
 
 struct Execution {
   Outcome outcome = Outcome::BrokeOff;
-  /// What made it count as fallen, why the world broke off, or what is odd about how a foot stood (describeFeet()).
+  /// What made it count as fallen, why the world broke off, what is not decided, or what is odd about how a foot stood
+  /// (describeFeet()).
   std::string message;
   double duration = 0;                 ///< until the end, the fall or the break, s
+  double extension = 0;                ///< of that beyond what was asked for, until it was decided whether it stands, s
   double distance = 0;                 ///< of the centre of mass over the ground, from the start to the end, m
   double largest_gap = 0;              ///< of closures, m
   double largest_slip = 0;             ///< of a sole since its touchdown, m

@@ -68,7 +68,10 @@ CLI::Validator isListOfWorlds() {
 }
 
 void describePlan(OptionFields& fields, SimulateArguments& a) {
-  fields.text("robot", a.robot, "name or directory of the robot for which the motion is solved");
+  fields.text("robot", a.robot,
+              "name, directory or file of the robot for which the motion is solved; with the directory of a solved "
+              "motion, the robot of the world alone, of the same joints and motors, which plan and controller do not "
+              "know");
   fields.number("speed", a.speed, "m/s", {}, "speed of the motion that is solved first");
   fields.text("command", a.commands,
               "YAML file with velocity commands for a walk with --control mpc, which plans its steps as it goes. "
@@ -142,6 +145,11 @@ void describeWorld(OptionFields& fields, SimulateArguments& a) {
   fields.number("time_step", a.time_step, "s", {0, 0.1},
                 "time step of worlds with fixed steps, at most --control-period; the longest step of others; 0: the "
                 "world's default");
+  fields.number("payload", a.payload, "kg", {0, 1e6},
+                "a point mass on the simulated robot alone, which neither plan nor controller know");
+  fields.text("payload_at", a.payload_at,
+              "its place, LINK,x,y,z in the frame of a link [m], or x,y,z in that of the trunk (default: the trunk's "
+              "centre of mass)");
   fields.number("mass_error", a.errors.mass, "1", {0, 0.99},
                 "largest relative error of masses: the simulated robot's masses and inertias are the "
                 "controller's, times a random factor within 1 plus or minus this");
@@ -214,6 +222,27 @@ Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
   return ground;
 }
 
+Payload makePayload(const SimulateArguments& arguments) {
+  Payload payload{arguments.payload, {}, {}};
+  if (arguments.payload_at.empty()) return payload;
+  std::vector<std::string> parts;
+  std::istringstream text(arguments.payload_at);
+  for (std::string part; std::getline(text, part, ',');) parts.push_back(part);
+  const auto refuse = [&arguments] {
+    throw InputError("", "--payload-at " + arguments.payload_at, "it is not a place",
+                     "e.g. --payload-at trunk,0.15,0,0.1");
+  };
+  if (parts.size() < 3 || parts.size() > 4) refuse();
+  if (parts.size() == 4) payload.link = parts[0];
+  payload.at.emplace();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto value = parseNumber(parts[parts.size() - 3 + static_cast<size_t>(axis)]);
+    if (!value || !std::isfinite(*value)) refuse();
+    (*payload.at)[axis] = *value;
+  }
+  return payload;
+}
+
 std::string getName(PlanControl control) { return kControls[static_cast<size_t>(control)]; }
 std::string getName(Sensing sensors) { return kSensors[static_cast<size_t>(sensors)]; }
 
@@ -257,6 +286,7 @@ std::vector<std::string> listIdleOptions(const SimulateArguments& a) {
   check(a.sensors == Sensing::Real, {"noise"}, "ideal sensors have none");
   check(a.execution.duration == 0, {"hold"}, "--duration ends the motion");
   check(!a.pushes.empty(), {"push_body"}, "there is no --push");
+  check(a.payload > 0, {"payload_at"}, "there is no --payload");
   const bool has_tiles = a.terrain.rfind("tiles", 0) == 0 || a.terrain.rfind("uneven", 0) == 0;
   check(has_tiles || a.jitter > 0 || a.sensors == Sensing::Real || !a.errors.isZero(), {"seed"}, "nothing is random");
   return idle;
@@ -311,6 +341,7 @@ void parseOptions(SimulateArguments& arguments) {
   arguments.errors.seed = arguments.seed;
   if (is_real) arguments.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
   makeGround(arguments, {});
+  makePayload(arguments);
   const std::vector<std::string> worlds = splitWorlds(arguments.world);
   if (std::set<std::string>(worlds.begin(), worlds.end()).size() < worlds.size())
     throw InputError("", "--world " + arguments.world, "a world is given twice", "give it once");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bielle/model/options.h"
+#include "model/payload.h"
 #include "worlds/execution.h"
 #include "worlds/robot_errors.h"
 
@@ -19,7 +20,7 @@ std::string getName(Sensing sensors);
 struct SimulateArguments {
   std::string directory, output;
   // Of the plan.
-  std::string robot;     // of a motion that is to be solved; empty: `directory` holds one
+  std::string robot;     // of a motion that is to be solved; empty: `directory` holds one, or is a robot
   std::string commands;  // file; empty: none
   std::optional<double> speed;
   std::vector<std::string> settings;  // name=value
@@ -28,6 +29,9 @@ struct SimulateArguments {
   double friction = 0;  // 0: that of the plan
   double accuracy = 0;  // 0: that of the world
   double time_step = 0;
+  std::string world_robot;  // file or directory; empty: the robot of the plan
+  double payload = 0;       // kg
+  std::string payload_at;   // LINK,x,y,z or x,y,z
   RobotErrors errors;
   std::vector<std::string> pushes;
   unsigned seed = 1;
@@ -71,6 +75,9 @@ void requireShortSteps(const SimulateArguments& arguments, const std::string& fl
 
 /// Sets what follows from pushes, delays and sensors, and checks what can be checked without the motion. \throws InputError
 void parseOptions(SimulateArguments& arguments);
+
+/// What the robot of the world carries, and a plan does not know. \throws InputError
+Payload makePayload(const SimulateArguments& arguments);
 
 /// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01". \throws InputError
 Ground makeGround(const SimulateArguments& arguments, const Ground& planned);

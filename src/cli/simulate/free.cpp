@@ -252,7 +252,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
     execution.record_period =
         std::min(std::max(kRecordPeriod, arguments.time_step), std::max(execution.duration / 100, arguments.time_step));
   requireShortSteps(arguments, "--record-period", execution.record_period);
-  const LoadedRobot robot = [&] {
+  LoadedRobot robot = [&] {
     try {
       return loadRobot(arguments.directory);
     } catch (const InputError& error) {
@@ -264,6 +264,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   }();
   refuseOptionsOfPlans(given);
   for (const std::string& warning : robot.warnings) std::cerr << "bielle: warning: " << warning << "\n";
+  robot.model = addPayload(robot.model, makePayload(arguments));
   const FreeStart start = makeFreeStart(robot.model, arguments);
   std::vector<MotorSpring> springs;
   for (const std::string& spring : arguments.springs) addSprings(robot.model, spring, start.q, springs);

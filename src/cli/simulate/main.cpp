@@ -1,14 +1,21 @@
 // bielle-simulate: carries a motion out in a world.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <utility>
 
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
+#include "bielle/motion/registry.h"
 #include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "cli/simulate/free.h"
 #include "cli/simulate/output.h"
 #include "cli/simulate/watch.h"
+#include "control/clock.h"
+#include "model/listing.h"
 #include "model/number_text.h"
 #include "results/interrupt.h"
 #include "results/output_place.h"
@@ -21,7 +28,7 @@ using namespace bielle::worlds;
 
 namespace {
 
-constexpr int kStood = 0, kFell = 1, kBadInput = 2;
+constexpr int kStood = 0, kFell = 1, kBadInput = 2, kNotDecided = 3;
 
 // Predictive control needs states with closed loops, which other formulations do not have. Returns why another one is chosen.
 std::string chooseControl(SimulateArguments& arguments) {
@@ -77,8 +84,7 @@ void roundPeriods(SimulateArguments& arguments) {
 // What has no effect on this motion and robot.
 std::vector<std::string> listIdleInPlan(const SimulateArguments& arguments, const Plan& plan) {
   const ExecutionOptions& o = arguments.execution;
-  std::vector<std::string> idle =
-      listIdlePushes(o.pushes, o.duration > 0 ? o.duration : plan.reference().duration() + o.hold);
+  std::vector<std::string> idle;
   const double steps = std::ceil(o.control_period / arguments.time_step - 1e-9), step = o.control_period / steps;
   if (arguments.time_step > 0 && step < 0.99 * arguments.time_step)
     idle.push_back("--time-step " + formatNumber(arguments.time_step) + ": steps are of " + formatNumber(step) +
@@ -88,9 +94,68 @@ std::vector<std::string> listIdleInPlan(const SimulateArguments& arguments, cons
   return idle;
 }
 
-// The robot of the world, which is not quite the one that its controller knows if errors are given.
-Model makeRobot(const Plan& plan, const RobotErrors& errors) {
-  const Model& model = plan.robot.model;
+// What a robot does that is still pushed at the end is decided by how long it is looked at.
+void requirePushesToEnd(const ExecutionOptions& o, double planned) {
+  const double end = o.duration > 0 ? o.duration : planned + o.hold;
+  for (const Push& push : o.pushes) {
+    const double over = push.time + push.duration;
+    if (over <= end + kClockTolerance) continue;
+    const std::string longer = o.duration > 0 ? "--duration " + formatNumber(over + o.hold)
+                                              : "--hold " + formatNumber(over + o.hold - planned);
+    throw InputError(
+        "", "--push at " + formatNumber(push.time) + " s",
+        "it is over at " + formatNumber(over) + " s, but the simulation ends at " + formatNumber(end) + " s",
+        "give an earlier time, or " + longer);
+  }
+}
+
+int getStatus(Outcome outcome) {
+  return outcome == Outcome::Stood ? kStood : outcome == Outcome::Undecided ? kNotDecided : kFell;
+}
+
+// A robot for a solved motion is that of the world. What is the name of a motion is that motion, whatever lies there.
+void chooseRobot(SimulateArguments& arguments) {
+  const std::vector<MotionEntry>& motions = getMotions();
+  const bool is_motion = std::any_of(motions.begin(), motions.end(),
+                                     [&](const MotionEntry& motion) { return motion.name == arguments.directory; });
+  const bool is_solved = std::filesystem::exists(std::filesystem::path(arguments.directory) / "summary.json");
+  if (arguments.robot.empty() || !is_solved) return;
+  if (is_motion) {
+    tell({"motion '" + arguments.directory + "' is solved for " + arguments.robot + "; give ./" + arguments.directory +
+          " to carry out the one in that directory"});
+    return;
+  }
+  arguments.world_robot = std::exchange(arguments.robot, {});
+}
+
+// Of the joints, motors and contacts of a plan's robot, in their order.
+void requireSameParts(const Model& planned, const LoadedRobot& robot) {
+  const auto compare = [&robot](const char* what, const std::vector<std::string>& wanted,
+                                const std::vector<std::string>& there) {
+    if (wanted == there) return;
+    throw InputError(robot.file, what,
+                     "they are " + listItems(there) + ", but those of the plan's robot " + listItems(wanted),
+                     "give a robot of the same joints, motors and contacts");
+  };
+  compare("joints", makeVelocityNames(planned), makeVelocityNames(robot.model));
+  compare("motors", getNames(planned.motors()), getNames(robot.model.motors()));
+  compare("contacts", getNames(planned.contacts()), getNames(robot.model.contacts()));
+}
+
+// The robot of the world, which its controller may not know.
+LoadedRobot loadWorldRobot(const Plan& plan, const SimulateArguments& arguments) {
+  LoadedRobot robot = plan.robot;
+  if (!arguments.world_robot.empty()) {
+    robot = loadRobot(arguments.world_robot);
+    tell(robot.warnings);
+    requireSameParts(plan.robot.model, robot);
+  }
+  robot.model = addPayload(robot.model, makePayload(arguments));
+  return robot;
+}
+
+// With random errors.
+Model addErrors(const Plan& plan, const Model& model, const RobotErrors& errors) {
   if (errors.isZero()) return model;
   Model machine = makeMachine(model, errors);
   VectorXd q = model.makeNeutral(), v = VectorXd::Zero(model.nv());
@@ -115,6 +180,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
     tell(listIdleOptions(arguments));
     return kStood;
   }
+  chooseRobot(arguments);
   if (arguments.robot.empty()) requireApart(arguments.output, {arguments.directory});
   watchInterrupts();
   if (isFree(arguments)) return simulateFreely(arguments, command) ? kStood : kFell;
@@ -124,11 +190,13 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   const Plan plan = obtainPlan(arguments);
   std::vector<std::string> warnings = arguments.robot.empty() ? plan.robot.warnings : std::vector<std::string>();
   for (const std::string& each : listIdleOptions(arguments)) warnings.push_back(each);
+  requirePushesToEnd(arguments.execution, plan.reference().duration());
   for (const std::string& each : listIdleInPlan(arguments, plan)) warnings.push_back(each);
   const PlanController controller = makeController(plan, arguments.control);
   const Ground ground = makeGround(arguments, plan.ground);
+  const LoadedRobot robot = loadWorldRobot(plan, arguments);
   const double tolerance = controlsError(arguments.world) ? arguments.accuracy : 0;
-  const auto world = makeWorld(arguments.world, makeRobot(plan, arguments.errors),
+  const auto world = makeWorld(arguments.world, addErrors(plan, robot.model, arguments.errors),
                                {ground, arguments.time_step, &isInterrupted(), tolerance});
   for (const std::string& each : world->warnings()) warnings.push_back("world " + arguments.world + ": " + each);
   tell(warnings);
@@ -136,7 +204,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   options.fall.only_whirling = controller.prediction != nullptr;
   options.interrupt = &isInterrupted();
   makeOutputDirectory(arguments.output);
-  const CarriedOut carried{arguments, plan, controller.prediction, ground, command, warnings};
+  const CarriedOut carried{arguments, plan, robot, controller.prediction, ground, command, warnings};
   const auto writeFiles = [&carried](const Execution& execution) { return write(carried, execution); };
   ExecutionObserver observer;
   if (!arguments.summary_only) {  // a campaign's, which looks at nothing else
@@ -149,7 +217,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   const Execution execution = carryOut(plan, *controller.law, *world, arguments.perception, options, observer);
   print(carried, reason, execution);
   for (const std::string& path : writeFiles(execution)) std::cout << "  " << path << "\n";
-  return execution.outcome == Outcome::Stood ? kStood : kFell;
+  return getStatus(execution.outcome);
 }
 
 }  // namespace
@@ -168,9 +236,12 @@ int main(int argc, char** argv) {
       "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. With\n"
       "--control mpc, a joint driven by a linkage counts only if the linkage has passed a dead point or the joint is "
       "half\n"
-      "a turn away. Exit status: 0 it stood to the end, 1 it fell, was stopped by Ctrl-C, or the simulation failed "
-      "(files\n"
-      "are written all the same, unless Ctrl-C comes while the motion is still solved), 2 bad input.\n"
+      "a turn away. It stands if it has been at rest, or its capture point over its soles, for the last three time\n"
+      "constants sqrt(height / gravity); else the simulation goes on until that is decided, for up to 5 s. Exit "
+      "status:\n"
+      "0 it stands, 1 it fell, was stopped by Ctrl-C, or the simulation failed, 3 not decided (files are written all "
+      "the\n"
+      "same, unless Ctrl-C comes while the motion is still solved), 2 bad input.\n"
       "Examples:\n"
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"

@@ -23,7 +23,8 @@ namespace {
 MotionResult makeResult(const CarriedOut& carried, const Execution& execution) {
   const Plan& plan = carried.plan;
   MotionResult result;
-  result.run = makeRunInfo(plan.summary.run.robot, plan.robot, carried.command);
+  const std::string& other = carried.arguments.world_robot;
+  result.run = makeRunInfo(other.empty() ? plan.summary.run.robot : other, carried.robot, carried.command);
   result.motion = plan.summary.motion;
   result.formulation = plan.summary.formulation;
   result.options = plan.summary.options;
@@ -32,7 +33,7 @@ MotionResult makeResult(const CarriedOut& carried, const Execution& execution) {
   result.ground = carried.ground;
   result.record = execution.record;
   result.objective = plan.summary.objective;
-  setFigures(plan.robot.model, result);
+  setFigures(carried.robot.model, result);
   result.goals = worlds::measureCarriedGoals(plan, carried.arguments.control.control, execution.record);
   result.gap_position = execution.largest_gap;  // also between the rows of the record
   result.slip_position = execution.largest_slip;
@@ -175,6 +176,10 @@ std::string describeSteadySpeed(const std::vector<GoalOutcome>& outcomes) {
   return speed ? " with the time that it stands, " + formatNumber(*speed, "%.3f") + " m/s in its steady steps" : "";
 }
 
+std::string describeExtension(const Execution& e) {
+  return e.extension > 0 ? ", " + formatNumber(e.extension, "%.3f s") + " longer, to see whether it stands" : "";
+}
+
 // The summary of a result, with what happened in place of how it was solved.
 Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Execution& e) {
   const SimulateArguments& arguments = carried.arguments;
@@ -203,6 +208,10 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
     summary["noise"] = arguments.noise;
     summary["estimator"] = listEstimation(e.estimation);
   }
+  if (const Payload payload = makePayload(arguments); payload.mass > 0) {
+    summary["payload"] = {{"mass_kg", payload.mass}, {"link", payload.link}};
+    if (payload.at) summary["payload"]["at_m"] = {payload.at->x(), payload.at->y(), payload.at->z()};
+  }
   summary["robot_errors"] = {{"mass", arguments.errors.mass}, {"rod_m", arguments.errors.rod}};
   summary["delay"] = {{"mean_ms", arguments.delay}, {"jitter_ms", arguments.jitter}};
   summary["seed"] = arguments.seed;
@@ -213,6 +222,7 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   summary["fell"] = e.outcome == Outcome::Fell;
   summary["fall_time"] = e.outcome == Outcome::Fell ? Json(e.duration) : nullptr;
   summary["duration"] = e.duration;
+  summary["extension"] = e.extension;
   summary["distance"] = e.distance;
   summary["mean_speed"] = e.meanSpeed();
   if (!plan.goals.empty()) summary["plan"] = {{"goals", listGoals(measurePlannedGoals(plan))}};
@@ -340,13 +350,13 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
             << ", control " << getName(arguments.control.control);
   if (!reason.empty()) std::cout << " (" << reason << ")";
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
-  std::cout << ": it " << getName(e.outcome);
+  std::cout << (e.outcome == Outcome::Undecided ? ": " : ": it ") << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
   const std::vector<GoalOutcome> goals = measureCarriedGoals(carried, e);
   char text[1000];
   std::snprintf(text, sizeof text,
                 "\n"
-                "  duration            %.3f s\n"
+                "  duration            %.3f s%s\n"
                 "  distance            %.3f m, %.3f m/s%s\n"
                 "  trunk deviation     %.4f m at most\n"
                 "  closures            gap %.1e m at most\n"
@@ -354,10 +364,10 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
                 "  energy balance      %.1e J, %.1e of the energy exchanged\n"
                 "  torques             %.2f %% saturated\n"
                 "  computing time      %.2f s, %.2g times real time; world %.2f s, control %.2f s\n",
-                e.duration, e.distance, e.meanSpeed(), describeSteadySpeed(goals).c_str(), e.largest_deviation,
-                e.largest_gap, e.largest_slip, e.largest_tilt.value, e.largest_depth.value, e.imbalance,
-                e.energy_balance, 100 * e.saturated_share, e.whole_seconds, e.realTimeFactor(), e.world_seconds,
-                e.control_seconds);
+                e.duration, describeExtension(e).c_str(), e.distance, e.meanSpeed(), describeSteadySpeed(goals).c_str(),
+                e.largest_deviation, e.largest_gap, e.largest_slip, e.largest_tilt.value, e.largest_depth.value,
+                e.imbalance, e.energy_balance, 100 * e.saturated_share, e.whole_seconds, e.realTimeFactor(),
+                e.world_seconds, e.control_seconds);
   std::cout << text;
   for (const Push& push : arguments.execution.pushes)
     std::cout << "  push                " << formatNumber(push.impulse) << " N s at " << formatNumber(push.time)

@@ -18,6 +18,7 @@ void tell(const std::vector<std::string>& warnings);
 struct CarriedOut {
   const SimulateArguments& arguments;
   const Plan& plan;
+  const LoadedRobot& robot;                // of the world, without random errors
   const PredictiveController* prediction;  // null under other control
   const Ground& ground;                    // of the world
   const std::vector<std::string>& command;
