@@ -7,10 +7,12 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
+#include "bielle/motion/motion.h"
 #include "bielle/results/robot_info.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/adopt.h"
 #include "get_error.h"
+#include "math/so3.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -134,6 +136,32 @@ TEST_CASE("an adopted robot starts from the posture of its file, if it has one")
     const int i = original.joints()[original.findJoint(knee)].idx_q;
     CHECK(std::abs(posture.q[i] - q[i]) < 0.5);
     CHECK(posture.q[i] * q[i] > 0);
+  }
+}
+
+TEST_CASE("an adopted robot stands at home, wherever the posture of its file is") {
+  const Model original = loadRobot("rsu_biped").model;
+  const VectorXd q = assembleReference(original, "half_sitting").q;
+  std::string at_home;
+  for (const double heading : {0.0, 1.9}) {
+    CAPTURE(heading);
+    ModelParts parts = takeParts(original);
+    parts.contacts.clear();
+    parts.references.clear();
+    const SE3 X{makeAxisRotation(Vector3d::UnitZ(), heading), heading * Vector3d(1, -2, 0.5)};
+    const VectorXd carried = carryPosture(original, q, X);
+    Reference home;
+    home.name = "home";
+    for (const Joint& joint : original.joints())
+      if (joint.nq > 0)
+        home.joints[joint.name] =
+            std::vector<double>(carried.data() + joint.idx_q, carried.data() + joint.idx_q + joint.nq);
+    parts.references.push_back(home);
+    const RobotText bare = formatRobot(ModelBuilder::restore(parts));
+    const RobotDirectory directory;
+    const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(bare.urdf, bare.yaml)), "../robot.urdf");
+    if (heading == 0) at_home = adoption.yaml;
+    CHECK(adoption.yaml == at_home);
   }
 }
 

@@ -362,3 +362,25 @@ TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and te
   CHECK_THAT(getError([] { formatUrdf(loadRobot("cleobot").model); }),
              Catch::Contains("URDF does not support such joints"));
 }
+
+TEST_CASE("feet of a reference keep their places and yaws in YAML; what is no yaw is refused") {
+  const RobotDirectory directory;
+  const std::string head = "tree:\n  biped: {part: rsu_biped}\nreferences:\n  half_sitting: {feet: {foot_left: ";
+  const Model model =
+      loadRobot(directory.write("toes/toes.yaml", head + "{place: [1, 2.125, 0.5], yaw: 0.3}}}\n")).model;
+  const Reference& given = model.references().at(0);
+  CHECK(given.feet.at("foot_left") == Vector3d(1, 2.125, 0.5));
+  CHECK(given.yaws == std::map<std::string, double>{{"foot_left", 0.3}});
+  const RobotText text = formatRobot(model);
+  const Model again = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
+  CHECK(again.references().at(0).feet == given.feet);
+  CHECK(again.references().at(0).yaws == given.yaws);
+  for (const auto& [foot, problem] : {std::pair("{yaw: 0.3}", "place"),
+                                      {"{place: [0, 0, 0], yaw: 20}", "half a turn"},
+                                      {"{place: [0, 0, 0], turn: 1}", "turn"}}) {
+    CAPTURE(foot);
+    const std::string error = getError([&] { loadRobot(directory.write("wrong/wrong.yaml", head + foot + "}}\n")); });
+    CHECK(error.find(problem) != std::string::npos);
+    CHECK(error.find("wrong.yaml") != std::string::npos);
+  }
+}

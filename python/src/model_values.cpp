@@ -159,7 +159,8 @@ void bindConstraints(py::module_& module) {
       .field("joints", &Reference::joints, "q of joints, by name")
       .field("height_frame", &Reference::height_frame, "frame whose height is given; empty: only joints are given")
       .field("height", &Reference::height, "over the soles, m")
-      .field("feet", &Reference::feet, "positions of the origins of contact frames (3,), by name, m");
+      .field("feet", &Reference::feet, "positions of the origins of contact frames (3,), by name, m")
+      .field("yaws", &Reference::yaws, "headings of those that have one, of x about the vertical, by name, rad");
   Value<ContactTarget>(module, "ContactTarget", "A foot on the ground at a given place.")
       .field("contact", &ContactTarget::contact, "index into Model.contacts")
       .field("X_WT", &ContactTarget::X_WT, "where the contact frame belongs; matters only with kp > 0")

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
@@ -268,6 +269,146 @@ FrameTarget makeFrameTarget(const ContactFrame& contact, const SE3& X_WT) {
   return target;
 }
 
+namespace {
+
+const ContactFrame& getFoot(const Model& model, const Reference& reference, const std::string& name) {
+  const int index = model.findContact(name);
+  if (index < 0)
+    throw InputError(model.name(), "reference '" + reference.name + "'", "there is no contact '" + name + "'",
+                     "name one of the contacts of the file");
+  return model.contacts()[index];
+}
+
+// Zero for what is only rounding, so that robots that face x do so exactly.
+double dropRounding(double angle) { return std::abs(angle) < 1e-9 ? 0 : angle; }
+
+// Angle about the vertical by which points turn to lie as others do, about the middle of each, in the least-squares sense; 0 for
+// fewer than two.
+double calcTurn(const std::vector<Vector3d>& from, const std::vector<Vector3d>& to) {
+  Vector3d middle_from = Vector3d::Zero(), middle_to = Vector3d::Zero();
+  for (size_t i = 0; i < from.size(); ++i) {
+    middle_from += from[i] / static_cast<double>(from.size());
+    middle_to += to[i] / static_cast<double>(to.size());
+  }
+  double sine = 0, cosine = 0;
+  for (size_t i = 0; i < from.size(); ++i) {
+    const Vector3d a = from[i] - middle_from, b = to[i] - middle_to;
+    sine += a.x() * b.y() - a.y() * b.x();
+    cosine += a.x() * b.x() + a.y() * b.y();
+  }
+  return dropRounding(std::atan2(sine, cosine));
+}
+
+// Where the feet of a reference are, and which way those without a yaw of their own face.
+class ReferenceFeet {
+ public:
+  // \param q_ref  preferred configuration, with a base that is not given at the origin
+  ReferenceFeet(const Model& model, const Reference& reference, const VectorXd& q_ref)
+      : model_(model), reference_(reference), ws_(model) {
+    is_placed_ = !model.hasFreeFlyer() || reference.joints.count(model.joints()[1].name) > 0;
+    if (reference.feet.empty()) return;
+    unbent_ = model.makeNeutral();
+    if (model.hasFreeFlyer() && is_placed_) unbent_.head<7>() = q_ref.head<7>();
+    lowest_ = std::numeric_limits<double>::infinity();
+    for (const auto& [name, place] : reference.feet) {
+      middle_ += place / static_cast<double>(reference.feet.size());
+      lowest_ = std::min(lowest_, place.z());
+    }
+    heading_ = is_placed_ ? findHeadingOfBase() : findHeadingOfFeet(q_ref);
+  }
+
+  // Whether the base is where the file puts it, or the reference.
+  bool is_placed() const { return is_placed_; }
+  double lowest() const { return lowest_; }
+
+  double getYaw(const std::string& name) const {
+    const auto yaw = reference_.yaws.find(name);
+    return yaw == reference_.yaws.end() ? heading_ : yaw->second;
+  }
+
+  // Over the middle of the feet, and facing as they do in the mean.
+  SE3 findBase() const {
+    double sine = 0, cosine = 0;
+    for (const auto& [name, place] : reference_.feet) {
+      sine += std::sin(getYaw(name));
+      cosine += std::cos(getYaw(name));
+    }
+    return {makeAxisRotation(Vector3d::UnitZ(), reference_.feet.empty() ? 0 : std::atan2(sine, cosine)),
+            {middle_.x(), middle_.y(), lowest_}};
+  }
+
+  // The contact flat at its place. It turns freely about the vertical where the reference gives a joint that turns it so, and no
+  // yaw.
+  FrameTarget makeTarget(const std::string& name, const Vector3d& place) {
+    const ContactFrame& contact = getFoot(model_, reference_, name);
+    FrameTarget target = makeFrameTarget(contact, {makeAxisRotation(Vector3d::UnitZ(), getYaw(name)), place});
+    if (!reference_.yaws.count(name) && isTurned(contact)) target.mask[5] = false;
+    return target;
+  }
+
+ private:
+  // That of soles on unbent legs: their axes across stay level as legs bend.
+  double findHeadingOfBase() {
+    updatePositions(model_, ws_, unbent_);
+    Vector3d across = Vector3d::Zero();
+    for (const auto& [name, place] : reference_.feet) {
+      const ContactFrame& contact = getFoot(model_, reference_, name);
+      if (contact.kind != ContactKind::Point3D) across += getPlacement(ws_, contact.body, contact.X_BF).R.col(1);
+    }
+    const bool is_level = across.head<2>().norm() > 0.5 * across.norm();
+    return is_level ? dropRounding(std::atan2(-across.x(), across.y())) : 0;
+  }
+
+  // That of a base which brings the feet nearest to their places. Two feet stand across or along the robot: by the line between
+  // them, so that small differences of legs turn nothing.
+  double findHeadingOfFeet(const VectorXd& q_ref) {
+    updatePositions(model_, ws_, q_ref);
+    std::vector<Vector3d> from, to;
+    for (const auto& [name, place] : reference_.feet) {
+      const ContactFrame& contact = getFoot(model_, reference_, name);
+      from.push_back(getPlacement(ws_, contact.body, contact.X_BF).p);
+      to.push_back(place);
+    }
+    if (from.size() != 2) return calcTurn(from, to);
+    constexpr double kQuarter = 1.57079632679489662;  // turn
+    const Vector3d a = from[1] - from[0], b = to[1] - to[0];
+    const double along = kQuarter * std::round(std::atan2(a.y(), a.x()) / kQuarter);
+    return dropRounding(std::remainder(std::atan2(b.y(), b.x()) - along, 4 * kQuarter));
+  }
+
+  // Whether an angle is given of a joint between base and foot that turns about the vertical while the legs are not bent. None turns
+  // the foot: it faces ahead.
+  bool isTurned(const ContactFrame& contact) {
+    constexpr double kUpright = 0.9;  // least cosine between its axis and the vertical
+    constexpr double kTurned = 1e-3;  // rad
+    updatePositions(model_, ws_, unbent_);
+    for (int i = contact.body; i > (model_.hasFreeFlyer() ? 1 : 0); i = model_.joints()[i].parent) {
+      const Joint& joint = model_.joints()[i];
+      const auto given = reference_.joints.find(joint.name);
+      if (given == reference_.joints.end()) continue;
+      const std::vector<double>& q = given->second;
+      const auto turns = [&](const Vector3d& axis, double angle) {
+        return std::abs((ws_.X_WB[i].R * axis).z()) > kUpright && std::abs(angle) > kTurned;
+      };
+      const bool is_hinge = joint.kind == JointKind::Revolute || joint.kind == JointKind::Continuous;
+      if ((is_hinge || joint.kind == JointKind::Universal) && turns(joint.axis, q[0])) return true;
+      if (joint.kind == JointKind::Universal && turns(joint.axis2, q[1])) return true;
+      if (joint.kind == JointKind::Spherical && std::abs(2 * std::atan2(q[2], q[3])) > kTurned) return true;
+    }
+    return false;
+  }
+
+  const Model& model_;
+  const Reference& reference_;
+  Workspace ws_;
+  bool is_placed_ = false;
+  VectorXd unbent_;  // neutral but for a base that is given
+  Vector3d middle_ = Vector3d::Zero();
+  double lowest_ = 0, heading_ = 0;
+};
+
+}  // namespace
+
 AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference) {
   AssemblyProblem problem;
   problem.q_ref = model.makeNeutral();
@@ -287,13 +428,12 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
     problem.weights.segment(joint.idx_v, joint.nv).setOnes();
   }
   if (model.hasFreeFlyer()) problem.weights.head<6>().setOnes();
-  for (const auto& [name, position] : reference.feet) {
-    const int index = model.findContact(name);
-    if (index < 0)
-      throw InputError(model.name(), "reference '" + reference.name + "'", "there is no contact '" + name + "'",
-                       "name one of the contacts of the file");
-    problem.frames.push_back(makeFrameTarget(model.contacts()[index], {Matrix3d::Identity(), position}));
+  ReferenceFeet feet(model, reference, problem.q_ref);
+  if (!feet.is_placed()) {
+    const SE3 base = feet.findBase();
+    problem.q_ref.head<7>() << base.p, Eigen::Quaterniond(base.R).coeffs();
   }
+  for (const auto& [name, place] : reference.feet) problem.frames.push_back(feet.makeTarget(name, place));
   if (!reference.height_frame.empty()) {
     const int index = model.findFrame(reference.height_frame);
     if (index < 0)
@@ -303,10 +443,10 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
     target.name = "height of " + reference.height_frame;
     target.body = model.frames()[index].body;
     target.X_BF = model.frames()[index].X_BF;
-    target.X_WT.p.z() = reference.height;
+    target.X_WT.p.z() = feet.lowest() + reference.height;
     target.mask << false, false, true, false, false, false;
     problem.frames.push_back(target);
-    if (model.hasFreeFlyer()) problem.q_ref[2] = reference.height - target.X_BF.p.z();
+    if (model.hasFreeFlyer()) problem.q_ref[2] = target.X_WT.p.z() - target.X_BF.p.z();
   }
   return problem;
 }

@@ -37,7 +37,8 @@ class Adopter {
            "`model`, motors and a reference");
     const AssemblyResult closed = findClosedConfiguration(model_);
     if (closed.status != NumericalStatus::Ok) fail("its loops do not close: " + closed.message, "correct the robot");
-    updatePositions(model_, ws_, closed.q);
+    q_ = closed.q;
+    updatePositions(model_, ws_, q_);
   }
 
   Adoption write() {
@@ -63,8 +64,17 @@ class Adopter {
     out_ << YAML::Newline << YAML::Newline << YAML::Comment(text);
   }
 
+  // Feet are looked for on both sides of the xz plane: where there is no pair, after the robot is carried back to where a posture of
+  // its file has it from.
   void nameFeet() {
     feet_ = findFeet(model_, ws_);
+    if (feet_.size() != 2) {
+      const VectorXd q = carryHome(q_);
+      Workspace home(model_);
+      updatePositions(model_, home, q);
+      const std::vector<FoundFoot> feet = findFeet(model_, home);
+      if (feet.size() == 2 || feet_.empty()) feet_ = feet, is_carried_ = true, updatePositions(model_, ws_, q);
+    }
     if (feet_.empty())
       fail("no frame on a leg has its z axis up in the closed neutral configuration, and no body has a shape",
            "add a link without mass under each foot, z up and x forward");
@@ -73,6 +83,15 @@ class Adopter {
       feet_[i].frame = "sole" + getContactName(i).substr(4);
       while (model_.findFrame(feet_[i].frame) >= 0) feet_[i].frame += "_";
     }
+  }
+
+  // With the base at x = y = 0, and its rotation about the vertical undone.
+  VectorXd carryHome(VectorXd q) const {
+    const Eigen::Quaterniond base(Eigen::Vector4d(q.segment<4>(3)));
+    const Eigen::AngleAxisd back(-2 * std::atan2(base.z(), base.w()), Vector3d::UnitZ());
+    q.head<2>().setZero();
+    q.segment<4>(3) = (Eigen::Quaterniond(back) * base).coeffs();
+    return q;
   }
 
   std::string getContactName(size_t i) const {
@@ -245,7 +264,7 @@ class Adopter {
     const AssemblyResult posture = assembleReference(model_, given.name);
     if (posture.status != NumericalStatus::Ok) return false;
     Workspace ws(model_);
-    updatePositions(model_, ws, posture.q);
+    updatePositions(model_, ws, is_carried_ ? carryHome(posture.q) : posture.q);
     for (double share = 1 - kStep; share > kLowest; share -= kStep) {
       Reference r = makePosture(ws, share);
       for (const Joint& joint : model_.joints())
@@ -298,9 +317,10 @@ class Adopter {
 
   const Model& model_;
   const std::string path_;
+  VectorXd q_;  // closed
   Workspace ws_;
   std::vector<FoundFoot> feet_;
-  bool has_made_frames_ = false;
+  bool has_made_frames_ = false, is_carried_ = false;
   std::optional<Model> with_feet_;
   YAML::Emitter out_;
   std::vector<std::string> guesses_;

@@ -219,6 +219,26 @@ void fixBase(UrdfFile& tree, YamlFile& yaml) {
   }
 }
 
+// The q of a free base is its place in the world. That in which a joint of the file puts it is kept by the references, unless
+// their feet say where they stand.
+void placeBase(UrdfFile& tree, YamlFile& yaml) {
+  for (UrdfJoint& j : tree.joints) {
+    if (j.joint.kind != JointKind::FreeFlyer || j.parent != tree.root || yaml.references.empty()) continue;
+    for (Reference& reference : yaml.references) {
+      const auto given = reference.joints.find(j.joint.name);
+      if (given == reference.joints.end() && !reference.feet.empty()) continue;
+      std::vector<double>& q = reference.joints[j.joint.name];
+      if (q.empty()) q = {0, 0, 0, 0, 0, 0, 1};
+      if (q.size() != 7) continue;  // which the builder refuses
+      const Vector3d p = j.joint.X_PJ.act(Vector3d(q[0], q[1], q[2]));
+      const Eigen::Quaterniond turn(j.joint.X_PJ.R), base(q[6], q[3], q[4], q[5]);
+      Eigen::Map<Vector3d>(q.data()) = p;
+      Eigen::Map<Eigen::Vector4d>(q.data() + 3) = (turn * base).coeffs();
+    }
+    j.joint.X_PJ = SE3();
+  }
+}
+
 // The root link: carried by a free-flyer, or part of the ground. A root named "world" is the ground itself.
 void addRoot(const UrdfFile& urdf, BaseKind base, ModelBuilder& builder) {
   if (urdf.root == "world") return;
@@ -349,6 +369,7 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
 
   const BaseKind base = overriding.value_or(yaml.base.value_or(BaseKind::Free));
   if (urdf.has_own_base && base == BaseKind::Fixed) fixBase(urdf, yaml);
+  if (urdf.root == "world") placeBase(urdf, yaml);
   ModelBuilder builder(urdf.name, urdf.path);
   addRoot(urdf, base, builder);
   addJoints(urdf, yaml, builder);

@@ -17,6 +17,8 @@ namespace {
 using Entry = YamlEntry;
 using Fields = YamlFields;
 
+constexpr double kMostYaw = 3.1416;  // rad, half a turn of four decimals
+
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
   return text;
@@ -236,6 +238,20 @@ void readContacts(const Entry& map, YamlFile& file) {
   }
 }
 
+// A place alone, or {place, yaw}.
+void readFoot(const std::string& contact, const Entry& entry, Reference& reference) {
+  if (!entry.isMap()) {
+    reference.feet[contact] = entry.getVector3();
+    return;
+  }
+  const Fields fields = entry.getFields({"place", "yaw"});
+  reference.feet[contact] = require(fields, "place", entry).getVector3();
+  const Entry* yaw = find(fields, "yaw");
+  if (!yaw) return;
+  reference.yaws[contact] = yaw->getNumber();
+  if (std::abs(reference.yaws[contact]) > kMostYaw) yaw->fail("it is more than half a turn", "give radians, e.g. 0.2");
+}
+
 void readReferences(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
     const Fields fields = entry.getFields({"joints", "height", "feet"});
@@ -250,7 +266,7 @@ void readReferences(const Entry& map, YamlFile& file) {
       reference.height = require(f, "value", *height).getNumber();
     }
     if (const Entry* feet = find(fields, "feet"))
-      for (const auto& [contact, value] : feet->getMap()) reference.feet[contact] = value.getVector3();
+      for (const auto& [contact, value] : feet->getMap()) readFoot(contact, value, reference);
     file.references.push_back(reference);
   }
 }

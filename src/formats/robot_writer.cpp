@@ -207,7 +207,17 @@ class YamlWriter {
         add("value", formatExact(reference.height)) << EndMap;
       }
       if (!reference.feet.empty()) out_ << Key << "feet" << Value << BeginMap;
-      for (const auto& [name, place] : reference.feet) out_ << Key << name << Value << place;
+      for (const auto& [name, place] : reference.feet) {
+        const auto yaw = reference.yaws.find(name);
+        out_ << Key << name << Value;
+        if (yaw == reference.yaws.end()) {
+          out_ << place;
+          continue;
+        }
+        out_ << Flow << BeginMap << Key << "place" << Value << place;
+        add("yaw", yaw->second);
+        out_ << EndMap;
+      }
       if (!reference.feet.empty()) out_ << EndMap;
       out_ << EndMap;
     });

@@ -248,6 +248,11 @@ void ModelBuilder::checkReference(const Reference& reference) const {
     if (model_.findContact(contact) < 0) fail(element, "there is no contact '" + contact + "'", "correct the name");
     if (!position.allFinite()) fail(element, "the place of contact '" + contact + "' is not finite", "correct it");
   }
+  for (const auto& [contact, yaw] : reference.yaws) {
+    if (!reference.feet.count(contact))
+      fail(element, "it gives a yaw to contact '" + contact + "', but no place", "give both");
+    if (!std::isfinite(yaw)) fail(element, "the yaw of contact '" + contact + "' is not finite", "correct it");
+  }
   if (reference.height_frame.empty()) return;
   getFrame(reference.height_frame, element);
   if (!std::isfinite(reference.height)) fail(element, "its height is not finite", "give a height in metres");

@@ -256,8 +256,12 @@ class PartComposer {
       it = std::prev(references.end());
     }
     for (const auto& [joint, values] : own.joints) it->joints[resolve(joint, entry)] = values;
-    for (const auto& [foot, place] : own.feet)
-      it->feet[resolve(foot, entry)] = Vector3d(1, part_.side, 1).cwiseProduct(place);
+    for (const auto& [foot, place] : own.feet) {
+      const std::string contact = resolve(foot, entry);
+      it->feet[contact] = Vector3d(1, part_.side, 1).cwiseProduct(place);
+      it->yaws.erase(contact);
+      if (const auto yaw = own.yaws.find(foot); yaw != own.yaws.end()) it->yaws[contact] = part_.side * yaw->second;
+    }
     if (own.height_frame.empty()) return;
     it->height_frame = resolve(own.height_frame, entry);
     it->height = own.height;

@@ -103,6 +103,7 @@ Model makeSpringBiped(const SpringBipedParameters& p) {
   standing.feet = {{"foot_left", Vector3d(x, p.hip_offset, 0)}, {"foot_right", Vector3d(x, -p.hip_offset, 0)}};
   standing.height_frame = "trunk";
   standing.height = p.stand_height;
+  standing.joints[root.name] = {0, 0, p.stand_height, 0, 0, 0, 1};  // the soles are ahead of the trunk's frame
   for (const char* side : {"_left", "_right"})
     for (const char* joint : {"hip_roll", "hip_yaw", "hip_pitch", "knee"})
       standing.joints[std::string(joint) + side] = {0};

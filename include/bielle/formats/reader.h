@@ -48,7 +48,9 @@
 ///   model.h
 /// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length
 ///   along x, m
-/// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`
+/// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z], contact: {place:
+///   [x, y, z], yaw: rad}}}, ...}`; the height is over the lowest foot. Without a yaw a foot turns freely about the vertical if an
+///   angle but 0 of a joint of its leg about the vertical is given, and else faces as the robot does (makeReferenceProblem)
 /// - `cross_inertia: kg m^2` splits every universal joint into two revolute ones, named after it and their axes (`_Z`,
 ///   `_Y`), with a cross of this inertia about any axis between them
 /// - `importance: {joint: [position, velocity], ...}` weighs joints in the state regularization of motions (default 1,

@@ -184,10 +184,11 @@ struct ContactFrame {
 struct Reference {
   std::string name;
   std::map<std::string, std::vector<double>> joints;  ///< joint name -> its q
-  /// Height of a frame over the soles, with feet flat on the ground under their hips; empty frame: joints alone.
+  /// Height of a frame over the lowest of the feet, with feet flat on the ground; empty frame: joints and feet alone.
   std::string height_frame;
   double height = 0;                     ///< m
   std::map<std::string, Vector3d> feet;  ///< contact frame -> position of its origin, m (world)
+  std::map<std::string, double> yaws;    ///< of those whose heading is given: of its x about the vertical, rad (world)
 };
 
 /// The shape of a body, for distances: a box with rounded edges, all points within `radius` of those with |x_i| <=
