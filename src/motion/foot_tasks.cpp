@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/dynamics/distance.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {
@@ -12,7 +13,7 @@ constexpr double kFree = std::numeric_limits<double>::infinity();
 constexpr double kPosition = 0.01, kAngle = 0.1, kVelocity = 0.1;  // m, rad, m/s and rad/s
 
 // Makes the first rows zero and leaves the others free.
-PathConstraint makeEquation(const std::string& name, std::unique_ptr<Residual> residual, int rows,
+PathConstraint makeEquation(const std::string& name, std::shared_ptr<const Residual> residual, int rows,
                             const VectorXd& scale) {
   VectorXd bound = VectorXd::Constant(scale.size(), kFree);
   bound.head(rows).setZero();
@@ -27,6 +28,13 @@ Shape makeSoleCapsule(const ContactFrame& contact) {
 }
 
 BodyFrame getFrame(const ContactFrame& contact) { return {contact.body, contact.X_BF}; }
+
+// z up, x where that of a foothold lies seen from above.
+Matrix3d makeLevelAxes(const SE3& X_WF) {
+  constexpr double kRounding = 1e-9;  // rad: what faces x does so exactly
+  const double heading = std::atan2(X_WF.R(1, 0), X_WF.R(0, 0));
+  return makeAxisRotation(Vector3d::UnitZ(), std::abs(heading) < kRounding ? 0 : heading);
+}
 
 FootTask& getTask(int contact, FootRole role, StageSpec& stage) {
   for (FootTask& foot : stage.feet)
@@ -92,18 +100,21 @@ void addLanding(const Model& model, int contact, const SE3& X_WF, const LandingR
   const BodyFrame frame = getFrame(foot);
   const bool point = foot.kind == ContactKind::Point3D, edge = foot.kind == ContactKind::Edge5D;
   const Vector3d position = Vector3d::Constant(kPosition), angle = Vector3d::Constant(kAngle);
-  PathConstraint place = point
-                             ? makeEquation("landing of " + foot.name, makeFrameTranslation(frame, X_WF.p), 3, position)
-                             : makeEquation("landing of " + foot.name, makeFramePlacement(frame, X_WF), 6,
-                                            (Vector6d() << position, angle).finished());
+  const Matrix3d axes = makeLevelAxes(X_WF);
+  PathConstraint place = point ? makeEquation("landing of " + foot.name,
+                                              makeTurned(makeFrameTranslation(frame, X_WF.p), axes), 3, position)
+                               : makeEquation("landing of " + foot.name, makeFramePlacement(frame, X_WF), 6,
+                                              (Vector6d() << position, angle).finished());
   const double reach = std::hypot(foot.half_length, foot.half_width);
   if (!point && reach > 0) place.upper[5] = region.turn / reach;
   if (edge) place.upper[3] = kFree;  // it rolls
   place.lower = -place.upper;
   place.upper.head<2>() = region.upper;
   place.lower.head<2>() = region.lower;
-  PathConstraint velocity = makeEquation("landing velocity of " + foot.name, makeFrameVelocity(frame), point ? 3 : 6,
-                                         Vector6d::Constant(kVelocity));
+  PathConstraint velocity =
+      makeEquation("landing velocity of " + foot.name,
+                   makeTurned(makeFrameVelocity(frame), speed > 0 ? axes : Matrix3d(Matrix3d::Identity())),
+                   point ? 3 : 6, Vector6d::Constant(kVelocity));
   velocity.lower.head<3>().setConstant(-speed);
   velocity.upper.head<3>() << speed, speed, -speed;
   if (edge) {

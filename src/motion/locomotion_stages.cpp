@@ -32,16 +32,22 @@ StageSpec makeRegularizedStage(const Scene& scene, const GaitNode& node) {
 }
 
 void addCost(StageSpec& stage, const std::string& name, double weight, const VectorXd& weights,
-             std::unique_ptr<Residual> residual, bool defines = false) {
+             std::shared_ptr<const Residual> residual, bool defines = false) {
   if (weight != 0 && !weights.isZero(0))
     stage.costs.push_back({name, weight, Activation::makeQuadratic(weights), std::move(residual), defines});
+}
+
+// x along a horizontal unit vector, z up.
+Matrix3d makeAxes(const Vector3d& direction) {
+  return (Matrix3d() << direction, Vector3d::UnitZ().cross(direction), Vector3d::UnitZ()).finished();
 }
 
 void addComCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
   addCost(stage, "com", 1, Vector3d(o.com_weight, o.com_weight, o.com_height_weight), makeComPosition(node.com));
-  addCost(stage, "com velocity", o.com_velocity_weight, scene.task.direction.cwiseAbs(),
-          makeComVelocity(scene.task.speed * scene.task.direction));
+  if (!scene.task.direction.isZero(0))
+    addCost(stage, "com velocity", o.com_velocity_weight, Vector3d::UnitX(),
+            makeTurned(makeComVelocity(scene.task.speed * scene.task.direction), makeAxes(scene.task.direction)));
 }
 
 // Of the weight of a swing's velocity, for the turning of a free foot: one that left aslant then turns flat with a time constant of

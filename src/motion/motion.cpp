@@ -192,8 +192,7 @@ void addCone(const Model& model, int c, double friction, double margin, double u
   const ContactFrame& contact = model.contacts()[set.getContact(c)];
   const double X = (1 - margin) * contact.half_length, Y = (1 - margin) * contact.half_width;
   // Points and edges tilt on the ground; a point has no planned attitude.
-  if (contact.kind == ContactKind::Point3D) axes = ForceAxes::World;
-  if (contact.kind == ContactKind::Edge5D) axes = ForceAxes::Ground;
+  if (contact.kind != ContactKind::Surface6D) axes = ForceAxes::Ground;
   std::unique_ptr<Residual> cone = makeWrenchCone(set, c, X, Y, (1 - margin) * friction / std::sqrt(2), axes);
   const int rows = cone->size();
   const double least = 0.01;  // m, of soles without size

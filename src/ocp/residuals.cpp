@@ -2,6 +2,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "math/so3.h"
 #include "ocp/residual_data.h"
 
 namespace bielle {
@@ -41,6 +42,14 @@ class ComVelocity : public DescribedResidual {
   Vector3d reference_;
 };
 
+// The rotation about the vertical by which y lies where it does seen from above; none where it stands upright.
+Matrix3d makeLevel(const Matrix3d& R) {
+  constexpr double kRounding = 1e-9;  // rad: what faces x does so exactly
+  const double heading = std::atan2(-R(0, 1), R(1, 1));
+  if (std::hypot(R(0, 1), R(1, 1)) < 0.5 || std::abs(heading) < kRounding) return Matrix3d::Identity();
+  return makeAxisRotation(Vector3d::UnitZ(), heading);
+}
+
 // Residuals linear or smooth in the force of one contact, F = blockdiag(R, R) E lambda with R = 1 in the axes of the
 // contact, R = R_WF in those of the world and R = R_WT^T R_WF in those of the ground where the contact belongs. E expands the
 // rows of an edge to a wrench, and is the identity otherwise.
@@ -55,7 +64,9 @@ class ForceResidual : public DescribedResidual {
         turns_(axes != ForceAxes::Contact),
         body_(set.closures[constraint].body1),
         R_BF_(set.closures[constraint].X_B1.R) {
-    if (axes == ForceAxes::Ground) R_AW_ = set.closures[constraint].X_B2.R.transpose();
+    const Closure& closure = set.closures[constraint];
+    if (axes == ForceAxes::Ground)
+      R_AW_ = (closure.kind == ClosureKind::Ball3D ? makeLevel(closure.X_B2.R) : closure.X_B2.R).transpose();
     E_.setZero();
     for (int k = 0; k < rows_; ++k) E_.col(k) = expandRows(set.closures[constraint], Force(Force::Unit(rows_, k)));
   }

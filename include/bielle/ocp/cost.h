@@ -83,6 +83,9 @@ std::unique_ptr<Residual> makeFrameTranslation(const BodyFrame& frame, const Vec
 std::unique_ptr<Residual> makeFrameRotation(const BodyFrame& frame, const Matrix3d& R_WT);
 /// Velocity of the frame's origin and angular velocity, in world axes, minus a reference (6), m/s and rad/s.
 std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector6d& reference = Vector6d::Zero());
+/// A residual of vectors in the axes of the world, whose rows are three by three, in other axes A instead; itself where these are
+/// those of the world. Weights and bounds of single rows are then those of a robot that faces along A.
+std::shared_ptr<const Residual> makeTurned(std::shared_ptr<const Residual> vectors, const Matrix3d& R_WA);
 /// Heights of the corners of a sole over the ground (4), of its origin if it has no size (1), m. Around a step the
 /// ground is taken to rise to its top over `ramp` m, so that the residual is continuous, and never exceeds the true
 /// height.
@@ -91,7 +94,7 @@ std::unique_ptr<Residual> makeSoleClearance(const BodyFrame& sole, double half_l
 /// Distance between two shapes (1), m; negative where they overlap (distance.h).
 std::unique_ptr<Residual> makeShapeDistance(const Shape& a, const Shape& b);
 /// The axes in which the force of a contact is expressed: its own, those of the world, or those of the ground, i.e. of the place
-/// where it belongs (ContactTarget::X_WT). Its moment is always about the origin of the contact frame. A sole that rests aslant
+/// where it belongs (ContactTarget::X_WT); of a point's place, which is not level, the heading alone. Its moment is always about the origin of the contact frame. A sole that rests aslant
 /// on an edge is pushed along the normal of the ground, not along its own: with a friction of 0.3 its own cone holds no force that
 /// carries the robot once it leans by 0.3 rad.
 enum class ForceAxes { Contact, World, Ground };
