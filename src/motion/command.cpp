@@ -68,6 +68,7 @@ void checkCommand(const Model& model, const StandingRobot& standing, const Locom
     throw InputError(model.name(), element, "it turns by more than half a turn in a step",
                      "give a lower rate of turning, e.g. 0.4 rad/s");
   const Stance stance = makeStance(model, options, standing);
+  requireLevel(model, listSoles(stance), "walk by commands");
   for (const Side first : {Side::Left, Side::Right}) {
     LocomotionTask task;
     task.name = element;

@@ -96,12 +96,6 @@ void checkSwings(const Model& model, const Stance& stance, const Course& course,
 
 }  // namespace
 
-GroundStep makeStone(const ContactFrame& sole, const SE3& X_WF, double rim) {
-  const double yaw = calcHeading(X_WF), pitch = std::asin(std::clamp(-X_WF.R(2, 0), -1.0, 1.0)),
-               roll = std::atan2(X_WF.R(2, 1), X_WF.R(2, 2));
-  return {X_WF.p, 2 * (sole.half_length + rim), 2 * (sole.half_width + rim), yaw, pitch, roll};
-}
-
 double chooseTread(const Model& model, const Stance& stance, const std::string& option, double requested) {
   constexpr double kUsual = 0.2, kShare = 1.25;  // m; of the sole's length
   constexpr double kSpare = 1e-3;  // before and behind it, m: what a foot in a passed check may slip, and more

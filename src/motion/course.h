@@ -10,9 +10,6 @@ struct Course {
   Ground ground;
 };
 
-// A box under a sole, which it exceeds by `rim` on all sides, with the sole's inclination.
-GroundStep makeStone(const ContactFrame& sole, const SE3& X_WF, double rim);
-
 // Length of ground that bears both soles in the direction of travel, of the option `option`: as requested, or, where that is 0,
 // 0.2 m, or a quarter more than the sole is long. \throws InputError where it is shorter than the sole and a margin
 double chooseTread(const Model& model, const Stance& stance, const std::string& option, double requested);

@@ -11,6 +11,7 @@
 #include "math/constants.h"
 #include "math/so3.h"
 #include "motion/course.h"
+#include "motion/standing_ground.h"
 
 namespace bielle {
 namespace {
@@ -90,9 +91,13 @@ Ground makeGround(const Model& model, const Stance& stance, const std::vector<Fo
   double width = 0, length = 0;
   for (int i = 0; i < 2; ++i) {
     const ContactFrame& sole = model.contacts()[stance.contacts[i]];
-    const Vector3d place = stance.middle.inverseTimes(stance.feet[i]).p;
-    width = std::max(width, 2 * (std::abs(place.y()) + sole.half_width + rim));
-    length = std::max(length, 2 * (std::abs(place.x()) + sole.half_length + rim));
+    const SE3 X_PF = stance.middle.inverseTimes(stance.feet[i]);
+    for (double x : {-sole.half_length, sole.half_length})
+      for (double y : {-sole.half_width, sole.half_width}) {
+        const Vector3d corner = X_PF.act(Vector3d(x, y, 0));
+        width = std::max(width, 2 * (std::abs(corner.y()) + rim));
+        length = std::max(length, 2 * (std::abs(corner.x()) + rim));
+      }
   }
   ground.steps.push_back({stance.middle.p, length, width, calcHeading(stance.middle)});
   return ground;
@@ -146,6 +151,7 @@ MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const St
                      "result");
   listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, standing);
+  requireLevel(model, listSoles(stance), "walk over footholds");
   Course course{"footholds", makeSteps(stance, parseFootholds(o.footholds)), {}};
   course.ground = makeGround(model, stance, course.steps, o.rim);
   MotionPlan plan = planCourse(model, stance, course, o.gait);

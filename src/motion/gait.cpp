@@ -265,7 +265,8 @@ Gait makeGait(const LocomotionTask& task, std::vector<GaitPhase> phases, const G
   }
   p.col(0) = start.com.head<2>();
   p.col(stages) = rest.head<2>();
-  const double height = start.rest.z() - P0.p.z();
+  const double left = plan.start[0].p.z(), right = plan.start[1].p.z();
+  const double height = start.rest.z() - (std::abs(left - right) < kLevelSoles ? P0.p.z() : std::min(left, right));
   solvePendulum((bounce.rise.array() + height) / (gravity * h * h), bounce.load, p);
 
   const VectorXd z = calcHeights(plan, gait, countNodes(timing.stepDuration() / 4, h));

@@ -97,12 +97,11 @@ void addHeightCost(const JumpScene& scene, const std::string& name, double weigh
 }
 
 // Node i of n in flight. The first one is where the feet stood.
-void addFlightConstraints(const JumpScene& scene, int i, int n, StageSpec& stage) {
+void addFlightConstraints(const JumpScene& scene, const Ground& ground, int i, int n, StageSpec& stage) {
   if (i == 0) return;
-  Ground ground;
-  ground.height = scene.before.front().X_WT.p.z();
+  const double ramp = ground.steps.empty() ? 0 : chooseRamp(scene.model, ground, scene.before);
   for (const ContactTarget& start : scene.before)
-    addClearance(scene.model, start.contact, ground, 0, isMidSwing(i, n) ? kMidSwingClearance : 0, stage);
+    addClearance(scene.model, start.contact, ground, ramp, isMidSwing(i, n) ? kMidSwingClearance : 0, stage);
 }
 
 void addTouchdown(const JumpScene& scene, StageSpec& stage) {
@@ -219,7 +218,8 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Standi
   checkHeights(options, model.gravity().norm(), standing.com.z() - scene.before.front().X_WT.p.z());
   MotionPlan plan;
   plan.name = "jump";
-  plan.ground.height = scene.before.front().X_WT.p.z();
+  if (options.length != 0) requireLevel(model, scene.before, "jump forward");
+  plan.ground = makeGroundUnder(model, scene.before);
   plan.ground.friction = options.friction;
   std::vector<StageSpec>& stages = plan.stages;
   const double g = model.gravity().norm();
@@ -245,7 +245,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Standi
       if (phase == JumpPhase::Flight && 2 * i == nodes)
         addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, true, stage);
       if (phase == JumpPhase::Flight && i > 0) addSwingCosts(scene, static_cast<double>(i) / nodes, stage);
-      if (phase == JumpPhase::Flight) addFlightConstraints(scene, i, nodes, stage);
+      if (phase == JumpPhase::Flight) addFlightConstraints(scene, plan.ground, i, nodes, stage);
       if (phase == JumpPhase::Land && i == 0) addTouchdown(scene, stage);
       plan.guess.xs.push_back(makeGuess(scene, phase, i * options.time_step));
       plan.guess.us.push_back(u);

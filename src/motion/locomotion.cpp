@@ -29,6 +29,19 @@ void check(const LocomotionOptions& o) {
                 "give a lower speed, e.g. 0.05");
 }
 
+// The left one if both are level.
+const SE3& getLowerFoot(const Stance& stance) {
+  return stance.feet[stance.feet[1].p.z() < stance.feet[0].p.z() - kLevelSoles ? 1 : 0];
+}
+
+// The same with both feet on the ground on which it steps.
+Stance putDown(const Stance& stance) {
+  Stance down = stance;
+  if (!areLevel(listSoles(stance)))
+    for (SE3& foot : down.feet) foot.p.z() = stance.middle.p.z();
+  return down;
+}
+
 // Rejects requests that no motor torques can satisfy.
 void check(const Scene& scene) {
   constexpr double kStretch = 1.15, kCrouch = 0.6;  // of the legs, over their length in the standing posture
@@ -47,8 +60,8 @@ void check(const Scene& scene) {
              "turn or step less at a time, with more steps");
   }
   // Legs as struts from the middle of the hips' plane, half way between two consecutive footholds at touchdown.
-  const double strut = (scene.stance.com - scene.stance.feet[0].p).norm(),
-               height = scene.stance.com.z() - scene.stance.feet[0].p.z();
+  const Vector3d strut_of_stance = scene.stance.com - getLowerFoot(scene.stance).p;
+  const double strut = strut_of_stance.norm(), height = strut_of_stance.z();
   requireOption(scene.options.swing.height < strut, "swing_height",
                 formatNumber(scene.options.swing.height) + " m is more than the legs are long, " +
                     formatNumber(strut, "%.3g") + " m",
@@ -101,7 +114,8 @@ void keepReach(Scene& scene) {
   std::optional<bool>* reaches = stance.neighbours ? &stance.neighbours->getReach() : nullptr;
   if (reaches && reaches->value_or(false)) return;
   bool all = true;
-  LegReach reach(scene.model, stance);
+  const Stance down = putDown(stance);
+  LegReach reach(scene.model, down);
   Gait& gait = scene.gait;
   const int size = static_cast<int>(gait.nodes.size());
   VectorXd lift(size);
@@ -117,7 +131,7 @@ void keepReach(Scene& scene) {
       lower = std::max(lower, feet[i].p.z() + heights.shortest);
       upper = std::min(upper, feet[i].p.z() + heights.longest);
     }
-    const double z = node.com.z(), margin = kReachMargin * (stance.com.z() - stance.feet[0].p.z());
+    const double z = node.com.z(), margin = kReachMargin * (stance.com.z() - getLowerFoot(stance).p.z());
     all &= lower + margin < z && z < upper - margin;
     lift[k] = (lower < upper ? std::clamp(z, lower, upper) : 0.5 * (lower + upper)) - z;
   }
@@ -151,7 +165,7 @@ std::vector<VectorXd> makeGuesses(const Scene& scene) {
 Gait makeStartingGait(const Model& model, const Stance& stance, const LocomotionTask& task,
                       const LocomotionOptions& options) {
   constexpr double kStep = 0.05, kLongest = 2;  // s
-  const double gravity = model.gravity().norm(), height = stance.com.z() - stance.feet[0].p.z();
+  const double gravity = model.gravity().norm(), height = stance.com.z() - getLowerFoot(stance).p.z();
   const double tau = std::sqrt(height / gravity);
   const double half =
       std::min(model.contacts()[stance.contacts[0]].half_length, model.contacts()[stance.contacts[1]].half_length);
@@ -193,7 +207,14 @@ Stance makeStance(const Model& model, const LocomotionOptions& options, const St
     stance.feet[i] = standing.contacts[static_cast<size_t>(stance.contacts[i])];
   }
   stance.middle = calcMiddle(stance.feet[0], stance.feet[1]);
+  if (!areLevel(listSoles(stance))) stance.middle.p.z() = getLowerFoot(stance).p.z();
   return stance;
+}
+
+std::vector<ContactTarget> listSoles(const Stance& stance) {
+  std::vector<ContactTarget> soles;
+  for (int i = 0; i < 2; ++i) soles.push_back({stance.contacts[i], stance.feet[i]});
+  return soles;
 }
 
 MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
@@ -239,7 +260,9 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   const auto end = task.plan.getStance(static_cast<int>(task.plan.steps.size()));
   plan.goals = makeFootholdGoals(scene, plan.schedule);
   plan.q_start = stance.q;
-  plan.q_end = carryPosture(model, stance.q, calcMiddle(end[0], end[1]) * stance.middle.inverse());
+  plan.q_end = areLevel(listSoles(stance))
+                   ? carryPosture(model, stance.q, calcMiddle(end[0], end[1]) * stance.middle.inverse())
+                   : guess.back().head(model.nq()).eval();  // on level feet
   return plan;
 }
 

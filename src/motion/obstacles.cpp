@@ -39,6 +39,7 @@ MotionPlan planBox(const Model& model, const BoxOptions& options, const Standing
   BoxOptions o = options;
   listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, standing);
+  requireLevel(model, listSoles(stance), "step onto a box");
   o.length = chooseTread(model, stance, "length", o.length);
   checkTreadWidth(model, stance, "width", o.width);
   const double stride = calcHalfLength(model, stance) + o.distance + o.length / 2;
@@ -57,6 +58,7 @@ MotionPlan planBox(const Model& model, const BoxOptions& options, const Standing
 
 MotionPlan planGap(const Model& model, const GapOptions& o, const StandingRobot& standing) {
   const Stance stance = makeStance(model, o.gait, standing);
+  requireLevel(model, listSoles(stance), "step over a gap");
   checkGap(o);
   const double half = calcHalfLength(model, stance), edge = half + o.distance, stride = o.width + 2 * edge;
   Course course{"gap", moveTogether(stance, {Vector3d(stride, 0, 0)}), {}};

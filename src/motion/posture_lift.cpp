@@ -2,9 +2,8 @@
 
 #include <cmath>
 
-#include "model/number_text.h"
-
 #include "math/largest.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {

@@ -52,6 +52,7 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const StandingRobot&
   listOptions(o).check();
   const int steps = o.steps;
   const Stance stance = makeStance(model, o.gait, standing);
+  requireLevel(model, listSoles(stance), "run");
   const double length = o.speed * (o.stance + o.flight);
   std::vector<std::pair<Side, double>> landings;
   for (int i = 1; i <= steps; ++i)
@@ -73,6 +74,7 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const StandingRobot&
 MotionPlan planHop(const Model& model, const HopOptions& o, const StandingRobot& standing) {
   listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, standing);
+  requireLevel(model, listSoles(stance), "hop");
   const Side side = o.foot;
   const int hops = o.hops;
   std::vector<std::pair<Side, double>> landings;

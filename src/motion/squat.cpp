@@ -81,7 +81,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& requested, const St
 
   MotionPlan plan;
   plan.name = "squat";
-  plan.ground.height = level;
+  plan.ground = makeGroundUnder(model, contacts);
   plan.ground.friction = options.friction;
   const int nodes = static_cast<int>(std::ceil((options.duration + 2 * options.settle) / options.time_step - 1e-9));
   plan.schedule.phases = {{nameSupport(contacts.size()), nodes, options.time_step, contacts}};

@@ -49,6 +49,7 @@ MotionPlan planStairs(const Model& model, const StairsOptions& options, const St
   StairsOptions o = options;
   listOptions(o).check();
   const Stance stance = makeStance(model, o.gait, standing);
+  requireLevel(model, listSoles(stance), "climb of stairs");
   o.depth = chooseTread(model, stance, "depth", o.depth);
   checkTreadWidth(model, stance, "width", o.width);
   checkDuration(o);

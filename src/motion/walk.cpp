@@ -8,7 +8,7 @@
 namespace bielle {
 namespace {
 
-// A motion of steps on level ground, and the stance that it starts from.
+// A motion of steps on level ground, where one foot may stand higher at the start, and the stance that it starts from.
 struct StepsPlan {
   MotionPlan motion;
   SE3 start;  // middle of the feet
@@ -23,7 +23,9 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
   LocomotionTask task;
   task.name = name;
   task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, options.steps, first);
-  task.ground.height = stance.middle.p.z();
+  task.ground = makeGroundUnder(model, listSoles(stance));
+  if (!task.ground.steps.empty())  // down from what one foot stands on
+    for (Footstep& step : task.plan.steps) step.X_WF.p.z() = task.ground.height;
   task.direction = stance.middle.R * direction;
   task.speed = speed;
   MotionPlan plan = planLocomotion(model, stance, task, options.gait);

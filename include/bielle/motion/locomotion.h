@@ -84,13 +84,15 @@ void describe(OptionFields& fields, LocomotionOptions& options);
 
 /// The robot as it stands before the first step.
 struct Stance {
-  VectorXd q;                            ///< nq, standing posture
-  Vector3d com;                          ///< m
-  std::array<int, 2> contacts{};         ///< indices of the left and right foot
-  std::array<SE3, 2> feet;               ///< their placements
-  SE3 middle;                            ///< of the feet (calcMiddle)
+  VectorXd q;                     ///< nq, standing posture
+  Vector3d com;                   ///< m
+  std::array<int, 2> contacts{};  ///< indices of the left and right foot
+  std::array<SE3, 2> feet;        ///< their placements
+  SE3 middle;                     ///< of the feet (calcMiddle), where they are not level at the height of the lower
   NeighbourPlans* neighbours = nullptr;  ///< of the standing robot
 };
+/// Both feet where they stand.
+std::vector<ContactTarget> listSoles(const Stance& stance);
 /// \throws InputError when the robot lacks a foot
 Stance makeStance(const Model& model, const LocomotionOptions& options, const StandingRobot& standing);
 

@@ -130,6 +130,16 @@ std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef
 /// All contacts of the robot, held where it stands.
 std::vector<ContactTarget> makeContactTargets(const StandingRobot& standing, double kp, double kd);
 
+/// Soles whose heights differ by less stand on one plane, at the mean of their heights.
+inline constexpr double kLevelSoles = 1e-4;  // m
+/// Whether all stand on one plane.
+bool areLevel(const std::vector<ContactTarget>& soles);
+/// The ground under soles: a plane under the lowest, and a box under each that stands higher, with its inclination. Boxes exceed
+/// soles by 2 cm, or less where another sole is near. Its friction is the default.
+Ground makeGroundUnder(const Model& model, const std::vector<ContactTarget>& soles);
+/// \throws InputError naming the heights of the soles unless they are level   \param motion  that needs it
+void requireLevel(const Model& model, const std::vector<ContactTarget>& soles, const std::string& motion);
+
 /// Names of the contacts of the targets, in their order.
 std::vector<std::string> getContactNames(const Model& model, const std::vector<ContactTarget>& targets);
 
