@@ -94,8 +94,8 @@ std::unique_ptr<Residual> makeSoleClearance(const BodyFrame& sole, double half_l
 /// Distance between two shapes (1), m; negative where they overlap (distance.h).
 std::unique_ptr<Residual> makeShapeDistance(const Shape& a, const Shape& b);
 /// The axes in which the force of a contact is expressed: its own, those of the world, or those of the ground, i.e. of the place
-/// where it belongs (ContactTarget::X_WT); of a point's place, which is not level, the heading alone. Its moment is always about the origin of the contact frame. A sole that rests aslant
-/// on an edge is pushed along the normal of the ground, not along its own: with a friction of 0.3 its own cone holds no force that
+/// where it belongs (ContactTarget::X_WT); of a point's place, which is not level, the heading alone. Its moment is always about
+/// the origin of the contact frame. A sole that rests aslant on an edge is pushed along the normal of the ground, not along its own: with a friction of 0.3 its own cone holds no force that
 /// carries the robot once it leans by 0.3 rad.
 enum class ForceAxes { Contact, World, Ground };
 /// Entries of the force of a contact: 3 of a point, else those of a wrench.
