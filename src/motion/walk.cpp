@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "math/constants.h"
 
@@ -14,6 +15,18 @@ struct StepsPlan {
   SE3 start;  // middle of the feet
 };
 
+// Whether a sole on the plane would be in a box.
+bool isOnBox(const ContactFrame& sole, const SE3& X_WF, const Ground& ground) {
+  constexpr int kPoints = 10;  // in each direction, edges besides
+  for (int i = 0; i <= kPoints; ++i)
+    for (int j = 0; j <= kPoints; ++j) {
+      const Vector3d p =
+          X_WF.act(Vector3d((2.0 * i / kPoints - 1) * sole.half_length, (2.0 * j / kPoints - 1) * sole.half_width, 0));
+      if (ground.calcHeight(p.x(), p.y()) > ground.height) return true;
+    }
+  return false;
+}
+
 // \param direction  in the axes of the feet at the start
 template <typename Options>
 StepsPlan planSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& direction,
@@ -25,7 +38,11 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
   task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, options.steps, first);
   task.ground = makeGroundUnder(model, listSoles(stance));
   if (!task.ground.steps.empty())  // down from what one foot stands on
-    for (Footstep& step : task.plan.steps) step.X_WF.p.z() = task.ground.height;
+    for (Footstep& step : task.plan.steps) {
+      step.X_WF.p.z() = task.ground.height;
+      if (isOnBox(model.contacts()[stance.contacts[static_cast<int>(step.side)]], step.X_WF, task.ground))
+        requireLevel(model, listSoles(stance), std::string(name) + " with a foothold on its higher level");
+    }
   task.direction = stance.middle.R * direction;
   task.speed = speed;
   MotionPlan plan = planLocomotion(model, stance, task, options.gait);
