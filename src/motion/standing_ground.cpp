@@ -61,7 +61,7 @@ void requireLevel(const Model& model, const std::vector<ContactTarget>& soles, c
       std::minmax_element(soles.begin(), soles.end(),
                           [](const ContactTarget& a, const ContactTarget& b) { return a.X_WT.p.z() < b.X_WT.p.z(); });
   const auto describe = [&](const ContactTarget& sole) {
-    return model.contacts()[sole.contact].name + "' at " + formatNumber(1e-6 * std::round(1e6 * sole.X_WT.p.z())) +
+    return model.contacts()[sole.contact].name + "' at " + formatNumber(1e-6 * std::round(1e6 * sole.X_WT.p.z()) + 0.0) +
            " m";
   };
   throw InputError(model.name(), "feet",

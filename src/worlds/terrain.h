@@ -1,9 +1,11 @@
 #pragma once
 /// \file The ground of a world: quick heights and normals, and grounds that no motion was planned for.
 #include <array>
+#include <string>
 #include <vector>
 
 #include "bielle/dynamics/ground.h"
+#include "bielle/motion/motion.h"
 
 namespace bielle::worlds {
 
@@ -72,6 +74,22 @@ class Terrain {
   int columns_ = 0, rows_ = 0;
   std::vector<int> starts_, entries_;  // tops that may cover a cell: entries_[starts_[cell] .. starts_[cell + 1])
 };
+
+/// Where a robot stands: the middle of its soles at the height of the ground under them (makeGroundUnder), z up, x ahead; the world
+/// itself to 1e-9. \param reach  how far soles go ahead of there, m
+struct StandingPlace {
+  SE3 X_WP;
+  double reach = 0;
+};
+StandingPlace findPlace(const Model& model, const std::vector<ContactTarget>& soles);
+/// A ground that is given where the robot stands, in the world.
+Ground carryGround(Ground ground, const SE3& X_WP);
+/// Soles that are in the ground, or over it, by more than 1 mm at their lowest corner; a sentence each.
+std::vector<std::string> describeSoles(const Model& model, const Ground& ground,
+                                       const std::vector<ContactTarget>& soles);
+/// Whether a sole lies on a box of the ground that begins beyond x = `start` of P, in part or all.
+bool reachesBoxes(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles, const SE3& X_WP,
+                  double start);
 
 /// A ramp from x = `start` on, `length` long and `width` wide about y = 0, that rises by `slope` (height over length; negative:
 /// it goes down). \throws InputError on numbers that make no sense, as makeTiles() does

@@ -133,10 +133,11 @@ void describeWorld(OptionFields& fields, SimulateArguments& a) {
   fields.number("accuracy", a.accuracy, "rad, m, relative in velocities", {0, 1},
                 "error per step of worlds that control it, bielle and simbody; 0: the "
                 "world's default; with a motion, bielle takes such steps only if it is given");
-  fields.text("terrain", a.terrain,
-              "planned: the plan's ground; flat; ramp=SLOPE: height over length [1], from x = 0.3 m on; "
-              "tiles=HEIGHT: 0.25 m long, random heights from 0 to HEIGHT [m], from x = 0.2 m on; uneven=HEIGHT: "
-              "likewise, from -HEIGHT to HEIGHT");
+  fields.text(
+      "terrain", a.terrain,
+      "planned: the plan's ground; flat; ramp=SLOPE: height over length [1], from 0.3 m ahead of "
+      "where the robot stands; tiles=HEIGHT: 0.25 m long, random heights from 0 to HEIGHT [m], from 0.2 m ahead; "
+      "uneven=HEIGHT: likewise, from -HEIGHT to HEIGHT; none begins under its toes");
   fields.number("friction", a.friction, "1", {0, 100}, "coefficient of friction of the ground; 0: the plan's");
   fields.integer("seed", a.seed, "seed of the tiles' heights, the jitter, the noise and the robot's errors");
   fields.texts("push", a.pushes,
@@ -196,30 +197,40 @@ std::string makeFlag(std::string name) {
 
 }  // namespace
 
-Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
-  Ground ground;
+WorldGround makeGround(const SimulateArguments& arguments, const Ground& planned, const StandingPlace& place) {
+  constexpr double kBeforeToes = 0.05;  // m
+  WorldGround made;
+  Ground& ground = made.ground;
+  const auto beginAhead = [&](double& start) {
+    if (place.reach > 0) start = std::max(start, place.reach + kBeforeToes);
+    made.start = start;
+  };
   if (arguments.terrain == "planned") {
     ground = planned;
-  } else if (arguments.terrain != "flat") {
+  } else if (arguments.terrain == "flat") {
+    ground = carryGround({}, place.X_WP);
+  } else {
     const auto [name, value] = parseSetting("--terrain", arguments.terrain, "tiles=0.01");
     if (!std::isfinite(value)) throw InputError("", "terrain '" + name + "'", "it is not finite", "e.g. tiles=0.01");
     if (name == "ramp") {
       RampOptions ramp;
       ramp.slope = value;
-      ground = makeRamp(ramp);
+      beginAhead(ramp.start);
+      ground = carryGround(makeRamp(ramp), place.X_WP);
     } else if (name == "tiles" || name == "uneven") {
       TileOptions tiles;
       tiles.height = value;
       if (name == "uneven") tiles.lowest = -value;
       tiles.seed = arguments.seed;
-      ground = makeTiles(tiles);
+      beginAhead(tiles.start);
+      ground = carryGround(makeTiles(tiles), place.X_WP);
     } else {
       throw InputError("", "terrain '" + name + "'", "there is no such terrain",
                        "choose one of: planned, flat, ramp=SLOPE, tiles=HEIGHT, uneven=HEIGHT");
     }
   }
   ground.friction = arguments.friction > 0 ? arguments.friction : planned.friction;
-  return ground;
+  return made;
 }
 
 Payload makePayload(const SimulateArguments& arguments) {

@@ -9,6 +9,7 @@
 #include "model/payload.h"
 #include "worlds/execution.h"
 #include "worlds/robot_errors.h"
+#include "worlds/terrain.h"
 
 namespace bielle::worlds {
 
@@ -79,7 +80,12 @@ void parseOptions(SimulateArguments& arguments);
 /// What the robot of the world carries, and a plan does not know. \throws InputError
 Payload makePayload(const SimulateArguments& arguments);
 
-/// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01". \throws InputError
-Ground makeGround(const SimulateArguments& arguments, const Ground& planned);
+/// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01".
+struct WorldGround {
+  Ground ground;
+  double start = 0;  ///< where ramps and tiles begin, ahead of where the robot stands, m; 0: it has none
+};
+/// \param place  where the robot stands: ramps and tiles lie ahead of it, before its toes   \throws InputError
+WorldGround makeGround(const SimulateArguments& arguments, const Ground& planned, const StandingPlace& place = {});
 
 }  // namespace bielle::worlds

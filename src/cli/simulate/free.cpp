@@ -269,7 +269,10 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   std::vector<MotorSpring> springs;
   for (const std::string& spring : arguments.springs) addSprings(robot.model, spring, start.q, springs);
   const Model model = addMotorSprings(robot.model, springs);
-  const Ground ground = makeGround(arguments, {});
+  const std::vector<ContactTarget> soles = makeContactTargets(makeStandingRobot(model, start.q), 0, 0);
+  StandingPlace place = findPlace(model, soles);
+  place.X_WP.p.z() = 0;  // it may start in the air
+  const Ground ground = makeGround(arguments, {}, place).ground;
   const int pushed_body = findPushedBody(model, arguments.push_body);
   FreeMotionOptions options;
   options.duration = execution.duration;
@@ -279,6 +282,9 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
 
   std::vector<std::string> idle = listIdleOptions(arguments);
   for (const std::string& each : listIdleInFree(arguments, model, options)) idle.push_back(each);
+  for (const ContactTarget& sole : soles)
+    if (sole.X_WT.p.z() < ground.calcHeight(sole.X_WT.p.x(), sole.X_WT.p.y()))
+      for (const std::string& each : describeSoles(model, ground, {sole})) idle.push_back(each);
   tell(idle);
 
   const std::vector<std::string> names = splitWorlds(arguments.world);

@@ -154,6 +154,21 @@ LoadedRobot loadWorldRobot(const Plan& plan, const SimulateArguments& arguments)
   return robot;
 }
 
+// Soles that do not stand on the ground of the world, and terrain that is out of their way.
+std::vector<std::string> listOddGround(const Plan& plan, const Ground& ground, const StandingPlace& place,
+                                       double start) {
+  const Model& model = plan.robot.model;
+  const std::vector<ContactPhase>& phases = plan.schedule.phases;
+  std::vector<std::string> odd = describeSoles(model, ground, phases.front().contacts);
+  const bool is_reached = std::any_of(phases.begin(), phases.end(), [&](const ContactPhase& phase) {
+    return reachesBoxes(model, ground, phase.contacts, place.X_WP, start);
+  });
+  if (start > 0 && !is_reached)
+    odd.push_back("--terrain begins " + formatNumber(start) +
+                  " m ahead of where the robot stands, and no planned foothold is on it: let it walk farther");
+  return odd;
+}
+
 // With random errors.
 Model addErrors(const Plan& plan, const Model& model, const RobotErrors& errors) {
   if (errors.isZero()) return model;
@@ -193,7 +208,9 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   requirePushesToEnd(arguments.execution, plan.reference().duration());
   for (const std::string& each : listIdleInPlan(arguments, plan)) warnings.push_back(each);
   const PlanController controller = makeController(plan, arguments.control);
-  const Ground ground = makeGround(arguments, plan.ground);
+  const StandingPlace place = findPlace(plan.robot.model, plan.schedule.phases.front().contacts);
+  const auto [ground, start] = makeGround(arguments, plan.ground, place);
+  for (const std::string& each : listOddGround(plan, ground, place, start)) warnings.push_back(each);
   const LoadedRobot robot = loadWorldRobot(plan, arguments);
   const double tolerance = controlsError(arguments.world) ? arguments.accuracy : 0;
   const auto world = makeWorld(arguments.world, addErrors(plan, robot.model, arguments.errors),
