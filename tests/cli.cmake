@@ -56,6 +56,11 @@ add_test(NAME results_alone_long COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_S
 add_test(NAME changed_robot COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_changed_robot.py
   $<TARGET_FILE:bielle_command>)
 set_tests_properties(results_alone results_alone_long changed_robot PROPERTIES LABELS system)
+# Where robots stand, and on what.
+add_test(NAME place COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_place.py $<TARGET_FILE:bielle_command>)
+add_test(NAME place_long COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_place.py $<TARGET_FILE:bielle_command>
+  rest)
+set_tests_properties(place place_long PROPERTIES LABELS system)
 add_test(NAME licences COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_licences.py
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(licences PROPERTIES LABELS system)
