@@ -82,6 +82,7 @@ def make_feet(directory, place, yaws=False, base=False, toes=0.0):
 
 def make_keyframe(directory, place):
     path = f"{directory}/robot.xml"
+    os.makedirs(directory, exist_ok=True)
     run("convert", "rsu_biped", "--to", "mjcf", "-o", path)
     with open(path) as file:
         text = file.read()
