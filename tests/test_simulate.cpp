@@ -43,9 +43,8 @@ TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
   CHECK((world > 0 && control > 0 && world + control < whole));
   CHECK_THAT(result.out, Catch::Contains("times real time; world "));
   // Nothing is left of how the plan was solved.
-  for (const char* of_solving :
-       {"formulation", "step", "goals", "converged", "interrupted", "termination", "acceptable", "cost", "iterations",
-        "solver_gap", "constraints", "free_timings", "log"})
+  for (const char* of_solving : {"formulation", "step", "converged", "interrupted", "termination", "acceptable", "cost",
+                                 "iterations", "solver_gap", "constraints", "free_timings", "log"})
     CHECK_FALSE(summary.contains(of_solving));
   const MotionRecord record = readRecord(output + "/trajectory.npz");
   CHECK(record.time[record.time.size() - 1] == Approx(summary["duration"].get<double>()));
