@@ -46,16 +46,22 @@ std::string listDoubts(const Motion& motion, const StartingPoint* start = nullpt
   return doubts;
 }
 
-Footstep makeFoothold(Side side, double x, double y, double z = 0, double yaw = 0, double pitch = 0) {
-  Footstep step{side, {}};
-  step.X_WF.p << x, y, z;
-  step.X_WF.R = makeAxisRotation(Vector3d::UnitZ(), yaw) * makeAxisRotation(Vector3d::UnitY(), pitch);
-  return step;
+std::string makeFoothold(Side side, double x, double y, double z = 0, double yaw = 0, double pitch = 0) {
+  std::string text = side == Side::Left ? "{foot: left" : "{foot: right";
+  for (const auto& [key, value] : {std::pair("x", x), {"y", y}, {"z", z}, {"yaw", yaw}, {"pitch", pitch}})
+    text += std::string(", ") + key + ": " + formatExact(value);
+  return text + "}";
 }
 
-Motion makeStones(const std::vector<Footstep>& steps) {
+std::string listFootholds(const std::vector<std::string>& steps) {
+  std::string list;
+  for (const std::string& step : steps) list += (list.empty() ? "[" : ", ") + step;
+  return list + "]";
+}
+
+Motion makeStones(const std::vector<std::string>& steps) {
   FootholdsOptions options;
-  options.footholds = steps;
+  options.footholds = listFootholds(steps);
   return makeFootholds(getRsuBiped(), options);
 }
 
@@ -295,10 +301,10 @@ TEST_CASE("feasibility: flights that legs cannot give are refused before solving
 }
 
 TEST_CASE("feasibility: a foothold too steep for the ground's friction is doubtful, and not with more of it") {
-  const std::vector<Footstep> steps = {makeFoothold(Side::Right, 0.15, -0.12, 0.04, 0, 0.5),
-                                       makeFoothold(Side::Left, 0.35, 0.12)};
+  const std::vector<std::string> steps = {makeFoothold(Side::Right, 0.15, -0.12, 0.04, 0, 0.5),
+                                          makeFoothold(Side::Left, 0.35, 0.12)};
   FootholdsOptions options;
-  options.footholds = steps;
+  options.footholds = listFootholds(steps);
   options.gait.swing.height = 0.08;
   const std::string doubts = listDoubts(makeFootholds(getRsuBiped(), options));
   CHECK_THAT(doubts, Catch::Contains("foot_right would slip") && Catch::Contains("the ground has 0.7"));
