@@ -236,7 +236,8 @@ def check_yaws(where):
             ends = trajectory["q"][[0, -1], names.index(joint)]
             assert np.abs(ends[0] - angle) < 2e-3 and np.abs(ends[1] - angle) < 0.02, (joint, ends)
         way_walked = trajectory["com"][-1] - trajectory["com"][0]
-        assert abs(math.atan2(way_walked[1], way_walked[0]) - PLACE[3]) < 0.01, way_walked
+        # With toes ahead, too, the centre of mass ends 7 mm beside its way.
+        assert abs(math.atan2(way_walked[1], way_walked[0]) - PLACE[3]) < 0.02, way_walked
 
 
 def check_terrain(where):

@@ -153,7 +153,7 @@ TEST_CASE("solve --model serial tells what it leaves out, lift carries the motio
     CHECK(result.status == 0);
     CHECK_THAT(result.out, Catch::Contains("lifted: all 31 nodes") && Catch::Contains("motor_knee_left"));
     CHECK(directory.list(method) ==
-          std::vector<std::string>{"lift.json", "summary.json", "trajectory.csv", "trajectory.npz"});
+          std::vector<std::string>{"lift.json", "mechanism.urdf", "mechanism.yaml", "summary.json", "trajectory.csv", "trajectory.npz"});
     const json summary = json::parse(readFile(directory.str(method) + "/summary.json"));
     CHECK(summary["model"] == "closed");
     CHECK(summary["converged"] == true);

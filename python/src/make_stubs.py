@@ -207,7 +207,8 @@ def make_motions():
              f"{COMMON}) -> Result: ..."]  # fmt: skip
     for name, motion in bielle.motions().items():
         function = getattr(bielle, "solve_" + name.replace("-", "_"))
-        options = [f"{key}: {type(o['default']).__name__} = ..." for key, o in motion["options"].items()]
+        options = [f"{key}: {type(o['default']).__name__} = ..." for key, o in motion["options"].items()
+                   if key not in motion["files"]]
         options += [f"{key}: str" for key in motion["files"]]
         lines += ["", f"def {function.__name__}(robot: Union[str, Robot], *, {', '.join(options)}, {COMMON}) -> Result:"]
         lines += make_doc(function.__doc__, "    ") + ["    ..."]

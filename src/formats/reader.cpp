@@ -369,7 +369,7 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
 
   const BaseKind base = overriding.value_or(yaml.base.value_or(BaseKind::Free));
   if (urdf.has_own_base && base == BaseKind::Fixed) fixBase(urdf, yaml);
-  if (urdf.root == "world") placeBase(urdf, yaml);
+  if (urdf.is_urdf && urdf.root == "world") placeBase(urdf, yaml);
   ModelBuilder builder(urdf.name, urdf.path);
   addRoot(urdf, base, builder);
   addJoints(urdf, yaml, builder);

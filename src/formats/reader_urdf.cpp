@@ -372,6 +372,7 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
                      "correct the element");
   UrdfFile file;
   file.path = path;
+  file.is_urdf = true;
   file.name = tree.robot;
   file.root = tree.root;
   file.warnings = std::move(tree.warnings);

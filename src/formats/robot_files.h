@@ -38,6 +38,7 @@ struct UrdfFile {
   std::vector<UrdfJoint> joints;
   std::vector<std::string> warnings;
   bool has_own_base = false;  ///< it says itself what is free: the option of a free base has no effect
+  bool is_urdf = false;       ///< its floating joints have origins, from which other formats do not count
 };
 
 /// Joint kind that replaces that of the URDF, with the axes of a universal joint in the joint's frame.
