@@ -37,7 +37,7 @@ for bad in "${BAD:-/nowhere}"/*; do
     status) status=$((1 - status)) ;;
     cut) number='1' ; cut=1 ;;
     missing) exit 0 ;;
-    strange) exit 3 ;;
+    strange) exit 4 ;;
     killed) kill -9 $$ ;;
     large) mkdir -p "$out"; head -c 5000000 /dev/zero | tr '\0' ' ' > "$out/summary.json" ;;
     link) mkdir -p "$out"; ln -s /etc/passwd "$out/summary.json"; exit $status ;;
@@ -161,7 +161,7 @@ def test_bad_results():
     told = read("bad.log")
     assert not os.listdir("bad") and told.count("; retrying") == len(kinds), told
     for words in ("distance is not a number", "no outcome 'flew'", "exit status was", "parse error", "did not write it",
-                  "exit status 3", "signal 9", "larger than"):
+                  "exit status 4", "signal 9", "larger than"):
         assert words in told, (words, told)
     check_same("poisoned")
     shutil.rmtree("bad")

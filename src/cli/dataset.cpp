@@ -70,9 +70,9 @@ std::string describeShortfall(const DatasetEntry& entry) {
   if (!entry.error.empty()) return entry.error;
   if (!entry.converged) return "the solver did not converge";
   if (!entry.passed) return "the check did not pass";
-  if (!entry.met) return "a goal was missed";
+  if (entry.outcome == "fell") return "it fell in simulation";  // and so missed its goals
   if (entry.outcome == "not decided") return "it is not decided whether it stands";
-  return entry.outcome == "fell" ? "it fell in simulation" : "the simulation failed";
+  return entry.met ? "the simulation failed" : "a goal was missed";
 }
 
 // What the page shows of a motion (dataset.js).
