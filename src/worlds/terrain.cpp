@@ -7,6 +7,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/motion/footsteps.h"
+#include "bielle/motion/motion.h"
 #include "math/so3.h"
 #include "model/number_text.h"
 
@@ -172,7 +173,7 @@ Terrain::Touch Terrain::touch(const Vector3d& point, const Vector3d& from) const
 }
 
 template <typename Top>
-Clipped clip(const Top& top, const Terrain::Corners& corners) {
+static Clipped clip(const Top& top, const Terrain::Corners& corners) {
   const Eigen::Vector2d centre(top.x, top.y), axes[] = {{top.cos, top.sin}, {-top.sin, top.cos}};
   const double halves[] = {top.half_length - kInside, top.half_width - kInside};
   Clipped part(corners);
@@ -226,14 +227,17 @@ void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double
       place.distance = distance;
     }
   });
-  // Places that are at the ground, or found an edge and then a corner, are not asked again.
+  // A top that lies in several cells is visited again: corners that have a place are left.
   visit([&](const Top& top) {
     const auto isFree = [&](const Place& place) { return place.top == &top; };
     if (std::none_of(places.begin(), places.end(), isFree)) return;
     const Clipped part = clip(top, corners);
     for (size_t i = 0; i < part.size(); ++i) {
       const auto isHere = [&](const Eigen::Vector2d& at) { return (at - part[i]).squaredNorm() < kInside * kInside; };
-      if (std::any_of(corners.begin(), corners.end(), isHere) || !bears(top, part[i])) continue;
+      const auto isTaken = [&](const Place& place) { return isHere(place.support); };
+      if (std::any_of(corners.begin(), corners.end(), isHere) || std::any_of(places.begin(), places.end(), isTaken) ||
+          !bears(top, part[i]))
+        continue;
       Place* nearest = nullptr;
       for (Place& place : places)
         if (isFree(place) &&

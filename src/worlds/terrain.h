@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bielle/dynamics/ground.h"
-#include "bielle/motion/motion.h"
+#include "bielle/ocp/contact_schedule.h"
 
 namespace bielle::worlds {
 
