@@ -162,8 +162,8 @@ def check_motion(where, way, make, motion, arguments, places):
     home = f"{where}/{way.replace(' ', '-')}"
     at_home = solve(home, make(home, (0, 0, 0, 0)), motion, arguments)
     was, trajectory = read(at_home)
-    for i, place in enumerate(places):
-        there = f"{home}-{i}"
+    for place in places:
+        there = f"{home}-{(OTHERS + [PLACE]).index(place)}"
         name = f"{motion}, {way}, at {place}"
         result = solve(there, make(there, place), motion, arguments)
         now, moved = read(result)
