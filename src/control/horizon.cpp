@@ -5,6 +5,7 @@
 
 #include "bielle/model/error.h"
 #include "control/window_grid.h"
+#include "motion/robot_size.h"
 
 namespace bielle {
 namespace {
@@ -31,6 +32,7 @@ StateCost makeEndCost(const Model& model, const VectorXd& q, const VectorXd& joi
     weights.head<6>() << o.end_place, o.end_place, o.end_posture, o.end_posture, o.end_posture, o.end_place;
     weights.segment<6>(nv).setConstant(o.end_velocity);
   }
+  scaleStateWeights(model, calcRobotSize(model, makeStandingRobot(model, q)), weights);
   return {1, q, VectorXd::Zero(nv), weights};
 }
 

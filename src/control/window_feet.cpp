@@ -8,7 +8,8 @@
 namespace bielle {
 namespace {
 
-constexpr int kEarly = 2;               // stages before its landing at which a foot counts as early
+constexpr int kEarly = 2;  // stages before its landing at which a foot counts as early
+// Of the reference robot (motion/robot_size.h).
 constexpr double kLandingWay = 0.01;    // that it may then be farther off than where it may land, m
 constexpr double kLoweringSpeed = 0.3;  // m/s
 constexpr double kDepth = 0.05;         // to which it is lowered, m
@@ -34,7 +35,7 @@ bool WindowPlanner::isOverFoothold(int landing, int contact, ConstVectorRef q) {
   const ContactFrame& foot = model_.contacts()[contact];
   updatePlacements<double>(model_, feet_, q);
   const Vector3d off = X_WT.R.transpose() * (getPlacement(feet_, foot.body, foot.X_BF).p - X_WT.p);
-  const double room = getLandingRoom(contact, getSpec(landing)) + kLandingWay;
+  const double room = getLandingRoom(contact, getSpec(landing)) + kLandingWay * size_.length;
   return off.head<2>().cwiseAbs().maxCoeff() <= room;
 }
 
@@ -74,7 +75,7 @@ void WindowPlanner::lower(int foot, int landing) {
   late_ = {foot, landing, 0};
   for (int k = landing - kLowering; k <= landing; ++k) {
     StageSpec spec = getSpec(k);
-    lowerFoot(model_, foot, kLoweringSpeed, spec);
+    lowerFoot(model_, foot, kLoweringSpeed * size_.velocity(), spec);
     problem_.replaceStage(horizon_->getNode(k), std::move(spec));
   }
   lowered_ = true;
@@ -97,7 +98,7 @@ int WindowPlanner::chooseNext(const Request& request, Solution& solution) {
   }
   const int begin = late_.landing - kLowering;
   if (!request.again) late_.waited += horizon_->getStart(begin + 1) - horizon_->getStart(begin);
-  if (!contacts[late_.foot] && kLoweringSpeed * late_.waited < kDepth) return begin;
+  if (!contacts[late_.foot] && kLoweringSpeed * late_.waited < kDepth * size_.time) return begin;
   late_.foot = -1;
   return late_.landing;
 }

@@ -14,12 +14,13 @@ constexpr int kAhead = 3;             // stages of a policy: what is left when s
 constexpr int kAheadIfLate = 8;       // or where they may come late
 constexpr int kFirstIterations = 10;  // of the solve before the start
 
-RecedingOptions makeSolverOptions(const PredictiveOptions& options, int iterations) {
+RecedingOptions makeSolverOptions(const PredictiveOptions& options, const RobotSize& size, int iterations) {
   RecedingOptions out;
   out.threads = options.threads;
   out.iterations = iterations;
-  out.initial_regularization = out.min_regularization = options.regularization;
-  out.gradient_tolerance = 0;  // steps near the optimum are like others
+  out.initial_regularization = out.min_regularization = options.regularization / (size.torque * size.torque);
+  out.state_regularization_ratio = 0;  // of angles, lengths and speeds, which no common number suits
+  out.gradient_tolerance = 0;          // steps near the optimum are like others
   // One penalty for all solves: each takes a few iterations only, and multipliers are moved on from one to the next.
   out.constraints.initial_penalty = options.penalty;
   out.constraints.penalty_increase = 1;
@@ -44,6 +45,7 @@ WindowPlanner::WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveO
       horizon_(std::move(horizon)),
       problem_(horizon_->getProblem()),
       model_(problem_.model()),
+      size_(calcRobotSize(model_, makeStandingRobot(model_, startPosture()))),
       grid_(*horizon_, options_),
       window_(problem_, options.nodes),
       evaluator_(problem_),
@@ -68,6 +70,7 @@ WindowPlanner::Solution WindowPlanner::makeEmpty() const {
 }
 
 WindowPlanner::Solution WindowPlanner::makeFirst() {
+  if (horizon_->isSolved()) aimFootholds();
   startFromGuess(0);
   if (!horizon_->isSolved()) solveFromRest();
   Receding first = makeSolver(kFirstIterations);
@@ -130,7 +133,7 @@ void WindowPlanner::prepare() {
 bool WindowPlanner::isPrepared(int first) const { return prepared_ && !lowered_ && grid_.begin() == first; }
 
 Receding WindowPlanner::makeSolver(int iterations) const {
-  return Receding(window_, makeSolverOptions(options_, iterations));
+  return Receding(window_, makeSolverOptions(options_, size_, iterations));
 }
 
 // From a guess that stands still, step by step to the end.

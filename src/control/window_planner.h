@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/impact.h"
 #include "control/window_grid.h"
+#include "motion/robot_size.h"
 #include "solve/receding.h"
 #include "solve/stopwatch.h"
 #include "solve/window.h"
@@ -75,6 +76,18 @@ class WindowPlanner {
   void keepGains(int phase, const RowMatrixXd& K);
   void makePolicy(const Receding& solver, int stage, Solution& solution);
 
+  // window_aims.cpp
+  struct AimedLanding {
+    int stage = 0, contact = 0;
+    StageSpec free;  // as it was made
+    // Of the cost by the distance from the foothold along its x and y, 1/m; and that where the foot lands, m.
+    Eigen::Vector2d slope = Eigen::Vector2d::Zero(), off = Eigen::Vector2d::Zero();
+  };
+  void aimFootholds();
+  Eigen::Vector2d findSlope(const AimedLanding& landing);
+  void aim(const AimedLanding& landing);
+  void walkThrough(std::vector<AimedLanding>& landings);
+
   // window_feet.cpp
   bool stands(int stage, int contact) const;
   const SE3& getFoothold(int stage, int contact) const;
@@ -91,6 +104,7 @@ class WindowPlanner {
   const std::unique_ptr<Horizon> horizon_;
   RobotProblem& problem_;
   Model model_;
+  const RobotSize size_;
   WindowGrid grid_;
   Window window_;
   RobotEvaluator evaluator_;

@@ -16,8 +16,9 @@ constexpr int kForeseenSteps = 2;    // beyond that whose stages are made; one m
 LocomotionOptions complete(const Model& model, LocomotionOptions options, const StandingRobot& standing) {
   options.timing.flight = options.landing_speed = 0;
   options.rigid_landing = false;
-  if (options.timing.time_step == 0)
-    options.timing.time_step = std::min(kTimeStep, calcSpringStage(model, makeStance(model, options, standing)));
+  const Stance stance = makeStance(model, options, standing);
+  if (options.timing.time_step == 0) options.timing.time_step = std::min(kTimeStep, calcSpringStage(model, stance));
+  scaleWeights(calcRobotSize(model, stance), options);
   return options;
 }
 
@@ -144,12 +145,14 @@ CommandedWalk::Segment CommandedWalk::planSegment(const Stance& stance) {
 void CommandedWalk::makeStages() {
   const Stance stance = makeStanceHere();
   Segment segment = planSegment(stance);
+  const RobotSize size = calcRobotSize(model_, standing_);
   const Scene scene{model_,
                     stance,
                     segment.task,
                     options_,
+                    size,
                     std::move(segment.gait),
-                    makeStageWeights(model_, options_),
+                    makeStageWeights(model_, size, options_),
                     chooseRamp(model_, segment.task.ground, {})};
   std::vector<StageSpec> specs;
   std::vector<Stage> made(segment.nodes);

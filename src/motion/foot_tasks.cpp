@@ -9,7 +9,7 @@ namespace bielle {
 namespace {
 
 constexpr double kFree = std::numeric_limits<double>::infinity();
-// Violations that count as 1.
+// Violations that count as 1, of the reference robot.
 constexpr double kPosition = 0.01, kAngle = 0.1, kVelocity = 0.1;  // m, rad, m/s and rad/s
 
 // Makes the first rows zero and leaves the others free.
@@ -94,12 +94,12 @@ LandingRegion findLandingRegion(const ContactFrame& foot, const SE3& X_WF, doubl
   return region;
 }
 
-void addLanding(const Model& model, int contact, const SE3& X_WF, const LandingRegion& region, double speed,
-                StageSpec& stage) {
+void addLanding(const Model& model, const RobotSize& size, int contact, const SE3& X_WF, const LandingRegion& region,
+                double speed, StageSpec& stage) {
   const ContactFrame& foot = model.contacts()[contact];
   const BodyFrame frame = getFrame(foot);
   const bool point = foot.kind == ContactKind::Point3D, edge = foot.kind == ContactKind::Edge5D;
-  const Vector3d position = Vector3d::Constant(kPosition), angle = Vector3d::Constant(kAngle);
+  const Vector3d position = Vector3d::Constant(kPosition * size.length), angle = Vector3d::Constant(kAngle);
   const Matrix3d axes = makeLevelAxes(X_WF);
   PathConstraint place = point ? makeEquation("landing of " + foot.name,
                                               makeTurned(makeFrameTranslation(frame, X_WF.p), axes), 3, position)
@@ -111,10 +111,11 @@ void addLanding(const Model& model, int contact, const SE3& X_WF, const LandingR
   place.lower = -place.upper;
   place.upper.head<2>() = region.upper;
   place.lower.head<2>() = region.lower;
-  PathConstraint velocity =
-      makeEquation("landing velocity of " + foot.name,
-                   makeTurned(makeFrameVelocity(frame), speed > 0 ? axes : Matrix3d(Matrix3d::Identity())),
-                   point ? 3 : 6, Vector6d::Constant(kVelocity));
+  Vector6d rates;
+  rates << Vector3d::Constant(kVelocity * size.velocity()), Vector3d::Constant(kVelocity / size.time);
+  PathConstraint velocity = makeEquation(
+      "landing velocity of " + foot.name,
+      makeTurned(makeFrameVelocity(frame), speed > 0 ? axes : Matrix3d(Matrix3d::Identity())), point ? 3 : 6, rates);
   velocity.lower.head<3>().setConstant(-speed);
   velocity.upper.head<3>() << speed, speed, -speed;
   if (edge) {
@@ -133,13 +134,14 @@ double getLandingRoom(int contact, const StageSpec& stage) {
   return kFree;
 }
 
-void addClearance(const Model& model, int contact, const Ground& ground, double ramp, double least, StageSpec& stage) {
+void addClearance(const Model& model, const RobotSize& size, int contact, const Ground& ground, double ramp,
+                  double least, StageSpec& stage) {
   const ContactFrame& foot = model.contacts()[contact];
   std::shared_ptr<const Residual> residual =
       makeSoleClearance(getFrame(foot), foot.half_length, foot.half_width, ground, ramp);
   const int n = residual->size();
   stage.path_constraints.push_back({"clearance of " + foot.name, residual, VectorXd::Constant(n, least),
-                                    VectorXd::Constant(n, kFree), VectorXd::Constant(n, kPosition)});
+                                    VectorXd::Constant(n, kFree), VectorXd::Constant(n, kPosition * size.length)});
   getTask(contact, FootRole::Swing, stage).clearance = residual;
 }
 
@@ -179,33 +181,33 @@ double chooseRamp(const Model& model, const Ground& ground, const std::vector<Co
   return std::max(kLeast, room);
 }
 
-void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing, const SE3& X_standing,
-                 double least, StageSpec& stage) {
-  constexpr double kTracking = 0.01;  // m
+void addDistance(const RobotSize& size, const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing,
+                 const SE3& X_standing, double least, StageSpec& stage) {
+  constexpr double kTracking = 0.01;  // of the reference robot, m
   for (const ContactFrame* contact : {&swinging, &standing})
     if (contact->half_length == 0) return;
   const Shape a = makeSoleCapsule(swinging), b = makeSoleCapsule(standing);
   const double of_path =
       calcDistance(a, X_path * swinging.X_BF.inverse(), b, X_standing * standing.X_BF.inverse()).distance;
   stage.path_constraints.push_back({"distance of " + swinging.name + " and " + standing.name, makeShapeDistance(a, b),
-                                    VectorXd::Constant(1, std::min(least, of_path - kTracking)),
-                                    VectorXd::Constant(1, kFree), VectorXd::Constant(1, kPosition)});
+                                    VectorXd::Constant(1, std::min(least, of_path - kTracking * size.length)),
+                                    VectorXd::Constant(1, kFree), VectorXd::Constant(1, kPosition * size.length)});
 }
 
-void addRest(const Model& model, StageSpec& terminal) {
+void addRest(const Model& model, const RobotSize& size, StageSpec& terminal) {
   std::vector<PathConstraint>& constraints = terminal.path_constraints;
   const bool flies = model.hasFreeFlyer(), is_planar = hasPlanarBase(model);
   Vector3d bound(flies ? 0 : kFree, flies ? 0 : kFree, 0);
   if (is_planar)  // along the axes of the world that are in its plane
     bound = model.joints()[1].axis.cwiseAbs().unaryExpr([](double x) { return x > 0.5 ? kFree : 0.0; });
   constraints.push_back({"rest of the centre of mass at the end", makeComVelocity(Vector3d::Zero()), -bound, bound,
-                         Vector3d::Constant(kVelocity)});
+                         Vector3d::Constant(kVelocity * size.velocity())});
   if (flies)
-    constraints.push_back(
-        makeEquation("rest of the torso at the end", makeJointVelocity({3, 4, 5}), 3, Vector3d::Constant(kVelocity)));
+    constraints.push_back(makeEquation("rest of the torso at the end", makeJointVelocity({3, 4, 5}), 3,
+                                       Vector3d::Constant(kVelocity / size.time)));
   if (is_planar)
-    constraints.push_back(
-        makeEquation("rest of the torso at the end", makeJointVelocity({2}), 1, VectorXd::Constant(1, kVelocity)));
+    constraints.push_back(makeEquation("rest of the torso at the end", makeJointVelocity({2}), 1,
+                                       VectorXd::Constant(1, kVelocity / size.time)));
 }
 
 }  // namespace bielle

@@ -2,6 +2,7 @@
 // What feet do in a stage (StageSpec::feet), with their costs and constraints; and constraints of the end of a motion. Contacts are
 // indices in the model.
 #include "bielle/motion/motion.h"
+#include "motion/robot_size.h"
 
 namespace bielle {
 
@@ -21,14 +22,15 @@ LandingRegion findLandingRegion(const ContactFrame& foot, const SE3& X_WF, doubl
 
 // The sole lies at a place, at rest; of a contact at a point only the point does. It may be off as far as the region goes, and
 // it comes down at `speed`, m/s.
-void addLanding(const Model& model, int contact, const SE3& X_WF, const LandingRegion& region, double speed,
-                StageSpec& stage);
+void addLanding(const Model& model, const RobotSize& size, int contact, const SE3& X_WF, const LandingRegion& region,
+                double speed, StageSpec& stage);
 
 // How far from its foothold a foot may land with this stage, along x and y, m; infinite where the stage has no landing of it.
 double getLandingRoom(int contact, const StageSpec& stage);
 
 // All corners of the sole are at least `least` m over the ground, whose steps have ramps (makeSoleClearance).
-void addClearance(const Model& model, int contact, const Ground& ground, double ramp, double least, StageSpec& stage);
+void addClearance(const Model& model, const RobotSize& size, int contact, const Ground& ground, double ramp,
+                  double least, StageSpec& stage);
 // Whether check and motion ask for full clearance at node i of n in the air: in the middle half.
 inline bool isMidSwing(int i, int n) { return 4 * i >= n && 4 * i <= 3 * n; }
 inline constexpr double kMidSwingClearance = 6e-3;  // m
@@ -41,8 +43,8 @@ double chooseRamp(const Model& model, const Ground& ground, const std::vector<Co
 
 // A foot in the air stays at least `least` m from a standing one, or from where its path leads, less a centimetre if
 // that is nearer. Soles count as capsules: their middle lines, as thick as they are wide.
-void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing, const SE3& X_standing,
-                 double least, StageSpec& stage);
+void addDistance(const RobotSize& size, const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing,
+                 const SE3& X_standing, double least, StageSpec& stage);
 
 // Whether the first body moves freely in a plane: along two axes, and by an angle, its coordinate 2.
 inline bool hasPlanarBase(const Model& model) {
@@ -52,6 +54,6 @@ inline bool hasPlanarBase(const Model& model) {
 // The motion ends with the centre of mass at rest and without rotation of the torso. With the feet on the ground, all
 // other velocities follow from these; constraints on them too would contradict what contacts are off by. Of a robot on
 // a rail that leaves the vertical velocity alone, of one in a plane those along it.
-void addRest(const Model& model, StageSpec& terminal);
+void addRest(const Model& model, const RobotSize& size, StageSpec& terminal);
 
 }  // namespace bielle

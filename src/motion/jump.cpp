@@ -6,8 +6,8 @@
 #include "model/number_text.h"
 #include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
-#include "motion/motor_scale.h"
 #include "motion/quintic.h"
+#include "motion/robot_size.h"
 
 namespace bielle {
 namespace {
@@ -15,7 +15,8 @@ namespace {
 // Data common to all stages.
 struct JumpScene {
   const Model& model;
-  const JumpOptions& options;
+  JumpOptions options;  // whose weights suit the size
+  RobotSize size;
   JumpFigures figures;
   const StandingRobot& standing;      // at the start
   VectorXd state_weights;             // 2 nv
@@ -70,7 +71,7 @@ StageSpec makeStage(const JumpScene& scene, const std::vector<ContactTarget>& co
   stage.constraints = makeConstraintSet(model, contacts);
   setClosureGains({o.contact_kp, o.contact_kd}, stage.constraints);
   stage.state = {o.state_weight, scene.standing.q, VectorXd::Zero(model.nv()), scene.state_weights};
-  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
+  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model, scene.size)};
   return stage;
 }
 
@@ -101,11 +102,13 @@ void addFlightConstraints(const JumpScene& scene, const Ground& ground, int i, i
   if (i == 0) return;
   const double ramp = ground.steps.empty() ? 0 : chooseRamp(scene.model, ground, scene.before);
   for (const ContactTarget& start : scene.before)
-    addClearance(scene.model, start.contact, ground, ramp, isMidSwing(i, n) ? kMidSwingClearance : 0, stage);
+    addClearance(scene.model, scene.size, start.contact, ground, ramp, isMidSwing(i, n) ? kMidSwingClearance : 0,
+                 stage);
 }
 
 void addTouchdown(const JumpScene& scene, StageSpec& stage) {
-  for (const ContactTarget& target : scene.after) addLanding(scene.model, target.contact, target.X_WT, {}, 0, stage);
+  for (const ContactTarget& target : scene.after)
+    addLanding(scene.model, scene.size, target.contact, target.X_WT, {}, 0, stage);
 }
 
 StageSpec makeTerminalStage(const JumpScene& scene) {
@@ -113,9 +116,10 @@ StageSpec makeTerminalStage(const JumpScene& scene) {
   StageSpec stage = makeStage(scene, {});
   stage.constraints = {};
   stage.control.weight = 0;
-  stage.costs.push_back({"com", o.terminal_weight, Activation::makeQuadratic(Vector3d::Ones()),
+  stage.state.weight *= scene.size.time;
+  stage.costs.push_back({"com", o.terminal_weight * scene.size.time, Activation::makeQuadratic(Vector3d::Ones()),
                          makeComPosition(scene.standing.com + scene.shift), true});
-  addRest(scene.model, stage);
+  addRest(scene.model, scene.size, stage);
   return stage;
 }
 
@@ -133,12 +137,22 @@ void checkHeights(const JumpOptions& o, double gravity, double height) {
   }
 }
 
+JumpOptions suit(const RobotSize& size, JumpOptions o) {
+  scaleWeights(size, o);
+  for (double* weight : {&o.apex_weight, &o.com_weight, &o.swing_weight, &o.terminal_weight})
+    *weight /= size.length * size.length * size.time;
+  o.swing_rotation_weight /= size.time;
+  return o;
+}
+
 JumpScene makeScene(const Model& model, const JumpOptions& o, const StandingRobot& standing) {
+  const RobotSize size = calcRobotSize(model, standing);
   const std::vector<ContactTarget> feet = makeContactTargets(standing, o.contact_kp, o.contact_kd);
   const JumpFigures figures = calcJumpFigures(o, model.gravity().norm());
-  JumpScene scene{model, o, figures, standing, makeStateWeights(model), {}, {}, feet, feet};
+  JumpScene scene{model, suit(size, o), size, figures, standing, makeStateWeights(model), {}, {}, feet, feet};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, scene.state_weights);
+  scaleStateWeights(model, size, scene.state_weights);
   Vector3d forward = Vector3d::Zero();
   for (const SE3& foot : standing.contacts) forward += foot.R.col(0);
   scene.forward = Vector3d(forward.x(), forward.y(), 0).normalized();
@@ -223,7 +237,8 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Standi
   plan.ground.friction = options.friction;
   std::vector<StageSpec>& stages = plan.stages;
   const double g = model.gravity().norm();
-  const GroundCosts ground{options.force_weight, options.pressure_weight};
+  const JumpOptions& o = scene.options;
+  const GroundCosts ground{o.force_weight, o.pressure_weight, ForceAxes::Contact, scene.size.length};
   for (JumpPhase phase : {JumpPhase::Stand, JumpPhase::Push, JumpPhase::Flight, JumpPhase::Land, JumpPhase::Settle}) {
     const bool over = phase == JumpPhase::Land || phase == JumpPhase::Settle;
     const std::vector<ContactTarget> none,
@@ -241,9 +256,9 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Standi
       const double load = model.mass() * (g + com.acceleration);  // on all feet together, Eq. (2)
       addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
       addWrenchCones(model, options.friction, options.cone_margin, stage);
-      if (phase != JumpPhase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, false, stage);
+      if (phase != JumpPhase::Flight) addHeightCost(scene, "com height", o.com_weight, com.height, false, stage);
       if (phase == JumpPhase::Flight && 2 * i == nodes)
-        addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, true, stage);
+        addHeightCost(scene, "apex", o.apex_weight * scene.size.time / o.time_step, com.height, true, stage);
       if (phase == JumpPhase::Flight && i > 0) addSwingCosts(scene, static_cast<double>(i) / nodes, stage);
       if (phase == JumpPhase::Flight) addFlightConstraints(scene, plan.ground, i, nodes, stage);
       if (phase == JumpPhase::Land && i == 0) addTouchdown(scene, stage);

@@ -223,8 +223,15 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   LocomotionOptions options = requested;
   if (options.timing.time_step == 0)
     options.timing.time_step = chooseTimeStep(task, options.timing, options.swing, calcSpringStage(model, stance));
-  Scene scene{
-      model, stance, task, options, makeStartingGait(model, stance, task, options), makeStageWeights(model, options)};
+  const RobotSize size = calcRobotSize(model, stance);
+  scaleWeights(size, options);
+  Scene scene{model,
+              stance,
+              task,
+              options,
+              size,
+              makeStartingGait(model, stance, task, options),
+              makeStageWeights(model, size, options)};
   check(scene);
   if (options.timing.flight == 0) keepReach(scene);
   std::vector<ContactTarget> soles;

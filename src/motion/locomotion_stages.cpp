@@ -5,7 +5,6 @@
 #include "bielle/dynamics/kinematics.h"
 #include "math/so3.h"
 #include "motion/foot_tasks.h"
-#include "motion/motor_scale.h"
 
 namespace bielle {
 namespace {
@@ -27,7 +26,7 @@ StageSpec makeRegularizedStage(const Scene& scene, const GaitNode& node) {
   stage.state = {scene.options.state_weight, scene.stance.q, VectorXd::Zero(model.nv()), scene.state_weights};
   stage.state.q_ref.segment<4>(3) = makeHeading(scene, node);
   stage.state.v_ref[5] = node.heading_rate;
-  stage.control = {scene.options.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
+  stage.control = {scene.options.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model, scene.size)};
   return stage;
 }
 
@@ -63,11 +62,11 @@ void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   VectorXd loads(set.closures.size() - set.num_loops);
   for (int i = 0; i < loads.size(); ++i) {
     const bool left = set.contacts[i] == scene.stance.contacts[0];
-    loads[i] = std::max(1.0, weight * node.load[left ? 0 : 1]);
+    loads[i] = std::max(scene.size.force(), weight * node.load[left ? 0 : 1]);
   }
   // Feet that may land anywhere stand as they landed, perhaps aslant on an edge.
   const ForceAxes axes = isFree(scene) ? ForceAxes::Ground : ForceAxes::Contact;
-  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, axes}, loads, stage);
+  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, axes, scene.size.length}, loads, stage);
   addWrenchCones(scene.model, o.friction, o.cone_margin, stage, axes);
 }
 
@@ -79,12 +78,13 @@ void addSwingCosts(const Scene& scene, const GaitNode& node, Side side, StageSpe
   const LocomotionOptions& o = scene.options;
   const SwingNode& swing = node.swings[static_cast<int>(side)];
   const bool free = isFree(scene), leaves = swing.progress < o.swing.leave;
+  const double turning = o.swing_velocity_weight * scene.size.length * scene.size.length;
   addSwing(scene.model, getContact(scene, side), swing.X_WF,
            makeVector(free ? o.foothold_weight : o.swing_weight, o.swing_weight, o.swing_rotation_weight), stage);
   // Until it moves along its path a free foot rises straight, or its toes would be caught by the side of a higher tile.
   addSwingVelocity(scene.model, getContact(scene, side), swing.V_F,
                    makeVector(free && !leaves ? 0 : o.swing_velocity_weight, o.swing_velocity_weight,
-                              free ? kTurnShare * o.swing_velocity_weight : o.swing_velocity_weight),
+                              free ? kTurnShare * turning : turning),
                    stage);
 }
 
@@ -99,10 +99,10 @@ void addSwingConstraints(const Scene& scene, const GaitNode& node, int k, StageS
     const int since = k - span.begin, n = span.end - span.begin;
     // A free foot may leave from below the ground that was planned.
     if (!(isFree(scene) && scene.task.ground.steps.empty() && 4 * since < n))
-      addClearance(scene.model, getContact(scene, side), scene.task.ground, scene.ramp,
+      addClearance(scene.model, scene.size, getContact(scene, side), scene.task.ground, scene.ramp,
                    isMidSwing(since, n) ? kMidSwingClearance : 0, stage);
     if (!apart)
-      addDistance(getFoot(scene, side), feet[foot], getFoot(scene, getOther(side)), feet[1 - foot],
+      addDistance(scene.size, getFoot(scene, side), feet[foot], getFoot(scene, getOther(side)), feet[1 - foot],
                   scene.options.feet_distance, stage);
     apart = true;
   }
@@ -112,19 +112,21 @@ void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
   const double h = stage.kind == StageKind::Impact ? 1 : stage.dt;
   const ContactFrame& foot = getFoot(scene, step.side);
-  if (o.foothold_room > 0)
-    addCost(stage, "foothold", o.foothold_weight / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
+  if (isFree(scene))
+    addCost(stage, "foothold", o.foothold_weight * scene.size.time / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
             makeFramePlacement({foot.body, foot.X_BF}, step.X_WF));
-  addLanding(scene.model, getContact(scene, step.side), step.X_WF,
+  addLanding(scene.model, scene.size, getContact(scene, step.side), step.X_WF,
              findLandingRegion(foot, step.X_WF, o.foothold_room, scene.task.ground), o.landing_speed, stage);
+  if (isFree(scene) && o.foothold_weight > 0) stage.feet.back().aim = stage.costs.back().residual;
 }
 
 }  // namespace
 
-VectorXd makeStageWeights(const Model& model, const LocomotionOptions& o) {
+VectorXd makeStageWeights(const Model& model, const RobotSize& size, const LocomotionOptions& o) {
   VectorXd weights = makeStateWeights(model);
   weights.segment<3>(3) << o.torso_weight, o.torso_weight, o.heading_weight;
   raiseMotorWeights(model, o.motor_weight, weights);
+  scaleStateWeights(model, size, weights);
   return weights;
 }
 
@@ -199,8 +201,10 @@ StageSpec makeTerminalStage(const Scene& scene) {
   const GaitNode& node = scene.gait.nodes.back();
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.control.weight = 0;
-  addCost(stage, "com", scene.options.terminal_weight, Vector3d::Ones(), makeComPosition(node.com), true);
-  addRest(scene.model, stage);
+  stage.state.weight *= scene.size.time;
+  addCost(stage, "com", scene.options.terminal_weight * scene.size.time, Vector3d::Ones(), makeComPosition(node.com),
+          true);
+  addRest(scene.model, scene.size, stage);
   return stage;
 }
 

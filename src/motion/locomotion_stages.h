@@ -1,6 +1,7 @@
 #pragma once
 /// \file The stages of a locomotion, node by node, with the costs and constraints of locomotion.h.
 #include "motion/gait.h"
+#include "motion/robot_size.h"
 
 namespace bielle {
 
@@ -9,13 +10,14 @@ struct Scene {
   const Model& model;
   const Stance& stance;  ///< before the first node
   const LocomotionTask& task;
-  const LocomotionOptions& options;
+  const LocomotionOptions& options;  ///< whose weights suit the size
+  RobotSize size;
   Gait gait;
   VectorXd state_weights;  ///< 2 nv, by makeStageWeights()
   double ramp = 0;         ///< around the steps of the ground, m
 };
 
-VectorXd makeStageWeights(const Model& model, const LocomotionOptions& options);
+VectorXd makeStageWeights(const Model& model, const RobotSize& size, const LocomotionOptions& options);
 
 /// The gait of a task from rest: the first double support is lengthened until locomotion.h Eq. (1) holds.
 /// \param options  with the length of the stages

@@ -236,14 +236,15 @@ void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd
     const int rows = countForces(set, c);
     VectorXd reference = VectorXd::Zero(rows);
     reference[2] = loads[c - set.num_loops];
+    VectorXd weights = VectorXd::Ones(rows);
+    weights.tail(rows - 3) /= costs.arm * costs.arm;
     if (costs.force_weight != 0)
       stage.costs.push_back({"force " + contact.name, costs.force_weight / (weight * weight),
-                             Activation::makeQuadratic(VectorXd::Ones(rows)),
-                             makeContactForce(set, c, reference, costs.axes)});
+                             Activation::makeQuadratic(weights), makeContactForce(set, c, reference, costs.axes)});
     if (costs.pressure_weight == 0 || rows != 6 || contact.half_length <= 0) continue;
     const double half_length = contact.half_length, half_width = contact.half_width;  // the latter is none of edges
-    const Eigen::Vector2d weights(1 / (half_length * half_length), half_width > 0 ? 1 / (half_width * half_width) : 0);
-    stage.costs.push_back({"pressure " + contact.name, costs.pressure_weight, Activation::makeQuadratic(weights),
+    const Eigen::Vector2d pressure(1 / (half_length * half_length), half_width > 0 ? 1 / (half_width * half_width) : 0);
+    stage.costs.push_back({"pressure " + contact.name, costs.pressure_weight, Activation::makeQuadratic(pressure),
                            makeCenterOfPressure(set, c, costs.axes)});
   }
 }

@@ -13,11 +13,4 @@ inline bool isLinear(const Model& model, const Motor& motor) {
   return model.joints()[motor.joint].kind == JointKind::Prismatic;
 }
 
-/// Weights of the squares of torques and forces, nu.
-inline VectorXd makeControlWeights(const Model& model) {
-  VectorXd weights(model.nu());
-  for (int m = 0; m < model.nu(); ++m) weights[m] = isLinear(model, model.motors()[m]) ? kScrewArm * kScrewArm : 1;
-  return weights;
-}
-
 }  // namespace bielle

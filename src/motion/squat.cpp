@@ -7,7 +7,7 @@
 #include "math/constants.h"
 #include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
-#include "motion/motor_scale.h"
+#include "motion/robot_size.h"
 #include "motion/statics.h"
 
 namespace bielle {
@@ -26,8 +26,9 @@ void check(const Model& model, const SquatOptions& o) {
                      "add `contacts` to its YAML file");
 }
 
-StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector<ContactTarget>& contacts,
-                    const VectorXd& q0, const Vector3d& com) {
+// \param o  whose weights suit the size
+StageSpec makeStage(const Model& model, const RobotSize& size, const SquatOptions& o,
+                    const std::vector<ContactTarget>& contacts, const VectorXd& q0, const Vector3d& com) {
   StageSpec stage;
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
@@ -35,11 +36,12 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   stage.state = {o.state_weight, q0, VectorXd::Zero(model.nv()), makeStateWeights(model)};
   if (model.hasFreeFlyer()) stage.state.weights.segment<2>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, stage.state.weights);
-  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
+  scaleStateWeights(model, size, stage.state.weights);
+  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model, size)};
   stage.costs.push_back(
       {"com height", o.com_weight, Activation::makeQuadratic(Vector3d::UnitZ()), makeComPosition(com), true});
   const double weight = model.mass() * model.gravity().norm();
-  addGroundCosts(model, {o.force_weight, o.pressure_weight},
+  addGroundCosts(model, {o.force_weight, o.pressure_weight, ForceAxes::Contact, size.length},
                  VectorXd::Constant(contacts.size(), weight / contacts.size()), stage);
   addWrenchCones(model, o.friction, o.cone_margin, stage);
   return stage;
@@ -73,6 +75,9 @@ MotionPlan planSquat(const Model& model, const SquatOptions& requested, const St
   if (options.time_step == 0)
     options.time_step = std::min(kTimeStep, calcSpringStage(model, standing.q, makeContactTargets(standing, 0, 0)));
   check(model, options);
+  const RobotSize size = calcRobotSize(model, standing);
+  scaleWeights(size, options);
+  options.com_weight /= size.length * size.length * size.time;
   const VectorXd& q0 = standing.q;
   const Vector3d& com0 = standing.com;
   const std::vector<ContactTarget> contacts = makeContactTargets(standing, options.contact_kp, options.contact_kd);
@@ -88,14 +93,16 @@ MotionPlan planSquat(const Model& model, const SquatOptions& requested, const St
   for (int k = 0; k <= nodes; ++k) {
     const double height = (com0.z() - level) * calcSquatHeight(options, k * options.time_step);
     const Vector3d com(com0.x(), com0.y(), level + height);
-    plan.stages.push_back(makeStage(model, options, contacts, q0, com));
+    plan.stages.push_back(makeStage(model, size, options, contacts, q0, com));
   }
   StageSpec& terminal = plan.stages.back();
   terminal.constraints = {};
   terminal.control.weight = 0;
+  terminal.state.weight *= size.time;
   terminal.path_constraints.clear();
   terminal.costs.resize(1);  // the height; forces have no meaning at the terminal node
-  addRest(model, terminal);
+  terminal.costs[0].weight *= size.time;
+  addRest(model, size, terminal);
 
   VectorXd x0 = VectorXd::Zero(model.nq() + model.nv());
   x0.head(model.nq()) = q0;

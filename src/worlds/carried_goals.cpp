@@ -38,8 +38,9 @@ double findEnd(const Plan& plan, const Foothold& foothold) {
 // Of the motion that predictive control solves.
 std::vector<Goal> listFreedGoals(const Plan& plan) {
   MotionRequest freed = *plan.solution->motion.request;
-  freeFeet(plan.ground, freed.options);
-  return freed.plan(plan.model(), makeStandingRobot(plan.model())).goals;
+  const StandingRobot standing = makeStandingRobot(plan.model());
+  freeFeet(plan.model(), standing, plan.ground, freed.options);
+  return freed.plan(plan.model(), standing).goals;
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ Plan makeCommandedPlan(const PlanRequest& request, const std::string& file) {
   const StandingRobot standing = makeStandingRobot(model);
   for (size_t i = 0; i < commands.size(); ++i)
     checkCommand(model, standing, options, commands[i].velocity, file + ", command " + std::to_string(i + 1));
-  freeFeet(Ground(), set);
+  freeFeet(model, standing, Ground(), set);
   options = readOptions<LocomotionOptions>(set);
   const CommandSource source = [commands](double time) { return findCommand(commands, time); };
   Plan plan = foresee(CommandedWalk(model, options, {}, source, standing),

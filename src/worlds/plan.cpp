@@ -7,6 +7,7 @@
 #include "bielle/motion/solve.h"
 #include "bielle/robots/robot_loader.h"
 #include "motion/applied_options.h"
+#include "motion/robot_size.h"
 #include "results/interrupt.h"
 #include "results/remade_motion.h"
 
@@ -14,7 +15,7 @@ namespace bielle::worlds {
 namespace {
 
 constexpr int kMaxIterations = 200;                                 // more than a motion takes from its own solution
-constexpr double kFootholdRoom = 0.4, kFootholdRoomOnSteps = 0.02;  // m
+constexpr double kFootholdRoom = 0.4, kFootholdRoomOnSteps = 0.02;  // of the reference robot, m
 constexpr double kFeedbackMargin = 0.2;
 
 // Sets an option of a motion, or of the parts of a sequence, where it has one.
@@ -134,9 +135,10 @@ void chooseSteps(double duration, OptionSet& options) {
 
 }  // namespace
 
-void freeFeet(const Ground& ground, OptionSet& options) {
+void freeFeet(const Model& model, const StandingRobot& standing, const Ground& ground, OptionSet& options) {
+  const double room = ground.steps.empty() ? kFootholdRoom : kFootholdRoomOnSteps;
   setWherePresent("contact_kp", 0, options);
-  setWherePresent("foothold_room", ground.steps.empty() ? kFootholdRoom : kFootholdRoomOnSteps, options);
+  setWherePresent("foothold_room", room * calcRobotSize(model, standing).length, options);
   setWherePresent("cone_margin", kFeedbackMargin, options);
 }
 

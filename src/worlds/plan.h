@@ -82,7 +82,7 @@ Plan makeCommandedPlan(const PlanRequest& request, const std::string& file);
 /// Sets what predictive control wants of steps, where a motion has the option: feet stand where they landed, and may land
 /// elsewhere than planned, on steps of the ground a little; wrenches keep away from the edges of their cones, since feedback and
 /// errors of the model add to what is planned.
-void freeFeet(const Ground& ground, OptionSet& options);
+void freeFeet(const Model& model, const StandingRobot& standing, const Ground& ground, OptionSet& options);
 
 /// A controller that owns all that it works with.
 struct PlanController {

@@ -28,10 +28,10 @@ std::unique_ptr<PredictiveController> predict(const Model& model, const Model& c
   options.dead_point_stop = std::min(options.dead_point_stop, kStopShare * problem.limits.dead_point_margin);
   const VectorXd q0 = restrictConfiguration(model, cut, motion.problem->initialState().head(model.nq()));
   MotionRequest freed = *motion.request;
-  freeFeet(motion.ground, freed.options);
-  return std::make_unique<PredictiveController>(
-      makePredictiveMotion(cut, freed.plan(cut, makeStandingRobot(cut, q0)), problem, options),
-      restrictTrajectory(model, cut, solution.trajectory), options);
+  const StandingRobot standing = makeStandingRobot(cut, q0);
+  freeFeet(cut, standing, motion.ground, freed.options);
+  return std::make_unique<PredictiveController>(makePredictiveMotion(cut, freed.plan(cut, standing), problem, options),
+                                                restrictTrajectory(model, cut, solution.trajectory), options);
 }
 
 }  // namespace

@@ -176,6 +176,7 @@ struct GroundCosts {
   double force_weight = 10;             ///< of the force reference, over (m g)^2
   double pressure_weight = 1;           ///< of the centre of pressure, over the half size of the sole squared
   ForceAxes axes = ForceAxes::Contact;  ///< of force reference and centre of pressure
+  double arm = 1;                       ///< about which a force counts as much as its moment, m
 };
 /// Adds a path constraint for every active contact: the wrench cone of its sole (ocp/cost.h), reduced by `margin` in
 /// friction and in size, and by a thousandth of the robot's weight in the normal force. Its pyramids of

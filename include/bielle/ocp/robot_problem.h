@@ -78,8 +78,8 @@ struct FootTask {
   FootRole role = FootRole::Swing;
   double room = 0;  ///< of a landing: largest distance from its place along each horizontal axis of that, m
   /// Residuals of its place and its velocity, in the costs of a swing or the path constraints of a landing, and of its clearance
-  /// over the ground; null where the stage has none.
-  std::shared_ptr<const Residual> place{}, velocity{}, clearance{};
+  /// over the ground, and of a landing in the costs, by which it is drawn to its place; null where the stage has none.
+  std::shared_ptr<const Residual> place{}, velocity{}, clearance{}, aim{};
 };
 
 /// One stage of the horizon (or the terminal node, which uses neither kind, dt nor constraints).

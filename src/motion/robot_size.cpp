@@ -1,0 +1,66 @@
+#include "motion/robot_size.h"
+
+#include <cmath>
+
+#include "motion/motor_scale.h"
+
+namespace bielle {
+
+namespace {
+
+RobotSize calcSize(const Model& model, double height) {
+  const double gravity = model.gravity().norm();
+  if (!(height > 0 && gravity > 0 && model.mass() > 0)) return {};
+  const double length = height / kReferenceHeight;
+  return {length, std::sqrt(length * kReferenceGravity / gravity),
+          model.mass() / kReferenceMass * gravity / kReferenceGravity * length};
+}
+
+}  // namespace
+
+RobotSize calcRobotSize(const Model& model, const Stance& stance) {
+  return calcSize(model, stance.com.z() - stance.middle.p.z());
+}
+
+RobotSize calcRobotSize(const Model& model, const StandingRobot& standing) {
+  if (standing.contacts.empty()) return {};
+  double sole = 0;
+  for (const SE3& contact : standing.contacts) sole += contact.p.z() / static_cast<double>(standing.contacts.size());
+  return calcSize(model, standing.com.z() - sole);
+}
+
+void scaleWeights(const RobotSize& size, MotionOptions& o) {
+  for (double* weight : {&o.state_weight, &o.control_weight, &o.force_weight, &o.pressure_weight}) *weight /= size.time;
+  o.control_weight /= size.torque * size.torque;
+}
+
+void scaleWeights(const RobotSize& size, LocomotionOptions& o) {
+  scaleWeights(size, static_cast<MotionOptions&>(o));
+  const double length = size.length, velocity = size.velocity();
+  for (double* weight : {&o.com_weight, &o.com_height_weight, &o.swing_weight, &o.foothold_weight, &o.terminal_weight})
+    *weight /= length * length * size.time;
+  for (double* weight : {&o.com_velocity_weight, &o.swing_velocity_weight}) *weight /= velocity * velocity * size.time;
+  o.swing_rotation_weight /= size.time;
+}
+
+VectorXd makeControlWeights(const Model& model, const RobotSize& size) {
+  const double arm = kScrewArm * size.length;
+  VectorXd weights(model.nu());
+  for (int m = 0; m < model.nu(); ++m) weights[m] = isLinear(model, model.motors()[m]) ? arm * arm : 1;
+  return weights;
+}
+
+void scaleStateWeights(const Model& model, const RobotSize& size, VectorXd& weights) {
+  const int nv = model.nv();
+  for (const Joint& joint : model.joints()) {
+    const int linear = joint.kind == JointKind::FreeFlyer   ? 3
+                       : joint.kind == JointKind::Planar    ? 2
+                       : joint.kind == JointKind::Prismatic ? 1
+                                                            : 0;
+    for (double* part : {&weights[joint.idx_v], &weights[nv + joint.idx_v]})
+      for (int i = 0; i < linear; ++i) part[i] /= size.length * size.length;
+  }
+  weights.tail(nv) *= size.time * size.time;
+}
+
+}  // namespace bielle
