@@ -1,7 +1,7 @@
 #include <pybind11/stl.h>
 
-#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/ball_cuts.h"
+#include "bielle/dynamics/closing.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/motion.h"
@@ -176,23 +176,28 @@ void addConfigurations(ModelType& type) {
 
 const AssemblyResult& requireClosed(const Model& model, const AssemblyResult& result) {
   if (result.status != NumericalStatus::Ok)
-    throw InputError(model.name(), "posture", result.message, "start from a closer configuration");
+    throw InputError(model.name(), "posture", result.message,
+                     result.worst.rfind("joint '", 0) == 0 ? "hold it there" : "start from a closer configuration");
   return result;
 }
 
 void addAssembly(ModelType& type) {
   type.def(
       "close",
-      [](const Model& m, const py::object& q) {
+      [](const Model& m, const py::object& q, const std::vector<std::string>& hold) {
         const VectorXd start = readVector(q, m.nq(), "q");
         AssemblyResult result;
         {
           const py::gil_scoped_release release;
-          result = closeConfiguration(m, start);
+          result = closeConfiguration(m, start, hold);
         }
         return makeArray(requireClosed(m, result).q);
       },
-      py::arg("q"), "The closed configuration nearest to q (nq,).\n\nRaises InputError when the loops do not close.");
+      py::arg("q"), py::arg("hold") = std::vector<std::string>(),
+      "The closed configuration nearest to q (nq,), in which the joints of these names stay where they are.\n\nRaises "
+      "InputError when the loops do not close, with the gap and the nearest value in reach of a joint that cannot "
+      "stay. "
+      "LoopCloser closes many, in microseconds.");
   type.def(
       "posture",
       [](const Model& m, const std::string& name) {

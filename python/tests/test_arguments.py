@@ -41,6 +41,7 @@ def make_samples():
     by_type.update(
         Robot=robot, Model=model, Motion=motion, World=world, Sensors=bielle.Sensors(world), MotionPlan=plan,
         ModelBuilder=bielle.ModelBuilder("m"), Estimator=bielle.Estimator(model, model.standing()), Node=Seen.nodes[0],
+        LoopCloser=bielle.LoopCloser(model, model.standing(), ["knee_left"]), LinkageMap=bielle.LinkageMap(model, model.standing()),
         Request=bielle.Request(motion="squat"), Controller=bielle.Controller.policy(solution, gains=False), Solution=solution,
         Parametrization=bielle.Parametrization.generated("fivebar_leg", [variable]), Trajectory=motion.guess,
         LibraryResidual=bielle.residuals.com_position(np.zeros(3)), ConstraintSet=model.constraints(["foot_left"]),
@@ -48,6 +49,7 @@ def make_samples():
         str="x", float=1.0, int=0, bool=True, list=[], tuple=(), dict={}, List=[], Dict={}, function=len)  # fmt: skip
     q, v = model.standing(), np.zeros(model.nv)
     by_name = {"q": q, "q0": q, "q1": q, "v": v, "dq": v, "a": v, "u": np.zeros(model.nu), "losses": np.zeros(model.nu),
+               "joints": np.zeros(model.nu), "motors": np.zeros(model.nu),
                "x": [0.2], "contacts": (), "R_WT": np.eye(3), "twist": np.zeros(6), "weights": [1.0], "lower": [0.0],
                "upper": [0.0], "start": [0.0], "made_of": plan, "options": bielle.ProblemOptions(), "warm_start": solution}  # fmt: skip
     return by_type, by_name

@@ -224,6 +224,43 @@ def test_generated_robots(tmp_path):
         bielle.generate_robot("cleobot", upper_length=-1)
 
 
+def test_joints_are_held_while_loops_close(model):
+    q = model.standing()
+    knee = list(model.q_names).index("knee_left")
+    bent = q.copy()
+    bent[knee] += 0.2
+    assert abs(model.close(bent)[knee] - bent[knee]) > 0.01
+    closed = model.close(bent, hold=["knee_left"])
+    assert closed[knee] == bent[knee] and np.abs(model.closure_residual(closed)).max() < 1e-10
+    closer = bielle.LoopCloser(model, q, ["knee_left"])
+    again, result = closer.close(bent)
+    assert result.status == bielle.NumericalStatus.OK and result.gap == 0 and result.joint == ""
+    assert np.abs(again - closed).max() < 1e-8
+    assert closer.reset(q) and not closer.reset(bent)
+    bent[knee] = 1.5  # between what two assembly modes reach
+    far, result = closer.close(bent)
+    assert result.status == bielle.NumericalStatus.NOT_CLOSED and result.joint == "knee_left"
+    assert result.gap == pytest.approx(1.5 - far[knee]) and np.abs(model.closure_residual(far)).max() < 1e-10
+    with pytest.raises(bielle.InputError, match="'knee_left' cannot be held at 1.5: the nearest value in reach is"):
+        model.close(bent, hold=["knee_left"])
+    with pytest.raises(bielle.InputError, match="choose some of"):
+        model.close(q, hold=["knie_left"])
+
+
+def test_motors_for_joints_and_back(model):
+    q = model.standing()
+    linkages = bielle.LinkageMap(model, q)
+    assert linkages.motor_names == list(model.u_names) and set(linkages.joint_names) <= set(model.q_names)
+    joints = np.array([q[list(model.q_names).index(name)] for name in linkages.joint_names])
+    joints[linkages.joint_names.index("knee_left")] += 0.1
+    motors, result = linkages.motors(joints)
+    assert result.status == bielle.NumericalStatus.OK
+    back, result = linkages.joints(motors)
+    assert result.status == bielle.NumericalStatus.OK and np.abs(back - joints).max() < 1e-9
+    assert np.abs(model.closure_residual(linkages.q)).max() < 1e-10
+    assert linkages.reset(q)
+
+
 def test_ratio_of_a_knee(model):
     sweep = bielle.sweep_ratio(model, "knee_left", model.standing())
     start = next(sample for sample in sweep.samples if sample.s == 0)

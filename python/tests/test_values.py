@@ -23,7 +23,8 @@ VALUES = {
 }
 
 
-NOT_VALUES = {"ModelBuilder", "Node", "Controller", "Estimator", "World", "Sensors"}  # they hold what goes on
+# They hold what goes on.
+NOT_VALUES = {"ModelBuilder", "Node", "Controller", "Estimator", "World", "Sensors", "LoopCloser", "LinkageMap"}
 
 
 def make_plan():

@@ -1,0 +1,220 @@
+// Closing with held joints, and motors for joints and back. Oracles: closed forms of a four-bar and of an ankle on two rods (RSU).
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <ctime>
+#include <iostream>
+
+#include "bielle/dynamics/closing.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+#include "bielle/model/names.h"
+#include "count_allocations.h"
+#include "math/so3.h"
+#include "mechanisms.h"
+#include "own_robots.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr double kGround = 0.4, kCrank = 0.15, kCoupler = 0.35, kRocker = 0.3;
+constexpr const char *kCrankJoint = "crank_joint", *kRockerJoint = "rocker_joint";
+
+int getEntry(const Model& model, const std::string& joint) {
+  return model.joints()[static_cast<size_t>(model.findJoint(joint))].idx_q;
+}
+
+double calcGap(const Model& model, ConstVectorRef q) {
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  return calcLargestGap(ws, makeConstraintSet(model));
+}
+
+// The left ankle of rsu_biped (robots/parts/ankle/rsu.yaml): cranks of length c at (0, +-w, h) over the ankle, whose ends rods
+// tie to the heels of the foot.
+struct RsuAnkle {
+  static constexpr double kArm = 0.05, kLength = 0.05, kWidth = 0.06, kHeight = 0.17, kAngle = 0.6;
+
+  // |m + R_y(theta) c u - heel| = h:  A cos theta + B sin theta = C, on the branch of theta = 0. NaN out of reach.
+  static double calcMotor(double pitch, double roll, int number) {
+    const double w = number == 1 ? kWidth : -kWidth;
+    const Vector3d aside(-std::cos(kAngle), 0, std::sin(kAngle)), y = Vector3d::UnitY();
+    const Matrix3d R = makeAxisRotation(y, pitch) * makeAxisRotation(Vector3d::UnitX(), roll);
+    const Vector3d p = R * (kArm * aside + w * y) - Vector3d(0, w, kHeight);
+    const double A = p.dot(aside), B = p.dot(y.cross(aside)),
+                 C = (p.squaredNorm() + kLength * kLength - kHeight * kHeight) / (2 * kLength);
+    const double angle = std::acos(C / std::hypot(A, B)), start = std::atan2(B, A);
+    const double one = std::remainder(start + angle, 2 * M_PI), other = std::remainder(start - angle, 2 * M_PI);
+    return std::abs(one - pitch) < std::abs(other - pitch) ? one : other;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("closing: a four-bar with its crank held, and with its rocker held, against the closed form") {
+  const Mechanism start = makePlanarFourBar(kGround, kCrank, kCoupler, kRocker, 1);
+  const Model& model = start.model;
+  const std::string crank = model.joints()[1].name;
+  // Far from the start, at once.
+  for (const double angle : {0.7, 1.3, 2.0, -0.5}) {
+    VectorXd q = start.q_closed;
+    q[0] = -angle;
+    const AssemblyResult result = closeConfiguration(model, q, {crank});
+    CAPTURE(angle, result.message);
+    REQUIRE(result.status == NumericalStatus::Ok);
+    CHECK(result.q[0] == -angle);
+    CHECK(calcGap(model, result.q) < 1e-10);
+    const VectorXd exact = makePlanarFourBar(kGround, kCrank, kCoupler, kRocker, angle).q_closed;
+    for (int k = 0; k < 4; ++k) CHECK(std::abs(std::remainder(result.q[k] - exact[k], 2 * M_PI)) < 1e-9);
+  }
+  // Without holding, the crank moves.
+  VectorXd q = start.q_closed;
+  q[0] -= 0.5;
+  CHECK(std::abs(closeConfiguration(model, q).q[0] - q[0]) > 0.05);
+  CHECK(closeConfiguration(model, q, std::vector<std::string>()).q == closeConfiguration(model, q).q);
+  CHECK_THROWS_WITH(closeConfiguration(model, q, {"elbow"}),
+                    Catch::Contains("joint 'elbow'") && Catch::Contains("choose some of: " + crank));
+}
+
+TEST_CASE("closing: a rocker beyond its dead point is refused with the gap and the nearest value, and nothing jumps") {
+  const Model model = loadOwn("fourbar").model;
+  const VectorXd start = assembleReference(model, model.references()[0].name).q;
+  const int rocker = getEntry(model, kRockerJoint);
+  // The rocker turns back where crank and coupler are in line, or folded: |AD|^2 + r^2 - 2 |AD| r cos(angle) = (b +- a)^2.
+  const auto calcEnd = [](double reach) {
+    return M_PI - std::acos((kGround * kGround + kRocker * kRocker - reach * reach) / (2 * kGround * kRocker));
+  };
+  const double ends[] = {calcEnd(kCoupler - kCrank), calcEnd(kCoupler + kCrank)};
+  const double lower = std::min(ends[0], ends[1]), upper = std::max(ends[0], ends[1]);
+  LinkageMap map(model, start);
+  REQUIRE(map.joints() == std::vector<int>{model.findJoint(kRockerJoint)});
+  VectorXd joint(1), motor(1), back(1);
+  const double sign = start[rocker] > 0 ? 1 : -1;
+  REQUIRE((std::abs(start[rocker]) > lower && std::abs(start[rocker]) < upper));
+  for (const double beyond : {0.2, 0.01, 1e-4}) {
+    for (const double end : {lower, upper}) {
+      CAPTURE(beyond, end);
+      const double asked = sign * (end == lower ? end - beyond : end + beyond);
+      joint[0] = asked;
+      const HeldResult result = map.calcMotors(joint, motor);
+      CHECK(result.status == NumericalStatus::NotClosed);
+      CHECK(result.gap == Approx(beyond).margin(1e-8));
+      CHECK(result.joint == map.joints()[0]);
+      CHECK(std::abs(map.q()[rocker]) == Approx(end).margin(1e-8));
+      CHECK(calcGap(model, map.q()) < 1e-10);
+      // The next one is on the same branch again.
+      joint[0] = start[rocker];
+      CHECK(map.calcMotors(joint, motor).status == NumericalStatus::Ok);
+      CHECK(motor[0] == Approx(start[getEntry(model, kCrankJoint)]).margin(1e-9));
+    }
+  }
+  // At the dead point itself it is reached, and said to be one: by the square of the angle's error.
+  joint[0] = sign * upper;
+  CHECK(map.calcMotors(joint, motor).status == NumericalStatus::NearDeadPoint);
+  VectorXd q = start;
+  q[rocker] = sign * (upper + 0.1);
+  const AssemblyResult refused = closeConfiguration(model, q, {kRockerJoint});
+  CHECK(refused.status == NumericalStatus::NotClosed);
+  CHECK_THAT(refused.message,
+             Catch::Contains("'rocker_joint' cannot be held at") && Catch::Contains("nearest value in reach"));
+  CHECK(std::abs(refused.q[rocker]) == Approx(upper).margin(1e-8));
+  joint[0] = std::nan("");
+  CHECK(map.calcMotors(joint, motor).status == NumericalStatus::NotFinite);
+}
+
+TEST_CASE("closing: motors of an ankle on two rods for its joints and back, against the closed form") {
+  const Model model = loadOwn("rsu_biped").model;
+  const VectorXd start = assembleReference(model, "half_sitting").q;
+  const std::vector<std::string> held = {"ankley_left", "anklex_left"};
+  const int pitch = getEntry(model, held[0]), roll = getEntry(model, held[1]);
+  const int motors[] = {getEntry(model, "motor_ankle1_left"), getEntry(model, "motor_ankle2_left")};
+  LinkageMap map(model, start);
+  REQUIRE(map.joints().size() == static_cast<size_t>(model.nu()));
+  VectorXd joints(model.nu()), u(model.nu()), back(model.nu());
+  for (int i = 0; i < model.nu(); ++i)
+    joints[i] = start[model.joints()[static_cast<size_t>(map.joints()[static_cast<size_t>(i)])].idx_q];
+  const auto set = [&](int entry, double value) {
+    for (int i = 0; i < model.nu(); ++i)
+      if (model.joints()[static_cast<size_t>(map.joints()[static_cast<size_t>(i)])].idx_q == entry) joints[i] = value;
+  };
+  for (const auto& [p, r] : {std::pair(-0.3, 0.1), {0.2, -0.2}, {0.0, 0.0}, {-0.5, 0.15}, {0.3, 0.25}}) {
+    CAPTURE(p, r);
+    set(pitch, p), set(roll, r);
+    REQUIRE(map.calcMotors(joints, u).status == NumericalStatus::Ok);
+    REQUIRE(map.q()[pitch] == Approx(p).margin(1e-10));
+    for (int i = 0; i < 2; ++i) CHECK(map.q()[motors[i]] == Approx(RsuAnkle::calcMotor(p, r, i + 1)).margin(1e-9));
+    for (int m = 0; m < model.nu(); ++m)
+      CHECK(u[m] == map.q()[model.joints()[static_cast<size_t>(model.motors()[static_cast<size_t>(m)].joint)].idx_q]);
+    REQUIRE(map.calcJoints(u, back).status == NumericalStatus::Ok);
+    CHECK((back - joints).cwiseAbs().maxCoeff() < 1e-9);
+    // From the standing posture, at once.
+    VectorXd q = start;
+    q[pitch] = p, q[roll] = r;
+    const AssemblyResult closed = closeConfiguration(model, q, held);
+    REQUIRE(closed.status == NumericalStatus::Ok);
+    CHECK((closed.q[pitch] == p && closed.q[roll] == r));
+    CHECK(calcGap(model, closed.q) < 1e-10);
+    for (int i = 0; i < 2; ++i) CHECK(closed.q[motors[i]] == Approx(RsuAnkle::calcMotor(p, r, i + 1)).margin(1e-9));
+    // The rest of the robot stays.
+    for (int k = 0; k < 7; ++k) CHECK(closed.q[k] == Approx(start[k]).margin(1e-12));
+    CHECK(closed.q[getEntry(model, "knee_left")] == Approx(start[getEntry(model, "knee_left")]).margin(1e-12));
+  }
+  // Only one of them held: the other one moves least.
+  VectorXd q = start;
+  q[pitch] -= 0.1;
+  LoopCloser closer(model, start, {held[0]});
+  REQUIRE(closer.close(q).status == NumericalStatus::Ok);
+  CHECK(q[pitch] == start[pitch] - 0.1);
+  CHECK(std::abs(q[roll] - start[roll]) < 1e-4);
+  CHECK(q[motors[0]] == Approx(RsuAnkle::calcMotor(q[pitch], q[roll], 1)).margin(1e-9));
+  // Beyond reach: the gap is told, and the value is one that the closed form knows.
+  set(pitch, 0), set(roll, 2.5);
+  const HeldResult beyond = map.calcMotors(joints, u);
+  CHECK(beyond.status == NumericalStatus::NotClosed);
+  CHECK(beyond.gap == Approx(2.5 - map.q()[roll]));
+  CHECK(beyond.joint == model.findJoint(held[1]));
+  CHECK(calcGap(model, map.q()) < 1e-10);
+  CHECK_FALSE(map.reset(model.integrate(start, 0.1 * VectorXd::Ones(model.nv()))));
+  CHECK(map.reset(start));
+}
+
+TEST_CASE("closing: no allocation, and a linkage without joints is refused") {
+  const Model model = loadOwn("rsu_biped").model;
+  const VectorXd start = assembleReference(model, "half_sitting").q;
+  LinkageMap map(model, start);
+  LoopCloser closer(model, start, {"ankley_left", "anklex_left"});
+  VectorXd joints(model.nu()), u(model.nu()), q = start;
+  for (int i = 0; i < model.nu(); ++i)
+    joints[i] = start[model.joints()[static_cast<size_t>(map.joints()[static_cast<size_t>(i)])].idx_q];
+  const long before = num_allocations;
+  for (int i = 0; i < 20; ++i) {
+    joints.array() += 0.005;
+    q[getEntry(model, "ankley_left")] -= i == 19 ? 3 : 0.005;  // at last beyond reach
+    map.calcMotors(joints, u);
+    map.calcJoints(u, joints);
+    closer.close(q);
+  }
+  CHECK(num_allocations - before <= 20);  // names for getEntry()
+  CHECK_THROWS_WITH(LinkageMap(loadOwn("delta").model, findClosedConfiguration(loadOwn("delta").model).q),
+                    Catch::Contains("serial_joints"));
+}
+
+TEST_CASE("closing: time of a call", "[.time]") {
+  const Model model = loadOwn("rsu_biped").model;
+  const VectorXd start = assembleReference(model, "half_sitting").q;
+  LoopCloser closer(model, start, {"ankley_left", "anklex_left"});
+  const int pitch = getEntry(model, "ankley_left"), roll = getEntry(model, "anklex_left");
+  for (const double step : {1e-3, 1e-2, 1e-1}) {
+    VectorXd q = start;
+    const int calls = 20000;
+    const std::clock_t begin = std::clock();
+    for (int i = 0; i < calls; ++i) {
+      q[pitch] = start[pitch] + (i % 2 ? step : 0);
+      q[roll] = start[roll] - (i % 2 ? step : 0);
+      REQUIRE(closer.close(q).status == NumericalStatus::Ok);
+    }
+    const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    std::cout << "closing an ankle on two rods, " << step << " rad a call: " << 1e6 * seconds / calls << " us\n";
+  }
+}
