@@ -13,6 +13,7 @@
 #include "formats/adopt.h"
 #include "get_error.h"
 #include "math/so3.h"
+#include "model/number_text.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -189,6 +190,36 @@ TEST_CASE("an adopted robot bends its knees the way that their ranges allow") {
       CHECK(q < upper);
     }
     CHECK(2 * std::asin(posture.q.segment<3>(3).norm()) < 0.1);  // the trunk is upright
+  }
+}
+
+TEST_CASE("an adopted robot says where the dead points of its linkages are") {
+  // A four-bar at the knee whose crank turns wholly (robots/parts/knee/four_bar.yaml): the knee turns back where crank and rod are in
+  // line, l +- c from the motor to the end of the arm, which is at the angle psi from the thigh, cos psi = sin(knee - middle).
+  const double thigh = 0.22, crank = 0.04, arm = 0.05, rod = std::hypot(thigh, crank - arm);
+  for (const double middle : {1.2, 1.6}) {
+    CAPTURE(middle);
+    const OptionValues values = {{"knee", "four_bar"},  {"ankle", "serial"}, {"thigh_length", thigh},
+                                 {"knee_crank", crank}, {"knee_arm", arm},   {"knee_middle", middle}};
+    const Generator generator = findGenerator("leg_biped", values);
+    OptionSet parameters = generator.parameters;
+    for (const auto& [name, value] : values) parameters.set(name, value);
+    ModelParts parts = takeParts(generator.make(parameters));
+    parts.contacts.clear();
+    parts.references.clear();
+    const RobotText bare = formatRobot(ModelBuilder::restore(parts));
+    const RobotDirectory directory;
+    const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(bare.urdf, bare.yaml)), "../robot.urdf");
+    CAPTURE(adoption.yaml);
+    CHECK(loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model.references().size() == 1);
+    for (const double reach : {rod - crank, rod + crank}) {
+      const double knee = middle + std::asin((thigh * thigh + arm * arm - reach * reach) / (2 * thigh * arm));
+      const std::string text = "knee_left at " + formatNumber(knee, "%.4g") + ", ";
+      CAPTURE(text);
+      CHECK(std::any_of(adoption.guesses.begin(), adoption.guesses.end(), [&](const std::string& guess) {
+        return guess.find(text) != std::string::npos && guess.find("it turns back") != std::string::npos;
+      }));
+    }
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/ratio.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
@@ -49,6 +50,7 @@ class Adopter {
     writeContacts();
     writePosture();
     writeSerialJoints();
+    if (posture_.size() > 0) tellDeadPoints();
     out_ << EndMap;
     return {out_.c_str() + std::string("\n"), guesses_};
   }
@@ -218,7 +220,7 @@ class Adopter {
 
   // Whether it closes within the ranges of the joints; moves the base so that the centre of mass is over the feet. The base weighs
   // more than other joints that are given; if there are any, all get the values that they have there.
-  bool stand(Reference& reference) const {
+  bool stand(Reference& reference) {
     constexpr double kJointWeight = 0.01;
     Workspace ws(*with_feet_);
     std::vector<double>& base = reference.joints.at(model_.joints()[1].name);
@@ -235,6 +237,7 @@ class Adopter {
       updatePositions(*with_feet_, ws, result.q);
       off = calcCom(*with_feet_, ws).x();
       if (std::abs(off) < kOver) {
+        posture_ = result.q;
         for (auto& [name, values] : reference.joints) {
           const Joint& joint = model_.joints()[model_.findJoint(name)];
           for (int k = 0; k < joint.nq && reference.joints.size() > 1; ++k)
@@ -313,11 +316,55 @@ class Adopter {
     }
     guess("Serial joints: all from the base to the feet.");
     out_ << Key << "serial_joints" << Value << all;
+    serial_joints_ = all;
+  }
+
+  // Of linkages: whether one lies between the neutral configuration and the posture, and those that their joints can reach.
+  void tellDeadPoints() {
+    ModelParts parts = takeParts(*with_feet_);
+    parts.serial_joints.clear();
+    for (const std::string& name : serial_joints_) parts.serial_joints.push_back(model_.findJoint(name));
+    const Model model = ModelBuilder::restore(std::move(parts));
+    std::vector<std::string> lines;
+    try {
+      for (const Linkage& linkage : listLinkages(model, posture_)) {
+        if (linkage.isDirect()) continue;
+        if (calcTransmission(linkage, model, q_) < 0)
+          lines.push_back(linkage.output + " is on the other side of a dead point than in the neutral configuration");
+        const DeadPoint nearest = findDeadPoint(linkage, model, posture_);
+        if (linkage.joints.empty() && nearest.kind != DeadPointKind::None)
+          lines.push_back(linkage.output + ": one of the " + getName(nearest.kind) + ", " + formatDistance(nearest) +
+                          " (rad or m) away");
+        for (size_t j = 0; j < linkage.joints.size(); ++j)
+          for (const RatioSample& sample : sweepRatio(model, linkage, posture_, static_cast<int>(j)).samples)
+            if (sample.dead != DeadPointKind::None || sample.loses_rank)
+              lines.push_back(describe(linkage, j, sample, posture_[model.joints()[linkage.joints[j]].idx_q]));
+      }
+    } catch (const InputError& error) {  // the posture is one itself
+      lines.push_back(error.element() + ": " + error.problem());
+    }
+    if (lines.empty()) return;
+    guess("Dead points, where motor and joint do not move each other, as seen from the posture:");
+    for (const std::string& line : lines) {
+      guesses_.push_back("  " + line);
+      out_ << YAML::Newline << YAML::Comment(line);
+    }
+  }
+
+  static std::string describe(const Linkage& linkage, size_t joint, const RatioSample& dead, double posture) {
+    const double angle = dead.joints[static_cast<Eigen::Index>(joint)];
+    return linkage.joint_names[joint] + " at " + format(angle) + ", " + format(std::abs(angle - posture)) +
+           " (rad or m) away: " +
+           (dead.dead == DeadPointKind::Motors   ? "the motors cannot hold it"
+            : dead.dead == DeadPointKind::Output ? "it turns back"
+                                                 : "its loops can go on in several ways");
   }
 
   const Model& model_;
   const std::string path_;
-  VectorXd q_;  // closed
+  VectorXd q_;        // closed
+  VectorXd posture_;  // in which it stands; empty if there is none
+  std::vector<std::string> serial_joints_;
   Workspace ws_;
   std::vector<FoundFoot> feet_;
   bool has_made_frames_ = false, is_carried_ = false;

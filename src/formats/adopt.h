@@ -20,7 +20,8 @@ struct Adoption {
 ///   the base at the greatest of 94, 90, .. 50 % of its height there that can be assembled within the ranges of the joints;
 /// - motors: those of the robot; rotors of 1e-3 kg m^2 where it has none, and no limits where they could not hold its weight
 ///   on a lever of 20 mm;
-/// - serial joints: those from base to foot, if they are six of one coordinate each.
+/// - serial joints: those from base to foot, if they are six of one coordinate each. Dead points of their linkages that they can
+///   reach from the posture are told, and that one lies between it and the neutral configuration.
 /// \param model  value of the key `model`: the path of the robot, as the file will name it
 /// \throws InputError when the robot has no free base, no loop that closes or no such foot
 Adoption adoptRobot(const LoadedRobot& robot, const std::string& model);
