@@ -59,7 +59,7 @@ void ModelBuilder::addLink(const std::string& link, const std::string& parent_li
   for (Vector3d* axis : {&joint.axis, &joint.axis2}) {
     const double norm = axis->norm();
     if (!(norm > 1e-12) || !std::isfinite(norm)) fail(element, "its axis is not a direction", "give a non-zero vector");
-    *axis /= norm;
+    if (std::abs(axis->squaredNorm() - 1) > 1e-15) *axis /= norm;  // so that what is written is read back
   }
   if (joint.kind == JointKind::Universal && joint.axis.cross(joint.axis2).norm() < 1e-6)
     fail(element, "the two axes of a universal joint are parallel", "give two different axes");

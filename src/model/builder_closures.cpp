@@ -40,7 +40,7 @@ void ModelBuilder::addClosure(const std::string& name, ClosureKind kind, const s
   closure.body2 = f2.body;
   closure.X_B1 = f1.X_BF;
   closure.X_B2 = f2.X_BF;
-  closure.axis = axis.normalized();
+  closure.axis = std::abs(axis.squaredNorm() - 1) > 1e-15 ? Vector3d(axis.normalized()) : axis;  // as it is read back
   closure.kp = kp;
   closure.kd = kd;
   addChecked(std::move(closure));

@@ -12,7 +12,8 @@ struct RobotText {
   std::string urdf, yaml;
 };
 
-/// Masses and inertias have twelve digits; lengths, angles and directions are rounded to 1e-12. Every body, joint,
+/// Numbers have as many digits as read back to the same bits. Rotations are roll, pitch and yaw, of which readers make the same
+/// matrices up to rounding. Every body, joint,
 /// frame, closure, motor, contact and reference keeps its name; links that were merged into a body become frames.
 /// Bodies keep their order if the model lists them depth first.
 /// \param remark  comment at the head of both files

@@ -1,0 +1,195 @@
+// Robots out into every format that is also read, and in again, with the same loops and numbers. Random mechanisms, and plane four-bars and parallelograms of hinges anywhere in space, whose rows are redundant.
+#include <catch2/catch.hpp>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <regex>
+#include <sstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/closure.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/formats/robot_writer.h"
+#include "bielle/model/error.h"
+#include "bielle/robots/robot_loader.h"
+#include "formats/drake.h"
+#include "formats/mjcf.h"
+#include "formats/sdf.h"
+#include "math/so3.h"
+#include "mechanisms.h"
+#include "model/number_text.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// A plane four-bar in any plane, closed by a hinge whose five rows leave its motion three of them: crank, coupler and rocker on
+// random bars (Grashof or not), with random masses. \param is_parallelogram  whose pins stay in line with its bars
+Mechanism makeFourBarInSpace(std::mt19937& rng, bool is_parallelogram) {
+  std::uniform_real_distribution<double> length(0.1, 0.5), angle(0.4, 2.4);
+  const Vector3d normal = randomVector(rng, 3).normalized();
+  const Matrix3d R = makeAxisRotation(randomVector(rng, 3).normalized(), angle(rng));
+  const Vector3d u = normal.unitOrthogonal(), w = normal.cross(u), start = randomVector(rng, 3);
+  double crank = 0, coupler = 0, rocker = 0, ground = 0, turn = 0, reach = 0;
+  do {
+    crank = length(rng), ground = length(rng), turn = angle(rng);
+    coupler = is_parallelogram ? ground : length(rng), rocker = is_parallelogram ? crank : length(rng);
+    reach = std::sqrt(crank * crank + ground * ground - 2 * crank * ground * std::cos(turn));
+  } while (!(reach < 0.95 * (coupler + rocker) && reach > 1.05 * std::abs(coupler - rocker)));
+  const auto place = [&](double x, double y) { return Vector3d(start + R * (x * u + y * w)); };
+  const Vector3d A = place(0, 0), D = place(ground, 0), B = place(crank * std::cos(turn), crank * std::sin(turn));
+  const double along = (reach * reach + coupler * coupler - rocker * rocker) / (2 * reach);
+  const double across = std::sqrt(std::max(0.0, coupler * coupler - along * along));
+  const Vector3d way = (D - B).normalized(), axis = R * normal;
+  const Vector3d side = (is_parallelogram ? -1 : 1) * way.cross(axis);
+  const Vector3d C = is_parallelogram ? Vector3d(B + D - A) : Vector3d(B + along * way + across * side);
+  ModelBuilder builder("four_bar");
+  // Each link in a frame of its own, turned at random; all angles are zero where they are drawn.
+  std::map<std::string, SE3> X;
+  const auto add = [&](const std::string& link, const std::string& parent, const Vector3d& pivot) {
+    X[link] = {exp3(Vector3d(randomVector(rng, 3))), pivot};
+    Joint joint;
+    joint.name = link + "_joint";
+    joint.kind = JointKind::Revolute;
+    joint.X_PJ = parent == "world" ? X[link] : X[parent].inverse() * X[link];
+    joint.axis = X[link].R.transpose() * axis;
+    builder.addLink(link, parent, joint, randomInertia(rng));
+  };
+  add("crank", "world", A), add("coupler", "crank", B), add("rocker", "world", D);
+  const SE3 X_pin(exp3(Vector3d(randomVector(rng, 3))), C);
+  builder.addFrame("pin_1", "coupler", X["coupler"].inverse() * X_pin);
+  builder.addFrame("pin_2", "rocker", X["rocker"].inverse() * X_pin);
+  builder.addClosure("pin", ClosureKind::Hinge5D, "pin_1", "pin_2", X_pin.R.transpose() * axis);
+  builder.addMotor({"crank_joint", 0, 0, 1e-3, 10 * length(rng), 7, {}, 1e9, {}});
+  builder.addSerialJoint("rocker_joint");
+  const Model model = builder.build();
+  return {model, VectorXd::Zero(model.nv())};
+}
+
+Mechanism makeAny(std::mt19937& rng, int i) {
+  const std::vector<MechanismKind>& kinds = listMechanismKinds();
+  const MechanismKind& kind = kinds[static_cast<size_t>(i / 4) % kinds.size()];
+  if (i % 4 == 0) return makeFourBarInSpace(rng, false);
+  if (i % 4 == 1) return makeFourBarInSpace(rng, true);
+  if (i % 4 == 2) return makeRandomMechanism(rng, kind.joint, kind.closure, kind.base);
+  return makeSprungMechanism(rng, kind.joint, kind.closure, kind.base);
+}
+
+double calcGap(const Model& model, ConstVectorRef q) {
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  return calcLargestGap(ws, makeConstraintSet(model));
+}
+
+// The numbers of a text in their order, as they are written.
+std::vector<std::string> readNumbers(const std::string& text) {
+  static const std::regex number(R"(rpy="[^"]*"|axis xyz="[^"]*"|-?\d+\.?\d*(e[-+]?\d+)?)");
+  std::vector<std::string> out;
+  for (std::sregex_iterator it(text.begin(), text.end(), number), end; it != end; ++it) out.push_back(it->str());
+  return out;
+}
+
+// Lengths, masses and limits of two models: a writer of fewer digits rounds once and never again, so that texts do not tell.
+void checkLengths(const Model& a, const Model& b) {
+  for (int i = 1; i < a.numBodies(); ++i) {
+    const Joint& joint = a.joints()[static_cast<size_t>(i)];
+    CAPTURE(joint.name);
+    const int j = b.findJoint(joint.name);
+    REQUIRE(j > 0);
+    const Joint& other = b.joints()[static_cast<size_t>(j)];
+    const Inertia &own = a.bodies()[static_cast<size_t>(i)].inertia, &back = b.bodies()[static_cast<size_t>(j)].inertia;
+    CHECK(other.X_PJ.p == joint.X_PJ.p);
+    CHECK((other.X_PJ.R - joint.X_PJ.R).cwiseAbs().maxCoeff() < 1e-15);
+    CHECK(back.mass == own.mass);
+    CHECK(back.com == own.com);
+    for (int r = 0; r < 3; ++r)  // one half, which may differ from the other by rounding
+      for (int c = r; c < 3; ++c) CHECK(back.I_com(r, c) == own.I_com(r, c));
+  }
+  REQUIRE(a.closures().size() == b.closures().size());
+  for (size_t c = 0; c < a.closures().size(); ++c) {
+    const Closure &own = a.closures()[c], &back = b.closures()[c];
+    CHECK((back.X_B1.p == own.X_B1.p && back.X_B2.p == own.X_B2.p && back.offset == own.offset));
+  }
+}
+
+// Of rotations and of axes, which readers make of unit length, up to rounding.
+void checkNumbers(const std::vector<std::string>& a, const std::vector<std::string>& b) {
+  REQUIRE(a.size() == b.size());
+  for (size_t k = 0; k < a.size(); ++k) {
+    if (a[k] == b[k]) continue;
+    CAPTURE(a[k], b[k]);
+    REQUIRE((a[k].rfind("rpy", 0) == 0 || a[k].rfind("axis", 0) == 0));
+    std::vector<double> x, y;
+    const auto read = [](std::string text, std::vector<double>& values) {
+      for (char& c : text)
+        if (!std::isdigit(static_cast<unsigned char>(c)) && c != '.' && c != '-' && c != 'e') c = ' ';
+      std::istringstream words(text);
+      for (std::string word; words >> word;)
+        if (const std::optional<double> value = parseNumber(word)) values.push_back(*value);
+    };
+    read(a[k], x), read(b[k], y);
+    REQUIRE((x.size() == 3 && y.size() == 3));
+    for (size_t i = 0; i < 3; ++i) CHECK(std::abs(std::remainder(x[i] - y[i], 2 * M_PI)) < 1e-14);
+  }
+}
+
+}  // namespace
+
+TEST_CASE(
+    "robots of any kind come back from URDF and YAML: they close, and every number but rotations is the same bits",
+    "[sweep]") {
+  const int count = std::getenv("BIELLE_SWEEP") ? 1000 : 30;
+  int refused = 0, redundant = 0;
+  for (int i = 0; i < count; ++i) {
+    CAPTURE(i);
+    std::mt19937 rng(static_cast<unsigned>(i));
+    const Mechanism mechanism = makeAny(rng, i);
+    RobotText text;
+    try {
+      text = formatRobot(mechanism.model);
+    } catch (const InputError&) {  // a universal joint that files cannot express
+      ++refused;
+      continue;
+    }
+    const RobotDirectory directory;
+    const Model model = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
+    REQUIRE(model.nq() == mechanism.model.nq());
+    CHECK(calcGap(model, mechanism.q_closed) < 1e-11);
+    checkLengths(mechanism.model, model);
+    const RobotText again = formatRobot(model);
+    checkNumbers(readNumbers(text.urdf), readNumbers(again.urdf));
+    CHECK(readNumbers(text.yaml) == readNumbers(again.yaml));
+    const Mobility mobility = calcMobility(model, mechanism.q_closed);
+    redundant += mobility.rank < mobility.rows;
+    if (i % 10 == 0) CHECK(findClosedConfiguration(model).status == NumericalStatus::Ok);
+  }
+  CHECK(redundant >= count / 2 - 1);
+  CHECK(refused <= count / 3);
+}
+
+TEST_CASE("four-bars in any plane come back from MJCF, Drake's URDF and SDF with their motion", "[sweep]") {
+  const int count = std::getenv("BIELLE_SWEEP") ? 200 : 8;
+  for (int i = 0; i < count; ++i) {
+    std::mt19937 rng(static_cast<unsigned>(i));
+    const Mechanism mechanism = makeFourBarInSpace(rng, i % 2 == 1);
+    const Model& model = mechanism.model;
+    const RobotDirectory directory;
+    for (const std::string& file : {directory.write("mjcf/robot.xml", formatMjcf(model, mechanism.q_closed).xml),
+                                    directory.write("drake/robot.urdf", formatDrake(model).urdf),
+                                    directory.write("sdf/robot.sdf", formatSdf(model, mechanism.q_closed).xml)}) {
+#ifndef BIELLE_READS_SDF
+      if (file.rfind(".sdf") != std::string::npos) continue;
+#endif
+      CAPTURE(i, file);
+      const Model back = loadRobot(file).model;
+      const AssemblyResult closed = findClosedConfiguration(back);
+      REQUIRE(closed.status == NumericalStatus::Ok);
+      CHECK(calcMobility(back, closed.q).mobility == (back.hasFreeFlyer() ? 7 : 1));
+      CHECK(back.mass() == Approx(model.mass()).epsilon(1e-15));
+    }
+  }
+}
