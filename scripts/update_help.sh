@@ -1,6 +1,7 @@
 #!/bin/bash
-# update_help.sh [BIELLE]: writes src/cli/help, the help of the companions' commands, which the core prints where a companion is not
-# there. BIELLE (default: build/test/bin/bielle) has all of them beside it. The test `companions` compares.
+# update_help.sh [BIELLE]: writes what the programs say of themselves: src/cli/help, the help of the companions' commands, which the
+# core prints where a companion is not there, and the table of docs/keys.md. BIELLE (default: build/test/bin/bielle) has all of them
+# beside it. The tests `companions` and `keys` compare.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 bielle=${1:-build/test/bin/bielle}
@@ -13,3 +14,6 @@ done
 sed -n '/^Robots:/,/^Examples:/s/^  \([^ ]*\).*/\1/p' src/cli/help/generate.txt | while read -r robot; do
   "$bielle" generate "$robot" --help >"src/cli/help/generate-$robot.txt"
 done
+
+sed -i '/^| .*`/d' docs/keys.md  # its rows
+for part in "" -complete -design -tasks -simulate; do "$bielle$part" --yaml-keys; done | LC_ALL=C sort -u >>docs/keys.md

@@ -451,7 +451,7 @@ TEST_CASE("parts: errors give the file, the line, the name and what to do") {
   refuse(kRobotOfRods, "part: rod, prefix: upper_", "part: rods, prefix: upper_",
          {"there is no part 'rods'", "searched were"});
   refuse(kRobotOfRods, "mounts: {base: world}", "mounts: {bases: world}",
-         {"wants to be mounted on base (link), offered are bases"});
+         {"key 'bases' (line ", "there is no mount 'bases'; known are base"});
   refuse(kRobotOfRods, "mounts: {base: world}", "mounts: {base: swing_upper_left}",
          {"there is no link 'swing_upper_left'"});
   files.write("bad/motor.yaml", "mounts: {on: joint}\ntree: {}\nmotors: {on: {armature: 0.1}}\n");

@@ -91,6 +91,16 @@ int run(const DatasetArguments& arguments) {
   const DatasetSpec spec = readDatasetSpec(arguments.spec);
   makeOutputDirectory(arguments.directory);
   requireCompanion("bielle-check");  // motions have to be checked
+  const bool carries_out = std::any_of(spec.motions.begin(), spec.motions.end(),
+                                       [](const DatasetMotion& motion) { return motion.carried_out; });
+  const std::string log = arguments.directory + "/dry_run.log";
+  const bool is_checked = checkDataset(spec, requireCompanion("bielle-complete"),
+                                       carries_out ? requireCompanion("bielle-simulate") : "", log);
+  fs::remove(log);
+  if (!is_checked) {
+    std::cerr << "bielle: error: interrupted; run the same command again to continue" << std::endl;
+    return kFailed;
+  }
   const std::map<std::string, std::string> robots = makeRobots(spec, arguments.directory);
   CaseRun cases{arguments.directory + "/motions", {}, {}, arguments.tasks};
   for (const DatasetMotion& motion : spec.motions)

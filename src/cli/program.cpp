@@ -11,6 +11,7 @@
 #include "cli/help.h"
 #include "formats/companion.h"
 #include "formats/process.h"
+#include "formats/yaml_entry.h"
 #include "model/missing_part.h"
 #include "results/number_option.h"
 #include "results/standard_output.h"
@@ -115,6 +116,11 @@ void addCommands(CLI::App& app, const std::vector<OwnCommand>& commands, Action&
 
 int run(int argc, char** argv, const std::vector<OwnCommand>& commands) {
   setCommandLine(argc, argv);
+  if (argc == 2 &&
+      argv[1] == std::string("--yaml-keys")) {  // of this program alone: scripts/update_help.sh puts them together
+    std::cout << describeYamlKeys();
+    return kOk;
+  }
   if (const CommandEntry* command = argc > 1 ? findCommand(argv[1]) : nullptr)
     if (std::none_of(commands.begin(), commands.end(),
                      [&](const OwnCommand& own) { return own.name == std::string(argv[1]); }))

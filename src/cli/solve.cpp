@@ -15,6 +15,7 @@
 #include "cli/free_timings.h"
 #include "cli/objective.h"
 #include "cli/table.h"
+#include "motion/applied_options.h"
 #include "results/interrupt.h"
 #include "results/output_place.h"
 #include "results/setting.h"
@@ -35,7 +36,7 @@ struct SolveArguments {
   TimingArguments timings;
   FddpOptions solver = makeMotionSolverOptions();
   std::string warm_start;  // directory of a result, or empty
-  bool quiet = false, no_check = false, no_report = false;
+  bool quiet = false, no_check = false, no_report = false, dry_run = false;
 };
 
 LimitOptions makeLimits(const SolveArguments& arguments) {
@@ -193,6 +194,13 @@ StartingPoint readStart(const std::string& directory, const Motion& motion) {
   }
 }
 
+// Whatever does not depend on the motion that is asked for.
+int checkRequest(const Model& model, const MotionRequest& request, const ProblemOptions& problem) {
+  request.options.check();
+  Limits(model, problem.limits, makeStandingPosture(model));
+  return kOk;
+}
+
 int solve(const SolveArguments& arguments, MotionRequest request) {
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] = splitSetting("--set", setting, "com_weight=1e5");
@@ -211,6 +219,7 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   problem.limits = makeLimits(arguments);
   problem.timings = makeTimings(arguments.timings);
   problem.step = arguments.step.value_or(serial ? StepRule::Euler : StepRule::Midpoint);
+  if (arguments.dry_run) return checkRequest(model, request, problem);
   const Motion motion = makeMotion(model, request, problem);
   SolveOptions options;
   options.solver = arguments.solver;
@@ -320,6 +329,7 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
   sub.add_flag("--quiet", arguments->quiet, "do not print a line per iteration");
   sub.add_flag("--no-report", arguments->no_report, "do not write report.html");
   sub.add_flag("--no-check", arguments->no_check, "do not run `bielle check` on the result");
+  sub.add_flag("--dry-run", arguments->dry_run, "check the options and the robot only: plan nothing, write nothing");
 }
 
 constexpr const char* kOutcome =

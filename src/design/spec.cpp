@@ -18,6 +18,21 @@ namespace {
 using Entry = YamlEntry;
 using Fields = YamlFields;
 
+const YamlKeys kDesignKeys("design", "",
+                           {"robot", "generator", "set", "architecture", "variables", "motor_catalogue", "motions",
+                            "mode", "margin", "objective", "constraints", "drives", "search"});
+const YamlKeys kVariableKeys("design", "variables[]",
+                             {"name", "unit", "bounds", "length", "shift", "parameter", "ratio", "gear", "motor",
+                              "choices", "mass", "start"});
+const YamlKeys kLengthKeys("design", "variables[].length[]", {"from", "to", "across", "stretch"});
+const YamlKeys kShiftKeys("design", "variables[].shift[]", {"of", "along"});
+const YamlKeys kGearKeys("design", "variables[].gear", {"loss", "mass"});
+const YamlKeys kTermKeys("design", "objective[]", {"measure", "motors", "weight", "region"});
+const YamlKeys kRegionKeys("design", "objective[].region",
+                           {"foot", "base", "max_conditioning", "x", "y", "z", "roll", "pitch", "yaw"});
+const YamlKeys kConstraintKeys("design", "constraints[]", {"measure", "motors", "at_most", "at_least", "except"});
+const YamlKeys kDesignDriveKeys("design", "drives", {"motor_constant", "motors", "regeneration"});
+
 Vector3d readDirection(const Entry& entry) {
   const Vector3d direction = entry.getVector3();
   if (direction.norm() < 1e-9) entry.fail("it is not a direction", "give three numbers that are not all zero");
@@ -28,7 +43,7 @@ Vector3d readDirection(const Entry& entry) {
 std::vector<Entry> getItems(const Entry& entry) { return entry.isList() ? entry.getList() : std::vector<Entry>{entry}; }
 
 LengthChange readLength(const Entry& entry) {
-  const Fields fields = entry.getFields({"from", "to", "across", "stretch"});
+  const Fields fields = entry.getFields(kLengthKeys);
   LengthChange change;
   change.from = require(fields, "from", entry).getText();
   change.to = require(fields, "to", entry).getText();
@@ -38,7 +53,7 @@ LengthChange readLength(const Entry& entry) {
 }
 
 ShiftChange readShift(const Entry& entry) {
-  const Fields fields = entry.getFields({"of", "along"});
+  const Fields fields = entry.getFields(kShiftKeys);
   return {require(fields, "of", entry).getText(), readDirection(require(fields, "along", entry))};
 }
 
@@ -91,7 +106,7 @@ void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& s
 }
 
 GearCost readGearCost(const Entry& entry) {
-  const Fields fields = entry.getFields({"loss", "mass"});
+  const Fields fields = entry.getFields(kGearKeys);
   GearCost cost;
   if (const Entry* loss = find(fields, "loss")) cost.loss = loss->getNumber();
   if (const Entry* mass = find(fields, "mass")) cost.mass_per_effort = mass->getNumber();
@@ -101,8 +116,7 @@ GearCost readGearCost(const Entry& entry) {
 }
 
 DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const Entry* catalogues) {
-  const Fields fields = entry.getFields(
-      {"name", "unit", "bounds", "length", "shift", "parameter", "ratio", "gear", "motor", "choices", "mass", "start"});
+  const Fields fields = entry.getFields(kVariableKeys);
   DesignVariable variable;
   variable.name = require(fields, "name", entry).getText();
   if (const Entry* lengths = find(fields, "length"))
@@ -218,10 +232,7 @@ WorkspaceAxis readAxis(const Entry& entry) {
 }
 
 WorkspaceRegion readRegion(const Entry& entry) {
-  const std::vector<std::string> axes = {"x", "y", "z", "roll", "pitch", "yaw"};
-  std::vector<std::string> keys = {"foot", "base", "max_conditioning"};
-  keys.insert(keys.end(), axes.begin(), axes.end());
-  const Fields fields = entry.getFields(keys);
+  const Fields fields = entry.getFields(kRegionKeys);
   WorkspaceRegion region;
   if (const Entry* foot = find(fields, "foot")) region.foot = foot->getText();
   if (const Entry* base = find(fields, "base")) region.base = base->getText();
@@ -230,23 +241,33 @@ WorkspaceRegion readRegion(const Entry& entry) {
     if (!(region.max_conditioning >= 1))
       bound->fail("the conditioning of a linkage is at least 1", "give a number of 1 or more");
   }
-  for (size_t i = 0; i < axes.size(); ++i)
-    if (const Entry* axis = find(fields, axes[i])) region.axes[i] = readAxis(*axis);
+  int i = 0;
+  for (const char* name : {"x", "y", "z", "roll", "pitch", "yaw"}) {
+    if (const Entry* axis = find(fields, name)) region.axes[i] = readAxis(*axis);
+    ++i;
+  }
   return region;
 }
 
-DriveTable readDrives(const Entry& entry) {
-  const Fields fields = entry.getFields({"motor_constant", "motors", "regeneration"});
+void addMotorNames(const Entry& list, DesignSpec& spec) {
+  for (const Entry& entry : list.getList()) spec.motor_names.emplace_back(entry.getText(), entry);
+}
+
+DriveTable readDrives(const Entry& entry, DesignSpec& spec) {
+  const Fields fields = entry.getFields(kDesignDriveKeys);
   DriveTable drives;
   if (const Entry* constant = find(fields, "motor_constant")) drives.motor_constant = constant->getNumber();
   if (const Entry* share = find(fields, "regeneration")) drives.regeneration = share->getNumber();
   if (const Entry* motors = find(fields, "motors"))
-    for (const auto& [name, value] : motors->getMap()) drives.motor_constants.emplace_back(name, value.getNumber());
+    for (const auto& [name, value] : motors->getMap()) {
+      drives.motor_constants.emplace_back(name, value.getNumber());
+      spec.motor_names.emplace_back(name, value);
+    }
   return drives;
 }
 
-ObjectiveTerm readTerm(const Entry& entry) {
-  const Fields fields = entry.getFields({"measure", "motors", "weight", "region"});
+ObjectiveTerm readTerm(const Entry& entry, DesignSpec& spec) {
+  const Fields fields = entry.getFields(kTermKeys);
   ObjectiveTerm term;
   term.measure =
       readChoice<Measure>(require(fields, "measure", entry),
@@ -259,14 +280,14 @@ ObjectiveTerm readTerm(const Entry& entry) {
   if (motors && term.measure == Measure::Cost) motors->fail("the cost is that of the whole motion", "remove it");
   if (region && !is_workspace) region->fail("only a workspace has a region", "remove it");
   if (region) term.region = readRegion(*region);
-  if (motors) term.motors = motors->getTexts();
+  if (motors) term.motors = motors->getTexts(), addMotorNames(*motors, spec);
   if (const Entry* weight = find(fields, "weight")) term.weight = weight->getNumber();
   if (!(term.weight > 0)) entry.fail("its weight is not positive", "give a positive number, or none");
   return term;
 }
 
-DesignConstraint readConstraint(const Entry& entry) {
-  const Fields fields = entry.getFields({"measure", "motors", "at_most", "at_least", "except"});
+DesignConstraint readConstraint(const Entry& entry, DesignSpec& spec) {
+  const Fields fields = entry.getFields(kConstraintKeys);
   DesignConstraint constraint;
   constraint.measure = readChoice<Measure>(
       require(fields, "measure", entry),
@@ -274,7 +295,7 @@ DesignConstraint readConstraint(const Entry& entry) {
        Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy, Measure::Conditioning});
   const Entry *most = find(fields, "at_most"), *least = find(fields, "at_least"), *motors = find(fields, "motors");
   if (motors && !isOfMotors(constraint.measure)) motors->fail("the measure does not depend on motors", "remove it");
-  if (motors) constraint.motors = motors->getTexts();
+  if (motors) constraint.motors = motors->getTexts(), addMotorNames(*motors, spec);
   const bool is_share = constraint.measure == Measure::Envelope || constraint.measure == Measure::Heat;
   if ((most && least) || (!most && !least && !is_share))
     entry.fail("it does not have exactly one bound", "give one of `at_most` and `at_least`");
@@ -299,8 +320,7 @@ DesignConstraint readConstraint(const Entry& entry) {
 }
 
 void readRoot(const Entry& root, DesignSpec& spec) {
-  const Fields fields = root.getFields({"robot", "generator", "set", "architecture", "variables", "motor_catalogue",
-                                        "motions", "mode", "margin", "objective", "constraints", "drives", "search"});
+  const Fields fields = root.getFields(kDesignKeys);
   spec.robot = readRobotSpec(fields, root);
   const Entry *architecture = find(fields, "architecture"), *variables = find(fields, "variables");
   if (architecture) readArchitecture(*architecture, spec);
@@ -308,16 +328,16 @@ void readRoot(const Entry& root, DesignSpec& spec) {
     for (const Entry& item : require(fields, "variables", root).getList())
       spec.variables.push_back(readVariable(item, spec, find(fields, "motor_catalogue")));
   if (const Entry* motions = find(fields, "motions")) spec.motions = readMotionSpecs(*motions, true);
-  if (const Entry* drives = find(fields, "drives")) spec.drives = readDrives(*drives);
+  if (const Entry* drives = find(fields, "drives")) spec.drives = readDrives(*drives, spec);
   if (const Entry* mode = find(fields, "mode"))
     spec.mode = readChoice<MotionMode>(*mode, {MotionMode::Reoptimized, MotionMode::Kept});
   if (const Entry* margin = find(fields, "margin")) {
     spec.margin = margin->getNumber();
     if (!(spec.margin >= 1e-3 && spec.margin < 1)) margin->fail("it is outside 0.001 .. 1", "give e.g. 0.1");
   }
-  for (const Entry& item : require(fields, "objective", root).getList()) spec.objective.push_back(readTerm(item));
+  for (const Entry& item : require(fields, "objective", root).getList()) spec.objective.push_back(readTerm(item, spec));
   if (const Entry* constraints = find(fields, "constraints"))
-    for (const Entry& item : constraints->getList()) spec.constraints.push_back(readConstraint(item));
+    for (const Entry& item : constraints->getList()) spec.constraints.push_back(readConstraint(item, spec));
   if (const Entry* search = find(fields, "search")) readSearch(*search, spec);
 }
 

@@ -63,6 +63,7 @@
 #include "bielle/model/options.h"
 #include "design/evaluation.h"
 #include "design/front_search.h"
+#include "formats/yaml_entry.h"
 #include "model/payload.h"
 
 namespace bielle {
@@ -95,6 +96,7 @@ struct DesignSpec {
   std::vector<ObjectiveTerm> objective;
   std::vector<DesignConstraint> constraints;
   DriveTable drives;
+  std::vector<std::pair<std::string, YamlEntry>> motor_names;  ///< of the three, * stands for any text
   unsigned seed = 1;
   int searches = 2;
   std::vector<VectorXd> starts;  ///< of searches, in place of their number; NaN: the value of the start design

@@ -1,4 +1,6 @@
+#include "bielle/model/names.h"
 #include "bielle/motion/registry.h"
+#include "design/motor_change.h"
 #include "design/spec.h"
 
 namespace bielle {
@@ -26,7 +28,13 @@ DesignEvaluator makeEvaluator(const DesignSpec& spec) {
   options.drives = spec.drives;
   options.margin = spec.margin;
   options.constraints = spec.constraints;
-  return DesignEvaluator(makeParametrization(spec), motions, spec.objective, options);
+  const Parametrization robot = makeParametrization(spec);
+  if (!spec.motor_names.empty()) {
+    const Model start = robot.make(robot.start());
+    for (const auto& [name, entry] : spec.motor_names)
+      if (findMotors(start, {name}).empty()) entry.failUnknown("motor", name, getNames(start.motors()));
+  }
+  return DesignEvaluator(robot, motions, spec.objective, options);
 }
 
 }  // namespace bielle

@@ -11,10 +11,35 @@
 namespace fs = std::filesystem;
 
 namespace bielle {
+namespace {
 
-OptionValues readSettings(const YamlEntry& entry) {
+const YamlKeys kMotionKeys("comparison", "motions[]", {"motion", "set"});
+const YamlKeys kWeighedMotionKeys("design", "motions[]", {"motion", "set", "weight", "payload", "payload_at"});
+
+}  // namespace
+
+const MotionEntry& findMotionOf(const YamlEntry& entry) {
+  try {
+    return findMotion(entry.path(), entry.getText());
+  } catch (const InputError& error) {
+    entry.fail(error.problem() + " as '" + entry.getText() + "'", error.remedy());
+  }
+}
+
+void setOption(OptionSet& options, const std::string& name, const YamlEntry& entry, const std::string& value) {
+  try {
+    options.set(name, parseOption(value));
+  } catch (const InputError& error) {
+    entry.fail(error.problem(), error.remedy());
+  }
+}
+
+OptionValues readSettings(const YamlEntry& entry, OptionSet known) {
   OptionValues settings;
-  for (const auto& [name, value] : entry.getMap()) settings.emplace_back(name, parseOption(value.getText()));
+  for (const auto& [name, value] : entry.getMap()) {
+    setOption(known, name, value, value.getText());
+    settings.emplace_back(name, parseOption(value.getText()));
+  }
   return settings;
 }
 
@@ -27,6 +52,7 @@ RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map) {
   if (const YamlEntry* set = find(fields, "set")) {
     if (spec.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
     for (const auto& [name, value] : set->getMap()) spec.settings.emplace_back(name, parseOption(locateBeside(value)));
+    readGeneratorEntry(fields.at("generator"), set);  // checks them
   }
   return spec;
 }
@@ -48,13 +74,12 @@ void readShare(const YamlFields& fields, MotionSpec& motion) {
 
 std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry, bool weighed) {
   std::vector<MotionSpec> motions;
-  std::vector<std::string> keys = {"motion", "set"};
-  if (weighed) keys.insert(keys.end(), {"weight", "payload", "payload_at"});
   for (const YamlEntry& item : entry.getList()) {
-    const YamlFields fields = item.getFields(keys);
+    const YamlFields fields = item.getFields(weighed ? kWeighedMotionKeys : kMotionKeys);
     MotionSpec motion;
-    motion.motion = require(fields, "motion", item).getText();
-    if (const YamlEntry* set = find(fields, "set")) motion.settings = readSettings(*set);
+    const MotionEntry& known = findMotionOf(require(fields, "motion", item));
+    motion.motion = known.name;
+    if (const YamlEntry* set = find(fields, "set")) motion.settings = readSettings(*set, known.request.options);
     if (weighed) readShare(fields, motion);
     motions.push_back(motion);
   }

@@ -4,12 +4,18 @@
 #include <vector>
 
 #include "bielle/model/model.h"
+#include "bielle/motion/registry.h"
 #include "design/spec.h"
 #include "formats/yaml_entry.h"
 
 namespace bielle {
 
-OptionValues readSettings(const YamlEntry& entry);
+// The motion that an entry names. \throws InputError with its line
+const MotionEntry& findMotionOf(const YamlEntry& entry);
+// Sets an option to what an entry says. \throws InputError with its line
+void setOption(OptionSet& options, const std::string& name, const YamlEntry& entry, const std::string& value);
+// The key `set` of a motion. \param known  its options
+OptionValues readSettings(const YamlEntry& entry, OptionSet known);
 
 // One of the values by its name.
 template <typename Enum>

@@ -1,14 +1,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bielle/model/names.h"
 #include "design/spec_parts.h"
 
 namespace bielle {
 namespace {
 
+const YamlKeys kSearchKeys("design", "search", {"seed", "searches", "starts", "stages", "pareto"});
+const YamlKeys kStageKeys("design", "search.stages[], search.pareto.refine", {"algorithm", "evaluations", "tolerance"});
+const YamlKeys kFrontKeys("design", "search.pareto", {"algorithm", "population", "generations", "refine"});
+
 // The mode, the objective and the constraints have been read.
 SearchStage readStage(const YamlEntry& item, const std::vector<SearchAlgorithm>& algorithms, const DesignSpec& spec) {
-  const YamlFields fields = item.getFields({"algorithm", "evaluations", "tolerance"});
+  const YamlFields fields = item.getFields(kStageKeys);
   SearchStage stage;
   stage.algorithm = readChoice<SearchAlgorithm>(require(fields, "algorithm", item), algorithms);
   if (needsGradient(stage.algorithm))
@@ -25,7 +30,7 @@ FrontSpec readFront(const YamlEntry& entry, const DesignSpec& spec) {
   if (!hasFrontSearch())
     entry.fail("this program was built without pagmo, which searches for fronts",
                "install libpagmo-dev and build it again, or give `stages`");
-  const YamlFields fields = entry.getFields({"algorithm", "population", "generations", "refine"});
+  const YamlFields fields = entry.getFields(kFrontKeys);
   FrontSpec front;
   FrontOptions& options = front.options;
   if (const YamlEntry* algorithm = find(fields, "algorithm"))
@@ -53,7 +58,7 @@ VectorXd readStart(const YamlEntry& entry, const std::vector<DesignVariable>& va
   for (const auto& [name, value] : entry.getMap()) {
     const auto is_it = [&name = name](const DesignVariable& variable) { return variable.name == name; };
     const auto variable = std::find_if(variables.begin(), variables.end(), is_it);
-    if (variable == variables.end()) value.fail("there is no variable '" + name + "'", "name one of `variables`");
+    if (variable == variables.end()) value.failUnknown("variable", name, getNames(variables));
     double& number = x[variable - variables.begin()];
     number = variable->isChoice() ? readChoiceNumber(value, variable->choices) : value.getNumber();
     if (!variable->isChoice() && !(number >= variable->lower && number <= variable->upper))
@@ -65,7 +70,7 @@ VectorXd readStart(const YamlEntry& entry, const std::vector<DesignVariable>& va
 }  // namespace
 
 void readSearch(const YamlEntry& entry, DesignSpec& spec) {
-  const YamlFields fields = entry.getFields({"seed", "searches", "starts", "stages", "pareto"});
+  const YamlFields fields = entry.getFields(kSearchKeys);
   if (const YamlEntry* seed = find(fields, "seed")) spec.seed = static_cast<unsigned>(readCount(*seed, 1000000000));
   if (const YamlEntry* searches = find(fields, "searches")) spec.searches = readCount(*searches, 1000);
   const YamlEntry *stages = find(fields, "stages"), *starts = find(fields, "starts");

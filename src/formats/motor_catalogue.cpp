@@ -10,10 +10,18 @@ namespace fs = std::filesystem;
 namespace bielle {
 namespace {
 
-// What a catalogue and a robot may say of a motor alike.
-const std::vector<std::string> kDriveKeys = {"ratio",           "rotor_inertia", "torque_constant",    "resistance",
-                                             "voltage",         "current",       "continuous_current", "efficiency",
-                                             "back_efficiency", "mass"};
+// With what a catalogue and a robot may say of a motor alike.
+std::vector<std::string> appendDriveKeys(std::vector<std::string> keys) {
+  keys.insert(keys.end(), {"ratio", "rotor_inertia", "torque_constant", "resistance", "voltage", "current",
+                           "continuous_current", "efficiency", "back_efficiency", "mass"});
+  return keys;
+}
+
+const YamlKeys kCatalogueKeys("motor catalogue", "", {"motors"});
+const YamlKeys kTypeKeys("motor catalogue", "motors.NAME", appendDriveKeys({"source", "effort", "velocity"}));
+const YamlKeys kMotorKeys("robot, part", "motors.JOINT, roles.ROLE",
+                          appendDriveKeys({"type", "catalogue_type", "armature", "effort", "velocity", "torque_loss",
+                                           "continuous_effort"}));
 
 void readNumber(const YamlFields& fields, const char* key, double& value, bool may_be_infinite = false) {
   if (const YamlEntry* found = find(fields, key)) value = found->getNumber(may_be_infinite);
@@ -36,18 +44,13 @@ void readDrive(const YamlFields& fields, MotorDrive& drive) {
   readNumber(fields, "mass", drive.mass);
 }
 
-std::vector<std::string> append(std::vector<std::string> keys, const std::vector<std::string>& more) {
-  keys.insert(keys.end(), more.begin(), more.end());
-  return keys;
-}
-
 using Catalogue = std::map<std::string, MotorSpec>;
 
 Catalogue readCatalogue(const std::string& path) {
   Catalogue catalogue;
   readYamlDocument(path, readRobotText(path), [&](const YamlEntry& root) {
-    for (const auto& [name, entry] : require(root.getFields({"motors"}), "motors", root).getMap()) {
-      const YamlFields fields = entry.getFields(append({"source", "effort", "velocity"}, kDriveKeys));
+    for (const auto& [name, entry] : require(root.getFields(kCatalogueKeys), "motors", root).getMap()) {
+      const YamlFields fields = entry.getFields(kTypeKeys);
       require(fields, "source", entry).getText();
       MotorSpec spec;
       spec.drive.type = name;
@@ -102,8 +105,7 @@ std::vector<MotorSpec> readMotorSpecs(const YamlEntry& motors, const std::string
   if (catalogues) known.emplace(path, catalogues);
   std::vector<MotorSpec> specs;
   for (const auto& [joint, entry] : motors.getMap()) {
-    const YamlFields fields = entry.getFields(append(
-        {"type", "catalogue_type", "armature", "effort", "velocity", "torque_loss", "continuous_effort"}, kDriveKeys));
+    const YamlFields fields = entry.getFields(kMotorKeys);
     MotorSpec motor;
     if (const YamlEntry* type = find(fields, "type")) {
       if (!known) known.emplace(path, catalogues);

@@ -16,6 +16,8 @@
 namespace bielle {
 namespace {
 
+constexpr const char* kRootJoint = "root_joint";  // of a root that is not the world
+
 template <typename Joints>
 auto findJoint(Joints& joints, const std::string& name) {
   return std::find_if(joints.begin(), joints.end(), [&name](const UrdfJoint& j) { return j.joint.name == name; });
@@ -90,6 +92,24 @@ void splitUniversalJoints(double cross_inertia, UrdfFile& urdf) {
   urdf.joints = std::move(joints);
 }
 
+// Names that the robot does not have, with their line.
+void checkNames(const UrdfFile& urdf, const YamlFile& yaml, BaseKind base) {
+  std::vector<std::string> links = {"world"}, moving, joints, contacts;
+  for (const auto& [name, link] : urdf.links) links.push_back(name);
+  if (urdf.root != "world") (base == BaseKind::Free ? moving : joints).push_back(kRootJoint);
+  for (const UrdfJoint& j : urdf.joints) (j.joint.kind == JointKind::Fixed ? joints : moving).push_back(j.joint.name);
+  joints.insert(joints.end(), moving.begin(), moving.end());
+  for (const ContactSpec& contact : yaml.contacts) contacts.push_back(contact.name);
+  for (const auto& [kind, name, entry] : yaml.names) {
+    if (kind == RobotName::Kind::Contact) {
+      if (!contains(contacts, name)) entry.failUnknown("contact", name, contacts);
+    } else if (!contains(joints, name)) {
+      if (kind == RobotName::Kind::Joint) entry.failUnknown("joint", name, moving);
+      if (!contains(links, name)) entry.failUnknown("link or joint", name, links);
+    }
+  }
+}
+
 void setImportance(const YamlFile& yaml, UrdfFile& urdf) {
   for (const auto& [name, values] : yaml.importance) {
     const auto it = findJoint(urdf.joints, name);
@@ -145,6 +165,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   if (own.base) yaml.base = own.base;
   if (own.motor_armature) yaml.motor_armature = own.motor_armature;
   if (own.gravity) yaml.gravity = own.gravity;
+  yaml.names.insert(yaml.names.end(), own.names.begin(), own.names.end());
   yaml.warnings.insert(yaml.warnings.end(), own.warnings.begin(), own.warnings.end());
 }
 
@@ -243,7 +264,7 @@ void placeBase(UrdfFile& tree, YamlFile& yaml) {
 void addRoot(const UrdfFile& urdf, BaseKind base, ModelBuilder& builder) {
   if (urdf.root == "world") return;
   Joint joint;
-  joint.name = "root_joint";
+  joint.name = kRootJoint;
   joint.kind = base == BaseKind::Free ? JointKind::FreeFlyer : JointKind::Fixed;
   builder.addLink(urdf.root, "world", joint, urdf.links.at(urdf.root).inertia);
 }
@@ -365,9 +386,10 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
   retypeJoints(yaml, urdf);
   if (yaml.cross_inertia) splitUniversalJoints(*yaml.cross_inertia, urdf);
   addFrames(yaml, urdf);
+  const BaseKind base = overriding.value_or(yaml.base.value_or(BaseKind::Free));
+  checkNames(urdf, yaml, base);
   setImportance(yaml, urdf);
 
-  const BaseKind base = overriding.value_or(yaml.base.value_or(BaseKind::Free));
   if (urdf.has_own_base && base == BaseKind::Fixed) fixBase(urdf, yaml);
   if (urdf.is_urdf && urdf.root == "world") placeBase(urdf, yaml);
   ModelBuilder builder(urdf.name, urdf.path);

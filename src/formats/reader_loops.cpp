@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "bielle/model/error.h"
+#include "model/listing.h"
 
 namespace fs = std::filesystem;
 
@@ -16,6 +16,13 @@ UrdfJoint* findTreeJoint(UrdfFile& tree, const std::string& name) {
                                [&name](const UrdfJoint& joint) { return joint.joint.name == name; });
   return it == tree.joints.end() ? nullptr : &*it;
 }
+
+const YamlKeys kLoopFileKeys("loop_closures.yaml of others", "",
+                             {"closures", "ball_loops", "pin_loops", "dependent", "independent", "actuated_joints",
+                              "ball_upgrades"});
+const YamlKeys kHingeKeys("loop_closures.yaml of others", "closures[]", {"link_a", "link_b", "point", "axis"});
+const YamlKeys kTiedKeys("loop_closures.yaml of others", "ball_loops[], pin_loops[]",
+                         {"name", "parent", "child", "parent_xyz", "child_xyz", "axis"});
 
 class LoopClosuresReader {
  public:
@@ -32,7 +39,7 @@ class LoopClosuresReader {
     }
     tree_.warnings.push_back(tree_.path + ": its loops are those of " + path_);
     settings_.path = path_;
-    for (const auto& [key, entry] : root.getMap()) {
+    for (const auto& [key, entry] : getKnown(root, kLoopFileKeys)) {
       if (key == "closures")
         forEach(entry, [this](const YamlEntry& e) { readHinge(e); });
       else if (key == "ball_loops" || key == "pin_loops")
@@ -41,13 +48,11 @@ class LoopClosuresReader {
         forEach(entry, [this](const YamlEntry& e) { removeMimic(e); });
       else if (key == "independent" || key == "actuated_joints")
         forEach(entry, [this](const YamlEntry& e) { addMotor(e); });
-      else if (key == "ball_upgrades")
+      else
         forEach(entry, [this](const YamlEntry& e) {
           settings_.joint_types.emplace_back(findJoint(e).joint.name,
                                              JointRetyping{JointKind::Spherical, Vector3d::UnitZ(), Vector3d::UnitY()});
         });
-      else
-        tree_.warnings.push_back(path_ + ": " + entry.element() + ": it is left out");
     }
   }
 
@@ -90,15 +95,21 @@ class LoopClosuresReader {
     return axis / norm;
   }
 
-  // What is known of an entry; the rest is told.
-  YamlFields getKnown(const YamlEntry& entry, const std::set<std::string>& known) {
-    YamlFields fields;
+  // What is known of an entry, in its order; the rest is told: others may use it.
+  std::vector<std::pair<std::string, YamlEntry>> getKnown(const YamlEntry& entry,
+                                                          const std::vector<std::string>& known) {
+    std::vector<std::pair<std::string, YamlEntry>> fields;
     for (const auto& [key, value] : entry.getMap())
-      if (known.count(key))
-        fields.emplace(key, value);
+      if (contains(known, key))
+        fields.emplace_back(key, value);
       else
         tree_.warnings.push_back(path_ + ": " + value.element() + ": it is left out");
     return fields;
+  }
+
+  YamlFields getKnownFields(const YamlEntry& entry, const YamlKeys& known) {
+    const auto pairs = getKnown(entry, known);
+    return {pairs.begin(), pairs.end()};
   }
 
   void add(const std::string& name, ClosureKind kind, const Vector3d& axis, const std::string& link1, const SE3& X_L1,
@@ -113,7 +124,7 @@ class LoopClosuresReader {
   }
 
   void readHinge(const YamlEntry& entry) {
-    const YamlFields fields = getKnown(entry, {"link_a", "link_b", "point", "axis"});
+    const YamlFields fields = getKnownFields(entry, kHingeKeys);
     const std::string a = findLink(require(fields, "link_a", entry)), b = findLink(require(fields, "link_b", entry));
     const SE3 X_WP(Matrix3d::Identity(), require(fields, "point", entry).getVector3());
     add(a + "--" + b, ClosureKind::Hinge5D, getDirection(require(fields, "axis", entry)), a,
@@ -122,7 +133,7 @@ class LoopClosuresReader {
 
   // Frames that are parallel with all joints at zero.
   void readTied(const YamlEntry& entry, bool is_pin) {
-    const YamlFields fields = getKnown(entry, {"name", "parent", "child", "parent_xyz", "child_xyz", "axis"});
+    const YamlFields fields = getKnownFields(entry, kTiedKeys);
     const std::string a = findLink(require(fields, "parent", entry)), b = findLink(require(fields, "child", entry));
     const YamlEntry* name = find(fields, "name");
     const Matrix3d R_ba = X_WL_.at(b).R.transpose() * X_WL_.at(a).R;

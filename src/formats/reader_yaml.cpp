@@ -19,6 +19,26 @@ using Fields = YamlFields;
 
 constexpr double kMostYaw = 3.1416;  // rad, half a turn of four decimals
 
+std::vector<std::string> listRobotKeys() {
+  std::vector<std::string> keys = {"closed_loop", "type", "closure_name", "name_mot"};
+  keys.insert(keys.end(), listSharedKeys().begin(), listSharedKeys().end());
+  keys.insert(keys.end(), {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set"});
+  return keys;
+}
+
+const char* const kRobotOrPart = "robot, part";
+const YamlKeys kRobotKeys("robot", "", listRobotKeys());
+const YamlKeys kClosureKeys(kRobotOrPart, "closures[]",
+                            {"name", "frames", "type", "axis", "joints", "offset", "kp", "kd"});
+const YamlKeys kJointForceKeys(kRobotOrPart, "joint_forces.JOINT",
+                               {"stiffness", "rest", "preload", "damping", "friction", "friction_speed"});
+const YamlKeys kPointSpringKeys(kRobotOrPart, "point_springs.NAME",
+                                {"frames", "points", "stiffness", "rest", "preload", "damping"});
+const YamlKeys kContactKeys(kRobotOrPart, "contacts.NAME", {"frame", "type", "sole", "length"});
+const YamlKeys kReferenceKeys(kRobotOrPart, "references.NAME", {"joints", "height", "feet"});
+const YamlKeys kHeightKeys(kRobotOrPart, "references.NAME.height", {"frame", "value"});
+const YamlKeys kFootKeys(kRobotOrPart, "references.NAME.feet.CONTACT", {"place", "yaw"});
+
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
   return text;
@@ -58,6 +78,16 @@ std::string makeClosureName(const std::string& a, const std::string& b) {
   return last == std::string::npos ? a + "--" + b : stem.substr(0, last + 1);
 }
 
+// The names in a list.
+void addNames(RobotName::Kind kind, const Entry& list, YamlFile& file) {
+  for (const Entry& entry : list.getList()) file.names.push_back({kind, entry.getText(), entry});
+}
+
+// The keys of a map.
+void addKeys(RobotName::Kind kind, const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) file.names.push_back({kind, name, entry});
+}
+
 // closed_loop, type, closure_name: the published lists.
 void readPublishedClosures(const Fields& fields, const Entry& root, YamlFile& file) {
   const Entry *loops = find(fields, "closed_loop"), *types = find(fields, "type"),
@@ -77,6 +107,7 @@ void readPublishedClosures(const Fields& fields, const Entry& root, YamlFile& fi
     closure.name = names ? given[i] : makeClosureName(frames[0], frames[1]);
     closure.frame1 = frames[0];
     closure.frame2 = frames[1];
+    addNames(RobotName::Kind::Frame, pairs[i], file);
     closure.kind = readClosureKind(kinds[i]);
     if (closure.kind == ClosureKind::Coupler)
       kinds[i].fail("a coupler does not connect frames", "list it under `closures` with its joints");
@@ -84,20 +115,22 @@ void readPublishedClosures(const Fields& fields, const Entry& root, YamlFile& fi
   }
 }
 
-void readCoupler(const Fields& fields, const Entry& entry, ClosureSpec& closure) {
+void readCoupler(const Fields& fields, const Entry& entry, ClosureSpec& closure, YamlFile& file) {
   if (const Entry* frames = find(fields, "frames"))
     frames->fail("a coupler connects coordinates, not frames", "give its joints with their coefficients");
   closure.name = require(fields, "name", entry).getText();
-  for (const auto& [joint, coefficient] : require(fields, "joints", entry).getMap())
-    if (!closure.coefficients.emplace(joint, coefficient.getNumber()).second)
-      coefficient.fail("the joint is listed twice", "add up its coefficients");
+  for (const auto& [joint, coefficient] : require(fields, "joints", entry).getMap()) {
+    closure.coefficients.emplace(joint, coefficient.getNumber());
+    file.names.push_back({RobotName::Kind::Joint, joint, coefficient});
+  }
   if (const Entry* offset = find(fields, "offset")) closure.offset = offset->getNumber();
 }
 
-void readTiedFrames(const Fields& fields, const Entry& entry, ClosureSpec& closure) {
+void readTiedFrames(const Fields& fields, const Entry& entry, ClosureSpec& closure, YamlFile& file) {
   for (const char* key : {"joints", "offset"})
     if (const Entry* found = find(fields, key)) found->fail("only a coupler has it", "use type coupler or remove it");
   const std::vector<std::string> frames = require(fields, "frames", entry).getTexts(2);
+  addNames(RobotName::Kind::Frame, fields.at("frames"), file);
   const Entry* name = find(fields, "name");
   closure.name = name ? name->getText() : makeClosureName(frames[0], frames[1]);
   closure.frame1 = frames[0];
@@ -106,13 +139,13 @@ void readTiedFrames(const Fields& fields, const Entry& entry, ClosureSpec& closu
 
 void readClosures(const Entry& list, YamlFile& file) {
   for (const Entry& entry : list.getList()) {
-    const Fields fields = entry.getFields({"name", "frames", "type", "axis", "joints", "offset", "kp", "kd"});
+    const Fields fields = entry.getFields(kClosureKeys);
     ClosureSpec closure;
     closure.kind = readClosureKind(require(fields, "type", entry));
     if (closure.kind == ClosureKind::Coupler)
-      readCoupler(fields, entry, closure);
+      readCoupler(fields, entry, closure, file);
     else
-      readTiedFrames(fields, entry, closure);
+      readTiedFrames(fields, entry, closure, file);
     if (const Entry* axis = find(fields, "axis")) {
       if (closure.kind != ClosureKind::Hinge5D) axis->fail("only a hinge has an axis", "use type 5d or remove it");
       closure.axis = axis->getVector3();
@@ -139,7 +172,7 @@ void readJointTypes(const Fields& fields, YamlFile& file) {
 
 void readFrames(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
-    const Fields fields = entry.getFields({"link", "place", "rpy"});
+    const Fields fields = entry.getFields(kFrameKeys);
     FrameSpec frame{name, require(fields, "link", entry).getText(), {}};
     if (const Entry* place = find(fields, "place")) frame.X_LF.p = place->getVector3();
     if (const Entry* rpy = find(fields, "rpy")) frame.X_LF.R = makeRotation(rpy->getVector3());
@@ -158,21 +191,25 @@ void readMotors(const Fields& fields, YamlFile& file) {
   if (motors) {
     if (names) file.warnings.push_back(file.path + ": key 'name_mot': it is ignored, 'motors' lists the motors");
     file.motors = readMotorSpecs(*motors, file.path, find(fields, "motor_catalogue"));
+    addKeys(RobotName::Kind::Joint, *motors, file);
   } else if (names) {
     for (const std::string& joint : names->getTexts()) file.motors.push_back({joint, {}, {}, {}, {}, {}, {}});
+    addNames(RobotName::Kind::Joint, *names, file);
   }
   if (const Entry* armature = find(fields, "armature")) {
     if (!armature->isMap()) {
       file.motor_armature = armature->getNumber();
     } else {
       for (const auto& [joint, entry] : armature->getMap()) file.armature[joint] = entry.getNumber();
+      addKeys(RobotName::Kind::Joint, *armature, file);
     }
   }
 }
 
 void readJointForces(const Entry& map, YamlFile& file) {
+  addKeys(RobotName::Kind::Joint, map, file);
   for (const auto& [joint, entry] : map.getMap()) {
-    const Fields fields = entry.getFields({"stiffness", "rest", "preload", "damping", "friction", "friction_speed"});
+    const Fields fields = entry.getFields(kJointForceKeys);
     JointForceSpec spec{joint, {}};
     const auto read = [&fields](const char* key, double& value) {
       if (const Entry* found = find(fields, key)) value = found->getNumber();
@@ -189,8 +226,9 @@ void readJointForces(const Entry& map, YamlFile& file) {
 
 void readPointSprings(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
-    const Fields fields = entry.getFields({"frames", "points", "stiffness", "rest", "preload", "damping"});
+    const Fields fields = entry.getFields(kPointSpringKeys);
     const std::vector<std::string> frames = require(fields, "frames", entry).getTexts(2);
+    addNames(RobotName::Kind::Frame, fields.at("frames"), file);
     PointSpringSpec spec{frames[0], frames[1], {}};
     PointSpring& spring = spec.spring;
     spring.name = name;
@@ -214,10 +252,11 @@ void readPointSprings(const Entry& map, YamlFile& file) {
 
 void readContacts(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
-    const Fields fields = entry.getFields({"frame", "type", "sole", "length"});
+    const Fields fields = entry.getFields(kContactKeys);
     ContactSpec contact;
     contact.name = name;
     contact.frame = require(fields, "frame", entry).getText();
+    file.names.push_back({RobotName::Kind::Frame, contact.frame, fields.at("frame")});
     const Entry& type = require(fields, "type", entry);
     const std::string kind = lower(type.getText());
     if (kind != "6d" && kind != "5d" && kind != "3d")
@@ -244,7 +283,7 @@ void readFoot(const std::string& contact, const Entry& entry, Reference& referen
     reference.feet[contact] = entry.getVector3();
     return;
   }
-  const Fields fields = entry.getFields({"place", "yaw"});
+  const Fields fields = entry.getFields(kFootKeys);
   reference.feet[contact] = require(fields, "place", entry).getVector3();
   const Entry* yaw = find(fields, "yaw");
   if (!yaw) return;
@@ -254,24 +293,30 @@ void readFoot(const std::string& contact, const Entry& entry, Reference& referen
 
 void readReferences(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
-    const Fields fields = entry.getFields({"joints", "height", "feet"});
+    const Fields fields = entry.getFields(kReferenceKeys);
     Reference reference;
     reference.name = name;
-    if (const Entry* joints = find(fields, "joints"))
+    if (const Entry* joints = find(fields, "joints")) {
+      addKeys(RobotName::Kind::Joint, *joints, file);
       for (const auto& [joint, value] : joints->getMap())
         reference.joints[joint] = value.isList() ? value.getNumbers() : std::vector<double>{value.getNumber()};
+    }
     if (const Entry* height = find(fields, "height")) {
-      const Fields f = height->getFields({"frame", "value"});
+      const Fields f = height->getFields(kHeightKeys);
       reference.height_frame = require(f, "frame", *height).getText();
+      file.names.push_back({RobotName::Kind::Frame, reference.height_frame, f.at("frame")});
       reference.height = require(f, "value", *height).getNumber();
     }
-    if (const Entry* feet = find(fields, "feet"))
+    if (const Entry* feet = find(fields, "feet")) {
+      addKeys(RobotName::Kind::Contact, *feet, file);
       for (const auto& [contact, value] : feet->getMap()) readFoot(contact, value, reference);
+    }
     file.references.push_back(reference);
   }
 }
 
 void readImportance(const Entry& map, YamlFile& file) {
+  addKeys(RobotName::Kind::Joint, map, file);
   for (const auto& [joint, entry] : map.getMap()) {
     const std::vector<double> values = entry.getNumbers(2);
     if (values[0] < 0 || values[1] < 0) entry.fail("a number is negative", "give [position, velocity], 0 or more");
@@ -302,11 +347,7 @@ void readRoot(const Entry& root, YamlFile& file) {
         file.composed = root;
         return;
       }
-  std::vector<std::string> known = {"closed_loop", "type", "closure_name", "name_mot"};
-  known.insert(known.end(), listSharedKeys().begin(), listSharedKeys().end());
-  for (const char* key : {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set"})
-    known.push_back(key);
-  const Fields fields = root.getFields(known);
+  const Fields fields = root.getFields(kRobotKeys);
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
   if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
@@ -318,6 +359,8 @@ void readRoot(const Entry& root, YamlFile& file) {
 }
 
 }  // namespace
+
+const YamlKeys kFrameKeys(kRobotOrPart, "frames.NAME", {"link", "place", "rpy"});
 
 const std::vector<std::string>& listSharedKeys() {
   static const std::vector<std::string> keys = {"motors",        "motor_catalogue", "armature",      "closures",
@@ -333,7 +376,10 @@ void readSharedKeys(const YamlFields& fields, YamlFile& file) {
   if (const Entry* entry = find(fields, "point_springs")) readPointSprings(*entry, file);
   if (const Entry* entry = find(fields, "contacts")) readContacts(*entry, file);
   if (const Entry* entry = find(fields, "references")) readReferences(*entry, file);
-  if (const Entry* entry = find(fields, "serial_joints")) file.serial_joints = entry->getTexts();
+  if (const Entry* entry = find(fields, "serial_joints")) {
+    file.serial_joints = entry->getTexts();
+    addNames(RobotName::Kind::Joint, *entry, file);
+  }
   if (const Entry* entry = find(fields, "importance")) readImportance(*entry, file);
   if (const Entry* entry = find(fields, "gravity")) file.gravity = entry->getVector3();
   if (const Entry* entry = find(fields, "base")) file.base = readBase(*entry);

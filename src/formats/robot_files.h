@@ -85,6 +85,14 @@ struct ContactSpec {
   double half_length = 0, half_width = 0;
 };
 
+/// What an entry calls a part of the robot.
+struct RobotName {
+  enum class Kind { Joint, Frame, Contact };
+  Kind kind;
+  std::string name;
+  YamlEntry entry;
+};
+
 /// A robot's YAML file. Names are not resolved yet.
 struct YamlFile {
   std::string path;
@@ -107,6 +115,7 @@ struct YamlFile {
   std::vector<std::string> serial_joints;
   std::vector<std::pair<std::string, std::array<double, 2>>> importance;  ///< joint -> of its position, of its velocity
   std::optional<Vector3d> gravity;
+  std::vector<RobotName> names;  ///< all that this file uses, to be found in the robot
   std::vector<std::string> warnings;
 };
 
@@ -125,6 +134,7 @@ YamlFile readYaml(const std::string& path);
 /// serial_joints, importance, gravity and base.
 const std::vector<std::string>& listSharedKeys();
 void readSharedKeys(const YamlFields& fields, YamlFile& file);
+extern const YamlKeys kFrameKeys;  ///< of an entry of `frames`
 
 /// A name for what has none in its file: `made`, or, where several are in one line, with a number behind it.
 template <typename IsTaken>

@@ -9,9 +9,32 @@
 
 #include "bielle/model/error.h"
 #include "formats/text_file.h"
+#include "model/listing.h"
 #include "model/number_text.h"
 
 namespace bielle {
+namespace {
+
+// Rows of the table, which constants make before main().
+std::set<std::string>& getKeyRows() {
+  static std::set<std::string> rows;
+  return rows;
+}
+
+}  // namespace
+
+YamlKeys::YamlKeys(const std::string& files, const std::string& place, std::vector<std::string> keys)
+    : keys_(std::move(keys)) {
+  std::string row = "| " + files + " | " + (place.empty() ? "" : "`" + place + "`") + " | ";
+  for (const std::string& key : keys_) row += (&key == &keys_.front() ? "`" : ", `") + key + "`";
+  getKeyRows().insert(row + " |\n");
+}
+
+std::string describeYamlKeys() {
+  std::string text;
+  for (const std::string& row : getKeyRows()) text += row;
+  return text;
+}
 
 YamlEntry::YamlEntry(std::string path, std::string element, const YAML::Node& node)
     : path_(std::move(path)), element_(std::move(element)), node_(std::make_shared<const YAML::Node>(node)) {}
@@ -33,6 +56,11 @@ void YamlEntry::fail(const std::string& problem, const std::string& remedy) cons
   throw InputError(
       path_, (element_.empty() ? "document" : element_) + (line >= 0 ? " (line " + std::to_string(line + 1) + ")" : ""),
       problem, remedy);
+}
+
+void YamlEntry::failUnknown(const std::string& kind, const std::string& name,
+                            const std::vector<std::string>& known) const {
+  fail("there is no " + kind + " '" + name + "'", "known are " + listItems(known));
 }
 
 bool YamlEntry::isMap() const { return node_->IsMap(); }
@@ -111,14 +139,11 @@ std::vector<std::pair<std::string, YamlEntry>> YamlEntry::getMap() const {
   return pairs;
 }
 
-std::map<std::string, YamlEntry> YamlEntry::getFields(const std::vector<std::string>& known) const {
+std::map<std::string, YamlEntry> YamlEntry::getFields(const YamlKeys& keys) const {
+  const std::vector<std::string>& known = keys;
   std::map<std::string, YamlEntry> fields;
   for (const auto& [key, entry] : getMap()) {
-    if (std::find(known.begin(), known.end(), key) == known.end()) {
-      std::string names;
-      for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
-      entry.fail("it is unknown", "known keys are " + names);
-    }
+    if (!contains(known, key)) entry.fail("it is unknown", "known keys are " + listItems(known));
     fields.emplace(key, entry);
   }
   return fields;

@@ -16,6 +16,22 @@ class Node;
 
 namespace bielle {
 
+/// The keys that one kind of map may have. Each is a constant beside its reader: getFields() accepts nothing else, so that
+/// describeYamlKeys() lists what is read.
+class YamlKeys {
+ public:
+  /// \param files  kinds of files that have such maps, e.g. "robot, part"
+  /// \param place  of the map in them: `[]` is each entry of a list, capitals are names that the user gives, e.g.
+  ///               "contacts.NAME"; empty: the whole file
+  YamlKeys(const std::string& files, const std::string& place, std::vector<std::string> keys);
+  operator const std::vector<std::string>&() const { return keys_; }
+
+ private:
+  std::vector<std::string> keys_;
+};
+/// What the readers of this program accept: rows of a table in Markdown, files, place and keys, in alphabetical order.
+std::string describeYamlKeys();
+
 // An entry of the file: its value, and its name for messages.
 class YamlEntry {
  public:
@@ -26,6 +42,9 @@ class YamlEntry {
 
   /// \throws InputError, naming file, element and line
   [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const;
+  /// Of a name that is none of those that may stand here.
+  [[noreturn]] void failUnknown(const std::string& kind, const std::string& name,
+                                const std::vector<std::string>& known) const;
   const std::string& element() const { return element_; }
   bool isMap() const;
   bool isList() const;
@@ -44,8 +63,8 @@ class YamlEntry {
   const std::string& path() const { return path_; }
   /// Pairs of a map in the order of the file; a missing value counts as an empty map.
   std::vector<std::pair<std::string, YamlEntry>> getMap() const;
-  /// The map by key, all keys among the known ones.
-  std::map<std::string, YamlEntry> getFields(const std::vector<std::string>& known) const;
+  /// The map by key. \throws InputError for a key that is not among the known ones
+  std::map<std::string, YamlEntry> getFields(const YamlKeys& known) const;
 
  private:
   YamlEntry makeChild(const std::string& element, const YAML::Node& node) const;

@@ -11,8 +11,11 @@
 namespace bielle {
 namespace {
 
+const YamlKeys kCommandsKeys("commands", "", {"commands"});
+const YamlKeys kCommandKeys("commands", "commands[]", {"time", "forward", "sideways", "turning"});
+
 TimedCommand readCommand(const YamlEntry& entry) {
-  const YamlFields fields = entry.getFields({"time", "forward", "sideways", "turning"});
+  const YamlFields fields = entry.getFields(kCommandKeys);
   const auto get = [&](const std::string& key) {
     const YamlEntry* number = find(fields, key);
     return number ? number->getNumber() : 0;
@@ -28,7 +31,7 @@ std::vector<TimedCommand> readCommands(const std::string& path) {
   std::vector<TimedCommand> commands;
   readYamlDocument(
       path, readTextFile(path, "give a YAML file with a list of commands"), [&](const YamlEntry& document) {
-        const YamlFields fields = document.getFields({"commands"});
+        const YamlFields fields = document.getFields(kCommandsKeys);
         const YamlEntry& list = require(fields, "commands", document);
         for (const YamlEntry& entry : list.getList()) {
           commands.push_back(readCommand(entry));

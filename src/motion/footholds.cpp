@@ -19,10 +19,11 @@ namespace {
 constexpr double kSamePlace = 1e-3;  // m, rad
 constexpr size_t kMostSteps = 200;
 constexpr double kSunken = 0.05;  // of the plane under the lowest stone, m
-const std::vector<std::string> kKeys = {"foot", "x", "y", "z", "yaw", "pitch", "roll"};
+const YamlKeys kFootholdsKeys("footholds", "", {"footholds"});
+const YamlKeys kFootholdKeys("footholds", "footholds[]", {"foot", "x", "y", "z", "yaw", "pitch", "roll"});
 
 Footstep readFoothold(const YamlEntry& entry) {
-  const YamlFields fields = entry.getFields(kKeys);
+  const YamlFields fields = entry.getFields(kFootholdKeys);
   const YamlEntry& foot = require(fields, "foot", entry);
   if (!foot.isWord("left") && !foot.isWord("right")) foot.fail("it is not a foot", "give left or right");
   const auto get = [&](const std::string& key) {
@@ -106,7 +107,7 @@ Ground makeGround(const Model& model, const Stance& stance, const std::vector<Fo
 // Passes every entry of a list of footholds, which is checked. \param source  of the text, for messages
 void readList(const std::string& source, const std::string& text, const std::function<void(const YamlEntry&)>& pass) {
   readYamlDocument(source, text, [&](const YamlEntry& document) {
-    const YamlFields fields = document.getFields({"footholds"});
+    const YamlFields fields = document.getFields(kFootholdsKeys);
     const YamlEntry& list = require(fields, "footholds", document);
     const std::vector<YamlEntry> entries = list.getList();
     if (entries.empty() || entries.size() > kMostSteps)
@@ -131,10 +132,10 @@ std::vector<Footstep> parseFootholds(const std::string& list) {
 std::string readFootholds(const std::string& path) {
   std::string list;
   readList(path, readTextFile(path, "give a YAML file with a list of footholds"), [&list](const YamlEntry& entry) {
-    const YamlFields fields = entry.getFields(kKeys);
+    const YamlFields fields = entry.getFields(kFootholdKeys);
     list += list.empty() ? "[" : ", ";
     const char* separator = "{";
-    for (const std::string& key : kKeys)
+    for (const std::string& key : static_cast<const std::vector<std::string>&>(kFootholdKeys))
       if (const YamlEntry* value = find(fields, key)) {
         list += separator + key + ": " + value->getText();
         separator = ", ";

@@ -14,6 +14,10 @@ namespace {
 
 using Values = std::map<std::string, OptionValue>;
 
+const YamlKeys kRequirementKeys("part", "requires[]", {"that", "problem", "remedy"});
+const YamlKeys kLinkKeys("part", "tree.LINK",
+                         {"parent", "joint", "type", "place", "rpy", "axis", "axis2", "range", "solids"});
+
 // Calls it, and says of which entry an error in an expression is.
 template <typename Function>
 auto callFor(const YamlEntry& entry, const Function& function) {
@@ -91,7 +95,7 @@ class PartComposer {
     const YamlEntry* list = findScoped("requires");
     if (!list) return;
     for (const YamlEntry& entry : list->getList()) {
-      const YamlFields fields = entry.getFields({"that", "problem", "remedy"});
+      const YamlFields fields = entry.getFields(kRequirementKeys);
       if (require(fields, "that", entry).getNumber() == 0)
         entry.fail(require(fields, "problem", entry).getText(), require(fields, "remedy", entry).getText());
     }
@@ -110,8 +114,7 @@ class PartComposer {
   }
 
   void addLink(const std::string& key, const YamlEntry& entry) {
-    const YamlFields fields =
-        entry.getFields({"parent", "joint", "type", "place", "rpy", "axis", "axis2", "range", "solids"});
+    const YamlFields fields = entry.getFields(kLinkKeys);
     const std::string link = makeName(key, entry);
     UrdfFile& urdf = out_.files.urdf;
     if (const YamlEntry* parent = find(fields, "parent")) {
@@ -145,7 +148,7 @@ class PartComposer {
     const YamlEntry* frames = findScoped("frames");
     if (!frames) return;
     for (const auto& [key, entry] : frames->getMap()) {
-      const YamlFields fields = entry.getFields({"link", "place", "rpy"});
+      const YamlFields fields = entry.getFields(kFrameKeys);
       const YamlEntry& link = require(fields, "link", entry);
       SE3 X;
       if (const YamlEntry* place = find(fields, "place")) X.p = readPlace(*place, part_.side);
@@ -215,6 +218,8 @@ class PartComposer {
     for (auto& [joint, values] : own.importance) use(joint);
     append(own.importance, yaml.importance);
     for (const Reference& reference : own.references) mergeReference(reference, any);
+    for (RobotName& part : own.names) part.name = resolve(part.name, part.entry);
+    append(own.names, yaml.names);
     if (own.gravity) yaml.gravity = own.gravity;
     if (own.base) yaml.base = own.base;
     append(own.warnings, yaml.warnings);

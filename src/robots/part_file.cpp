@@ -13,6 +13,16 @@ namespace fs = std::filesystem;
 namespace bielle {
 namespace {
 
+std::vector<std::string> listPartKeys() {
+  std::vector<std::string> keys = {"help", "parameters", "points", "mounts",  "let",  "requires",
+                                   "tree", "solids",     "frames", "linkage", "roles"};
+  keys.insert(keys.end(), listSharedKeys().begin(), listSharedKeys().end());
+  return keys;
+}
+
+const YamlKeys kPartKeys("part", "", listPartKeys());
+const YamlKeys kParameterKeys("part", "parameters.NAME", {"value", "unit", "bounds", "help", "choices", "parts"});
+
 // Where parts are looked for, besides beside the file that names them.
 std::vector<fs::path> listPartDirectories(const std::string& file) {
   std::vector<fs::path> out = {fs::path(file).parent_path()};
@@ -38,7 +48,7 @@ OptionValue readValue(const YamlEntry& entry, bool is_choice) {
 }
 
 PartParameter readParameter(const std::string& name, const YamlEntry& entry, const std::string& path) {
-  const YamlFields fields = entry.getFields({"value", "unit", "bounds", "help", "choices", "parts"});
+  const YamlFields fields = entry.getFields(kParameterKeys);
   PartParameter out;
   out.file = path;
   Option& option = out.option;
@@ -70,15 +80,8 @@ MountKind readMountKind(const YamlEntry& entry) {
   entry.fail("a mount is a link or a joint", "write link or joint");
 }
 
-std::vector<std::string> listPartKeys() {
-  std::vector<std::string> keys = {"help", "parameters", "points", "mounts",  "let",  "requires",
-                                   "tree", "solids",     "frames", "linkage", "roles"};
-  keys.insert(keys.end(), listSharedKeys().begin(), listSharedKeys().end());
-  return keys;
-}
-
 void readDocument(const YamlEntry& root, PartFile& part) {
-  part.fields = root.getFields(listPartKeys());
+  part.fields = root.getFields(kPartKeys);
   const YamlFields& fields = part.fields;
   if (const YamlEntry* help = find(fields, "help")) part.help = help->getText();
   if (const YamlEntry* parameters = find(fields, "parameters"))

@@ -9,6 +9,7 @@ namespace bielle {
 namespace {
 
 constexpr int kDeepest = 20;  // parts in parts
+const YamlKeys kMountingKeys("part", "tree.PART", {"part", "prefix", "set", "mounts", "role", "sides", "when"});
 
 bool areSame(const Option& a, const Option& b) {
   return a.value == b.value && a.unit == b.unit && a.bounds.lower == b.bounds.lower &&
@@ -38,10 +39,34 @@ void addParameter(PartParameter parameter, const YamlEntry& entry, std::vector<P
                "rename one of them, or give both the same value, unit and bounds");
 }
 
+// What a mounting gives has to be wanted by one of the parts that may be mounted there.
+void checkMounting(PartLibrary& library, const PartFile& owner, const PartMounting& mounting, const PartChoices& bound,
+                   int depth) {
+  std::vector<std::string> known, mounts;
+  const std::vector<const PartFile*> parts = listAlternatives(library, owner, mounting, {});
+  const auto addKnown = [&](const PartFile& part, const PartChoices& choices) {
+    for (const PartParameter& p : listParameters(library, part, choices, depth + 1))
+      if (!contains(known, p.option.name)) known.push_back(p.option.name);
+  };
+  for (const PartFile* part : parts) {
+    for (const PartParameter& p : part->parameters) known.push_back(p.option.name);
+    known.insert(known.end(), part->points.begin(), part->points.end());
+    for (const auto& [name, kind] : part->mounts) mounts.push_back(name);
+    addKnown(*part, bound);
+  }
+  for (const auto& [name, value] : mounting.set) {
+    if (!contains(known, name) && value.isText())  // a choice within the part
+      for (const PartFile* part : parts) addKnown(*part, {});
+    if (!contains(known, name)) value.failUnknown("parameter or point", name, known);
+  }
+  if (const YamlEntry* given = find(mounting.fields, "mounts"))
+    for (const auto& [name, value] : given->getMap())
+      if (!contains(mounts, name)) value.failUnknown("mount", name, mounts);
+}
+
 }  // namespace
 
-PartMounting::PartMounting(const YamlEntry& mounted)
-    : entry(mounted), fields(mounted.getFields({"part", "prefix", "set", "mounts", "role", "sides", "when"})) {
+PartMounting::PartMounting(const YamlEntry& mounted) : entry(mounted), fields(mounted.getFields(kMountingKeys)) {
   if (const YamlEntry* given = find(fields, "prefix")) prefix = given->getText();
   if (const YamlEntry* given = find(fields, "set")) set = given->getMap();
 }
@@ -115,6 +140,7 @@ const std::vector<PartParameter>& listParameters(PartLibrary& library, const Par
     if (!mountsPart(entry)) continue;
     const PartMounting mounting(entry);
     const PartChoices bound = listBoundChoices(file, mounting, chosen);
+    checkMounting(library, file, mounting, bound, depth);
     for (const PartFile* part : listAlternatives(library, file, mounting, chosen))
       for (PartParameter p : listParameters(library, *part, bound, depth + 1)) {
         if (mounting.findSet(p.option.name) || file.defines(p.option.name)) continue;

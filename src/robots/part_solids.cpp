@@ -11,6 +11,10 @@ namespace {
 // Of motors, unless they are given as a cylinder, m.
 constexpr double kMotorRadius = 0.038, kMotorLength = 0.042;
 
+const YamlKeys kSolidKeys("part", "tree.LINK.solids[], solids.LINK[]",
+                          {"box", "cylinder", "rod", "sphere", "motor", "at", "axis", "rpy", "radius", "mass",
+                           "density", "material", "color", "when"});
+
 // kg/m^3: carbon is a laminate, nylon a sintered part.
 const std::map<std::string, double> kMaterials = {{"aluminium", 2700}, {"steel", 7850},     {"titanium", 4430},
                                                   {"carbon", 1600},    {"magnesium", 1800}, {"nylon", 1150}};
@@ -24,6 +28,11 @@ Value findNamed(const std::map<std::string, Value>& table, const YamlEntry& entr
   const auto it = table.find(entry.getText());
   if (it != table.end()) return it->second;
   entry.fail("'" + entry.getText() + "' is unknown", "use one of " + listKeys(table));
+}
+
+std::vector<std::string> append(std::vector<std::string> names, const std::vector<std::string>& more) {
+  names.insert(names.end(), more.begin(), more.end());
+  return names;
 }
 
 double readPositive(const YamlEntry& entry) {
@@ -60,6 +69,22 @@ Eigen::Vector4d readColor(const YamlFields& fields, const char* usual) {
   return Eigen::Map<const Eigen::Vector4d>(rgba.data());
 }
 
+// Keys that have no meaning for a shape.
+void requireUsed(const YamlFields& fields) {
+  static const std::map<std::string, std::vector<std::string>> used = {{"box", {"at", "rpy"}},
+                                                                       {"cylinder", {"at", "axis"}},
+                                                                       {"rod", {"radius"}},
+                                                                       {"sphere", {"at"}},
+                                                                       {"motor", {"at", "axis"}}};
+  for (const auto& [shape, keys] : used) {
+    if (!find(fields, shape)) continue;
+    std::vector<std::string> known = append({"color", "when", shape}, keys);
+    if (shape != "motor") known = append(known, {"mass", "density", "material"});
+    for (const auto& [key, entry] : fields)
+      if (!contains(known, key)) entry.fail("a " + shape + " does not use it", "known keys are " + listItems(known));
+  }
+}
+
 Solid readRod(const YamlEntry& ends, const YamlFields& fields, double side) {
   const std::vector<YamlEntry> list = ends.getList(2);
   const Vector3d a = readPlace(list[0], side), b = readPlace(list[1], side);
@@ -76,6 +101,7 @@ Solid readSolid(const YamlEntry& entry, const YamlFields& fields, double side) {
                   *sphere = find(fields, "sphere"), *motor = find(fields, "motor");
   if (!!box + !!cylinder + !!rod + !!sphere + !!motor != 1)
     entry.fail("it is not one solid", "give one of box, cylinder, rod, sphere and motor");
+  requireUsed(fields);
   if (rod) return readRod(*rod, fields, side);
   const Vector3d at = read_place("at");
   if (sphere) return makeSphere(at, readPositive(*sphere), 0, readColor(fields, "steel"));
@@ -118,8 +144,7 @@ bool isAcross(const Vector3d& axis) { return std::abs(axis.y()) == 1; }
 std::vector<Solid> readSolids(const YamlEntry& list, double side) {
   std::vector<Solid> solids;
   for (const YamlEntry& entry : list.getList()) {
-    const YamlFields fields = entry.getFields({"box", "cylinder", "rod", "sphere", "motor", "at", "axis", "rpy",
-                                               "radius", "mass", "density", "material", "color", "when"});
+    const YamlFields fields = entry.getFields(kSolidKeys);
     const YamlEntry* when = find(fields, "when");
     if (when && when->getNumber() == 0) continue;
     Solid solid = readSolid(entry, fields, side);

@@ -15,22 +15,25 @@ namespace {
 
 constexpr double kBarRadius = 0.006;  // m, unless it is given
 
+const YamlKeys kLinkageKeys("part", "linkage",
+                            {"base", "through", "normal", "points", "fixed", "bars", "hinges", "radius", "density"});
+const YamlKeys kFixedKeys("part", "linkage.fixed.LINK", {"points", "angles"});
+const YamlKeys kBarKeys("part", "linkage.bars.LINK", {"points", "radius", "density"});
+
 struct Body {
   std::string name;  // of its link
   YamlEntry entry;
   bool is_bar = false;
   std::vector<std::string> points = {};
-  std::map<std::string, double> angles = {};  // of joints between the base and a link, in the drawing
-  std::optional<SE3> X = {};                  // of a bar in the base, in the drawing, once it hangs on something
+  std::map<std::string, double> angles = {};                  // of joints between the base and a link, in the drawing
+  std::vector<std::pair<std::string, YamlEntry>> given = {};  // these angles, by the names of the joints
+  std::optional<SE3> X = {};  // of a bar in the base, in the drawing, once it hangs on something
 };
 
 class PlaneLinkage {
  public:
   PlaneLinkage(const YamlEntry& entry, const LinkagePlace& place)
-      : entry_(entry),
-        place_(place),
-        fields_(
-            entry.getFields({"base", "through", "normal", "points", "fixed", "bars", "hinges", "radius", "density"})) {
+      : entry_(entry), place_(place), fields_(entry.getFields(kLinkageKeys)) {
     readPoints();
     readFixed();
     readBars();
@@ -54,10 +57,29 @@ class PlaneLinkage {
     for (const auto& [point, name] : hinges_)
       if (!hung_.count(point))
         name.fail("no bar hangs on point '" + point + "'", "name a point by which a bar is carried");
+    for (const Body& body : bodies_)
+      for (const auto& [joint, angle] : body.given)
+        if (const std::vector<std::string> way = listWay(body); !contains(way, joint))
+          angle.fail("joint '" + joint + "' is not between link '" + base_ + "' and link '" + body.name + "'",
+                     "known are " + listItems(way));
     close();
   }
 
  private:
+  // Joints between the base and a link.
+  std::vector<std::string> listWay(const Body& body) const {
+    std::vector<std::string> way;
+    const std::vector<UrdfJoint>& joints = place_.files.urdf.joints;
+    for (std::string link = body.name; link != base_;) {
+      const auto it =
+          std::find_if(joints.begin(), joints.end(), [&link](const UrdfJoint& j) { return j.child == link; });
+      if (it == joints.end()) break;
+      way.push_back(it->joint.name);
+      link = it->parent;
+    }
+    return way;
+  }
+
   void requirePoint(const std::string& point, const YamlEntry& entry) const {
     if (!points_.count(point)) entry.fail("there is no point '" + point + "'", "known are " + listKeys(points_));
   }
@@ -94,11 +116,13 @@ class PlaneLinkage {
       if (entry.isList()) {
         body.points = readNames(entry);
       } else {
-        const YamlFields fields = entry.getFields({"points", "angles"});
+        const YamlFields fields = entry.getFields(kFixedKeys);
         body.points = readNames(require(fields, "points", entry));
         if (const YamlEntry* angles = find(fields, "angles"))
-          for (const auto& [joint, angle] : angles->getMap())
-            body.angles[place_.resolve(joint, angle)] = angle.getNumber();
+          for (const auto& [joint, angle] : angles->getMap()) {
+            body.given.emplace_back(place_.resolve(joint, angle), angle);
+            body.angles[body.given.back().first] = angle.getNumber();
+          }
       }
       bodies_.push_back(body);
     }
@@ -250,8 +274,6 @@ class PlaneLinkage {
       addFrameTo(urdf, closure.frame2, b.name, {Matrix3d::Identity(), self.getPlaceIn(b, point)}, b.entry);
     });
   }
-
-  inline static const std::vector<std::string> kBarKeys = {"points", "radius", "density"};
 
   YamlEntry entry_;
   LinkagePlace place_;

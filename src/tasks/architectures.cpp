@@ -17,12 +17,17 @@ namespace {
 using Entry = YamlEntry;
 using Fields = YamlFields;
 
+const YamlKeys kComparisonKeys("comparison", "", {"robots", "mass", "motions", "speeds", "groups", "drives"});
+const YamlKeys kContenderKeys("comparison", "robots.NAME", {"robot", "generator", "set"});
+const YamlKeys kSpeedKeys("comparison", "speeds", {"motion", "option", "from", "to", "step", "set"});
+const YamlKeys kComparedDriveKeys("comparison", "drives", {"motor_constant", "regeneration"});
+
 std::string formatValue(double value) { return formatNumber(value, "%.12g"); }
 
 std::vector<Architecture> readRobots(const Entry& entry) {
   std::vector<Architecture> robots;
   for (const auto& [name, item] : entry.getMap()) {
-    const Fields fields = item.getFields({"robot", "generator", "set"});
+    const Fields fields = item.getFields(kContenderKeys);
     if (name.empty() || name[0] == '.' || name.find('/') != std::string::npos)
       item.fail("'" + name + "' cannot be the name of a directory", "use a plain word");
     robots.push_back({name, readRobotSpec(fields, item)});
@@ -32,26 +37,31 @@ std::vector<Architecture> readRobots(const Entry& entry) {
 }
 
 void readSpeeds(const Entry& entry, ArchitectureSpec& spec) {
-  const Fields fields = entry.getFields({"motion", "option", "from", "to", "step", "set"});
+  const Fields fields = entry.getFields(kSpeedKeys);
   const auto getNumber = [&](const char* key) { return require(fields, key, entry).getNumber(); };
   const double from = getNumber("from"), to = getNumber("to"), step = getNumber("step");
   if (!(from <= to && step > 0 && (to - from) / step < 1000))
     entry.fail("its steps do not lead from the first to the last value",
                "give from <= to, step > 0 and less than 1000 steps");
   const Entry *motion = find(fields, "motion"), *option = find(fields, "option"), *set = find(fields, "set");
+  const MotionEntry& known = motion ? findMotionOf(*motion) : findMotion(spec.path, "walk");
+  OptionSet options = known.request.options;
+  const std::string varied = option ? option->getText() : "speed";
+  setOption(options, varied, option ? *option : entry, formatExact(from));
+  setOption(options, varied, require(fields, "to", entry), formatExact(to));
+  const OptionValues settings = set ? readSettings(*set, options) : OptionValues();
   for (int i = 0; from + i * step <= to + 1e-9 * step; ++i) {
     // The decimal number, not the sum of steps.
     const double value = std::round((from + i * step) * 1e9) / 1e9;
-    MotionSpec one{motion ? motion->getText() : "walk", {{option ? option->getText() : "speed", value}}};
-    if (set)
-      for (const auto& setting : readSettings(*set)) one.settings.push_back(setting);
+    MotionSpec one{known.name, {{varied, value}}};
+    one.settings.insert(one.settings.end(), settings.begin(), settings.end());
     spec.speeds.push_back(one);
     spec.speed_values.push_back(value);
   }
 }
 
 void readRoot(const Entry& root, ArchitectureSpec& spec) {
-  const Fields fields = root.getFields({"robots", "mass", "motions", "speeds", "groups", "drives"});
+  const Fields fields = root.getFields(kComparisonKeys);
   spec.robots = readRobots(require(fields, "robots", root));
   if (const Entry* mass = find(fields, "mass")) {
     spec.mass = mass->getNumber();
@@ -65,7 +75,7 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
     for (const auto& [name, words] : groups->getMap()) spec.groups.push_back({name, words.getTexts()});
   spec.groups.push_back({"all", {}});
   if (const Entry* drives = find(fields, "drives")) {
-    const Fields drive = drives->getFields({"motor_constant", "regeneration"});
+    const Fields drive = drives->getFields(kComparedDriveKeys);
     if (const Entry* constant = find(drive, "motor_constant")) {
       spec.drives.motor_constant = constant->getNumber();
       if (!(*spec.drives.motor_constant > 0)) constant->fail("it is not positive", "give N m/sqrt(W)");

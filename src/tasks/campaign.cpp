@@ -323,7 +323,7 @@ CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directo
   makeOutputDirectory(directory);
   const std::string check = directory + "/check.log";
   std::set<std::string> warnings;
-  const bool is_checked = checkCommands(spec, options.simulate, check, warnings);
+  const bool is_checked = checkCommands(spec, options.bielle, options.simulate, check, warnings);
   fs::remove(check);
   for (const std::string& warning : warnings)
     if (options.progress) options.progress(warning);

@@ -1,15 +1,13 @@
 #include "tasks/campaign_command.h"
 
 #include <cmath>
-#include <fstream>
 #include <set>
 
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "model/number_text.h"
-#include "tasks/cases.h"
 #include "tasks/cells.h"
-#include "tasks/child.h"
+#include "tasks/dry_run.h"
 
 namespace bielle::tasks {
 namespace {
@@ -35,39 +33,12 @@ double calcPhaseTime(const CampaignAxis& axis, const std::string& value, const s
   return std::round(1e6 * (start + (phase - index) * (end - start))) / 1e6;
 }
 
-// What a dry run warns of is added to `warnings`, a line each.
-void readWarnings(const std::string& log, std::set<std::string>& warnings) {
-  constexpr const char* kBegin = "bielle: ";
-  std::ifstream file(log);
-  for (std::string line; std::getline(file, line);)
-    if (line.rfind(std::string(kBegin) + "warning: ", 0) == 0) warnings.insert(line.substr(std::string(kBegin).size()));
-}
-
-// What a dry run complains about, or "" if it does not. None: the user asks for the end.
-std::optional<std::string> findComplaint(const std::string& simulate, const std::vector<std::string>& arguments,
-                                         const std::string& log, std::set<std::string>& warnings) {
-  std::vector<std::string> command = {simulate, "motion", "-o", "none", "--summary-only", "--dry-run"};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  tasks::SignalWatch watch;
-  const std::optional<int> status = watch.waitForChild(tasks::startChild(command, log));
-  if (!status) return std::nullopt;
-  if (*status == 0) {
-    readWarnings(log, warnings);
-    return "";
-  }
-  std::string complaint = findError(log);
-  if (complaint.empty()) {
-    std::ifstream file(log);
-    std::getline(file, complaint);
-  }
-  return complaint.empty() ? "it cannot be checked" : complaint;
-}
-
-[[noreturn]] void refuse(const CampaignSpec& spec, const CampaignAxis& varied, const std::string& complaint) {
-  const CampaignAxis* guilty = &varied;
+// Those of `bielle simulate`.
+OptionEntries listOptions(const CampaignSpec& spec) {
+  OptionEntries options;
   for (const CampaignAxis& axis : spec.axes)
-    if (axis.kind == Kind::Option && complaint.find("--" + axis.name) != std::string::npos) guilty = &axis;
-  guilty->entry.fail("`bielle simulate` rejects it: " + complaint, "see `bielle simulate --help`");
+    if (axis.kind == Kind::Option) options.emplace_back(axis.name, axis.entry);
+  return options;
 }
 
 }  // namespace
@@ -123,16 +94,28 @@ std::vector<std::string> CampaignCommands::make(const CampaignCell& cell, const 
   return arguments;
 }
 
-bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log,
-                   std::set<std::string>& warnings) {
+bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const std::string& simulate,
+                   const std::string& log, std::set<std::string>& warnings) {
+  for (const CampaignMotion& motion : spec.motions) {
+    if (motion.solve.empty()) continue;
+    std::vector<std::string> command = {bielle};
+    command.insert(command.end(), motion.solve.begin(), motion.solve.end());
+    command.insert(command.end(), {"-o", "none"});
+    std::set<std::string> told;  // when it is solved
+    const std::optional<std::string> complaint = findComplaint(command, log, told);
+    if (!complaint) return false;
+    if (!complaint->empty()) refuse("solve " + motion.solve[1], *complaint, motion.options, *motion.entry);
+  }
   const CampaignCommands commands(spec, {});
   const std::string impulse = spec.search ? formatImpulse(*spec.search, 1) : "";
   std::set<std::vector<std::string>> tried;  // cells may differ in nothing that options are made of, as in the motion
   const auto check = [&](const CampaignCell& cell, const CampaignAxis& varied) {
     const std::vector<std::string> arguments = commands.make(cell, impulse);
     if (!tried.insert(arguments).second) return true;
-    const std::optional<std::string> complaint = findComplaint(simulate, arguments, log, warnings);
-    if (complaint && !complaint->empty()) refuse(spec, varied, *complaint);
+    std::vector<std::string> command = {simulate, "motion", "-o", "none", "--summary-only"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    const std::optional<std::string> complaint = findComplaint(command, log, warnings);
+    if (complaint && !complaint->empty()) refuse("simulate", *complaint, listOptions(spec), varied.entry);
     return complaint.has_value();
   };
   const CampaignCell base(spec.axes.size(), 0);

@@ -27,10 +27,11 @@ class CampaignCommands {
   std::vector<std::vector<std::string>> phase_times_;  // per motion, per value of the axis of phases, s
 };
 
-// Dry runs of one cell and of those that differ from it in one value, equal ones once. `log`: a file for the outputs.
+// Dry runs of the motions that have to be solved, of one cell, and of those that differ from it in one value, equal ones
+// once. `bielle`, `simulate`: paths of the programs; `log`: a file for the outputs.
 // False if the user asks for the end before they are done. \param warnings  to which those of the runs are added
 // \throws InputError naming the file and the key that is refused
-bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log,
-                   std::set<std::string>& warnings);
+bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const std::string& simulate,
+                   const std::string& log, std::set<std::string>& warnings);
 
 }  // namespace bielle::tasks

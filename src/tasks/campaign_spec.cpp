@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "bielle/motion/registry.h"
 #include "design/spec_parts.h"
 #include "formats/text_file.h"
 #include "tasks/cells.h"
@@ -15,6 +14,11 @@ namespace bielle::tasks {
 namespace {
 
 using Kind = CampaignAxis::Kind;
+
+const YamlKeys kCampaignKeys("campaign", "", {"motions", "options", "push"});
+const YamlKeys kRequestKeys("campaign", "motions[]", {"name", "solve", "robot", "set", "options"});
+const YamlKeys kPushKeys("campaign", "push", {"time", "phase", "direction", "duration", "impulse", "largest_impulse"});
+const YamlKeys kImpulseKeys("campaign", "push.largest_impulse", {"up_to", "step"});
 
 constexpr double kMostImpulses = 1e4;
 
@@ -57,21 +61,22 @@ void refuseEndings(const std::string& name, const YamlEntry& entry) {
 }
 
 CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
-  const YamlFields fields = entry.getFields({"name", "solve", "robot", "set", "options"});
+  const YamlFields fields = entry.getFields(kRequestKeys);
   CampaignMotion motion;
+  motion.entry = entry;
   motion.name = require(fields, "name", entry).getText();
   if (motion.name.find('/') != std::string::npos || motion.name[0] == '.')
     fields.at("name").fail("it cannot be the name of a directory", "give a plain word");
   motion.robot = require(fields, "robot", entry).getText();
   if (motion.robot.find('/') != std::string::npos) motion.robot = locate(motion.robot, file).string();
   const std::string solve = require(fields, "solve", entry).getText();
-  OptionSet known = findMotion(file, solve).request.options;
+  OptionSet known = findMotionOf(fields.at("solve")).request.options;
   motion.solve = {"solve", solve, "--robot", motion.robot};
   if (const YamlEntry* set = find(fields, "set"))
-    for (const auto& [name, value] : readSettings(*set)) {
-      known.set(name, value);  // checks it
+    for (const auto& [name, value] : set->getMap()) {
+      setOption(known, name, value, value.getText());
       motion.solve.push_back("--set");
-      motion.solve.push_back(name + "=" + formatOption(value));
+      motion.solve.push_back(name + "=" + formatOption(known.get(name).value));
     }
   if (const YamlEntry* options = find(fields, "options"))
     for (const auto& [name, value] : options->getMap()) {
@@ -79,6 +84,7 @@ CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
       if (name == "output" || name == "set" || name == "robot")
         value.fail("it cannot be set here", name == "output" ? "remove it" : "use the key next to `options`");
       addOption(name, value.getText(), motion.solve);
+      motion.options.emplace_back(name, value);
     }
   return motion;
 }
@@ -95,7 +101,7 @@ void readMotions(const YamlEntry& entry, CampaignSpec& spec) {
 }
 
 ImpulseSearch readSearch(const YamlEntry& entry) {
-  const YamlFields fields = entry.getFields({"up_to", "step"});
+  const YamlFields fields = entry.getFields(kImpulseKeys);
   ImpulseSearch search;
   search.up_to = require(fields, "up_to", entry).getNumber();
   search.step = require(fields, "step", entry).getNumber();
@@ -108,7 +114,7 @@ ImpulseSearch readSearch(const YamlEntry& entry) {
 }
 
 void readPush(const YamlEntry& entry, CampaignSpec& spec) {
-  const YamlFields fields = entry.getFields({"time", "phase", "direction", "duration", "impulse", "largest_impulse"});
+  const YamlFields fields = entry.getFields(kPushKeys);
   if (fields.count("time") + fields.count("phase") != 1)
     entry.fail("it does not have exactly one of `time` and `phase`", "give one of them");
   if (fields.count("impulse") + fields.count("largest_impulse") != 1)
@@ -137,7 +143,7 @@ CampaignSpec readCampaignSpec(const std::string& path) {
   CampaignSpec spec;
   spec.path = path;
   readYamlDocument(path, readTextFile(path), [&spec](const YamlEntry& document) {
-    const YamlFields fields = document.getFields({"motions", "options", "push"});
+    const YamlFields fields = document.getFields(kCampaignKeys);
     readMotions(require(fields, "motions", document), spec);
     if (const YamlEntry* options = find(fields, "options"))
       for (const auto& [name, entry] : options->getMap()) {

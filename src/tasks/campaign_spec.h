@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "formats/yaml_entry.h"
+#include "tasks/dry_run.h"
 
 namespace bielle::tasks {
 
@@ -30,6 +31,8 @@ struct CampaignMotion {
   std::string directory;           ///< of its files; empty if it has to be solved
   std::string robot;               ///< of one to be solved
   std::vector<std::string> solve;  ///< arguments of `bielle`, without the output
+  OptionEntries options = {};      ///< of `bielle solve`
+  std::optional<YamlEntry> entry = {};
 };
 
 /// Something that is varied, with its place in the file.
@@ -58,7 +61,7 @@ struct CampaignSpec {
 /// Adds `--name value` to a command; for true the name alone, for false nothing.
 void addOption(const std::string& name, const std::string& value, std::vector<std::string>& arguments);
 
-/// \throws InputError naming the file, the key with its line, and the remedy. Options are not checked
+/// \throws InputError naming the file, the key with its line, and the remedy. Options of programs are not checked
 CampaignSpec readCampaignSpec(const std::string& path);
 
 }  // namespace bielle::tasks

@@ -8,9 +8,8 @@
 #include <set>
 
 #include "bielle/formats/reader.h"
-#include "bielle/motion/registry.h"
+#include "design/spec_parts.h"
 #include "formats/text_file.h"
-#include "formats/yaml_entry.h"
 #include "model/number_text.h"
 #include "tasks/campaign_spec.h"
 #include "tasks/cells.h"
@@ -21,6 +20,8 @@ namespace bielle::tasks {
 namespace {
 
 constexpr size_t kMostMotions = 100'000;
+const YamlKeys kDatasetKeys("data set", "", {"licence", "formats", "fps", "motions"});
+const YamlKeys kDatasetMotionKeys("data set", "motions[]", {"solve", "robot", "payload", "set", "options", "simulate"});
 
 // What is varied in one entry of `motions`.
 struct DatasetAxis {
@@ -65,11 +66,11 @@ std::vector<DatasetAxis> readAxes(const YamlFields& fields, const YamlEntry& ent
   if (const YamlEntry* set = find(fields, "set"))
     for (const auto& [name, value] : set->getMap()) {
       axes.push_back(readAxis(AxisKind::Setting, name, value));
-      for (const std::string& text : axes.back().values) known.set(name, parseOption(text));  // checks it
+      for (const std::string& text : axes.back().values) setOption(known, name, value, text);  // checks it
     }
   if (const YamlEntry* options = find(fields, "options"))
     addOptionAxes(AxisKind::Option, *options,
-                  {"help", "output", "robot", "set", "threads", "no-check", "no-report", "quiet"}, axes);
+                  {"help", "output", "robot", "set", "threads", "no-check", "no-report", "quiet", "dry-run"}, axes);
   if (const YamlEntry* options = find(fields, "simulate"))
     addOptionAxes(
         AxisKind::Simulation, *options,
@@ -106,10 +107,33 @@ class DatasetNames {
   std::map<std::string, std::string> robots_;  // by the names of bodies
 };
 
+// Of the combination i of `count`: the only axis whose value is not its first one, or the first axis if there is none. Null
+// if there are several, and for settings, which are checked already.
+const DatasetAxis* findTried(const std::vector<DatasetAxis>& axes, size_t count, size_t i) {
+  const DatasetAxis* varied = nullptr;
+  for (const DatasetAxis& axis : axes) {
+    count /= axis.values.size();
+    if (i / count == 0) continue;
+    i %= count;
+    if (varied || axis.kind == AxisKind::Setting || axis.kind == AxisKind::Payload) return nullptr;
+    varied = &axis;
+  }
+  return varied ? varied : &axes.front();
+}
+
+DatasetTrial makeTrial(const DatasetMotion& motion, const std::vector<DatasetAxis>& axes, const DatasetAxis& varied) {
+  DatasetTrial trial{motion, {}, {}, varied.entry};
+  for (const DatasetAxis& axis : axes) {
+    if (axis.kind == AxisKind::Option) trial.options.emplace_back(axis.name, axis.entry);
+    if (axis.kind == AxisKind::Simulation) trial.simulate.emplace_back(axis.name, axis.entry);
+  }
+  return trial;
+}
+
 void addMotions(const YamlEntry& entry, DatasetNames& names, DatasetSpec& spec) {
-  const YamlFields fields = entry.getFields({"solve", "robot", "payload", "set", "options", "simulate"});
+  const YamlFields fields = entry.getFields(kDatasetMotionKeys);
   const std::string solve = require(fields, "solve", entry).getText();
-  const std::vector<DatasetAxis> axes = readAxes(fields, entry, findMotion(spec.path, solve).request.options);
+  const std::vector<DatasetAxis> axes = readAxes(fields, entry, findMotionOf(fields.at("solve")).request.options);
   size_t count = 1;
   for (const DatasetAxis& axis : axes) {
     count *= axis.values.size();
@@ -144,6 +168,7 @@ void addMotions(const YamlEntry& entry, DatasetNames& names, DatasetSpec& spec) 
     motion.body = makeFileName(motion.robot_name + carried);
     motion.name = makeFileName(motion.body + "_" + solve + varied);
     names.add(motion, entry);
+    if (const DatasetAxis* varied = findTried(axes, count, i)) spec.trials.push_back(makeTrial(motion, axes, *varied));
     spec.motions.push_back(std::move(motion));
   }
 }
@@ -157,7 +182,7 @@ DatasetSpec readDatasetSpec(const std::string& path) {
   spec.rate = 50;
   spec.formats = {"mjlab"};
   readYamlDocument(path, spec.text, [&spec](const YamlEntry& document) {
-    const YamlFields fields = document.getFields({"licence", "formats", "fps", "motions"});
+    const YamlFields fields = document.getFields(kDatasetKeys);
     if (const YamlEntry* licence = find(fields, "licence")) spec.licence = licence->getText();
     if (const YamlEntry* rate = find(fields, "fps")) {
       spec.rate = rate->getNumber();
@@ -181,6 +206,30 @@ DatasetSpec readDatasetSpec(const std::string& path) {
           .fail("a motion that was carried out is no problem", "remove 'problem', or `simulate` from the motions");
   });
   return spec;
+}
+
+bool checkDataset(const DatasetSpec& spec, const std::string& bielle, const std::string& simulate,
+                  const std::string& log) {
+  std::set<std::vector<std::string>> tried;
+  std::set<std::string> told;  // by each motion
+  // False if the user asks for the end.
+  const auto check = [&](const std::string& program, const std::vector<std::string>& arguments, const std::string& name,
+                         const OptionEntries& options, const YamlEntry& varied) {
+    if (!tried.insert(arguments).second) return true;
+    std::vector<std::string> command = {program};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    const std::optional<std::string> complaint = findComplaint(command, log, told);
+    if (complaint && !complaint->empty()) refuse(name, *complaint, options, varied);
+    return complaint.has_value();
+  };
+  for (const DatasetTrial& trial : spec.trials) {
+    const std::vector<std::vector<std::string>> steps = makeDatasetCase(trial.motion, trial.motion.robot).steps;
+    if (!check(bielle, steps[0], "solve " + trial.motion.motion, trial.options, trial.varied)) return false;
+    if (steps.size() < 2) continue;
+    const std::vector<std::string> arguments(steps[1].begin() + 1, steps[1].end());  // without the command
+    if (!check(simulate, arguments, "simulate", trial.simulate, trial.varied)) return false;
+  }
+  return true;
 }
 
 Case makeDatasetCase(const DatasetMotion& motion, const std::string& robot) {

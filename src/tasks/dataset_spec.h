@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "tasks/cases.h"
+#include "tasks/dry_run.h"
 
 namespace bielle::tasks {
 
@@ -33,16 +34,29 @@ struct DatasetMotion {
   std::vector<std::pair<std::string, std::string>> simulate;  ///< options of `bielle simulate`, likewise
 };
 
+/// A motion to be tried before all: the options of both programs with their place in the file.
+struct DatasetTrial {
+  DatasetMotion motion;
+  OptionEntries options, simulate;
+  YamlEntry varied;  ///< what is different from the trial before it
+};
+
 struct DatasetSpec {
   std::string path, text;  ///< of the file
   std::string licence;
   std::vector<std::string> formats;
   double rate = 0;  ///< frames per second
   std::vector<DatasetMotion> motions;
+  std::vector<DatasetTrial> trials;  ///< of each entry the first motion, and those that differ from it in one value
 };
 
-/// \throws InputError naming the file, the key with its line, and the remedy; `options` are not checked
+/// \throws InputError naming the file, the key with its line, and the remedy; options of programs are not checked
 DatasetSpec readDatasetSpec(const std::string& path);
+
+/// Dry runs of the trials. `bielle`, `simulate`: paths of the programs; `log`: a file for their output. False if the user
+/// asks for the end before they are done. \throws InputError naming the file and the option that is refused
+bool checkDataset(const DatasetSpec& spec, const std::string& bielle, const std::string& simulate,
+                  const std::string& log);
 
 constexpr const char* kDatasetMotion = "motion";          ///< directory of the result of a case
 constexpr const char* kDatasetExecution = "carried_out";  ///< that of the motion as it was carried out

@@ -34,13 +34,15 @@ namespace {
 constexpr double kOwnTolerance = 1e-9, kSimbodyTolerance = 1e-6;
 constexpr double kDuration = 2, kRecordPeriod = 0.01;  // s
 constexpr const char* kSpringExample = "stiffness=50,damping=1,motor=crank,angle=0.3";
+const YamlKeys kTorquesKeys("torques", "", {"torques"});
+const YamlKeys kTorqueKeys("torques", "torques[]", {"time", "MOTOR"});
 
 // Entries {time: 0.5, MOTOR: 3, ..}; motors that an entry does not name keep their torque.
 std::vector<TimedTorques> readTorques(const Model& model, const std::string& path, const VectorXd& u) {
   std::vector<TimedTorques> torques{{0, u}};
   if (path.empty()) return torques;
   const auto read = [&](const YamlEntry& document) {
-    const YamlEntry list = require(document.getFields({"torques"}), "torques", document);
+    const YamlEntry list = require(document.getFields(kTorquesKeys), "torques", document);
     for (const YamlEntry& entry : list.getList()) {
       TimedTorques next = torques.back();
       bool has_time = false;

@@ -15,6 +15,7 @@
 #include "cli/simulate/output.h"
 #include "cli/simulate/watch.h"
 #include "control/clock.h"
+#include "formats/yaml_entry.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "results/interrupt.h"
@@ -267,6 +268,10 @@ int main(int argc, char** argv) {
       "  bielle simulate walk --robot cleobot --speed 0.3 --duration 10 -o long\n"
       "  bielle simulate walk --robot bipetto --command tour.yaml --duration 20 -o tour\n"
       "  bielle simulate fourbar --state swing.json --world bielle,simbody,mujoco -o swing");
+  if (argc == 2 && argv[1] == std::string("--yaml-keys")) {  // scripts/update_help.sh
+    std::cout << describeYamlKeys();
+    return kStood;
+  }
   try {
     app.parse(argc, argv);
     arguments.has_record_period = app.count("--record-period") > 0;
