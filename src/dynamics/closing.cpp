@@ -14,8 +14,8 @@ namespace {
 
 constexpr int kMostSteps = 300;
 constexpr double kMet = 1e-11;           // of held coordinates, rad or m
-constexpr double kLongestMove = 0.3;            // of a step, over all coordinates of the linkage, rad or m
-constexpr double kShortestMove = 1e-11;         // likewise
+constexpr double kLongestMove = 0.3;     // of a step, over all coordinates of the linkage, rad or m
+constexpr double kShortestMove = 1e-11;  // likewise
 constexpr double kLeastDamping = 1e-13, kFirstDamping = 1e-6, kMostDamping = 1e6;  // lambda; N is orthonormal
 constexpr double kLeastMotion = 0.02;  // the least that held coordinates move in a unit motion of a regular linkage
 constexpr double kOpen = 1e-8;         // m or rad
