@@ -263,6 +263,8 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
       {"motions: [{name: w, solve: wakl, robot: bipetto}]\n", {"wakl"}},
       {"motions: [{name: w, solve: walk, robot: bipetto, set: {sped: 1}}]\n", {"sped"}},
       {"motions: [{name: w, solve: walk, robot: bipetto, options: {set: 1}}]\n", {"key 'set' (line 1)", "next to"}},
+      {"motions: [{name: w, solve: walk, robot: bipetto, options: {max-iteratoins: 1}}]\n",
+       {"key 'max-iteratoins' (line 1)", "`bielle solve walk` rejects it", "--help"}},
       {"motions: [{name: w, solve: walk, robot: bipetto, options: {help: true}}]\n",
        {"key 'help' (line 1)", "remove"}}};
   for (const auto& [text, words] : cases) {
@@ -283,8 +285,10 @@ TEST_CASE("campaign: options without effect on some of its runs are told once, b
       directory.write("spec.yaml", std::string("motions: [") + kMotion +
                                        "]\noptions: {control: [gains, mpc], nodes: 50, seed: [1, 2]}\n");
   std::set<std::string> warnings;
-  const std::string simulate = (fs::path(BIELLE_COMMAND).parent_path() / "bielle-simulate").string();
-  REQUIRE(tasks::checkCommands(tasks::readCampaignSpec(path), simulate, directory.path() + "/log", warnings));
+  const fs::path programs = fs::path(BIELLE_COMMAND).parent_path();
+  const std::string bielle = (programs / "bielle-complete").string(),
+                    simulate = (programs / "bielle-simulate").string();
+  REQUIRE(tasks::checkCommands(tasks::readCampaignSpec(path), bielle, simulate, directory.path() + "/log", warnings));
   CHECK(warnings == std::set<std::string>{"warning: --nodes has no effect: control is not predictive",
                                           "warning: --seed has no effect: nothing is random"});
 }

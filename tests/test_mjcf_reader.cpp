@@ -95,7 +95,7 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
   checkError(makeSwing("\n<joint name=\"x\" limited=\"true\"/>"), "joint 'x' (line 2)",
              "it is limited but has no range");
   checkError(makeSwing("\n<site name=\"a\" quat=\"1 0 0 0\" zaxis=\"0 0 1\"/>"), "site 'a' (line 2)", "it has several");
-  checkError(makeSwing("\n<geom class=\"none\"/>"), "geom (line 2)", "there is no default class 'none'");
+  checkError(makeSwing("\n<geom class=\"none\"/>"), "geom of body 'tip' (line 2)", "there is no default class 'none'");
   checkError(makeSwing("\n<body><geom type=\"mesh\" mesh=\"a\"/></body>"), "geom (line 2)",
              "the mass of the body comes from the mesh 'a', which is not there");
   checkError(makeSwing("", "<equality>\n<flex/></equality>"), "flex (line 2)", "such equalities are not supported");

@@ -368,7 +368,8 @@ TEST_CASE("a file with the key model completes a robot that is elsewhere") {
                     Contains("mine.yaml: key 'model'") && Contains("nowhere, toy") && Contains("BIELLE_ROBOTS"));
   own.write("near/near.yaml",
             "model: " + others.path() + "/toy/robot.urdf\ncontacts: {tip: {frame: fist, type: 3d}}\n");
-  CHECK_THROWS_WITH(loadRobot("near"), Contains("near.yaml: contact 'tip'") && Contains("'fist'"));
+  CHECK_THROWS_WITH(loadRobot("near"),
+                    Contains("near.yaml: key 'contacts': key 'tip': key 'frame'") && Contains("'fist'"));
   own.write("alone/alone.yaml", "gravity: [0, 0, -1]\n");
   CHECK_THROWS_WITH(loadRobot(own.path() + "/alone"), Contains("it is missing"));
   own.write("both/both.urdf", kToyUrdf);

@@ -46,7 +46,7 @@ const std::vector<Mistake> kUrdfMistakes = {
     {"<robot name=\"toy\">", "<robot>", "element 'robot'", "no name", "name attribute"},
     {"</robot>", kSecondArm, "link 'arm'", "declared twice (line 40)", "rename"},
     {"name=\"wrist\"", "name=\"shoulder\"", "joint 'shoulder'", "declared twice", "rename"},
-    {"name=\"wrist\"", "", "joint (line 30)", "no name", "name attribute"},
+    {"name=\"wrist\"", "", "joint from 'arm' to 'hand' (line 30)", "no name", "name attribute"},
     {"<child link=\"hand\"/>", "<child link=\"nail\"/>", "joint 'wrist'", "child link 'nail' does not exist",
      "declare"},
     {"<parent link=\"arm\"/>", "", "joint 'wrist'", "parent link '' does not exist", "declare"},
@@ -246,6 +246,17 @@ TEST_CASE("a wrong YAML is an error that names file, element and remedy") {
   for (const Mistake& m : kYamlMistakes)
     checkError(getErrorOfLoading(directory.writeRobot(kToyUrdf, replaceOnce(kToyYaml, m.from, m.to))),
                directory.path() + "/robot.yaml", m);
+}
+
+TEST_CASE("messages name a file by one path, however it is given") {
+  const RobotDirectory directory;
+  const std::string place = directory.writeRobot(kToyUrdf, replaceOnce(kToyYaml, "type: [6D]", "type: [7D]"));
+  const std::string completing = directory.write("mine/mine.yaml", "model: ../mine/../robot.urdf\n");
+  for (const std::string& given :
+       {place, place + "/", place + "/./robot.urdf", place + "/mine/../robot.urdf", completing}) {
+    CAPTURE(given);
+    CHECK(getErrorOfLoading(given).rfind(directory.path() + "/robot.yaml: key 'type'[0] (line 2)", 0) == 0);
+  }
 }
 
 TEST_CASE("files that are no robot at all are errors") {

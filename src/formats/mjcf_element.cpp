@@ -87,7 +87,11 @@ MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclas
 MjcfElement::MjcfElement(const XMLElement& element, const std::string& childclass, MjcfSettings& settings,
                          const std::string& kind)
     : settings_(settings), path_(settings.files.getPath(element)), tag_(getTag(element)), line_(element.GetLineNum()) {
-  if (const char* name = element.Attribute("name")) name_ = name;
+  if (const char* name = element.Attribute("name")) name_ = " '" + std::string(name) + "'";
+  const XMLElement* parent = element.Parent() ? element.Parent()->ToElement() : nullptr;
+  if (const char* body = parent && getTag(*parent) == "body" ? parent->Attribute("name") : nullptr;
+      body && name_.empty())
+    name_ = " of body '" + std::string(body) + "'";
   const char* text = element.Attribute("class");
   const std::string own = text ? text : childclass.empty() ? "main" : childclass;
   const auto defaults = settings.defaults.find(own);
@@ -105,9 +109,7 @@ MjcfElement::~MjcfElement() {
     if (!asked_.count(name)) settings_.notes.addAttribute(attribute.path, "<" + tag_ + ">", attribute.line, name);
 }
 
-std::string MjcfElement::describe() const {
-  return tag_ + (name_.empty() ? "" : " '" + name_ + "'") + " (line " + std::to_string(line_) + ")";
-}
+std::string MjcfElement::describe() const { return tag_ + name_ + " (line " + std::to_string(line_) + ")"; }
 
 void MjcfElement::fail(const std::string& problem, const std::string& remedy) const {
   throw InputError(path_, describe(), problem, remedy);

@@ -218,7 +218,7 @@ RobotFiles readCompleted(const YamlFile& own) {
                                     : "the robot that this file completes was not found: " + models,
                      "put its directory into one of those in BIELLE_ROBOTS, or correct the key");
   }
-  return readRobotFiles(model);
+  return readRobotFiles(std::filesystem::path(model).lexically_normal());
 }
 
 RobotFiles readRobotFiles(const std::filesystem::path& path) {
@@ -423,7 +423,8 @@ std::string LoadedRobot::path() const {
 }
 
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {
-  const std::filesystem::path path = findRobotFile(name_or_path);
+  // So that all messages name a file alike.
+  const std::filesystem::path path = std::filesystem::path(findRobotFile(name_or_path)).lexically_normal();
   LoadedRobot robot;
   robot.model = combineFiles(readRobotFiles(path), options.base, &robot.warnings);
   robot.file = std::filesystem::absolute(path).lexically_normal().string();

@@ -74,7 +74,15 @@ std::set<std::string> collectNames(const XMLElement& robot, const std::string& t
   for (const XMLElement* e : getChildren(robot)) {
     if (tag == "joint" ? !isJoint(*e) : getTag(*e) != tag) continue;
     const std::string name = getAttribute(e, "name"), line = " (line " + std::to_string(e->GetLineNum()) + ")";
-    if (name.empty()) throw InputError(path, tag + line, "it has no name", "give it a name attribute");
+    if (name.empty()) {
+      const auto getLink = [e](const char* end, const char* word) {
+        const XMLElement* found = e->FirstChildElement(end);
+        const char* link = found ? found->Attribute("link") : nullptr;
+        return link ? word + std::string(" '") + link + "'" : std::string();
+      };
+      throw InputError(path, tag + getLink("parent", " from") + getLink("child", " to") + line, "it has no name",
+                       "give it a name attribute");
+    }
     const std::string element = tag + " '" + name + "'";
     if (!names.insert(name).second)
       throw InputError(path, element, "it is declared twice" + line, "rename one of them");

@@ -57,16 +57,20 @@ class PlaneLinkage {
     for (const auto& [point, name] : hinges_)
       if (!hung_.count(point))
         name.fail("no bar hangs on point '" + point + "'", "name a point by which a bar is carried");
+    place_.later.push_back([self = *this] { self.checkAngles(); });  // of links that come after it, too
+    close();
+  }
+
+ private:
+  // Angles are those of joints between the base and a link.
+  void checkAngles() const {
     for (const Body& body : bodies_)
       for (const auto& [joint, angle] : body.given)
         if (const std::vector<std::string> way = listWay(body); !contains(way, joint))
           angle.fail("joint '" + joint + "' is not between link '" + base_ + "' and link '" + body.name + "'",
                      "known are " + listItems(way));
-    close();
   }
 
- private:
-  // Joints between the base and a link.
   std::vector<std::string> listWay(const Body& body) const {
     std::vector<std::string> way;
     const std::vector<UrdfJoint>& joints = place_.files.urdf.joints;

@@ -267,7 +267,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   refuseOptionsOfPlans(given);
   for (const std::string& warning : robot.warnings) std::cerr << "bielle: warning: " << warning << "\n";
   robot.model = addPayload(robot.model, makePayload(arguments));
-  const FreeStart start = makeFreeStart(robot.model, arguments);
+  const FreeStart start = makeFreeStart(robot.model, arguments, robot.path());
   std::vector<MotorSpring> springs;
   for (const std::string& spring : arguments.springs) addSprings(robot.model, spring, start.q, springs);
   const Model model = addMotorSprings(robot.model, springs);

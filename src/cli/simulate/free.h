@@ -17,6 +17,6 @@ struct FreeStart {
 /// The posture of the arguments, with what their state file gives: loops are closed about the joints that it places, and the
 /// joints that it does not mention follow those that it moves. What does not fit to the loops is reported as a warning.
 /// \throws InputError
-FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments);
+FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments, const std::string& robot);
 
 }  // namespace bielle::worlds

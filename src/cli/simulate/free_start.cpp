@@ -34,11 +34,11 @@ void lift(const Model& model, VectorXd& q) {
   q[2] -= lowest;
 }
 
-VectorXd makePosture(const Model& model, const std::string& name) {
+VectorXd makePosture(const Model& model, const std::string& name, const std::string& file) {
   const AssemblyResult result = name.empty()        ? findClosedConfiguration(model)
                                 : name == "neutral" ? closeConfiguration(model, model.makeNeutral())
                                                     : assembleReference(model, name);
-  if (result.status != NumericalStatus::Ok) throw makeClosingError(model, model.name(), result);
+  if (result.status != NumericalStatus::Ok) throw makeClosingError(model, file, result);
   VectorXd q = result.q;
   if (name == "neutral") lift(model, q);
   return q;
@@ -93,8 +93,8 @@ void move(const Model& model, const std::string& file, cli::EvalState& state) {
 
 }  // namespace
 
-FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments) {
-  const VectorXd posture = makePosture(model, arguments.posture);
+FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments, const std::string& robot) {
+  const VectorXd posture = makePosture(model, arguments.posture, robot);
   if (arguments.state.empty()) return {posture, VectorXd::Zero(model.nv()), VectorXd::Zero(model.nu())};
   const std::string file = arguments.state == "-" ? "standard input" : arguments.state;
   cli::EvalState state = cli::readState(model, arguments.state, posture);
