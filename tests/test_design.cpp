@@ -451,7 +451,7 @@ TEST_CASE("design: errors are reported with their places and remedies") {
   check("motion: squat", "motion: dance", "there is no such motion");
   check("depth: 0.95", "dept: 0.95", "dept");
   check("measure: peak_torque", "measure: peak", "use one of peak_torque, rms_torque");
-  check("motors: [motor_knee_left", "motors: [motor_knee", "there is no motor 'motor_knee'; known are hip");
+  check("motors: [motor_knee_left", "motors: [motor_knee", "there is no motor 'motor_knee'; known are ");
   check("algorithm: crs", "algorithm: newton", "use one of crs");
   check("objective:", "objectiv:", "it is unknown");
   check("depth: 0.95", "depth: 0.05", "start design");
