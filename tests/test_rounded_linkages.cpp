@@ -1,0 +1,180 @@
+// Linkages that move only because their axes lie as they do: rounded, they are read as what was rounded. The ideal linkages
+// themselves are the oracle.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/closure.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/robots/robot_loader.h"
+#include "dynamics/rounded_linkages.h"
+#include "math/decompositions.h"
+#include "math/so3.h"
+#include "published_robots.h"
+#include "rounded_families.h"
+#include "selection.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// The posture next to q with the first joint at an angle.
+AssemblyResult turnTo(const Model& model, const VectorXd& q, double angle) {
+  AssemblyProblem problem;
+  problem.q_ref = q;
+  problem.q_ref[0] = angle;
+  problem.weights = VectorXd::Constant(model.nv(), 1e-4);
+  problem.weights[0] = 1;
+  return assemble(model, problem);
+}
+
+MatrixXd calcLoopJacobian(const Model& model, const VectorXd& q) {
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  const ConstraintSet set = makeConstraintSet(model);
+  MatrixXd J = MatrixXd::Zero(set.rows, model.nv());
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    calcClosureJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+  return J;
+}
+
+// Singular values, and the way that the linkage goes per way of its first joint.
+struct Motion {
+  VectorXd sigma, ratio;
+};
+Motion calcMotion(const Model& model, const VectorXd& q) {
+  const Eigen::JacobiSVD<MatrixXd> svd(calcLoopJacobian(model, q), Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const VectorXd way = svd.matrixV().rightCols(1);
+  return {svd.singularValues(), way / way[0]};
+}
+
+RoundingTolerance halfUnit(int decimals) {
+  const double half = 0.5 * std::pow(10, -decimals);
+  return {half, half};
+}
+
+// Whether nothing of it is changed, to the last bit.
+bool isUntouched(const Model& model, const RoundingTolerance& tolerance) {
+  return findRoundedLinkages(model, tolerance).model.isCopyOf(model);
+}
+
+void checkFamily(Family family, int count, int first_decimals, int last_decimals, ClosureKind kind) {
+  std::mt19937 rng(11 + static_cast<int>(family));
+  for (int i = 0; i < count; ++i) {
+    const HingeNet net = makeHingeNet(family, rng);
+    const Model ideal = makeModel(net, {}, kind);
+    const int decimals = first_decimals + i % (last_decimals - first_decimals + 1);
+    const double unit = std::pow(10, -decimals);
+    const Model rounded = makeModel(net, decimals, kind);
+    const RoundedLinkages read = findRoundedLinkages(rounded, halfUnit(decimals));
+    CAPTURE(getName(family), i, decimals);
+    // With twelve decimals some move as they are written, to 1e-13.
+    REQUIRE(read.mended.size() == (decimals < 12 ? 1 : read.mended.size()));
+    for (const RoundedLinkage& mended : read.mended) {
+      CHECK(mended.meant == 1);
+      CHECK(mended.angle <= 4 * std::max(unit / 2, kLeastRounding));
+      CHECK(mended.shape == (family == Family::Bennett     ? LinkageShape::Other
+                             : family == Family::Spherical ? LinkageShape::Spherical
+                                                           : LinkageShape::Plane));
+    }
+    const int rank = ideal.nv() - 1;
+    const double regular = calcMotion(ideal, ideal.makeNeutral()).sigma[rank - 1];
+    for (double way : {1.0, -1.0}) {
+      VectorXd q = ideal.makeNeutral(), q_read = q;
+      for (int step = 1; step <= 20; ++step) {
+        const AssemblyResult at = turnTo(ideal, q, 0.1 * way * step),
+                             at_read = turnTo(read.model, q_read, 0.1 * way * step);
+        if (at.status != NumericalStatus::Ok || std::abs(at.q[0] - 0.1 * way * step) > 1e-9) break;
+        const Motion motion = calcMotion(ideal, at.q);
+        if (motion.sigma[rank - 1] < 0.3 * regular || motion.ratio.cwiseAbs().maxCoeff() > 5)
+          break;  // near a dead point
+        REQUIRE(at_read.status == NumericalStatus::Ok);
+        q = at.q, q_read = at_read.q;
+        const Motion motion_read = calcMotion(read.model, q_read);
+        CHECK(motion_read.sigma[rank] < 1e-11);
+        CHECK((q - q_read).cwiseAbs().maxCoeff() < 50 * unit);
+        CHECK((motion.ratio - motion_read.ratio).cwiseAbs().maxCoeff() < 250 * unit);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("rounded linkages have the mobility of the ideal ones, their angles and ratios") {
+  for (Family family : kFamilies) checkFamily(family, 6, 4, 9, ClosureKind::Hinge5D);
+  for (Family family : {Family::PlaneFourBar, Family::SixBar, Family::Parallelogram, Family::PlaneInSpace})
+    checkFamily(family, 3, 5, 7, ClosureKind::Ball3D);
+}
+
+TEST_CASE("a thousand rounded linkages of each family", "[long]") {
+  for (Family family : kFamilies) checkFamily(family, 1000, 5, 12, ClosureKind::Hinge5D);
+}
+
+TEST_CASE("what was rounded moves, written as it is, hardly or not at all") {
+  // Else nothing above would have been to mend.
+  for (Family family : kFamilies) {
+    std::mt19937 rng(11);
+    const Model rounded = makeModel(makeHingeNet(family, rng), 6);
+    const VectorXd neutral = rounded.makeNeutral();
+    const AssemblyResult turned = turnTo(rounded, neutral, 0.2);
+    CHECK((turned.status != NumericalStatus::Ok || std::abs(turned.q[0] - 0.2) > 0.1));
+  }
+}
+
+TEST_CASE("linkages that are ideal to the last bit, or to be taken as they are, stay as they are") {
+  for (Family family : kFamilies) {
+    std::mt19937 rng(3);
+    for (int i = 0; i < 5; ++i) {
+      const HingeNet net = makeHingeNet(family, rng);
+      for (int decimals : {3, 6, 17}) CHECK(isUntouched(makeModel(net, {}), halfUnit(decimals)));
+      CHECK(isUntouched(makeModel(net, 6), {0, 0}));
+    }
+  }
+}
+
+TEST_CASE("loops in general position stay as they are, however near to special ones they are written") {
+  for (Family family : kFamilies) {
+    std::mt19937 rng(5);
+    for (double off : {1e-2, 1e-3, 1e-4, 1e-5}) {
+      HingeNet net = makeHingeNet(family, rng);
+      std::uniform_real_distribution<double> uniform(-off, off);
+      for (HingeNet::Hinge& hinge : net.hinges)
+        hinge.X_W = hinge.X_W * exp6(Vector6d(Vector6d::NullaryExpr([&](Eigen::Index) { return uniform(rng); })));
+      CAPTURE(getName(family), off);
+      CHECK(isUntouched(makeModel(net, {}), halfUnit(17)));
+      if (off > 5e-5) CHECK(isUntouched(makeModel(net, 7), halfUnit(7)));
+    }
+  }
+}
+
+TEST_CASE("a linkage that is locked by more than rounding is told, with its axes") {
+  std::mt19937 rng(8);
+  HingeNet net = makeHingeNet(Family::PlaneFourBar, rng);
+  net.hinges[2].X_W = net.hinges[2].X_W * SE3(exp3(Vector3d(8e-4, 0, 0)), Vector3d::Zero());
+  const RoundedLinkages read = findRoundedLinkages(makeModel(net, 5, ClosureKind::Ball3D), halfUnit(5));
+  CHECK(read.mended.empty());
+  REQUIRE(read.locked.size() == 1);
+  CHECK(read.locked[0].written == 0);
+  CHECK(read.locked[0].meant == 1);
+  CHECK(read.locked[0].apart == Approx(8e-4).epsilon(0.05));
+  CHECK(read.locked[0].axes[1] == "joint 'hinge3'");
+}
+
+TEST_CASE("our robots, and published ones, are read as they are written") {
+  const bool has_published = !findPublishedDirectory("battobot_6d").empty();
+  int count = 0;
+  for (const std::string& name : listRobots()) {
+    if (!has_published && (name == "battobot" || name == "digit")) continue;  // which complete published ones
+    CAPTURE(name);
+    const LoadedRobot robot = loadRobot(name);
+    ++count;
+    for (const std::string& warning : robot.warnings) {
+      CHECK(warning.find("rounded") == std::string::npos);
+      CHECK(warning.find("is less than") == std::string::npos);
+    }
+    CHECK(isUntouched(robot.model, halfUnit(17)));
+  }
+  CHECK(count > 15);
+}
