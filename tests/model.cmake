@@ -11,6 +11,7 @@ get_property(reads_sdf GLOBAL PROPERTY BIELLE_READS_SDF)
 if(reads_sdf)
   bielle_test(sdf_reader SOURCES test_sdf_reader.cpp LIBS bielle_results)
 endif()
+bielle_test(rounded_files SOURCES test_rounded_files.cpp LIBS bielle_results)
 bielle_test(loop_files SOURCES test_loop_files.cpp test_urdf_dialects.cpp LIBS bielle_results)
 bielle_test(locale SOURCES test_locale.cpp LIBS bielle_dynamics)
 # One with a decimal comma, where glibc's sources of locales are to be had.

@@ -39,6 +39,12 @@ const MjcfFiles::File& MjcfFiles::getFile(const XMLElement& element) const { ret
 
 const std::string& MjcfFiles::getPath(const XMLElement& element) const { return getFile(element).path; }
 
+std::vector<const XMLElement*> MjcfFiles::listRoots() const {
+  std::vector<const XMLElement*> roots;
+  for (const auto& [document, file] : files_) roots.push_back(document->RootElement());
+  return roots;
+}
+
 std::vector<const XMLElement*> MjcfFiles::getChildren(const XMLElement& element, const char* tag) {
   std::vector<const XMLElement*> children;
   for (const XMLElement* e : bielle::getChildren(element)) {

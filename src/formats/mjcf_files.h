@@ -16,6 +16,8 @@ class MjcfFiles {
   explicit MjcfFiles(const std::string& path);
 
   const XMLElement& root() const { return *root_; }
+  /// Of all files that were read.
+  std::vector<const XMLElement*> listRoots() const;
   /// The elements in another; in place of an <include>, those in the root of the file that it names. That file is beside
   /// the main one, as in MuJoCo, or beside the one that includes it.
   /// \throws InputError naming the line for files that are missing, that include each other without end, or are included

@@ -10,6 +10,7 @@
 #include "formats/reader_dialects.h"
 #include "formats/reader_loops.h"
 #include "formats/robot_files.h"
+#include "formats/rounding_warnings.h"
 #include "model/listing.h"
 #include "model/missing_part.h"
 
@@ -146,6 +147,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   replace(own.joint_types, yaml.joint_types);
   yaml.frames.insert(yaml.frames.end(), own.frames.begin(), own.frames.end());
   replace(own.closures, yaml.closures);
+  if (!own.closures.empty()) yaml.axes = own.axes;
   replace(own.motors, yaml.motors);
   for (const MotorSpec& motor : own.motors)
     if (motor.armature) yaml.armature.erase(motor.joint);
@@ -163,6 +165,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   replace(own.importance, yaml.importance);
   if (own.cross_inertia) yaml.cross_inertia = own.cross_inertia;
   if (own.base) yaml.base = own.base;
+  if (own.rounding) yaml.rounding = own.rounding;
   if (own.motor_armature) yaml.motor_armature = own.motor_armature;
   if (own.gravity) yaml.gravity = own.gravity;
   yaml.names.insert(yaml.names.end(), own.names.begin(), own.names.end());
@@ -379,6 +382,15 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
   if (yaml.gravity) builder.setGravity(*yaml.gravity);
 }
 
+// Axes of closures are of another file, which rounds in its own way: few digits are exact ones.
+RoundingTolerance findTolerance(const UrdfFile& urdf, const YamlFile& yaml) {
+  constexpr int kFewest = 4;
+  if (yaml.rounding) return {*yaml.rounding, *yaml.rounding};
+  RoundingTolerance tolerance = urdf.rounding;
+  if (yaml.axes.most_digits() >= kFewest) tolerance.angle = std::max(tolerance.angle, yaml.axes.calcHalfUnit());
+  return tolerance;
+}
+
 }  // namespace
 
 Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::vector<std::string>* warnings) {
@@ -403,7 +415,9 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
   if (warnings)
     for (const std::vector<std::string>* own : {&urdf.warnings, &yaml.warnings})
       warnings->insert(warnings->end(), own->begin(), own->end());
-  return builder.build(warnings);
+  RoundedLinkages linkages = findRoundedLinkages(builder.build(warnings), findTolerance(urdf, yaml));
+  if (warnings) warnOfRounding(linkages, urdf.path, *warnings);
+  return std::move(linkages.model);
 }
 
 RobotFiles parseRobotText(const RobotText& text, const std::string& path) {

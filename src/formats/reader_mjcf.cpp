@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "bielle/model/error.h"
+#include "formats/decimals.h"
 #include "formats/xml_document.h"
 #include "model/joint.h"
 
@@ -45,6 +46,9 @@ RobotFiles MjcfReader::read() {
   for (const auto& [name, tendon] : tendons_)
     if (!tendon.is_used) noteElement(*tendon.element, "the tendon is left out");
   tree_.warnings = settings_.notes.format();
+  GeometryDecimals decimals;
+  for (const XMLElement* root : settings_.files.listRoots()) decimals.add(*root, settings_.angle != 1);
+  tree_.rounding = decimals.calcTolerance();
   return {std::move(tree_), std::move(yaml_)};
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "bielle/model/error.h"
+#include "formats/decimals.h"
 #include "formats/log_capture.h"
 #include "model/number_text.h"
 
@@ -77,6 +78,9 @@ RobotFiles SdfReader::read() {
   addStart();
   const std::vector<std::string> notes = notes_.format();
   tree_.warnings.insert(tree_.warnings.end(), notes.begin(), notes.end());
+  GeometryDecimals decimals;
+  decimals.add(*document_.RootElement());
+  tree_.rounding = decimals.calcTolerance();
   return {std::move(tree_), std::move(yaml_)};
 }
 

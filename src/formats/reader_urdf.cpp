@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "formats/decimals.h"
 #include "formats/log_capture.h"
 #include "formats/mesh.h"
 #include "formats/reader_dialects.h"
@@ -384,6 +385,9 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
   file.name = tree.robot;
   file.root = tree.root;
   file.warnings = std::move(tree.warnings);
+  GeometryDecimals decimals;
+  decimals.add(robot);
+  file.rounding = decimals.calcTolerance();
   std::vector<std::string> unread;
   for (const auto& [name, link] : model->links_) {
     file.links[name] = makeLink(*link, path, unread);

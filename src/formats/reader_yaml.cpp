@@ -22,7 +22,8 @@ constexpr double kMostYaw = 3.1416;  // rad, half a turn of four decimals
 std::vector<std::string> listRobotKeys() {
   std::vector<std::string> keys = {"closed_loop", "type", "closure_name", "name_mot"};
   keys.insert(keys.end(), listSharedKeys().begin(), listSharedKeys().end());
-  keys.insert(keys.end(), {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set"});
+  keys.insert(keys.end(),
+              {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set", "rounding"});
   return keys;
 }
 
@@ -149,6 +150,8 @@ void readClosures(const Entry& list, YamlFile& file) {
     if (const Entry* axis = find(fields, "axis")) {
       if (closure.kind != ClosureKind::Hinge5D) axis->fail("only a hinge has an axis", "use type 5d or remove it");
       closure.axis = axis->getVector3();
+      if (axis->isList())
+        for (const std::string& number : axis->getTexts()) file.axes.add(number);
     }
     if (const Entry* kp = find(fields, "kp")) closure.kp = kp->getNumber();
     if (const Entry* kd = find(fields, "kd")) closure.kd = kd->getNumber();
@@ -352,6 +355,12 @@ void readRoot(const Entry& root, YamlFile& file) {
   readJointTypes(fields, file);
   if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
   readSharedKeys(fields, file);
+  if (const Entry* entry = find(fields, "rounding")) {
+    file.rounding = entry->getNumber();
+    if (!(*file.rounding >= 0 && *file.rounding <= kMostAngleRounding))
+      entry->fail("it is not within 0 .. 1e-3",
+                  "give by how much angles (rad) and lengths (m) are rounded; 0: not at all");
+  }
   if (const Entry* entry = find(fields, "frames")) readFrames(*entry, file);
   if (const Entry* entry = find(fields, "model"))
     file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};

@@ -9,6 +9,7 @@
 #include "bielle/formats/reader.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/model.h"
+#include "formats/decimals.h"
 #include "formats/yaml_entry.h"
 
 namespace bielle {
@@ -37,8 +38,9 @@ struct UrdfFile {
   std::map<std::string, UrdfLink> links;
   std::vector<UrdfJoint> joints;
   std::vector<std::string> warnings;
-  bool has_own_base = false;  ///< it says itself what is free: the option of a free base has no effect
-  bool is_urdf = false;       ///< its floating joints have origins, from which other formats do not count
+  RoundingTolerance rounding;  ///< of the numbers of its placements
+  bool has_own_base = false;   ///< it says itself what is free: the option of a free base has no effect
+  bool is_urdf = false;        ///< its floating joints have origins, from which other formats do not count
 };
 
 /// Joint kind that replaces that of the URDF, with the axes of a universal joint in the joint's frame.
@@ -116,6 +118,8 @@ struct YamlFile {
   std::vector<std::pair<std::string, std::array<double, 2>>> importance;  ///< joint -> of its position, of its velocity
   std::optional<Vector3d> gravity;
   std::vector<RobotName> names;  ///< all that this file uses, to be found in the robot
+  Decimals axes;                   ///< of closures
+  std::optional<double> rounding;  ///< instead of that of the numbers, rad and m
   std::vector<std::string> warnings;
 };
 

@@ -55,7 +55,7 @@
 ///   `_Y`), with a cross of this inertia about any axis between them
 /// - `importance: {joint: [position, velocity], ...}` weighs joints in the state regularization of motions (default 1,
 ///   1)
-/// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
+/// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2), `rounding: rad and m` that placements may be off by (docs/modelling.md)
 /// - `model: NAME or path relative to this file`, or a list of them: this file, with no URDF beside it, completes the
 ///   first of these published robots that exists; names are looked up in the directories of robots. Its keys take
 ///   precedence over those of that robot's YAML file. It may be one in MuJoCo's format, or a generated one.

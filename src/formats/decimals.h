@@ -1,0 +1,44 @@
+#pragma once
+/// \file By how much the numbers of a file may be rounded, from how they are written.
+#include <string>
+#include <vector>
+
+#include "dynamics/rounded_linkages.h"
+
+namespace tinyxml2 {
+class XMLElement;
+}
+
+namespace bielle {
+
+/// Digits of numbers. Files have a number of decimals, or of significant digits (printf's %.6f and %.6g): half a unit is that of the
+/// last of the most decimals, or of the most significant digits (of four or more), whichever is larger. Numbers that are those of
+/// float, printed with more digits than it has, are off by half of its last bit.
+class Decimals {
+ public:
+  /// \param text  anything; what is no number is passed over   \param unit  of these numbers
+  void add(const std::string& text, double unit = 1);
+  int most_digits() const { return most_digits_; }
+  /// 0 without numbers.
+  double calcHalfUnit() const;
+
+ private:
+  int most_digits_ = 0;
+  bool all_floats_ = true;
+  double finest_ = 1;            // unit of the last decimal
+  std::vector<double> largest_;  // number by its significant digits, in their unit of measure
+  double float_ = 0, unit_ = 0;
+};
+
+/// Of the placements and axes of joints, of bodies, sites and frames and of the loops in a document: in URDF, MJCF or SDF.
+class GeometryDecimals {
+ public:
+  /// \param degrees  whether Euler's angles of MJCF are in degrees
+  void add(const tinyxml2::XMLElement& root, bool degrees = false);
+  RoundingTolerance calcTolerance() const { return {angles_.calcHalfUnit(), lengths_.calcHalfUnit()}; }
+
+ private:
+  Decimals angles_, lengths_;
+};
+
+}  // namespace bielle

@@ -1,0 +1,169 @@
+// Files whose linkages move only because of numbers that are rounded: in every format, told once, and written so that they come back.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/formats/robot_writer.h"
+#include "bielle/robots/robot_loader.h"
+#include "formats/decimals.h"
+#include "get_error.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// A four-bar whose crank is turned by `right`, a right angle about x, and whose rocker's pin by the same; `gap` across its plane.
+std::string makeUrdf(const std::string& right, const std::string& gap = "0") {
+  const auto link = [](const std::string& name) {
+    return "<link name=\"" + name +
+           "\"><inertial><mass value=\"1\"/><inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.01\" ixy=\"0\" ixz=\"0\" "
+           "iyz=\"0\"/></inertial></link>\n";
+  };
+  const auto joint = [](const std::string& name, const std::string& type, const std::string& parent,
+                        const std::string& xyz, const std::string& rpy, const std::string& axis) {
+    return "<joint name=\"" + name + "_joint\" type=\"" + type + "\"><parent link=\"" + parent + "\"/><child link=\"" +
+           name + "\"/><origin xyz=\"" + xyz + "\" rpy=\"" + rpy + "\"/><axis xyz=\"" + axis + "\"/></joint>\n";
+  };
+  return "<robot name=\"fourbar\"><link name=\"world\"/>\n" + link("crank") + link("rod") + link("rocker") +
+         "<link name=\"rod_end\"/><link name=\"pin\"/>\n" +
+         joint("crank", "continuous", "world", "0 0 0.5", right + " 0 0", "0 0 1") +
+         joint("rod", "continuous", "crank", "0.1 0.1 0", "0 0 0", "0 0 1") +
+         joint("rocker", "continuous", "world", "0.5 0 0.5", "0 0 0", "0 -1 0") +
+         joint("rod_end", "fixed", "rod", "0.35 0.1 0", "0 0 0", "1 0 0") +
+         joint("pin", "fixed", "rocker", "-0.05 " + gap + " 0.2", right + " 0 0", "1 0 0") + "</robot>\n";
+}
+
+std::string makeYaml(const std::string& type, const std::string& more = "") {
+  return "base: fixed\nmotors: {crank_joint: {armature: 0.001}}\nclosures: [{name: pin, frames: [rod_end, pin], "
+         "type: " +
+         type + "}]\n" + more;
+}
+
+int countWarnings(const LoadedRobot& robot, const std::string& text) {
+  int count = 0;
+  for (const std::string& warning : robot.warnings) count += warning.find(text) != std::string::npos;
+  return count;
+}
+
+// It turns by a radian, closed.
+void checkTurns(const Model& model) {
+  AssemblyProblem problem;
+  problem.q_ref = model.makeNeutral();
+  problem.weights = VectorXd::Constant(model.nv(), 1e-4);
+  problem.weights[0] = 1;
+  for (double angle : {0.2, 0.4, 0.6}) {
+    problem.q_ref[0] = -angle;
+    const AssemblyResult turned = assemble(model, problem);
+    REQUIRE(turned.status == NumericalStatus::Ok);
+    CHECK(turned.q[0] == Approx(-angle).margin(1e-9));
+    problem.q_ref = turned.q;
+  }
+}
+
+double calcHalfUnit(const std::string& numbers) {
+  Decimals decimals;
+  decimals.add(numbers);
+  return decimals.calcHalfUnit();
+}
+
+}  // namespace
+
+TEST_CASE("how far numbers may be off, from how they are written") {
+  CHECK(calcHalfUnit("") == 0);
+  CHECK(calcHalfUnit("0 0.0") == 0);
+  CHECK(calcHalfUnit("0 0.1 -0.25") == Approx(5e-3));
+  CHECK(calcHalfUnit("1.570796 0.000001") == Approx(5e-7));  // %.6f
+  CHECK(calcHalfUnit("12.345678 1e-6") == Approx(5e-7));
+  CHECK(calcHalfUnit("1.5708 0.0123457 -0.349066") == Approx(5e-6));  // %.6g
+  CHECK(calcHalfUnit("1.5707963267948966 0.1") < 1e-15);              // a double
+  CHECK(calcHalfUnit("1.57079637050628662 0.100000001490116119 0.5") == Approx(1.57 * std::pow(2, -24)).epsilon(0.01));
+}
+
+TEST_CASE(
+    "a four-bar with right angles of five digits is the plane one, told once, and comes back from what is written") {
+  for (const char* type : {"5d", "3d"}) {
+    const RobotDirectory directory;
+    directory.write("robot.urdf", makeUrdf("1.5708"));
+    directory.write("robot.yaml", makeYaml(type));
+    const LoadedRobot robot = loadRobot(directory.path());
+    CHECK(countWarnings(robot,
+                        "loops: read closure 'pin' as a plane linkage: axes of crank_joint, rod_joint, rocker_joint "
+                        "made parallel (largest change ") == 1);
+    CHECK(countWarnings(robot, directory.path() + "/robot.urdf: ") == static_cast<int>(robot.warnings.size()));
+    checkTurns(robot.model);
+
+    const RobotDirectory again;
+    writeRobot(robot.model, again.path() + "/written");
+    const LoadedRobot read = loadRobot(again.path() + "/written");
+    CHECK(countWarnings(read, "rounded") == 0);
+    for (int i = 1; i < robot.model.numBodies(); ++i) {
+      const SE3 &X = robot.model.joints()[i].X_PJ, &X_read = read.model.joints()[i].X_PJ;
+      CHECK((X.p - X_read.p).norm() == 0);
+      CHECK((X.R - X_read.R).norm() < 1e-15);
+    }
+    checkTurns(read.model);
+  }
+}
+
+TEST_CASE("a linkage is as it is written with all digits, or where rounding is 0") {
+  const RobotDirectory directory;
+  directory.write("robot.yaml", makeYaml("3d"));
+  directory.write("robot.urdf", makeUrdf("1.5707963267948966"));
+  CHECK(countWarnings(loadRobot(directory.path()), "rounded") == 0);
+  directory.write("robot.yaml", makeYaml("3d", "rounding: 0\n"));
+  directory.write("robot.urdf", makeUrdf("1.5708"));
+  const LoadedRobot locked = loadRobot(directory.path());
+  CHECK(countWarnings(locked, "loops: read") == 0);
+  CHECK(countWarnings(locked, "mobility 0 is less than the 1 motor in its loops (crank_joint)") == 1);
+  directory.write("robot.yaml", makeYaml("3d", "rounding: 1\n"));
+  CHECK_THAT(getError([&] { loadRobot(directory.path()); }),
+             Catch::Contains("rounding") && Catch::Contains("0 .. 1e-3"));
+}
+
+TEST_CASE("a gap across the plane, however small, is none") {
+  for (const char* gap : {"1e-7", "1e-9", "2e-12"}) {
+    CAPTURE(gap);
+    const RobotDirectory directory;
+    directory.write("robot.urdf", makeUrdf("1.5707963267948966", gap));
+    directory.write("robot.yaml", makeYaml("5d", "rounding: 1e-7\n"));
+    const LoadedRobot robot = loadRobot(directory.path());
+    CHECK(countWarnings(robot, "as a plane linkage") == 1);
+    checkTurns(robot.model);
+  }
+}
+
+TEST_CASE("axes that are farther from parallel than rounding are told, with what would do") {
+  const RobotDirectory directory;
+  std::string urdf = makeUrdf("1.5708");
+  urdf = replaceOnce(urdf, "xyz=\"0.1 0.1 0\" rpy=\"0 0 0\"", "xyz=\"0.1 0.1 0\" rpy=\"0.0008 0 0\"");
+  directory.write("robot.urdf", urdf);
+  directory.write("robot.yaml", makeYaml("3d"));
+  const LoadedRobot robot = loadRobot(directory.path());
+  CHECK(countWarnings(robot, "rad from parallel, more than its numbers are rounded") == 1);
+  CHECK(countWarnings(robot, "joint 'rod_joint'") == 1);
+  CHECK(countWarnings(robot, "mobility would be 1") == 1);
+}
+
+TEST_CASE("MuJoCo's quaternions of six decimals, and its sites beside the plane") {
+  const auto load = [](const std::string& turn, const std::string& place) {
+    const RobotDirectory directory;
+    return loadRobot(directory.write("fourbar.xml", R"(<mujoco><compiler angle="radian"/>
+<default><geom type="capsule" size="0.012" density="900"/><joint axis="0 1 0"/></default>
+<worldbody>
+<body name="crank" pos="0 0 0.5"><joint name="crank"/><geom fromto="0 0 0 0.1 0 0.1"/>
+<body name="rod" pos="0.1 0 0.1"><joint name="rod"/><geom fromto="0 0 0 0.35 0 0.1"/><site name="a" pos=")" +
+                                                        place + R"("/></body></body>
+<body name="rocker" pos="0.5 0 0.5" )" + turn + R"(><geom fromto="0 0 0 -0.05 0.2 0"/>
+<joint name="rocker" axis="0 0 1"/><site name="b" pos="-0.05 0.2 0"/></body>
+</worldbody>
+<equality><connect site1="a" site2="b"/></equality><actuator><motor joint="crank"/></actuator></mujoco>)"));
+  };
+  for (const auto& [turn, place] : {std::pair("quat=\"0.707107 0.707105 0 0\"", "0.35 0 0.1"),
+                                    {"quat=\"0.707107 0.707107 0 0\"", "0.35 0.000001 0.1"}}) {
+    const LoadedRobot robot = load(turn, place);
+    CHECK(countWarnings(robot, "as a plane linkage: axes of crank, rod, rocker made parallel") == 1);
+    checkTurns(robot.model);
+  }
+}
