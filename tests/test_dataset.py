@@ -18,6 +18,7 @@ SHORT = "duration: 0.6, settle: 0, time_step: 0.02"
 SPEC = """licence: CC0-1.0
 formats: [mjlab, amp]
 fps: 30
+isaac_lab: 3
 motions:
   - {solve: squat, robot: bipetto, payload: [0, 3], set: {depth: 0.9, """ + SHORT + """}}
   - {solve: squat, robot: bipetto, set: {depth: 0.85, com_weight: 1, """ + SHORT + """}}
@@ -70,6 +71,8 @@ def check_entries(place):
             path = os.path.join(place, "squats", path)
             frames = read_shape(path, "joint_pos" if "mjlab" in path else "dof_positions")[0]
             assert frames == round(entry["duration_s"] * 30) + 1
+            with zipfile.ZipFile(path) as archive:
+                assert ("isaac_lab.npy" in archive.namelist()) == ("amp" in path), path
     assert entries[2]["converged"] and not entries[2]["goals_met"]
     # The robot carries what it was asked to carry.
     masses = []
@@ -123,7 +126,8 @@ def check_pushes(place):
     frames = read_shape(os.path.join(place, "squats", stood["files"]["mjlab"]), "joint_pos")[0]
     assert abs(frames - 1 - 50 * stood["duration_s"]) < 1, frames
     assert os.path.exists(os.path.join(place, "squats", stood["files"]["mcap"]))
-    for change, problem in ((("[mjlab, mcap]", "[problem]"), "is no problem"), (("hold: 0.1", "live: true"), "cannot be set")):
+    for change, problem in ((("[mjlab, mcap]", "[problem]"), "is no problem"), (("mcap]", "amp]\nisaac_lab: 4"), "no version of Isaac Lab"),
+                            (("hold: 0.1", "live: true"), "cannot be set")):
         refused = run(place, PUSHED.replace(*change), status=2)
         assert problem in refused.stderr, (change, refused.stderr)
 

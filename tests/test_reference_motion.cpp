@@ -95,6 +95,8 @@ double calcFrameError(const ReferenceMotion& motion, Eigen::Index k, const mjMod
                       std::min((quat - ours).norm(), (quat + ours).norm()),
                       (twist.tail<3>() - motion.body_lin_vel.row(k).segment<3>(3 * b).transpose()).norm(),
                       (twist.head<3>() - motion.body_ang_vel.row(k).segment<3>(3 * b).transpose()).norm()});
+    mj_objectVelocity(&mj, &data, mjOBJ_BODY, i, twist.data(), 0);  // at the centre of mass
+    error = std::max(error, (twist.tail<3>() - motion.body_com_vel.row(k).segment<3>(3 * b).transpose()).norm());
   }
   // Rows of loops: how far they are open, and how fast they open.
   const VectorXd rates = VectorXd::Map(data.efc_vel, data.nefc);
@@ -125,7 +127,7 @@ TEST_CASE("MuJoCo has the bodies of a reference where the file has them, and its
     }
     // Another number is noticed.
     for (RowMatrixXd* table : {&motion.joint_pos, &motion.joint_vel, &motion.body_pos, &motion.body_quat,
-                               &motion.body_lin_vel, &motion.body_ang_vel}) {
+                               &motion.body_lin_vel, &motion.body_ang_vel, &motion.body_com_vel}) {
       double& entry = (*table)(3, table->cols() - 1);
       entry += 1e-3;
       setFrame(motion, 3, is_free, *mj, *data);
@@ -156,6 +158,64 @@ TEST_CASE("Frames of a reference are the nodes where they meet, and velocities a
   CHECK((rates - motion.joint_vel.middleRows(1, 156)).cwiseAbs().maxCoeff() < 0.02 * largest);
 }
 
+TEST_CASE("Velocities of a format are the rates of the point that it declares, and quaternions have its order") {
+  const Model model = loadRobot("bipetto").model;
+  const VectorXd q_ref = findClosedConfiguration(model).q;
+  const ReferenceMotion motion = makeReferenceMotion(model, q_ref, makeSwing(model, q_ref, 13), 1000);
+  const RobotDirectory directory;
+  struct Format {
+    ReferenceFormat format;
+    int isaac_lab;
+    std::string position, quaternion, linear, angular;
+    bool of_com, scalar_last;
+  };
+  const std::vector<std::string> of_amp = {"body_positions", "body_rotations", "body_linear_velocities",
+                                           "body_angular_velocities"},
+                                 of_mjlab = {"body_pos_w", "body_quat_w", "body_lin_vel_w", "body_ang_vel_w"};
+  const auto make = [](ReferenceFormat format, int version, const std::vector<std::string>& names) {
+    const bool is_isaac = format != ReferenceFormat::Mjlab;
+    return Format{format, version, names[0], names[1], names[2], names[3], is_isaac, is_isaac && version == 3};
+  };
+  for (const Format& f : {make(ReferenceFormat::Mjlab, 2, of_mjlab), make(ReferenceFormat::Amp, 2, of_amp),
+                          make(ReferenceFormat::Amp, 3, of_amp), make(ReferenceFormat::BeyondMimic, 2, of_mjlab),
+                          make(ReferenceFormat::BeyondMimic, 3, of_mjlab)}) {
+    CAPTURE(f.linear, f.isaac_lab, f.of_com);
+    NpyArrays arrays =
+        readArchive(directory.write("reference.npz", formatReferenceMotion(motion, f.format, f.isaac_lab)));
+    CHECK(arrays.count("isaac_lab") == f.of_com);
+    if (f.of_com) CHECK(arrays["isaac_lab"].numbers == std::vector<double>{static_cast<double>(f.isaac_lab)});
+    const size_t bodies = motion.body_names.size();
+    const auto get = [&](const std::string& name, size_t frame, size_t body) {
+      return Vector3d(Vector3d::Map(arrays[name].numbers.data() + 3 * (frame * bodies + body)));
+    };
+    // \param as_com, scalar_last  how a reader takes the file
+    const auto calcError = [&](bool as_com, bool scalar_last) {
+      const auto getRotation = [&](size_t frame, size_t body) {
+        const double* x = arrays[f.quaternion].numbers.data() + 4 * (frame * bodies + body);
+        return (scalar_last ? Eigen::Quaterniond(x[3], x[0], x[1], x[2]) : Eigen::Quaterniond(x[0], x[1], x[2], x[3]))
+            .toRotationMatrix();
+      };
+      const std::vector<int> order = listMjcfBodies(model);
+      double error = 0;
+      for (size_t k = 1; k + 1 < arrays[f.position].shape[0]; ++k)
+        for (size_t b = 0; b < bodies; ++b) {
+          const Vector3d point = as_com ? model.bodies()[order[b]].inertia.com : Vector3d::Zero();
+          const auto place = [&](size_t frame) -> Vector3d {
+            return get(f.position, frame, b) + getRotation(frame, b) * point;
+          };
+          const Eigen::AngleAxisd turn(getRotation(k + 1, b) * getRotation(k - 1, b).transpose());
+          error = std::max({error, ((place(k + 1) - place(k - 1)) * 500 - get(f.linear, k, b)).norm(),
+                            (turn.angle() * turn.axis() * 500 - get(f.angular, k, b)).norm()});
+        }
+      return error;
+    };
+    const double right = calcError(f.of_com, f.scalar_last);
+    CHECK(right < 0.03);  // m/s, rad/s: the cubic and the straight line differ by the square of the step
+    CHECK(calcError(!f.of_com, f.scalar_last) > 2 * right);
+    CHECK(calcError(f.of_com, !f.scalar_last) > 2 * right);
+  }
+}
+
 TEST_CASE("References are archives with the names and shapes of their readers") {
   const Model model = loadRobot("bipetto").model;
   const VectorXd q_ref = findClosedConfiguration(model).q;
@@ -170,7 +230,7 @@ TEST_CASE("References are archives with the names and shapes of their readers") 
                   std::vector<std::string>{"dof_names", "dof_positions", "dof_velocities", "body_positions",
                                            "body_rotations", "body_linear_velocities", "body_angular_velocities"})}) {
     NpyArrays arrays = readArchive(directory.write("reference.npz", formatReferenceMotion(motion, format)));
-    CHECK(arrays.size() == 11);
+    CHECK(arrays.size() == (format == ReferenceFormat::Amp ? 12 : 11));
     CHECK(arrays["fps"].numbers == std::vector<double>{50});
     CHECK(arrays["fps"].shape == (format == ReferenceFormat::Amp ? std::vector<size_t>{} : std::vector<size_t>{1}));
     CHECK(arrays[names[0]].texts == motion.joint_names);

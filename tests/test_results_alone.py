@@ -80,6 +80,7 @@ def check_exports(result, where, name):
         path = f"{name} as {form}.{'json' if form == 'problem' else form}"
         told = run("export", result, "--format", form, "-o", path, where=where)
         assert "has changed since" not in told.stderr, told.stderr
+        assert ("give '--isaac-lab 3'" in told.stderr) == (form == "amp"), told.stderr
         assert os.path.getsize(os.path.join(where, path)) > 1000, path
 
 

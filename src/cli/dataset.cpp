@@ -55,7 +55,8 @@ void exportMotion(const DatasetSpec& spec, const std::string& directory, Dataset
     makeOutputDirectory(place.string());
     const char* extension = isReference(format) ? ".npz" : format == "problem" ? ".json" : ".mcap";
     const std::string name = format + "/" + entry.motion->name + extension;
-    ExportRequest request{entry.result, format, (fs::path(directory) / name).string(), "", spec.rate};
+    ExportRequest request{entry.result, format,    (fs::path(directory) / name).string(),
+                          "",           spec.rate, spec.isaac_lab == 0 ? kIsaacLab : spec.isaac_lab};
     if (hasRobot(format)) request.robot = (place / (entry.motion->body + ".xml")).string();
     for (const std::string& warning : writeExport(request)) {
       // What the files of a robot leave out is the same for all of its motions.
@@ -110,6 +111,8 @@ int run(const DatasetArguments& arguments) {
     std::vector<DatasetEntry> entries;
     Json shown = Json::array();
     std::vector<std::string> notes;
+    if (spec.isaac_lab == 0 && std::any_of(spec.formats.begin(), spec.formats.end(), &isOfIsaacLab))
+      notes.push_back(describeIsaacLab("isaac_lab:"));
     for (const DatasetMotion& motion : spec.motions) {
       entries.push_back(readDatasetEntry(motion, outcomes.at(motion.name), cases.directory + "/" + motion.name));
       DatasetEntry& entry = entries.back();
@@ -146,7 +149,8 @@ void addDataset(CLI::App& command, Action& action) {
   command.footer(
       "SPEC: every combination of the values of an entry is one motion.\n"
       "  licence: CC-BY-4.0\n"
-      "  formats: [mjlab, mcap]             (of `bielle export`: mjlab, amp, mcap, problem; default: mjlab)\n"
+      "  formats: [mjlab, mcap]             (of `bielle export`: mjlab, amp, beyondmimic, mcap, problem; default: "
+      "mjlab)\n"
       "  fps: 50\n"
       "  motions:\n"
       "    - solve: walk\n"

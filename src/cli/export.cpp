@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
@@ -20,6 +21,7 @@ namespace {
 struct ExportArguments {
   std::string directory, format = "sto", output;
   double rate = 50;
+  std::optional<int> isaac_lab;
 };
 
 fs::path makePath(const ExportArguments& arguments) {
@@ -42,7 +44,13 @@ void tellOfRobot(const ExportArguments& arguments) {
 int exportTrajectory(const ExportArguments& arguments) {
   const fs::path path = makePath(arguments);
   requireApart(path.string(), listResultFiles(arguments.directory));
-  ExportRequest request{arguments.directory, arguments.format, path.string(), "", arguments.rate};
+  const bool is_of_isaac = isOfIsaacLab(arguments.format);
+  if (arguments.isaac_lab && !is_of_isaac)
+    throw InputError("", "--isaac-lab", "'" + arguments.format + "' is the same for each version of it",
+                     "leave it out, or give --format amp or beyondmimic");
+  ExportRequest request{arguments.directory, arguments.format,
+                        path.string(),       "",
+                        arguments.rate,      arguments.isaac_lab.value_or(kIsaacLab)};
   if (hasRobot(arguments.format)) {
     request.robot = fs::path(path).replace_extension(".xml").string();
     if (request.robot == path.string())
@@ -50,6 +58,7 @@ int exportTrajectory(const ExportArguments& arguments) {
                        arguments.format == "problem" ? "give one that ends in .json" : "give one that ends in .npz");
   }
   tellOfRobot(arguments);
+  if (is_of_isaac && !arguments.isaac_lab) printWarnings({describeIsaacLab("--isaac-lab")});
   printWarnings(writeExport(request));
   std::cout << path.string() << "\n";
   if (arguments.format == "problem")
@@ -65,21 +74,28 @@ void addExport(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ExportArguments>();
   command.add_option("DIR", arguments->directory, "result of `bielle solve` or `bielle simulate`")->required();
   command
-      .add_option("--format", arguments->format,
-                  "amp, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; mjlab); "
-                  "mcap: frames, shapes, joints, forces and events (Foxglove, Lichtblick, PlotJuggler, Rerun); "
-                  "mot: coordinates over time (OpenSim); "
-                  "problem: the optimal control problem with its optimum, for other solvers (JSON, npz, URDF, MJCF); "
-                  "sto: everything over time (OpenSim)")
-      ->check(CLI::IsMember({"amp", "mcap", "mjlab", "mot", "problem", "sto"}))
+      .add_option(
+          "--format", arguments->format,
+          "amp, beyondmimic, mjlab: a reference for learning, with the robot (Isaac Lab's AMP; BeyondMimic; mjlab); "
+          "mcap: frames, shapes, joints, forces and events (Foxglove, Lichtblick, PlotJuggler, Rerun); "
+          "mot: coordinates over time (OpenSim); "
+          "problem: the optimal control problem with its optimum, for other solvers (JSON, npz, URDF, MJCF); "
+          "sto: everything over time (OpenSim)")
+      ->check(CLI::IsMember({"amp", "beyondmimic", "mcap", "mjlab", "mot", "problem", "sto"}))
       ->capture_default_str();
   command.add_option("--fps", arguments->rate, "frames per second of a reference for learning")
       ->check(isWithin(1e-3, 1e4))
       ->capture_default_str();
-  command.add_option("-o,--output", arguments->output,
-                     "the file; default: trajectory.FORMAT in the directory, amp.npz or mjlab.npz with the robot as "
-                     ".xml, problem.json with\n"
-                     "problem.npz and the robot as .urdf and .xml");
+  command
+      .add_option("--isaac-lab", arguments->isaac_lab,
+                  "version that will read amp or beyondmimic; default: 2, with a warning\n"
+                  "2: quaternions w, x, y, z; 3: x, y, z, w; in both, velocities are of centres of mass")
+      ->check(CLI::IsMember({2, 3}));
+  command.add_option(
+      "-o,--output", arguments->output,
+      "the file; default: trajectory.FORMAT in the directory, FORMAT.npz of a reference with the robot as "
+      ".xml, problem.json with\n"
+      "problem.npz and the robot as .urdf and .xml");
   command.footer(
       "SI units, radians. Without export: trajectory.csv has one named column per quantity and a column 'time', as\n"
       "PlotJuggler and spreadsheets read it; trajectory.npz holds arrays q and v with Pinocchio's frames and orders "
@@ -89,6 +105,7 @@ void addExport(CLI::App& command, Action& action) {
       "  bielle export squat --format mot\n"
       "  bielle export squat --format mcap\n"
       "  bielle export squat --format mjlab --fps 50\n"
+      "  bielle export squat --format amp --isaac-lab 3\n"
       "  bielle export squat --format problem\n"
       "  bielle export squat --format sto -o squat.sto");
   command.callback([&action, arguments] { action = [=] { return exportTrajectory(*arguments); }; });

@@ -1,5 +1,7 @@
 // A motion in the formats of other programs, for `bielle export` and `bielle dataset`.
 #include <filesystem>
+#include <optional>
+#include <utility>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/results/result.h"
@@ -17,8 +19,26 @@
 namespace fs = std::filesystem;
 
 namespace bielle::cli {
+namespace {
 
-bool isReference(const std::string& format) { return format == "amp" || format == "mjlab"; }
+constexpr std::pair<const char*, ReferenceFormat> kReferences[] = {
+    {"amp", ReferenceFormat::Amp}, {"beyondmimic", ReferenceFormat::BeyondMimic}, {"mjlab", ReferenceFormat::Mjlab}};
+
+std::optional<ReferenceFormat> findReference(const std::string& format) {
+  for (const auto& [name, reference] : kReferences)
+    if (name == format) return reference;
+  return {};
+}
+
+}  // namespace
+
+bool isReference(const std::string& format) { return findReference(format).has_value(); }
+
+bool isOfIsaacLab(const std::string& format) { return isReference(format) && isOfIsaacLab(*findReference(format)); }
+
+std::string describeIsaacLab(const std::string& option) {
+  return "quaternions are w, x, y, z, as Isaac Lab 2 has them; for Isaac Lab 3 (x, y, z, w) give '" + option + " 3'";
+}
 
 bool hasRobot(const std::string& format) { return isReference(format) || format == "problem"; }
 
@@ -40,6 +60,18 @@ std::vector<std::string> writeProblem(const ExportRequest& request, const Report
   return robot.warnings;
 }
 
+// A reference for learning, and the robot.
+std::vector<std::string> writeReference(const ExportRequest& request, const ReportRun& run) {
+  const ReferenceFormat format = *findReference(request.format);
+  const VectorXd q_ref = findClosedConfiguration(run.robot.model).q;
+  MjcfOptions options;
+  options.rotations = MjcfRotations::Hinges;
+  const ReferenceMotion motion = makeReferenceMotion(run.robot.model, q_ref, run.record, request.rate);
+  writeTextFile(request.path, formatReferenceMotion(motion, format, request.isaac_lab));
+  writeTextFile(request.robot, formatMjcf(run.robot.model, q_ref, options).xml);
+  return motion.warnings;
+}
+
 }  // namespace
 
 std::vector<std::string> writeExport(const ExportRequest& request) {
@@ -57,14 +89,7 @@ std::vector<std::string> writeExport(const ExportRequest& request) {
   }
   requireApart(request.robot, {run.robot.file});
   if (request.format == "problem") return writeProblem(request, run);
-  const VectorXd q_ref = findClosedConfiguration(run.robot.model).q;
-  MjcfOptions options;
-  options.rotations = MjcfRotations::Hinges;
-  const ReferenceMotion motion = makeReferenceMotion(run.robot.model, q_ref, run.record, request.rate);
-  writeTextFile(request.path,
-                formatReferenceMotion(motion, request.format == "amp" ? ReferenceFormat::Amp : ReferenceFormat::Mjlab));
-  writeTextFile(request.robot, formatMjcf(run.robot.model, q_ref, options).xml);
-  return motion.warnings;
+  return writeReference(request, run);
 }
 
 }  // namespace bielle::cli

@@ -77,7 +77,8 @@ std::vector<bool> findHingesOfBalls(const Model& model, const std::vector<std::s
 }
 
 // Of two quaternions for one rotation, it takes the one next to that of the frame before.
-void setBodies(const Workspace& ws, const std::vector<int>& bodies, Eigen::Index k, ReferenceMotion& motion) {
+void setBodies(const Model& model, const Workspace& ws, const std::vector<int>& bodies, Eigen::Index k,
+               ReferenceMotion& motion) {
   for (size_t b = 0; b < bodies.size(); ++b) {
     const Eigen::Index at = static_cast<Eigen::Index>(b);
     const SE3& X_WB = ws.X_WB[bodies[b]];
@@ -88,6 +89,8 @@ void setBodies(const Workspace& ws, const std::vector<int>& bodies, Eigen::Index
     motion.body_pos.row(k).segment<3>(3 * at) = X_WB.p.transpose();
     motion.body_quat.row(k).segment<4>(4 * at) = wxyz.transpose();
     motion.body_lin_vel.row(k).segment<3>(3 * at) = (X_WB.R * linear(twist)).transpose();
+    const Vector3d& com = model.bodies()[bodies[b]].inertia.com;
+    motion.body_com_vel.row(k).segment<3>(3 * at) = (X_WB.R * (linear(twist) + angular(twist).cross(com))).transpose();
     motion.body_ang_vel.row(k).segment<3>(3 * at) = (X_WB.R * angular(twist)).transpose();
   }
 }
@@ -100,6 +103,16 @@ NpyArray makeArray(const RowMatrixXd& table, size_t entries = 0) {
       entries > 0 ? std::vector<size_t>{rows, columns / entries, entries} : std::vector<size_t>{rows, columns};
   array.numbers.assign(table.data(), table.data() + table.size());
   return array;
+}
+
+// x, y, z, w from w, x, y, z.
+RowMatrixXd moveScalarLast(const RowMatrixXd& quaternions) {
+  RowMatrixXd out(quaternions.rows(), quaternions.cols());
+  for (Eigen::Index at = 0; at < out.cols(); at += 4) {
+    out.middleCols<3>(at) = quaternions.middleCols<3>(at + 1);
+    out.col(at + 3) = quaternions.col(at);
+  }
+  return out;
 }
 
 NpyArray makeTexts(const std::vector<std::string>& texts) { return {{texts.size()}, {}, texts, true}; }
@@ -121,7 +134,7 @@ ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, co
   const std::vector<bool> is_of_ball = findHingesOfBalls(model, motion.joint_names);
   const Eigen::Index num_joints = static_cast<Eigen::Index>(motion.joint_names.size());
   for (RowMatrixXd* table : {&motion.joint_pos, &motion.joint_vel}) table->resize(frames, num_joints);
-  for (RowMatrixXd* table : {&motion.body_pos, &motion.body_lin_vel, &motion.body_ang_vel})
+  for (RowMatrixXd* table : {&motion.body_pos, &motion.body_lin_vel, &motion.body_ang_vel, &motion.body_com_vel})
     table->resize(frames, 3 * num_bodies);
   motion.body_quat.resize(frames, 4 * num_bodies);
   motion.motor_torque.resize(frames, model.nu());
@@ -138,7 +151,7 @@ ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, co
     continueAngles(is_of_ball, k, motion.joint_pos);
     updatePositions(model, ws, state.q);
     updateVelocities<double>(model, ws, state.v);
-    setBodies(ws, bodies, k, motion);
+    setBodies(model, ws, bodies, k, motion);
     motion.motor_torque.row(k) = record.u.row(stage);
     margins = margins.cwiseMin(calcHingeMargins(model, q_ref, state.q));
   }
@@ -148,9 +161,10 @@ ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, co
   return motion;
 }
 
-std::string formatReferenceMotion(const ReferenceMotion& motion, ReferenceFormat format) {
-  const bool is_amp = format == ReferenceFormat::Amp;
+std::string formatReferenceMotion(const ReferenceMotion& motion, ReferenceFormat format, int isaac_lab) {
+  const bool is_amp = format == ReferenceFormat::Amp, is_isaac = isOfIsaacLab(format);
   NpyArrays arrays;
+  if (is_isaac) arrays["isaac_lab"] = {{}, {static_cast<double>(isaac_lab)}, {}, false};
   NpyArray rate;
   rate.numbers = {motion.rate};
   if (!is_amp) rate.shape = {1};  // Isaac Lab wants a number, mjlab writes a list of one
@@ -161,8 +175,10 @@ std::string formatReferenceMotion(const ReferenceMotion& motion, ReferenceFormat
   arrays[is_amp ? "dof_positions" : "joint_pos"] = makeArray(motion.joint_pos);
   arrays[is_amp ? "dof_velocities" : "joint_vel"] = makeArray(motion.joint_vel);
   arrays[is_amp ? "body_positions" : "body_pos_w"] = makeArray(motion.body_pos, 3);
-  arrays[is_amp ? "body_rotations" : "body_quat_w"] = makeArray(motion.body_quat, 4);
-  arrays[is_amp ? "body_linear_velocities" : "body_lin_vel_w"] = makeArray(motion.body_lin_vel, 3);
+  arrays[is_amp ? "body_rotations" : "body_quat_w"] =
+      makeArray(is_isaac && isaac_lab >= 3 ? moveScalarLast(motion.body_quat) : motion.body_quat, 4);
+  arrays[is_amp ? "body_linear_velocities" : "body_lin_vel_w"] =
+      makeArray(is_isaac ? motion.body_com_vel : motion.body_lin_vel, 3);
   arrays[is_amp ? "body_angular_velocities" : "body_ang_vel_w"] = makeArray(motion.body_ang_vel, 3);
   arrays["motor_torque"] = makeArray(motion.motor_torque);
   return formatArchive(arrays);

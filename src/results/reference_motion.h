@@ -19,6 +19,7 @@ struct ReferenceMotion {
   RowMatrixXd joint_pos, joint_vel;      ///< rad, m; turns are counted on, not wrapped
   RowMatrixXd body_pos, body_quat;       ///< 3 and 4 columns per body: origin and w, x, y, z of its frame in the world
   RowMatrixXd body_lin_vel, body_ang_vel;  ///< 3 columns per body, of the origin of its frame, in the world
+  RowMatrixXd body_com_vel;                ///< 3 columns per body, of its centre of mass, in the world
   RowMatrixXd motor_torque;                ///< N m or N
   std::vector<std::string> warnings;       ///< of hinges that nearly lock
 };
@@ -28,10 +29,16 @@ struct ReferenceMotion {
 ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, const MotionRecord& record, double rate);
 
 enum class ReferenceFormat {
-  Mjlab,  ///< of mjlab: fps, joint_pos, joint_vel, body_pos_w, body_quat_w, body_lin_vel_w, body_ang_vel_w
-  Amp     ///< of Isaac Lab's AMP: fps, dof_names, body_names, dof_positions, dof_velocities, body_positions, ...
+  Amp,          ///< of Isaac Lab's AMP: fps, dof_names, body_names, dof_positions, dof_velocities, body_positions, ...
+  BeyondMimic,  ///< of BeyondMimic, which is trained in Isaac Lab: the names of mjlab
+  Mjlab         ///< of mjlab: fps, joint_pos, joint_vel, body_pos_w, body_quat_w, body_lin_vel_w, body_ang_vel_w
 };
-/// As a NumPy archive. Both have the names of joints, bodies and motors, and motor_torque, as well.
-std::string formatReferenceMotion(const ReferenceMotion& motion, ReferenceFormat format);
+inline bool isOfIsaacLab(ReferenceFormat format) { return format != ReferenceFormat::Mjlab; }
+
+/// As a NumPy archive; all have the names of joints, bodies and motors, and motor_torque, as well. Those of mjlab have
+/// velocities of the frames' origins, and quaternions w, x, y, z. Those of Isaac Lab have velocities of centres of mass
+/// (its `body_lin_vel_w` and `write_root_com_velocity_to_sim`), quaternions x, y, z, w from version 3 on, and the version.
+/// \param isaac_lab  its version: 2 or 3
+std::string formatReferenceMotion(const ReferenceMotion& motion, ReferenceFormat format, int isaac_lab = 2);
 
 }  // namespace bielle

@@ -10,6 +10,7 @@
 #include "bielle/formats/reader.h"
 #include "design/spec_parts.h"
 #include "formats/text_file.h"
+#include "model/listing.h"
 #include "model/number_text.h"
 #include "tasks/campaign_spec.h"
 #include "tasks/cells.h"
@@ -19,8 +20,9 @@ namespace fs = std::filesystem;
 namespace bielle::tasks {
 namespace {
 
+const std::vector<std::string> kFormats = {"mjlab", "amp", "beyondmimic", "mcap", "problem"};
 constexpr size_t kMostMotions = 100'000;
-const YamlKeys kDatasetKeys("data set", "", {"licence", "formats", "fps", "motions"});
+const YamlKeys kDatasetKeys("data set", "", {"licence", "formats", "fps", "isaac_lab", "motions"});
 const YamlKeys kDatasetMotionKeys("data set", "motions[]", {"solve", "robot", "payload", "set", "options", "simulate"});
 
 // What is varied in one entry of `motions`.
@@ -188,11 +190,16 @@ DatasetSpec readDatasetSpec(const std::string& path) {
       spec.rate = rate->getNumber();
       if (!(spec.rate >= 1e-3 && spec.rate <= 1e4)) rate->fail("it is no rate", "give frames per second, up to 10000");
     }
+    if (const YamlEntry* version = find(fields, "isaac_lab")) {
+      const double number = version->getNumber();
+      if (number != 2 && number != 3) version->fail("it is no version of Isaac Lab that is known", "give 2 or 3");
+      spec.isaac_lab = static_cast<int>(number);
+    }
     if (const YamlEntry* formats = find(fields, "formats")) {
       spec.formats = formats->getTexts();
       for (const std::string& format : spec.formats)
-        if (format != "mjlab" && format != "amp" && format != "mcap" && format != "problem")
-          formats->fail("there is no format '" + format + "'", "give some of mjlab, amp, mcap, problem");
+        if (std::find(kFormats.begin(), kFormats.end(), format) == kFormats.end())
+          formats->fail("there is no format '" + format + "'", "give some of " + listItems(kFormats));
     }
     const YamlEntry& motions = require(fields, "motions", document);
     DatasetNames names;

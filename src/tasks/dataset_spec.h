@@ -4,7 +4,8 @@
 /// ```yaml
 /// licence: CC-BY-4.0             # of the data, for its card
 /// formats: [mjlab, mcap]         # of bielle export; default: mjlab
-/// fps: 50                        # of mjlab and amp; default: 50
+/// fps: 50                        # of references for learning; default: 50
+/// isaac_lab: 3                   # the version that reads amp and beyondmimic, 2 or 3
 /// motions:                       # one map or a list; each entry of a map one value or a list of them
 ///   - solve: walk
 ///     robot: [bipetto, cleobot]  # names, or paths from this file
@@ -45,7 +46,8 @@ struct DatasetSpec {
   std::string path, text;  ///< of the file
   std::string licence;
   std::vector<std::string> formats;
-  double rate = 0;  ///< frames per second
+  double rate = 0;    ///< frames per second
+  int isaac_lab = 0;  ///< its version; 0: not given
   std::vector<DatasetMotion> motions;
   std::vector<DatasetTrial> trials;  ///< of each entry the first motion, and those that differ from it in one value
 };
