@@ -8,6 +8,7 @@
 #include "bielle/math/se3.h"
 #include "math/constants.h"
 #include "math/direction.h"
+#include "math/linear_program.h"
 #include "math/small_dense.h"
 #include "math/so3.h"
 #include "model/joint.h"
@@ -282,4 +283,29 @@ TEST_CASE("small systems are solved with rows swapped more than once") {
     addSmallProductTransposed(B, X, out, 2);
     CHECK((out - MatrixXd::Ones(7, 3) - 2 * B.transpose() * X).cwiseAbs().maxCoeff() < 1e-12);
   }
+}
+
+TEST_CASE("linear programs end where the gains of their equations prove it, degenerate ones as well") {
+  std::uniform_real_distribution<double> number(-1, 1);
+  for (int trial = 0; trial < 200; ++trial) {
+    const int m = 3 + trial % 12, n = 2 * m + trial % 5, support = trial % 3 == 0 ? m - 2 : m;
+    MatrixXd A(m + 1, n);
+    VectorXd x = VectorXd::Zero(n), y(m + 1), gains = VectorXd::Zero(n);
+    for (double& entry : A.reshaped()) entry = number(rng);
+    A.row(m) = A.row(0) - 2 * A.row(1);  // a row that depends on others
+    for (double& entry : y) entry = number(rng);
+    for (int i = 0; i < n; ++i) (i < support ? x : gains)[i] = 0.1 + std::abs(number(rng));
+    const VectorXd c = A.transpose() * y + gains, b = A * x;
+    const std::optional<VectorXd> found = solveLinearProgram(A, b, c);
+    REQUIRE(found);
+    CHECK(found->minCoeff() > -1e-9);
+    CHECK((A * *found - b).cwiseAbs().maxCoeff() < 1e-8);
+    CHECK(c.dot(*found) == Approx(c.dot(x)).margin(1e-8));
+  }
+  const MatrixXd sum = MatrixXd::Ones(1, 3);
+  CHECK_FALSE(solveLinearProgram(sum, VectorXd::Constant(1, -1e-6), VectorXd::Ones(3)));
+  CHECK(solveLinearProgram(sum, VectorXd::Constant(1, 1e-6), VectorXd::Ones(3)));
+  MatrixXd free(1, 2);
+  free << 1, -1;
+  CHECK_FALSE(solveLinearProgram(free, VectorXd::Ones(1), VectorXd::Constant(2, -1.0)));  // no least value
 }

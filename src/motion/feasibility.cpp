@@ -20,10 +20,6 @@
 namespace bielle {
 namespace {
 
-// Of the limits, at the start. A biped with serial knees squats to 0.8, badly, with limits that are 1.4 times too low there, since
-// it straightens its legs first; with 1.75 and 2.3 times no motion is found.
-constexpr double kTooWeak = 1.5;
-
 // Velocities are those between postures that are so far apart, since the guess goes from one to the next in small jumps, s.
 constexpr double kApart = 0.1;
 
@@ -79,6 +75,8 @@ class FeasibilityCheck {
 
  private:
   VectorXd getStart() const { return problem_.initialState().head(model_.nq()); }
+  // Before, it has stood there.
+  bool startsAtRest() const { return problem_.initialState().segment(model_.nq(), model_.nv()).isZero(0); }
   VectorXd getPosture(int node) const { return motion_.guess.xs[static_cast<size_t>(node)].head(model_.nq()); }
   const ContactFrame& getContact(const ContactTarget& target) const { return model_.contacts()[target.contact]; }
 
@@ -209,7 +207,7 @@ class FeasibilityCheck {
     const VectorXd limits = getLimits(0);
     if (start_.phase->contacts.empty() && model_.hasFreeFlyer()) return;
     const HoldingShare share = calcShare(start_, getStart(), com_, limits);
-    if (!share.balances || share.least <= 1) return;
+    if (!share.isTooMuch()) return;
     int weakest = 0;
     std::string remedy;
     for (int m = 0; m < model_.nu(); ++m) {
@@ -224,7 +222,7 @@ class FeasibilityCheck {
     remedy =
         "give larger limits (" + remedy.substr(1) + "), a start with straighter legs, or ignore them (--no-limits)";
     held_ = true;
-    if (share.least > kTooWeak)
+    if (startsAtRest())
       throw InputError(model_.name(), quote("motor", model_.motors()[static_cast<size_t>(weakest)].name), problem,
                        remedy);
     if (warn_) tell(problem, remedy);
@@ -389,7 +387,7 @@ class FeasibilityCheck {
   void needEfforts(const Moment& moment, const VectorXd& q, std::vector<Need>& efforts) {
     const VectorXd limits = getLimits(moment.node);
     const HoldingShare share = calcShare(moment, q, calcCom(model_, ws_), limits);
-    if (!share.balances || share.least <= 1) return;
+    if (!share.isTooMuch()) return;
     for (size_t m = 0; m < efforts.size(); ++m) {
       const Need need{std::abs(share.u[static_cast<Eigen::Index>(m)]), limits[static_cast<Eigen::Index>(m)], moment};
       if (need.share() > std::max(1.0, efforts[m].share())) efforts[m] = need;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <vector>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -10,6 +12,8 @@
 #include "bielle/dynamics/rnea.h"
 #include "math/decompositions.h"
 #include "math/largest.h"
+#include "math/linear_program.h"
+#include "model/joint.h"
 
 namespace bielle {
 namespace {
@@ -120,47 +124,78 @@ StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constra
 
 namespace {
 
-// Rows r = r0 + Z y, of free y, of which the largest is to be as small as possible.
-struct MinimaxProblem {
-  VectorXd r0;
-  MatrixXd Z;
-};
-
-// A lower bound of the least max |r|. C. L. Lawson, "Contributions to the theory of linear least maximum approximation", 1961: with
-// weights that sum up to 1 the least squares sum_i w_i r_i^2 are at most its square, and equal to it for the weights
-// that w_i <- w_i |r_i| converges to.
-double boundLargest(const MinimaxProblem& problem) {
-  constexpr int kRounds = 50;
-  const Eigen::Index size = problem.r0.size();
-  if (size == 0) return 0;
-  VectorXd w = VectorXd::Constant(size, 1.0 / static_cast<double>(size));
-  double least = 0;
-  for (int round = 0; round < kRounds; ++round) {
-    const VectorXd root = w.cwiseSqrt();
-    VectorXd r = problem.r0;
-    if (problem.Z.cols() > 0) {
-      Eigen::ColPivHouseholderQR<MatrixXd> decomposition;
-      decomposition.setThreshold(kRankTolerance);  // mirrored legs have rows that are the same but for rounding
-      decomposition.compute(root.asDiagonal() * problem.Z);
-      r -= problem.Z * decomposition.solve(VectorXd(root.cwiseProduct(problem.r0)));
-    }
-    least = std::max(least, std::sqrt(w.dot(r.cwiseAbs2())));
-    w = w.cwiseProduct(r.cwiseAbs());
-    if (!(w.sum() > 0)) break;
-    w /= w.sum();
-  }
-  return least;
+// Wrenches that a contact of the ground can have are sums of these columns, in the rows of its closure: forces along the edges of
+// the pyramid around the friction cone, at the corners.
+MatrixXd makeConeEdges(const ContactFrame& contact, double friction) {
+  const bool is_sole = contact.kind == ContactKind::Surface6D, is_point = contact.kind == ContactKind::Point3D;
+  const Eigen::Matrix<double, 2, 3> across_edge = makePlaneBasis(Vector3d::UnitX()).leftCols<2>().transpose();
+  MatrixXd edges(is_sole ? 6 : is_point ? 3 : 5, 4 * (is_point ? 1 : 2) * (is_sole ? 2 : 1));
+  Eigen::Index column = 0;
+  for (const double x : is_point ? std::vector<double>{0} : std::vector<double>{-1, 1})
+    for (const double y : is_sole ? std::vector<double>{-1, 1} : std::vector<double>{0})
+      for (const double fx : {-friction, friction})
+        for (const double fy : {-friction, friction}) {
+          const Vector3d f(fx, fy, 1), moment = Vector3d(x * contact.half_length, y * contact.half_width, 0).cross(f);
+          edges.col(column).head<3>() = f;
+          if (is_sole) edges.col(column).tail<3>() = moment;
+          if (!is_sole && !is_point) edges.col(column).tail<2>() = across_edge * moment;
+          ++column;
+        }
+  return edges;
 }
 
-// What the rows of a contact can be at most while it bears all of the load, N: bounds of its wrench cone (ocp/cost.h).
-VectorUpTo6<double> calcMostForce(const ContactFrame& contact, double load, double friction) {
-  constexpr double kLeast = 1e-3;  // m, of soles without size
-  const double X = std::max(kLeast, contact.half_length), Y = std::max(kLeast, contact.half_width);
-  VectorUpTo6<double> most(contact.kind == ContactKind::Surface6D ? 6 : contact.kind == ContactKind::Edge5D ? 5 : 3);
-  most.head<3>() << friction, friction, 1;
-  if (contact.kind == ContactKind::Surface6D) most.tail<3>() << Y, X, friction * (X + Y);
-  if (contact.kind == ContactKind::Edge5D) most.tail<2>().setConstant(std::max(1.0, friction) * X);
-  return load * most;
+// The least s with which torques within s times the limits, and forces of contacts within their cones, hold the robot: the linear
+// program in torques, over their limits, and shares of the edges of cones. Loops only leave some motions Z of the tree.
+// \param A  makeHoldMatrix(), of whose columns the first are motors, then springs that hold whatever it takes
+double calcLeastShare(const Model& model, const ConstraintSet& constraints, const MatrixXd& A, const VectorXd& b,
+                      const VectorXd& limits, double friction) {
+  const Eigen::Index num_dofs = A.cols() - constraints.rows, nu = limits.size();
+  const double scale = calcForceScale(model);  // of forces and torques
+  const auto getColumns = [&](int c) {
+    return A.middleCols(num_dofs + constraints.offsets[c], getRows(constraints.closures[c].kind)) / scale;
+  };
+  MatrixXd loops(A.rows(), 0);
+  std::vector<MatrixXd> columns;  // of unknowns that are not negative
+  for (int c = 0; c < static_cast<int>(constraints.closures.size()); ++c) {
+    const MatrixXd J = getColumns(c);
+    if (c >= constraints.num_loops) {
+      columns.push_back(J * makeConeEdges(model.contacts()[constraints.getContact(c)], friction));
+      continue;
+    }
+    loops.conservativeResize(Eigen::NoChange, loops.cols() + J.cols());
+    loops.rightCols(J.cols()) = J;
+  }
+  for (const double sign : {1.0, -1.0})
+    for (Eigen::Index i = 0; i < num_dofs; ++i)
+      columns.push_back(sign * (i < nu && std::isfinite(limits[i]) ? limits[i] / scale : 1) * A.col(i));
+  Eigen::Index size = 0, first = 0;  // of the columns, and of those of motors and springs
+  for (const MatrixXd& each : columns) size += each.cols();
+  first = size - 2 * num_dofs;
+  MatrixXd Z = MatrixXd::Identity(A.rows(), A.rows());
+  if (loops.cols() > 0) {
+    Eigen::ColPivHouseholderQR<MatrixXd> decomposition;
+    decomposition.setThreshold(kRankTolerance);
+    decomposition.compute(loops);
+    Z = MatrixXd(decomposition.householderQ()).rightCols(A.rows() - decomposition.rank()).eval();
+  }
+  // Then t+ + t- + slack = s for every motor with a limit; s is the last unknown.
+  MatrixXd rows = MatrixXd::Zero(Z.cols() + nu, size + nu + 1);
+  Eigen::Index column = 0;
+  for (const MatrixXd& each : columns) {
+    rows.block(0, column, Z.cols(), each.cols()) = Z.transpose() * each;
+    column += each.cols();
+  }
+  for (Eigen::Index m = 0; m < nu; ++m) {
+    if (!std::isfinite(limits[m])) continue;
+    const Eigen::Index row = Z.cols() + m;
+    rows(row, first + m) = rows(row, first + num_dofs + m) = rows(row, size + m) = 1;
+    rows(row, size + nu) = -1;
+  }
+  VectorXd right = VectorXd::Zero(rows.rows()), costs = VectorXd::Zero(rows.cols());
+  right.head(Z.cols()) = Z.transpose() * b / scale;
+  costs[size + nu] = 1;
+  const std::optional<VectorXd> x = solveLinearProgram(rows, right, costs);
+  return x ? (*x)[size + nu] : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
@@ -180,35 +215,17 @@ HoldingShare calcHoldingShare(const Model& model, const ConstraintSet& constrain
   std::vector<int> dofs = listMotorDofs(model);
   for (const JointForce* spring : listFreeSprings(model)) dofs.push_back(spring->dof);
   const MatrixXd A = makeHoldMatrix(model, ws, constraints, dofs);
-  // Of A^T = Q R P^T: the last columns of Q are what A does not see, the first ones have the solution of least squares.
-  Eigen::ColPivHouseholderQR<MatrixXd> decomposition;
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
   decomposition.setThreshold(kRankTolerance);
-  decomposition.compute(A.transpose());
-  const Eigen::Index rank = decomposition.rank();
-  const MatrixXd Q = MatrixXd(decomposition.householderQ()), seen = A * Q.leftCols(rank);
-  const VectorXd solution = Q.leftCols(rank) * seen.colPivHouseholderQr().solve(b);
+  decomposition.compute(A);
+  const VectorXd solution = decomposition.solve(b);
+  const double scale = calcForceScale(model);
   HoldingShare share;
   share.u = solution.head(model.nu());
-  share.balances = calcLargest(A * solution - b) < kBalanced * calcForceScale(model);
-  if (share.balances && (share.u.array().abs() <= limits.array()).all()) return share;
-  MinimaxProblem all{VectorXd(0), MatrixXd(0, A.cols() - rank)};
-  const auto addRow = [&](Eigen::Index row, double most) {
-    const Eigen::Index last = all.r0.size();
-    all.r0.conservativeResize(last + 1);
-    all.Z.conservativeResize(last + 1, Eigen::NoChange);
-    all.r0[last] = solution[row] / most;
-    all.Z.row(last) = Q.row(row).tail(A.cols() - rank) / most;
-  };
-  const double load = model.mass() * (model.gravity().norm() + a.z()), scale = calcForceScale(model);
-  for (int c = constraints.num_loops; c < static_cast<int>(constraints.closures.size()); ++c) {
-    const VectorUpTo6<double> most = calcMostForce(model.contacts()[constraints.getContact(c)], load / scale, friction);
-    for (Eigen::Index i = 0; i < most.size(); ++i)
-      addRow(static_cast<Eigen::Index>(dofs.size()) + constraints.offsets[c] + i, most[i]);
-  }
-  share.balances = share.balances && boundLargest(all) <= 1;
-  for (int m = 0; m < model.nu(); ++m)
-    if (std::isfinite(limits[m])) addRow(m, limits[m]);
-  share.least = boundLargest(all);
+  const bool balances = calcLargest(A * solution - b) < kBalanced * scale;
+  if (balances && (share.u.array().abs() <= limits.array()).all()) return share;
+  share.least =
+      balances ? calcLeastShare(model, constraints, A, b, limits, friction) : std::numeric_limits<double>::infinity();
   return share;
 }
 

@@ -1,15 +1,19 @@
 #pragma once
 // Springs on joints without a motor: where the weight bends them, and how fast they swing.
+#include <cmath>
+
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {
 
 // What a posture asks of motors with these limits, while all of the robot accelerates alike.
 struct HoldingShare {
-  VectorXd u;            // nu, torques of least squares as in calcStaticTorques()
-  bool balances = true;  // whether any torques do it, with forces that feet on the ground can have
-  // However motors and feet share the load, something needs at least that many times what it can do; 0 where u keeps the limits.
+  VectorXd u;  // nu, torques of least squares as in calcStaticTorques()
+  // However motors and feet share the load, some motor needs that many times its limit; 0 where u keeps the limits, infinity where
+  // no torques hold the posture, with forces that feet on the ground can have.
   double least = 0;
+
+  bool isTooMuch() const { return least > 1 && std::isfinite(least); }
 };
 // \param a  acceleration of a robot with a free base, m/s^2 (world)   \param limits  nu, N m or N, infinite for none
 // \param friction  of the ground
