@@ -10,9 +10,9 @@
 #include "bielle/worlds/bielle_world.h"
 #include "count_allocations.h"
 #include "world_trials.h"
+#include "worlds/made_ground.h"
 #include "worlds/mujoco_model.h"
 #include "worlds/mujoco_world.h"
-#include "worlds/terrain.h"
 
 namespace bielle::worlds {
 namespace {

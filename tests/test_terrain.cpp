@@ -3,6 +3,7 @@
 #include <random>
 
 #include "bielle/model/error.h"
+#include "worlds/made_ground.h"
 #include "worlds/terrain.h"
 
 namespace bielle::worlds {
@@ -59,6 +60,39 @@ TEST_CASE("terrain: a point leaves a box by the shortest way, but not into the g
   // One that came from above leaves through the top, however near the side is.
   CHECK(terrain.touch({0.004, 0.1, 0.05}, {-0.01, 0.1, 0.101}).depth == Approx(0.05));
   CHECK(terrain.touch({0.004, 0.1, 0.05}, {-0.01, 0.1, 0.099}).depth == Approx(0.004));
+}
+
+TEST_CASE("terrain: a sole rests with its own points within one step and in the air, else on edges") {
+  const Terrain terrain(makeMixedGround());
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> anywhere(-1.5, 1.5), height(-0.05, 0.05), slope(-0.1, 0.1);
+  int moved = 0, kept = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Eigen::Vector2d middle(anywhere(generator), anywhere(generator));
+    const Terrain::Corners corners = {middle + Eigen::Vector2d(0.1, 0.05), middle + Eigen::Vector2d(-0.1, 0.05),
+                                      middle + Eigen::Vector2d(-0.1, -0.05), middle + Eigen::Vector2d(0.1, -0.05)};
+    Vector3d plane(0, slope(generator), slope(generator));
+    plane[0] = terrain.find(middle.x(), middle.y()).height + height(generator) - plane.tail<2>().dot(middle);
+    std::vector<Terrain::Place> places;
+    for (int x = -1; x <= 1; ++x)
+      for (int y = -1; y <= 1; ++y)
+        places.push_back({middle + Eigen::Vector2d(0.1 * x, 0.05 * y), Eigen::Vector2d::Zero()});
+    terrain.findSupports(corners, plane, 2e-4, 5e-3, places);
+    for (const Terrain::Place& place : places) {
+      const Eigen::Vector2d& at = place.support;
+      CHECK(((at - middle).cwiseAbs() - Eigen::Vector2d(0.1, 0.05)).maxCoeff() < 1e-9);
+      if (at == place.home) {
+        ++kept;
+        continue;
+      }
+      ++moved;  // to the ground, where its own place is above it
+      const double gap = plane[0] + plane.tail<2>().dot(at) - terrain.find(at.x(), at.y()).height;
+      CHECK(gap <= 2e-4 + 1e-12);
+      CHECK(gap >= -5e-3 - 1e-12);
+    }
+  }
+  CHECK(moved > 100);
+  CHECK(kept > 10000);
 }
 
 TEST_CASE("terrain: ramps start level, up and down") {

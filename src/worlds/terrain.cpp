@@ -3,13 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
+#include <utility>
 
 #include "bielle/model/error.h"
-#include "bielle/motion/footsteps.h"
-#include "bielle/motion/motion.h"
-#include "math/so3.h"
-#include "model/number_text.h"
 
 namespace bielle::worlds {
 namespace {
@@ -18,6 +14,7 @@ constexpr int kLargestGrid = 200000;  // cells
 constexpr double kBeyond = 1e-6;      // a side of a box is free if the ground is lower this far beyond it, m
 constexpr double kInside =
     1e-4;  // what rests on the side of a box lies so far inside it, more than a sole slips in a step, m
+constexpr double kMargin = 1e-6;    // of a cell: sides that lie in it by rounding
 constexpr double kRounding = 1e-9;  // of a point on a top, m
 
 // What of a convex polygon lies on a rectangle, by Sutherland and Hodgman ("Reentrant polygon clipping", 1974).
@@ -57,11 +54,14 @@ class Clipped {
   size_t count_;
 };
 
-void require(bool ok, const char* what, const char* remedy) {
-  if (!ok) throw InputError("terrain", what, "it is out of range", remedy);
-}
-
 }  // namespace
+
+// Lowest and highest place of a top. \param half  of the box around it, seen from above
+template <typename Top>
+static std::pair<double, double> calcSpan(const Top& top, const Eigen::Vector2d& half) {
+  const double middle = top.calcHeight(top.x, top.y), rise = top.slope.cwiseAbs().dot(half);
+  return {middle - rise, middle + rise};
+}
 
 bool Terrain::Top::covers(double px, double py, double margin) const {
   const double dx = px - x, dy = py - y;
@@ -102,25 +102,53 @@ void Terrain::fillGrid() {
   }
   const Eigen::Vector2d size = high - low;
   cell_ = std::max({edges / double(tops_.size()), size.maxCoeff() / 400, 1e-3});
-  columns_ = static_cast<int>(size.x() / cell_) + 1;
-  rows_ = static_cast<int>(size.y() / cell_) + 1;
-  require(columns_ * rows_ <= kLargestGrid, "the boxes of the ground", "give fewer or larger boxes");
-  corner_ = low;
+  columns_ = static_cast<int>(size.x() / cell_) + 2;
+  rows_ = static_cast<int>(size.y() / cell_) + 2;
+  if (columns_ * rows_ > kLargestGrid)
+    throw InputError("terrain", "the boxes of the ground", "it is out of range", "give fewer or larger boxes");
+  // Sides of tiles lie in the middle of cells, so that few tiles share one.
+  corner_ = low - Eigen::Vector2d::Constant(0.5 * cell_);
   std::vector<std::vector<int>> cells(columns_ * rows_);
   const auto clampTo = [](double at, int count) { return std::clamp(static_cast<int>(std::floor(at)), 0, count - 1); };
   for (size_t i = 0; i < tops_.size(); ++i) {
     const Eigen::Vector2d middle(tops_[i].x, tops_[i].y);
-    const Eigen::Vector2d from = (middle - halves[i] - low) / cell_, to = (middle + halves[i] - low) / cell_;
-    // One cell of margin spares the lookup any thought about rounding at the edges.
-    for (int row = clampTo(from.y() - 1, rows_); row <= clampTo(to.y() + 1, rows_); ++row)
-      for (int column = clampTo(from.x() - 1, columns_); column <= clampTo(to.x() + 1, columns_); ++column)
+    const Eigen::Vector2d from = (middle - halves[i] - corner_) / cell_, to = (middle + halves[i] - corner_) / cell_;
+    for (int row = clampTo(from.y() - kMargin, rows_); row <= clampTo(to.y() + kMargin, rows_); ++row)
+      for (int column = clampTo(from.x() - kMargin, columns_); column <= clampTo(to.x() + kMargin, columns_); ++column)
         cells[row * columns_ + column].push_back(static_cast<int>(i));
   }
   starts_.push_back(0);
   for (const std::vector<int>& cell : cells) {
     entries_.insert(entries_.end(), cell.begin(), cell.end());
     starts_.push_back(static_cast<int>(entries_.size()));
+    peaks_.push_back(ground_.height);
+    for (int i : cell) peaks_.back() = std::max(peaks_.back(), calcSpan(tops_[i], halves[i]).second);
   }
+  findHighest(halves);
+}
+
+void Terrain::findHighest(const std::vector<Eigen::Vector2d>& halves) {
+  for (size_t i = 0; i < tops_.size(); ++i) {
+    Top& top = tops_[i];
+    const Eigen::Vector2d middle(top.x, top.y);
+    top.is_highest = true;
+    visit(middle - halves[i], middle + halves[i], [&](const Top& other) {
+      const size_t j = static_cast<size_t>(&other - tops_.data());
+      const Eigen::Vector2d apart = (middle - Eigen::Vector2d(other.x, other.y)).cwiseAbs() - halves[i] - halves[j];
+      if (j != i && apart.maxCoeff() < -kInside && calcSpan(other, halves[j]).second > calcSpan(top, halves[i]).first)
+        top.is_highest = false;
+    });
+  }
+}
+
+// All tops that may be there, some several times.
+template <typename Take>
+void Terrain::visit(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const Take& take) const {
+  if (tops_.empty()) return;
+  for (int row = findRow(low.y()); row <= findRow(high.y()); ++row)
+    for (int column = findColumn(low.x()); column <= findColumn(high.x()); ++column)
+      for (int k = starts_[row * columns_ + column]; k < starts_[row * columns_ + column + 1]; ++k)
+        take(tops_[entries_[k]]);
 }
 
 int Terrain::findColumn(double x) const {
@@ -190,23 +218,26 @@ void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double
     high = high.cwiseMax(corner);
   }
   const auto calcHeight = [&](const Eigen::Vector2d& at) { return plane[0] + plane.tail<2>().dot(at); };
+  for (Place& place : places) place.support = place.home;
+  // Most soles are in the air, or within the sides of one step.
+  double lowest = std::numeric_limits<double>::infinity(), peak = ground_.height;
+  for (const Eigen::Vector2d& corner : corners) lowest = std::min(lowest, calcHeight(corner));
+  for (int row = findRow(low.y()); row <= findRow(high.y()); ++row)
+    for (int column = findColumn(low.x()); column <= findColumn(high.x()); ++column)
+      peak = std::max(peak, tops_.empty() ? peak : peaks_[row * columns_ + column]);
+  const Top* alone = findTop(corners[0].x(), corners[0].y());
+  const auto isInside = [&](const Eigen::Vector2d& corner) { return alone->covers(corner.x(), corner.y(), kInside); };
+  if (lowest > peak + over || (alone && alone->is_highest && std::all_of(corners.begin(), corners.end(), isInside)))
+    return;
   for (Place& place : places) {
-    place.support = place.home;
     place.top = nullptr;
     place.distance = calcHeight(place.home) - ground_.height > over ? std::numeric_limits<double>::infinity() : 0;
   }
-  const auto visit = [&](const auto& take) {
-    if (tops_.empty()) return;
-    for (int row = findRow(low.y()); row <= findRow(high.y()); ++row)
-      for (int column = findColumn(low.x()); column <= findColumn(high.x()); ++column)
-        for (int k = starts_[row * columns_ + column]; k < starts_[row * columns_ + column + 1]; ++k)
-          take(tops_[entries_[k]]);
-  };
   const auto bears = [&](const Top& top, const Eigen::Vector2d& at) {
     const double gap = calcHeight(at) - top.calcHeight(at.x(), at.y());
     return gap <= over && gap >= -under && findTop(at.x(), at.y()) == &top;
   };
-  visit([&](const Top& top) {
+  visit(low, high, [&](const Top& top) {
     for (Place& place : places)
       if (top.covers(place.home.x(), place.home.y(), kInside) &&
           calcHeight(place.home) - top.calcHeight(place.home.x(), place.home.y()) <= over)
@@ -214,7 +245,7 @@ void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double
   });
   const auto isOff = [](const Place& place) { return place.distance > 0; };
   if (std::none_of(places.begin(), places.end(), isOff)) return;
-  visit([&](const Top& top) {
+  visit(low, high, [&](const Top& top) {
     const Clipped part = clip(top, corners);
     if (part.size() == 0) return;
     for (Place& place : places) {
@@ -228,7 +259,7 @@ void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double
     }
   });
   // A top that lies in several cells is visited again: corners that have a place are left.
-  visit([&](const Top& top) {
+  visit(low, high, [&](const Top& top) {
     const auto isFree = [&](const Place& place) { return place.top == &top; };
     if (std::none_of(places.begin(), places.end(), isFree)) return;
     const Clipped part = clip(top, corners);
@@ -248,113 +279,6 @@ void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double
       nearest->top = nullptr;
     }
   });
-}
-
-namespace {
-
-// In the order of a path around it; one of a point.
-std::vector<Vector3d> listCorners(const ContactFrame& sole, const SE3& X_WF) {
-  std::vector<Vector3d> corners;
-  for (const auto& [x, y] : {std::pair(1, 1), {-1, 1}, {-1, -1}, {1, -1}})
-    corners.push_back(X_WF.act(Vector3d(x * sole.half_length, y * sole.half_width, 0)));
-  return corners;
-}
-
-double dropRounding(double x) { return std::abs(x) < 1e-9 ? 0 : x; }
-
-}  // namespace
-
-StandingPlace findPlace(const Model& model, const std::vector<ContactTarget>& soles) {
-  StandingPlace place;
-  if (soles.empty()) return place;
-  Vector3d middle = Vector3d::Zero(), across = Vector3d::Zero();
-  for (const ContactTarget& sole : soles) {
-    middle += sole.X_WT.p / static_cast<double>(soles.size());
-    across += sole.X_WT.R.col(1);  // level while legs bend
-  }
-  const bool is_level = across.head<2>().norm() > 0.5 * across.norm();
-  const double heading = is_level ? dropRounding(std::atan2(-across.x(), across.y())) : 0;
-  middle.z() = makeGroundUnder(model, soles).height;
-  place.X_WP = {makeAxisRotation(Vector3d::UnitZ(), heading), middle.unaryExpr(&dropRounding)};
-  for (const ContactTarget& sole : soles)
-    for (const Vector3d& corner : listCorners(model.contacts()[sole.contact], sole.X_WT))
-      place.reach = std::max(place.reach, (place.X_WP.inverse().act(corner)).x());
-  return place;
-}
-
-Ground carryGround(Ground ground, const SE3& X_WP) {
-  ground.height += X_WP.p.z();
-  for (GroundStep& step : ground.steps) {
-    step.top = X_WP.act(step.top);
-    step.yaw += calcHeading(X_WP);
-  }
-  return ground;
-}
-
-std::vector<std::string> describeSoles(const Model& model, const Ground& ground,
-                                       const std::vector<ContactTarget>& soles) {
-  constexpr double kTold = 1e-3;  // m
-  std::vector<std::string> told;
-  for (const ContactTarget& sole : soles) {
-    const ContactFrame& frame = model.contacts()[sole.contact];
-    double lowest = std::numeric_limits<double>::infinity();
-    for (const Vector3d& corner : listCorners(frame, sole.X_WT))
-      lowest = std::min(lowest, corner.z() - ground.calcHeight(corner.x(), corner.y()));
-    if (std::abs(lowest) > kTold)
-      told.push_back("'" + frame.name + "' starts " + formatNumber(std::abs(lowest)) + " m " +
-                     (lowest > 0 ? "over the ground" : "in the ground"));
-  }
-  return told;
-}
-
-bool reachesBoxes(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles, const SE3& X_WP,
-                  double start) {
-  const auto isOnBox = [&](const Vector3d& p) {
-    return (X_WP.inverse().act(p)).x() > start &&
-           std::any_of(ground.steps.begin(), ground.steps.end(),
-                       [&](const GroundStep& box) { return box.covers(p.x(), p.y()); });
-  };
-  return std::any_of(soles.begin(), soles.end(), [&](const ContactTarget& sole) {
-    const std::vector<Vector3d> corners = listCorners(model.contacts()[sole.contact], sole.X_WT);
-    return std::any_of(corners.begin(), corners.end(), isOnBox);
-  });
-}
-
-Ground makeRamp(const RampOptions& o) {
-  require(std::isfinite(o.slope) && std::abs(o.slope) < 1, "slope", "give height over length, e.g. 0.05");
-  require(std::isfinite(o.start), "start", "give metres, e.g. 0.3");
-  require(o.length > 0 && o.length <= 1000, "length", "give metres, e.g. 20");
-  require(o.width > 0 && o.width <= 1000, "width", "give metres, e.g. 4");
-  Ground ground;
-  // Down: the robot starts on a level box at height 0, from whose edge the ramp goes down to the plane.
-  const double rise = o.slope * o.length;
-  ground.height = std::min(0.0, rise);
-  if (rise < 0) ground.steps.push_back({{o.start - o.length / 2, 0, 0}, o.length, o.width, 0, 0, 0});
-  ground.steps.push_back({{o.start + o.length / 2, 0, rise / 2}, o.length, o.width, 0, -std::atan(o.slope), 0});
-  return ground;
-}
-
-Ground makeTiles(const TileOptions& o) {
-  require(o.height >= 0 && o.height <= 1, "height", "give metres, e.g. 0.01");
-  require(o.lowest <= 0 && o.lowest >= -1, "lowest", "give metres, e.g. -0.01");
-  require(std::isfinite(o.start), "start", "give metres, e.g. 0.2");
-  require(o.size > 0, "size", "give metres, e.g. 0.25");
-  require(o.length > 0 && o.width > 0 && o.length / o.size * o.width / o.size <= kLargestGrid / 20, "length",
-          "give a smaller field or larger tiles");
-  const int columns = static_cast<int>(std::ceil(o.length / o.size)),
-            rows = static_cast<int>(std::ceil(o.width / o.size));
-  std::mt19937 generator(o.seed);
-  Ground ground;
-  ground.height = o.lowest;
-  if (o.lowest < 0) ground.steps.push_back({{o.start - o.length / 2, 0, 0}, o.length, o.width, 0, 0, 0});
-  for (int column = 0; column < columns; ++column)
-    for (int row = 0; row < rows; ++row) {
-      // The generator is the same everywhere; the standard's distributions are not.
-      const double height = o.lowest + (o.height - o.lowest) * (generator() / 4294967295.0);
-      ground.steps.push_back(
-          {{o.start + (column + 0.5) * o.size, (row + 0.5 - 0.5 * rows) * o.size, height}, o.size, o.size, 0, 0, 0});
-    }
-  return ground;
 }
 
 }  // namespace bielle::worlds

@@ -1,11 +1,9 @@
 #pragma once
-/// \file The ground of a world: quick heights and normals, and grounds that no motion was planned for.
+/// \file The ground of a world: quick heights and normals, and what of a sole it bears.
 #include <array>
-#include <string>
 #include <vector>
 
 #include "bielle/dynamics/ground.h"
-#include "bielle/ocp/contact_schedule.h"
 
 namespace bielle::worlds {
 
@@ -55,10 +53,14 @@ class Terrain {
     Eigen::Vector2d slope = Eigen::Vector2d::Zero();
     double height = 0;
     Vector3d normal = Vector3d::UnitZ();
+    bool is_highest = false;                                     // of all tops that overlap it, everywhere
     bool covers(double px, double py, double margin = 0) const;  // margin: from its sides
     double calcHeight(double px, double py) const { return height + slope.x() * px + slope.y() * py; }
   };
   void fillGrid();
+  void findHighest(const std::vector<Eigen::Vector2d>& halves);
+  template <typename Take>
+  void visit(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const Take& take) const;
   Touch touchTop(const Top& top, const Vector3d& point) const {
     return {(top.calcHeight(point.x(), point.y()) - point.z()) * top.normal.z(), top.normal};
   }
@@ -72,46 +74,8 @@ class Terrain {
   Eigen::Vector2d corner_ = Eigen::Vector2d::Zero();  // of the grid
   double cell_ = 1;                                   // edge of a cell, m
   int columns_ = 0, rows_ = 0;
+  std::vector<double> peaks_;          // highest of the tops of each cell, m
   std::vector<int> starts_, entries_;  // tops that may cover a cell: entries_[starts_[cell] .. starts_[cell + 1])
 };
-
-/// Where a robot stands: the middle of its soles at the height of the ground under them (makeGroundUnder), z up, x ahead; the world
-/// itself to 1e-9. \param reach  how far soles go ahead of there, m
-struct StandingPlace {
-  SE3 X_WP;
-  double reach = 0;
-};
-StandingPlace findPlace(const Model& model, const std::vector<ContactTarget>& soles);
-/// A ground that is given where the robot stands, in the world.
-Ground carryGround(Ground ground, const SE3& X_WP);
-/// Soles that are in the ground, or over it, by more than 1 mm at their lowest corner; a sentence each.
-std::vector<std::string> describeSoles(const Model& model, const Ground& ground,
-                                       const std::vector<ContactTarget>& soles);
-/// Whether a sole lies on a box of the ground that begins beyond x = `start` of P, in part or all.
-bool reachesBoxes(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles, const SE3& X_WP,
-                  double start);
-
-/// A ramp from x = `start` on, `length` long and `width` wide about y = 0, that rises by `slope` (height over length; negative:
-/// it goes down). \throws InputError on numbers that make no sense, as makeTiles() does
-struct RampOptions {
-  double slope = 0.05;  ///< 1
-  double start = 0.3;   ///< m
-  double length = 20;   ///< along the horizontal, m
-  double width = 4;     ///< m
-};
-Ground makeRamp(const RampOptions& options);
-
-/// Square tiles whose heights are random, evenly distributed between `lowest` and `height`. They begin `start` ahead of the origin;
-/// before them the ground is level, at 0.
-struct TileOptions {
-  double height = 0.01;  ///< of the highest, m
-  double size = 0.25;    ///< edge of a tile, m
-  double start = 0.2;    ///< m
-  double length = 10;    ///< of the field, m
-  double width = 4;      ///< of the field, about y = 0, m
-  unsigned seed = 1;     ///< the same seed makes the same field on every machine
-  double lowest = 0;     ///< of the lowest, at most 0, m
-};
-Ground makeTiles(const TileOptions& options);
 
 }  // namespace bielle::worlds

@@ -13,8 +13,8 @@
 #include "results/option_flags.h"
 #include "results/setting.h"
 #include "solve/fddp_checks.h"
+#include "worlds/made_ground.h"
 #include "worlds/make_world.h"
-#include "worlds/terrain.h"
 
 namespace bielle::worlds {
 namespace {

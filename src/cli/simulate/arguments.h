@@ -9,7 +9,7 @@
 #include "model/payload.h"
 #include "worlds/execution.h"
 #include "worlds/robot_errors.h"
-#include "worlds/terrain.h"
+#include "worlds/standing_place.h"
 
 namespace bielle::worlds {
 
