@@ -1,6 +1,7 @@
 // The contact law: normal force, friction that sticks, energy, derivatives.
 #include <catch2/catch.hpp>
 #include <random>
+#include <tuple>
 
 #include "bielle/robots/robot_loader.h"
 #include "worlds/contact_law.h"
@@ -97,6 +98,52 @@ TEST_CASE("contact law: its damping is the derivative by the velocity") {
     Matrix3d poisoned = force.damping;
     poisoned(2, 2) *= 1.001;
     CHECK((poisoned - numeric).norm() > 1e-5 * numeric.norm());
+  }
+}
+
+TEST_CASE("contact law: so is that of a step, whose springs take the work that they hold after it") {
+  const Terrain terrain;
+  ContactPoint point = makePoint();
+  point.damping = point.shear_damping = 0;
+  constexpr double kStep = 2e-3;
+  // In the ground all along; touching down; lifting off; in the air at its middle.
+  for (const auto& [depth, before, after] :
+       {std::tuple(1e-3, -0.1, 0.2), {2e-4, -0.5, -0.3}, {2e-4, 0.2, 0.6}, {-1e-4, -0.02, -0.5}}) {
+    CAPTURE(depth, before, after);
+    const Vector3d x(2e-5, -1e-5, -depth), first(0.01, 0.004, before), second(0.02, -0.01, after);
+    const ContactStep step{kStep, first};
+    const auto calc = [&](const Vector3d& velocity, bool with_damping = false) {
+      return calcContactForce(terrain, point, x, velocity, with_damping, step);
+    };
+    const Vector3d mean = 0.5 * (first + second);
+    const ContactForce force = calc(mean, true);
+    Matrix3d numeric;
+    const double h = 1e-6;
+    for (int i = 0; i < 3; ++i) {
+      const Vector3d aside = h * Vector3d::Unit(i);
+      numeric.col(i) = -(calc(mean + aside).force - calc(mean - aside).force) / (2 * h);
+    }
+    CHECK((force.damping - numeric).norm() < 1e-5 * numeric.norm());
+    Matrix3d poisoned = force.damping;
+    poisoned(2, 2) *= 1.001;
+    CHECK((poisoned - numeric).norm() > 1e-5 * numeric.norm());
+    // Of the normal force, which is a spring alone here.
+    const auto calcHeld = [&](const Vector3d& end) {
+      return 0.5 * point.stiffness * std::pow(std::max(0.0, -end.z()), 2);
+    };
+    const double held = calcHeld(x + 0.5 * kStep * second) - calcHeld(x - 0.5 * kStep * first);
+    CHECK(-force.force.z() * mean.z() * kStep == Approx(held).epsilon(1e-9));
+    CHECK(std::abs(held) > 1e-6);
+  }
+  const JointStop stop{0, 0, -1, 2, 1e4, 0};
+  for (const auto& [q, before, after] : {std::tuple(2.01, 3.0, -1.0), {1.9999, 3.0, 2.5}, {-1.0005, 2.0, 3.0}}) {
+    const auto calcHeld = [&](double end) { return calcStopForce(stop, end, 0).elastic; };
+    const double mean = 0.5 * (before + after), h = 1e-6;
+    const StopForce force = calcStopForce(stop, q, mean, {kStep, before});
+    const double held = calcHeld(q + 0.5 * kStep * after) - calcHeld(q - 0.5 * kStep * before);
+    CHECK(-force.force * mean * kStep == Approx(held).epsilon(1e-9));
+    const auto calc = [&](double v) { return calcStopForce(stop, q, v, {kStep, before}).force; };
+    CHECK(force.damping == Approx(-(calc(mean + h) - calc(mean - h)) / (2 * h)).epsilon(1e-5));
   }
 }
 

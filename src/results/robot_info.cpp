@@ -13,6 +13,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "dynamics/point_spring.h"
+#include "dynamics/regular_mobility.h"
 #include "model/frame_name.h"
 #include "model/number_text.h"
 #include "results/json_text.h"
@@ -143,20 +144,6 @@ Json describePointSprings(const Model& model, const std::vector<Posture>& postur
       springs[s]["length " + posture.name] = calcPointSpringLength(model.pointSprings()[s], ws);
   }
   return springs;
-}
-
-// Another closed configuration nearby, where loops have the rank that they have almost everywhere.
-Mobility calcRegularMobility(const Model& model, const VectorXd& q) {
-  constexpr double kAside = 0.05;  // rad or m
-  Mobility most = calcMobility(model, q);
-  for (const double sign : {1.0, -1.0}) {
-    const VectorXd v = sign * kAside * VectorXd::LinSpaced(model.nv(), -0.7, 1.1);
-    const AssemblyResult aside = closeConfiguration(model, model.integrate(q, v));
-    if (aside.status != NumericalStatus::Ok) continue;
-    const Mobility there = calcMobility(model, aside.q);
-    if (there.rank > most.rank) most = there;
-  }
-  return most;
 }
 
 // At the first reference that closes, else at a closed configuration near neutral; beside it where it is singular.

@@ -76,6 +76,7 @@ class BielleWorld : public World {
   ClosedTree tree_;
   ContactSet contacts_;
   std::vector<ContactForce> forces_;  // of the last step, per point
+  std::vector<ContactStep> steps_;    // of the points
   std::vector<Vector3d> places_;      // where they acted, m (world)
   std::vector<double> stop_forces_;
   VectorXd tau_;                                                  // nv
@@ -106,6 +107,7 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
       tree_(model, findPosture(model), listTips(model, pushed_body_)),
       contacts_(model, ground_, options.contact),
       forces_(contacts_.points.size()),
+      steps_(contacts_.points.size()),
       places_(contacts_.points.size(), Vector3d::Zero()),
       stop_forces_(contacts_.stops.size(), 0.0),
       factors_(tree_.size()),
@@ -122,7 +124,7 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
 
 void BielleWorld::start() {
   if (!tree_.set(q_, v_)) fail(tree_.failure());
-  q_ = tree_.configuration();
+  q_ = tree_.configuration() + tree_.turns();
   v_ = tree_.velocity();
   tau_.setZero();
   now_.half_last.setZero();
@@ -135,7 +137,7 @@ void BielleWorld::start() {
 
 bool BielleWorld::step(double duration) {
   const bool is_done = move(duration);
-  q_ = tree_.configuration();
+  q_ = tree_.configuration() + tree_.turns();
   v_ = tree_.velocity();
   return is_done;
 }
@@ -216,6 +218,12 @@ bool BielleWorld::kick(double h) {
   tree_.updateLoads(tau_, now_.half_last);
   std::vector<ContactPoint>& points = contacts_.points;
   for (size_t i = 0; i < points.size(); ++i) places_[i] = getPlace(points[i].body, points[i].p);
+  for (size_t c = 0, i = 0; c < model_.contacts().size(); ++c) {
+    const int tip = static_cast<int>(c);
+    const Vector6d twist = calcTwist(tip, tree_.reducedVelocity());
+    for (; i < points.size() && points[i].contact == tip; ++i)
+      steps_[i] = {h, twist.head<3>() + twist.tail<3>().cross(places_[i])};
+  }
   com_ = getPlace(pushed_body_, model_.bodies()[pushed_body_].inertia.com);
   if (!solve(h)) return false;
   w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
@@ -335,7 +343,7 @@ void BielleWorld::addContacts(const VectorXd& w, VectorXd& loads, MatrixXd* damp
     for (; i < points.size() && points[i].contact == tip; ++i) {
       const Vector3d& x = places_[i];
       const Vector3d velocity = twist.head<3>() + twist.tail<3>().cross(x);
-      forces_[i] = calcContactForce(contacts_.terrain, points[i], x, velocity, damping != nullptr);
+      forces_[i] = calcContactForce(contacts_.terrain, points[i], x, velocity, damping != nullptr, steps_[i]);
       if (forces_[i].elastic == 0) continue;
       touches = true;
       wrench.head<3>() += forces_[i].force;
@@ -364,12 +372,14 @@ void BielleWorld::addStops(const VectorXd& w, VectorXd& loads, MatrixXd* damping
   for (size_t i = 0; i < contacts_.stops.size(); ++i) {
     const JointStop& stop = contacts_.stops[i];
     const double q = tree_.configuration()[stop.coordinate];
-    stop_forces_[i] = 0;
-    if (q <= stop.upper && q >= stop.lower) continue;
-    double v = 0;
-    tree_.visitRow(stop.dof, [&](int k, double entry) { v += entry * w[k]; });
-    const StopForce force = calcStopForce(stop, q, v);
+    double before = 0, v = 0;  // in the first half of the step, and in all of it
+    tree_.visitRow(stop.dof, [&](int k, double entry) {
+      before += entry * tree_.reducedVelocity()[k];
+      v += entry * w[k];
+    });
+    const StopForce force = calcStopForce(stop, q, v, {now_.length, before});
     stop_forces_[i] = force.force;
+    if (force.elastic == 0) continue;
     tree_.visitRow(stop.dof, [&](int k, double entry) {
       loads[k] += entry * force.force;
       if (damping)

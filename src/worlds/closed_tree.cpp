@@ -2,6 +2,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/whole_turns.h"
 #include "model/joint.h"
 #include "model/number_text.h"
 
@@ -14,7 +15,12 @@ ClosedTree::Cluster::Cluster(const ReducedCluster& l) : cluster(l), scratch(l), 
 }
 
 ClosedTree::ClosedTree(const Model& model, ConstVectorRef q, const std::vector<int>& tips)
-    : model_(model), reduction_(makeReduction(model, q)), tree_(model, reduction_, tips), ws_(model) {
+    : model_(model),
+      reduction_(makeReduction(model, q)),
+      tree_(model, reduction_, tips),
+      ws_(model),
+      free_turns_(listFreeTurns(model)),
+      turns_(VectorXd::Zero(model.nq())) {
   places_.resize(model.nv());
   clusters_.reserve(reduction_.clusters.size());  // lifts point into them
   for (const ReducedCluster& cluster : reduction_.clusters) {
@@ -35,6 +41,8 @@ ClosedTree::ClosedTree(const Model& model, ConstVectorRef q, const std::vector<i
 
 bool ClosedTree::set(ConstVectorRef q, ConstVectorRef v) {
   q_ = q;
+  turns_.setZero();
+  leaveOutTurns(free_turns_, q_, turns_);
   for (size_t i = 0; i < clusters_.size(); ++i) {
     Cluster& c = clusters_[i];
     gatherConfiguration(model_, c.cluster, q_, c.state.basis.q);
@@ -92,7 +100,11 @@ bool ClosedTree::driftAtOnce(double h) {
 }
 
 void ClosedTree::keep() {
-  for (Cluster& c : clusters_) c.kept = c.state;
+  const bool is_near = !leaveOutTurns(free_turns_, q_, turns_);
+  for (Cluster& c : clusters_) {
+    if (!is_near) gatherConfiguration(model_, c.cluster, q_, c.state.basis.q);
+    c.kept = c.state;
+  }
   q_kept_ = q_;
   w_kept_ = w_;
 }

@@ -33,7 +33,7 @@ class ClosedTree {
   /// divided again up to kMostHalvings times. If that does not help, the state is somewhere on the way: restore() it.
   bool drift(double h, int halvings = kMostHalvings);
   static constexpr int kMostHalvings = 6;
-  /// Keeps configuration and velocity, and returns to those that were kept last.
+  /// Keeps configuration and velocity, and returns to those that were kept last. Whole turns of far angles are left out.
   void keep();
   void restore();
   /// M^, and the columns of the tips, at q.
@@ -50,7 +50,8 @@ class ClosedTree {
   const MatrixXd& massMatrix() const { return M_; }
   const VectorXd& loads() const { return loads_; }
   const VectorXd& reducedVelocity() const { return w_; }  ///< w
-  const VectorXd& configuration() const { return q_; }    ///< nq
+  const VectorXd& configuration() const { return q_; }    ///< nq, without turns()
+  const VectorXd& turns() const { return turns_; }        ///< nq, whole turns of hinges that nothing counts, rad
   const VectorXd& velocity() const { return v_; }         ///< nv
   const SE3& getPlacement(int body) const { return ws_.X_WB[body]; }
   /// Columns J_b N of a tip, about the origin of the world; `outer` are their indices into w.
@@ -94,7 +95,9 @@ class ClosedTree {
   std::vector<DofPlace> places_;
   ReducedTree tree_;
   Workspace ws_;
-  MatrixXd M_;                       // size x size
+  MatrixXd M_;  // size x size
+  const std::vector<int> free_turns_;
+  VectorXd turns_;                   // nq
   VectorXd q_, q_next_, v_;          // nq, nq, nv
   VectorXd v_foreseen_, a_d_;        // nv
   VectorXd w_, w_foreseen_, loads_;  // size

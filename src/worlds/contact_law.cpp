@@ -31,6 +31,17 @@ double calcWeight(const Model& model) {
   return model.mass() * (gravity > kLeastGravity ? gravity : 9.81);
 }
 
+// Eq. (5), from a to b.
+struct MeanDepth {
+  double depth = 0, rate = 0;  // rate: d depth / d b
+};
+MeanDepth calcMeanDepth(double a, double b) {
+  if (a > 0 && b > 0) return {0.5 * (a + b), 0.5};
+  if (b > 0) return {0.5 * b * b / (b - a), 0.5 * b * (b - 2 * a) / ((b - a) * (b - a))};
+  if (a > 0) return {0.5 * a * a / (a - b), 0.5 * a * a / ((a - b) * (a - b))};
+  return {};
+}
+
 Vector3d shorten(const Vector3d& vector, double length) {
   const double norm = vector.norm();
   return norm > length ? Vector3d(vector * (length / norm)) : vector;
@@ -65,29 +76,40 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
 }
 
 ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
-                              const Vector3d& velocity, bool with_damping) {
+                              const Vector3d& velocity, bool with_damping, const ContactStep& step) {
   ContactForce out;
   const Terrain::Touch touch = terrain.touch(x, point.from);
-  if (!(touch.depth > 0)) return out;
   const Vector3d& n = touch.normal;
-  const double approach = -n.dot(velocity);
-  const NormalForce normal = calcNormalForce(point.stiffness, point.damping, touch.depth, approach);
+  const double approach = -n.dot(velocity), before = -n.dot(step.before), h = step.h;
+  const MeanDepth mean = calcMeanDepth(touch.depth - 0.5 * h * before, touch.depth + 0.5 * h * (2 * approach - before));
+  if (!(mean.depth > 0)) return out;
+  NormalForce normal = calcNormalForce(point.stiffness, point.damping, mean.depth, approach);
+  normal.rate += normal.force / mean.depth * mean.rate * h;
   const double limit = terrain.ground().friction * normal.force;
   const Vector3d anchor = point.touches ? point.anchor : x;
-  const Vector3d shift = x - anchor, sliding = velocity + approach * n;
+  out.shift = 0.5 * h * (velocity - step.before);
+  const Vector3d shift = x + out.shift - anchor, sliding = velocity + approach * n;
   const Vector3d held = -point.shear_stiffness * (shift - n.dot(shift) * n);
   out.spring = shorten(held, limit);
   const Vector3d wanted = out.spring - point.shear_damping * sliding, friction = shorten(wanted, limit);
   out.force = normal.force * n + friction;
   out.elastic =
-      0.5 * point.stiffness * touch.depth * touch.depth + 0.5 * out.spring.squaredNorm() / point.shear_stiffness;
+      0.5 * point.stiffness * mean.depth * mean.depth + 0.5 * out.spring.squaredNorm() / point.shear_stiffness;
   const double stretch = held.norm(), size = wanted.norm();
   out.slides = stretch > limit || size > limit;
   if (!with_damping) return out;
   const Matrix3d along = n * n.transpose();
   const double limit_rate = terrain.ground().friction * normal.rate;  // the cone narrows as the point lifts
-  Matrix3d shear = point.shear_damping * (Matrix3d::Identity() - along);
-  if (stretch > limit) shear += limit_rate / stretch * held * n.transpose();
+  const Matrix3d across = Matrix3d::Identity() - along;
+  Matrix3d shear = point.shear_damping * across;
+  const double stiff = 0.5 * h * point.shear_stiffness;
+  if (stretch > limit) {
+    const Vector3d direction = held / stretch;
+    shear +=
+        limit / stretch * stiff * (across - direction * direction.transpose()) + limit_rate * direction * n.transpose();
+  } else {
+    shear += stiff * across;
+  }
   if (size > limit) {
     const Vector3d direction = wanted / size;
     shear =
@@ -99,9 +121,10 @@ ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point,
 }
 
 void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point) {
-  const Terrain::Touch touch = terrain.touch(x, point.from);
+  const Vector3d at = x + force.shift;
+  const Terrain::Touch touch = terrain.touch(at, point.from);
   point.touches = touch.depth > 0;
-  point.anchor = point.from = x;
+  point.anchor = point.from = at;
   if (!point.touches) return;
   point.anchor += force.spring / point.shear_stiffness;
   point.from += touch.depth * touch.normal;
@@ -166,12 +189,14 @@ std::vector<JointStop> makeJointStops(const Model& model) {
 
 bool hasStops(JointKind kind) { return getNv(kind) == 1 || kind == JointKind::Universal; }
 
-StopForce calcStopForce(const JointStop& stop, double q, double v) {
+StopForce calcStopForce(const JointStop& stop, double q, double v, const StopStep& step) {
   const double above = q - stop.upper, below = stop.lower - q;
-  const double sign = above > 0 ? 1 : -1, depth = std::max(above, below);
-  if (!(depth > 0)) return {};
-  const NormalForce normal = calcNormalForce(stop.stiffness, stop.damping, depth, sign * v);
-  return {-sign * normal.force, 0.5 * stop.stiffness * depth * depth, normal.rate};
+  const double sign = above > below ? 1 : -1, depth = std::max(above, below), h = sign * step.h;
+  const MeanDepth mean = calcMeanDepth(depth - 0.5 * h * step.before, depth + 0.5 * h * (2 * v - step.before));
+  if (!(mean.depth > 0)) return {};
+  const NormalForce normal = calcNormalForce(stop.stiffness, stop.damping, mean.depth, sign * v);
+  return {-sign * normal.force, 0.5 * stop.stiffness * mean.depth * mean.depth,
+          normal.rate + normal.force / mean.depth * mean.rate * step.h};
 }
 
 }  // namespace bielle::worlds

@@ -25,6 +25,13 @@
 ///
 /// and what the ground takes, -f . x', less what the springs hold, is dissipated: with t = s - c_t T x', the damper and the
 /// slider take |s - f_t|^2 / c_t + (s - f_t) . (f_t - t) / c_t >= 0 in (2), and (3) lowers e.
+///
+/// Over a step in which d goes from d_0 to d_1 and x has the mean x_m, worlds with fixed steps take
+///
+///     d = (e(d_1) - e(d_0)) / (k (d_1 - d_0)),   e(d) = 1/2 k max(0, d)^2,   x = x_m                               (5)
+///
+/// in (1) and (2), so that springs take, within the cone, exactly the work that they hold after it, however hard they are and
+/// wherever in the step the point touches down (Gonzalez, "Time integration and discrete Hamiltonian systems", 1996).
 #include <vector>
 
 #include "bielle/worlds/bielle_world.h"
@@ -62,16 +69,24 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
 std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<ContactPoint>& points);
 
 struct ContactForce {
-  Vector3d force = Vector3d::Zero();    ///< on the point, N (world)
-  Vector3d spring = Vector3d::Zero();   ///< s, N (world)
-  double elastic = 0;                   ///< e, J
-  Matrix3d damping = Matrix3d::Zero();  ///< -df/dx', N s/m; not symmetric where the point slides: (1) sets the cone
-  bool slides = false;                  ///< whether s or f_t is at the cone
+  Vector3d force = Vector3d::Zero();   ///< on the point, N (world)
+  Vector3d spring = Vector3d::Zero();  ///< s, N (world)
+  Vector3d shift = Vector3d::Zero();   ///< from x to where the spring is taken, in a step, m (world)
+  double elastic = 0;                  ///< e, J
+  Matrix3d damping = Matrix3d::
+      Zero();  ///< -df/dx', in a step with what springs add by then, N s/m; not symmetric where the point slides: (1) sets the cone
+  bool slides = false;  ///< whether s or f_t is at the cone
+};
+/// A step of length h, whose first half has the velocity `before` and whose second half another one; the mean of both is that of
+/// the force, which is (5) then. Without one, (1) and (2) hold at an instant.
+struct ContactStep {
+  double h = 0;                        ///< s
+  Vector3d before = Vector3d::Zero();  ///< m/s (world)
 };
 /// Eqs. (1), (2) and (4) at a position and a velocity (world).
 /// \param with_damping  whether to fill the derivative
 ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
-                              const Vector3d& velocity, bool with_damping = false);
+                              const Vector3d& velocity, bool with_damping = false, const ContactStep& step = {});
 /// Eq. (3), for the force at x, and where the point came from.
 void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point);
 
@@ -94,7 +109,12 @@ struct StopForce {
   double elastic = 0;  ///< J
   double damping = 0;  ///< -d force/dv, not negative
 };
-StopForce calcStopForce(const JointStop& stop, double q, double v);
+/// As ContactStep, of a coordinate.
+struct StopStep {
+  double h = 0;       ///< s
+  double before = 0;  ///< rad/s or m/s
+};
+StopForce calcStopForce(const JointStop& stop, double q, double v, const StopStep& step = {});
 
 /// All points and stops of a robot on its ground, with the energy that their springs held at the start.
 /// Places are those of points in the world: body, point of it -> m. Coordinates are those of joints with stops: stop -> rad or m.

@@ -2,13 +2,14 @@
 #include <array>
 #include <cmath>
 
-#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/worlds/bielle_world.h"
 #include "dynamics/closed_field.h"
 #include "dynamics/joint_force.h"
 #include "dynamics/point_spring.h"
+#include "dynamics/regular_mobility.h"
+#include "dynamics/whole_turns.h"
 #include "math/runge_kutta.h"
 #include "model/number_text.h"
 #include "worlds/contact_law.h"
@@ -27,7 +28,6 @@ constexpr double kNearest = 1e-9;   // share of it below which rows are not chos
 constexpr double kMostLoose = 1e4;  // error of a step that is taken there, over the tolerance
 constexpr double kOpen = 1e-8;      // of dependent rows, m or rad: the rank has changed
 constexpr double kLessIndependent = 1e-2;  // share of it below which rows are chosen anew
-constexpr double kBeside = 1e-3;  // rad or m, of the displacement that tells a singular posture from its neighbours
 
 enum Work { kMotors, kPush, kContacts, kStops, kJoints, kWorks };
 
@@ -48,6 +48,7 @@ class ManifoldWorld : public World {
   void addForce(int body, const Vector3d& at, const Vector3d& force, VectorXd& tau) const;
   bool takeStep(double& h);
   bool settle(ConstVectorRef d, ConstVectorRef u);
+  void takeOver();
   void updateFeet();
   std::string describeStop() const;
   Vector3d getPlace(int body, const Vector3d& point) const { return field_.workspace().X_WB[body].act(point); }
@@ -61,6 +62,8 @@ class ManifoldWorld : public World {
   RungeKutta method_;
   RungeKutta::Derivative derivative_;
   ContactSet contacts_;
+  const std::vector<int> free_turns_;
+  VectorXd near_, turns_;  // nq: the configuration without and its whole turns
   VectorXd tau_motors_, tau_, x_, rate_, scale_;
   double next_step_ = 0, usual_step_ = 0, gap_ = 0, best_independence_ = 1, least_independence_ = 1;
 };
@@ -72,7 +75,8 @@ ManifoldWorld::ManifoldWorld(const Model& model, const ManifoldWorldOptions& opt
       field_(model_),
       method_(2 * model.nv() + kWorks),
       derivative_([this](const VectorXd& x, VectorXd& rate) { return evaluate(x, rate); }),
-      contacts_(model, ground_, options.contact) {
+      contacts_(model, ground_, options.contact),
+      free_turns_(listFreeTurns(model)) {
   integration_.integrator = "Runge-Kutta of order 8";
   integration_.tolerance = tolerance_;
   warnings_ = listMissingStops(model);
@@ -82,10 +86,13 @@ ManifoldWorld::ManifoldWorld(const Model& model, const ManifoldWorldOptions& opt
 }
 
 void ManifoldWorld::start() {
+  near_ = q_;
+  turns_.setZero(model_.nq());
+  leaveOutTurns(free_turns_, near_, turns_);
   next_step_ = usual_step_ = kFirstStep;
   tau_motors_.setZero();
   if (!model_.closures().empty()) {
-    const int rank = field_.select(q_);
+    const int rank = field_.select(near_);
     if (rank <= ClosedField::kDenseRows) checkStart(rank);
     if (!message_.empty()) return;
   }
@@ -99,10 +106,7 @@ void ManifoldWorld::start() {
 
 // A posture where rows are dependent that are independent all around it: the motion is not determined.
 void ManifoldWorld::checkStart(int rank) {
-  const VectorXd aside = model_.integrate(q_, kBeside * VectorXd::LinSpaced(model_.nv(), -0.7, 1.1));
-  const AssemblyResult beside = closeConfiguration(model_, aside);
-  if (beside.status != NumericalStatus::Ok) return;
-  const int other = calcMobility(model_, beside.q).rank;
+  const int other = calcRegularMobility(model_, near_).rank;
   if (other > rank)
     fail("the loops are singular at the start: they have rank " + std::to_string(rank) + ", and " +
          std::to_string(other) + " beside it; start from another posture");
@@ -110,14 +114,20 @@ void ManifoldWorld::checkStart(int rank) {
 
 // The state at d, u of a chart that begins at q_, as the state of the world.
 bool ManifoldWorld::settle(ConstVectorRef d, ConstVectorRef u) {
-  field_.begin(q_);
+  field_.begin(near_);
   if (!field_.close(d, u)) return false;
   gap_ = field_.calcGap();
   if (gap_ > kOpen) return fail("the rank of its loops changes there: a posture where they lock");
-  q_ = field_.configuration();
-  model_.normalize(q_);
-  v_ = field_.velocity();
+  takeOver();
   return true;
+}
+
+void ManifoldWorld::takeOver() {
+  near_ = field_.configuration();
+  model_.normalize(near_);
+  leaveOutTurns(free_turns_, near_, turns_);
+  q_ = near_ + turns_;
+  v_ = field_.velocity();
 }
 
 bool ManifoldWorld::step(double duration) {
@@ -142,14 +152,14 @@ bool ManifoldWorld::step(double duration) {
 // Takes one step of h or, where it has to, of less.
 bool ManifoldWorld::takeStep(double& h) {
   const int nv = model_.nv();
-  field_.begin(q_);
+  field_.begin(near_);
   x_.setZero();
   x_.segment(nv, nv) = v_;
   if (!evaluate(x_, rate_)) return fail(field_.failure());
   const double independence = field_.independence();
   if (independence < kLessIndependent * best_independence_ && independence > kNearest * best_independence_) {
-    field_.select(q_);
-    field_.begin(q_);
+    field_.select(near_);
+    field_.begin(near_);
     if (!evaluate(x_, rate_)) return fail(field_.failure());
   }
   best_independence_ = std::max(best_independence_, field_.independence());
@@ -166,9 +176,7 @@ bool ManifoldWorld::takeStep(double& h) {
     if (error <= 1 || takes_best) {
       const VectorXd& end = method_.end();
       if (field_.close(end.head(nv), end.segment(nv, nv)) && (gap_ = field_.calcGap()) <= kOpen) {
-        q_ = field_.configuration();
-        model_.normalize(q_);
-        v_ = field_.velocity();
+        takeOver();
         const auto works = end.tail(kWorks);
         work_.motor += works[kMotors];
         work_.push += works[kPush];

@@ -6,13 +6,14 @@
 ///
 ///     M^ dw = h (N^T (tau - b - M a_d) + sum_i P_i^T f_i(w + dw / 2)),   w <- w + dw,   drift by h                 (1)
 ///
-/// The first drift and the last one of advance() are half as long: it is the leapfrog, of second order, with springs taken at
-/// the middle. The forces of dampers and sliders depend on the mean velocity; (1) is solved by Newton steps,
+/// The first drift and the last one of advance() are half as long: it is the leapfrog, of second order, with springs of the robot
+/// taken at the middle, and those of contacts and stops as the mean over the step (contact_law.h Eq. (5)). These, and the forces of
+/// dampers and sliders, depend on the mean velocity; (1) is solved by Newton steps,
 ///
 ///     (M^ + h/2 sum_i P_i^T D_i P_i) d = h (..) - M^ dw,   dw <- dw + s d,   D_i = -d f_i / d velocity             (2)
 ///
-/// s = 1 or, where that does not lower the residual, a half of it and so on; so no damper limits h; springs do, by
-/// h < 2 / frequency. D_i is not symmetric where a point slides, since the normal force sets its friction. b is taken at a velocity
+/// s = 1 or, where that does not lower the residual, a half of it and so on; so no damper limits h, nor do contacts and stops;
+/// springs of the robot do, by h < 2 / frequency. D_i is not symmetric where a point slides, since the normal force sets its friction. b is taken at a velocity
 /// foreseen with the last dw. Since forces act at the middle with the mean velocity, (1) changes the kinetic energy by exactly the
 /// work that the books take.
 ///

@@ -11,6 +11,7 @@
 #include "cli/eval_state.h"
 #include "cli/simulate/free.h"
 #include "dynamics/loop_conflict.h"
+#include "dynamics/whole_turns.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 
@@ -53,12 +54,7 @@ void leaveOutTurns(const Model& model, const std::string& file, cli::EvalState& 
     if (joint.kind != JointKind::Revolute && joint.kind != JointKind::Continuous) continue;
     double& angle = state.q[joint.idx_q];
     if (std::abs(angle) <= kFar) continue;
-    bool is_counted =
-        std::isfinite(model.lowerLimits()[joint.idx_v]) || std::isfinite(model.upperLimits()[joint.idx_v]);
-    for (const JointForce& force : model.jointForces()) is_counted |= force.joint == j && force.stiffness != 0;
-    for (const Closure& closure : model.closures())
-      for (const CouplerTerm& term : closure.terms) is_counted |= term.joint == j;
-    if (is_counted)
+    if (countsTurns(model, j))
       throw InputError(file, "joint '" + joint.name + "'",
                        "its angle of " + formatNumber(angle) + " rad is rounded by more than loops may be open",
                        "give one within " + formatNumber(kFar) + " rad");
