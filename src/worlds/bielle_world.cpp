@@ -75,9 +75,10 @@ class BielleWorld : public World {
   const double time_step_;
   ClosedTree tree_;
   ContactSet contacts_;
-  std::vector<ContactForce> forces_;  // of the last step, per point
-  std::vector<ContactStep> steps_;    // of the points
-  std::vector<Vector3d> places_;      // where they acted, m (world)
+  std::vector<ContactForce> forces_;     // of the last step, per point
+  std::vector<ContactStep> steps_;       // of the points
+  std::vector<Terrain::Touch> touches_;  // at places_
+  std::vector<Vector3d> places_;         // where they acted, m (world)
   std::vector<double> stop_forces_;
   VectorXd tau_;                                                  // nv
   Vector3d com_ = Vector3d::Zero();                               // of the pushed body
@@ -108,6 +109,7 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
       contacts_(model, ground_, options.contact),
       forces_(contacts_.points.size()),
       steps_(contacts_.points.size()),
+      touches_(contacts_.points.size()),
       places_(contacts_.points.size(), Vector3d::Zero()),
       stop_forces_(contacts_.stops.size(), 0.0),
       factors_(tree_.size()),
@@ -217,7 +219,10 @@ bool BielleWorld::kick(double h) {
   now_.length = h;
   tree_.updateLoads(tau_, now_.half_last);
   std::vector<ContactPoint>& points = contacts_.points;
-  for (size_t i = 0; i < points.size(); ++i) places_[i] = getPlace(points[i].body, points[i].p);
+  for (size_t i = 0; i < points.size(); ++i) {
+    places_[i] = getPlace(points[i].body, points[i].p);
+    touches_[i] = contacts_.terrain.touch(places_[i], points[i].from);
+  }
   for (size_t c = 0, i = 0; c < model_.contacts().size(); ++c) {
     const int tip = static_cast<int>(c);
     const Vector6d twist = calcTwist(tip, tree_.reducedVelocity());
@@ -343,7 +348,8 @@ void BielleWorld::addContacts(const VectorXd& w, VectorXd& loads, MatrixXd* damp
     for (; i < points.size() && points[i].contact == tip; ++i) {
       const Vector3d& x = places_[i];
       const Vector3d velocity = twist.head<3>() + twist.tail<3>().cross(x);
-      forces_[i] = calcContactForce(contacts_.terrain, points[i], x, velocity, damping != nullptr, steps_[i]);
+      forces_[i] =
+          calcContactForce(touches_[i], ground_.friction, points[i], x, velocity, damping != nullptr, steps_[i]);
       if (forces_[i].elastic == 0) continue;
       touches = true;
       wrench.head<3>() += forces_[i].force;

@@ -77,15 +77,20 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
 
 ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
                               const Vector3d& velocity, bool with_damping, const ContactStep& step) {
+  return calcContactForce(terrain.touch(x, point.from), terrain.ground().friction, point, x, velocity, with_damping,
+                          step);
+}
+
+ContactForce calcContactForce(const Terrain::Touch& touch, double mu, const ContactPoint& point, const Vector3d& x,
+                              const Vector3d& velocity, bool with_damping, const ContactStep& step) {
   ContactForce out;
-  const Terrain::Touch touch = terrain.touch(x, point.from);
   const Vector3d& n = touch.normal;
   const double approach = -n.dot(velocity), before = -n.dot(step.before), h = step.h;
   const MeanDepth mean = calcMeanDepth(touch.depth - 0.5 * h * before, touch.depth + 0.5 * h * (2 * approach - before));
   if (!(mean.depth > 0)) return out;
   NormalForce normal = calcNormalForce(point.stiffness, point.damping, mean.depth, approach);
   normal.rate += normal.force / mean.depth * mean.rate * h;
-  const double limit = terrain.ground().friction * normal.force;
+  const double limit = mu * normal.force;
   const Vector3d anchor = point.touches ? point.anchor : x;
   out.shift = 0.5 * h * (velocity - step.before);
   const Vector3d shift = x + out.shift - anchor, sliding = velocity + approach * n;
@@ -99,7 +104,7 @@ ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point,
   out.slides = stretch > limit || size > limit;
   if (!with_damping) return out;
   const Matrix3d along = n * n.transpose();
-  const double limit_rate = terrain.ground().friction * normal.rate;  // the cone narrows as the point lifts
+  const double limit_rate = mu * normal.rate;  // the cone narrows as the point lifts
   const Matrix3d across = Matrix3d::Identity() - along;
   Matrix3d shear = point.shear_damping * across;
   const double stiff = 0.5 * h * point.shear_stiffness;

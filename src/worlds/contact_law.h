@@ -87,6 +87,9 @@ struct ContactStep {
 /// \param with_damping  whether to fill the derivative
 ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
                               const Vector3d& velocity, bool with_damping = false, const ContactStep& step = {});
+/// \param touch     Terrain::touch(x, point.from), which does not depend on the velocity   \param mu  friction of the ground
+ContactForce calcContactForce(const Terrain::Touch& touch, double mu, const ContactPoint& point, const Vector3d& x,
+                              const Vector3d& velocity, bool with_damping, const ContactStep& step);
 /// Eq. (3), for the force at x, and where the point came from.
 void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point);
 
