@@ -7,3 +7,4 @@ bielle_test(fddp_batches SOURCES test_fddp_batches.cpp LIBS bielle_solve bielle_
 bielle_test(constraints SOURCES test_constraints.cpp LIBS bielle_solve bielle_model)
 bielle_test(receding_constraints SOURCES test_receding_constraints.cpp LIBS bielle_solve bielle_model)
 bielle_test(peak SOURCES test_peak.cpp LIBS bielle_solve bielle_dynamics)
+bielle_test(periodic SOURCES test_periodic.cpp LIBS bielle_solve bielle_dynamics)

@@ -4,6 +4,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "solve/pool.h"
+
 namespace bielle {
 namespace {
 
@@ -15,30 +17,6 @@ struct PeakEvaluation : NodeEvaluation {
 
 const PeakEvaluation& getPeak(const NodeEvaluation* at) { return static_cast<const PeakEvaluation&>(*at); }
 const NodeEvaluation* getInner(const NodeEvaluation* at) { return at ? getPeak(at).inner.get() : nullptr; }
-
-// Things of various sizes, which are kept.
-template <typename T>
-class Pool {
- public:
-  void takeBack() { num_taken_ = 0; }
-  template <typename Fits, typename Resize>
-  T& take(const Fits& fits, const Resize& resize) {
-    const auto free = items_.begin() + num_taken_++;
-    const auto found = std::find_if(free, items_.end(), [&](const std::unique_ptr<T>& item) { return fits(*item); });
-    if (found != items_.end()) {
-      free->swap(*found);
-      return **free;
-    }
-    items_.push_back(std::make_unique<T>());
-    resize(*items_.back());
-    items_[num_taken_ - 1].swap(items_.back());
-    return *items_[num_taken_ - 1];
-  }
-
- private:
-  std::vector<std::unique_ptr<T>> items_;  // the first ones are taken
-  std::ptrdiff_t num_taken_ = 0;
-};
 
 // Tasks of the inner problem, and what they point to.
 struct PeakScratch : ProblemScratch {
