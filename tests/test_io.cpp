@@ -186,6 +186,23 @@ TEST_CASE("predicted footholds come back from NumPy files, and are refused where
   CHECK_THAT(getErrorOfReading(directory / "t.npz"), Catch::Contains("'footholds': its shape does not match"));
 }
 
+TEST_CASE("what a cycle is comes back from NumPy files, and is refused where it is none") {
+  const TemporaryDirectory directory;
+  const ShortSquat squat;
+  MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  const auto write = [&] {
+    writeNpz(directory / "t.npz", record);
+    return directory / "t.npz";
+  };
+  CHECK(readRecord(write()).cycle.size() == 0);
+  record.cycle = Eigen::Vector4d(0.8, 0.4, -0.1, 1.0 / 3);
+  CHECK(readRecord(write()).cycle == record.cycle);
+  record.cycle[2] = std::numeric_limits<double>::infinity();
+  CHECK_THAT(getErrorOfReading(write()), Catch::Contains("'cycle'"));
+  record.cycle.conservativeResize(3);
+  CHECK_THAT(getError([&] { write(); }), Catch::Contains("record, array 'cycle'"));
+}
+
 TEST_CASE("midpoint steps are recorded with the points to which their accelerations belong") {
   const TemporaryDirectory directory;
   ShortSquat squat(StepRule::Midpoint);

@@ -246,3 +246,23 @@ TEST_CASE("References are archives with the names and shapes of their readers") 
   still.time.setZero();
   CHECK_THROWS_WITH(makeReferenceMotion(model, q_ref, still, 50), Catch::Contains("it takes no time"));
 }
+
+TEST_CASE("A reference of a cycle has its period in whole frames, and what it takes to repeat it") {
+  const Model model = loadRobot("bipetto").model;
+  const VectorXd q_ref = findClosedConfiguration(model).q;
+  MotionRecord record = makeSwing(model, q_ref, 21);
+  const double period = record.time.tail(1)[0];
+  record.cycle = Eigen::Vector4d(period, 0.4, -0.1, 0.2);
+  const ReferenceMotion motion = makeReferenceMotion(model, q_ref, record, 50);
+  const double frames = std::round(50 * period);
+  REQUIRE(std::abs(frames - 50 * period) > 0.01);  // so that there is something to do
+  CHECK(motion.rate == Approx(frames / period));
+  CHECK(motion.joint_pos.rows() == static_cast<Eigen::Index>(frames) + 1);
+  REQUIRE(motion.warnings.size() >= 1);
+  CHECK_THAT(motion.warnings.front(), Catch::Contains("frames per second"));
+  const RobotDirectory directory;
+  NpyArrays arrays = readArchive(directory.write("cycle.npz", formatReferenceMotion(motion, ReferenceFormat::Amp)));
+  CHECK(arrays["loop_mode"].texts == std::vector<std::string>{"wrap"});
+  CHECK(arrays["period"].numbers == std::vector<double>{period});
+  CHECK(arrays["cycle_offset"].numbers == std::vector<double>{0.4, -0.1, 0.2});
+}

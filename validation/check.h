@@ -75,6 +75,8 @@ struct CheckBounds {
   double accelerations = 1e-3;
   double velocity_steps = 1e-6;  ///< Eqs. (2), (3), m/s or rad/s: gaps that a converged solver may leave
   double position_steps = 1e-8;  ///< Eqs. (2), (3), m or rad
+  double cycle =
+      1e-6;  ///< of a motion that repeats, its end against its beginning, moved; m, rad, m/s, rad/s: as the former two
   /// Eq. (6), over the same, of first order in the step and in the speed of the loops: 1e-3 for a squat, 3e-3 for a
   /// walk at 0.5 m/s, 3e-2 at 1 m/s.
   double finite_differences = 0.05;

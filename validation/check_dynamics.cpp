@@ -56,6 +56,26 @@ void addClosureRows(CheckContext& context) {
               reduced ? context.bounds.closed_velocity : context.bounds.drift_velocity, "the robot has no loop");
 }
 
+// Of a motion that repeats. The first six velocities are those of the base in its own frame, which a displacement does not change.
+void addCycleRow(CheckContext& context) {
+  const MotionRecord& record = context.motion.record;
+  if (record.cycle.size() == 0) return;
+  const Model& model = context.model();
+  const int last = context.motion.numStages();
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(record.cycle[3], Vector3d::UnitZ()));
+  VectorXd wanted = record.q.row(0).transpose();
+  const Eigen::Quaterniond base(Eigen::Vector4d(wanted.segment<4>(3)));
+  wanted.head<3>() = turn * Vector3d(wanted.head<3>()) + Vector3d(record.cycle[1], record.cycle[2], 0);
+  wanted.segment<4>(3) = (turn * base).coeffs();
+  Worst cycle;
+  addLargest(cycle, model.difference(wanted, record.q.row(last).transpose()), 1, last, record.v_names);
+  addLargest(cycle, (record.v.row(last) - record.v.row(0)).transpose(), 1, last, record.v_names);
+  Worst period;
+  period.add(std::abs(record.time[last] - record.time[0] - record.cycle[0]), last);
+  context.add(cycle, "cycle: end from beginning", "SI", context.bounds.cycle);
+  context.add(period, "cycle: period", "s", context.bounds.time);
+}
+
 }  // namespace
 
 void addDynamicsRows(CheckContext& context) {
@@ -83,6 +103,7 @@ void addDynamicsRows(CheckContext& context) {
   context.add(velocity, "steps of the velocity", "m/s, rad/s", bounds.velocity_steps);
   context.add(position, "steps of the configuration", "m, rad", bounds.position_steps);
   context.add(differences, "finite differences of the velocity", "of largest", bounds.finite_differences);
+  addCycleRow(context);
   addClosureRows(context);
 }
 

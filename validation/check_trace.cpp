@@ -3,6 +3,7 @@
 #include <array>
 #include <memory>
 
+#include "bielle/motion/motion.h"
 #include "check_accelerations.h"
 #include "math/decompositions.h"
 #include "math/largest.h"
@@ -33,14 +34,16 @@ Vector6d dropFreeAxes(const Closure& closure, Vector6d rate) {
   return rate;
 }
 
-// Diagonal of W, Eq. (3) of check.h, by Simbody's mass matrix; one for joints outside the loops. Empty for the full
-// formulation.
+// Diagonal of W, Eq. (3) of check.h, by Simbody's mass matrix, where the robot stands before a motion, about which a cycle moves; one for
+// joints outside the loops. Empty for the full formulation.
 VectorXd calcMetric(const CheckedMotion& motion) {
   constexpr double kFloor = 1e-3;
   const Model& model = motion.model;
   if (motion.summary.formulation == Formulation::Full || model.closures().empty()) return {};
   SimbodyBridge simbody(model, model.closures());
-  simbody.setState(motion.record.q.row(0).transpose(), VectorXd::Zero(model.nv()), VectorXd::Zero(model.nv()));
+  const bool starts_standing = motion.record.cycle.size() == 0;
+  simbody.setState(starts_standing ? motion.record.q.row(0).transpose().eval() : makeStandingPosture(model),
+                   VectorXd::Zero(model.nv()), VectorXd::Zero(model.nv()));
   const VectorXd inertia = simbody.calcMassMatrix().diagonal();
   VectorXd metric = VectorXd::Ones(model.nv());
   for (const LoopCluster& cluster : model.clusters()) {

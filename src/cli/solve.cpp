@@ -81,6 +81,16 @@ std::string formatDeadPoints(const MotionResult& result) {
   return (near.empty() ? formatDistance({}) : near) + " (rad or m)";
 }
 
+std::string formatCycle(const MotionResult& result) {
+  const VectorXd& cycle = result.record.cycle;
+  const std::optional<double>& floquet = result.cycle->floquet_multiplier;
+  std::string text = formatNumber(cycle[0], "%.4g") + " s, moves by " + formatNumber(cycle[1], "%.3f") + ", " +
+                     formatNumber(cycle[2], "%.3f") + " m";
+  if (cycle[3] != 0) text += ", turns by " + formatNumber(cycle[3], "%.3f") + " rad";
+  return text + "; closes to " + formatNumber(result.cycle->closing_error, "%.1e") +
+         (floquet ? ", largest Floquet multiplier " + formatNumber(*floquet, "%.3f") : "");
+}
+
 // Of a robot that has both kinds of motors, N m and N.
 std::string makeTorqueLabel(const Model& model) {
   bool turning = false, sliding = false;
@@ -114,6 +124,7 @@ void printResult(const Model& model, const MotionResult& result, const std::vect
                            {makeTorqueLabel(model), torques},
                            {"electrical energy", formatEnergy(result.energy)}});
   if (!result.dead_points.empty()) rows.push_back({"dead points", formatDeadPoints(result)});
+  if (result.cycle) rows.push_back({"cycle", formatCycle(result)});
   printTable(std::cout, rows);
   printTimings(result.timings);
   for (const std::string& path : paths) std::cout << "  " << path << "\n";

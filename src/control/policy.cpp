@@ -174,9 +174,11 @@ Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory) {
 }
 
 Policy makePolicy(const Solution& solution) {
-  const auto& [motion, trajectory, summary, multipliers, gains] = solution;
-  if (gains.size() != trajectory.us.size()) throw std::invalid_argument("makePolicy: the solution has no gains");
-  return makeHoldingPolicy(motion, trajectory, makeStages(motion, trajectory, gains));
+  const std::vector<Gains>& gains = solution.gains;
+  if (gains.size() != solution.trajectory.us.size())
+    throw std::invalid_argument("makePolicy: the solution has no gains");
+  return makeHoldingPolicy(solution.motion, solution.trajectory,
+                           makeStages(solution.motion, solution.trajectory, gains));
 }
 
 }  // namespace bielle

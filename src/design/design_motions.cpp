@@ -29,7 +29,10 @@ std::vector<size_t> groupByPayload(const std::vector<DesignMotion>& motions) {
 }
 
 Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const StandingRobot& standing) {
-  return makeMotion(model, motion.plan(model, standing), {Formulation::Reduced, StepRule::Euler});
+  Motion made = makeMotion(model, motion.plan(model, standing), {Formulation::Reduced, StepRule::Euler});
+  requireOption(!made.cycle, motion.name + ".periodic", "slopes of costs are those of motions whose start is given",
+                "leave it out");
+  return made;
 }
 
 namespace {

@@ -23,7 +23,8 @@ class Limits {
   /// has zero width or excludes q0
   Limits(const Model& model, const LimitOptions& options, const VectorXd& q0);
   /// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
-  bool addTo(std::vector<StageSpec>& stages) const;
+  /// \param cycle  whether the first state is free, which then has the constraints of the last one
+  bool addTo(std::vector<StageSpec>& stages, bool cycle) const;
 
  private:
   VectorXd efforts_;

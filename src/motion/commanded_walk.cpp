@@ -191,7 +191,7 @@ void CommandedWalk::addLimitsTo(std::vector<StageSpec>& stages) {
   // Those of the first stage and of the last are those of the ends of a motion.
   stages.insert(stages.begin(), StageSpec());
   stages.emplace_back();
-  limits_->addTo(stages);
+  limits_->addTo(stages, false);
   stages.erase(stages.begin());
   stages.pop_back();
 }

@@ -62,10 +62,10 @@ class FeasibilityCheck {
   void check(const StartingPoint* given) {
     checkTrajectory(given ? given->trajectory : motion_.guess, given ? "start" : "guess");
     checkSolesApart();
-    checkStartingMotors();
+    if (!motion_.cycle) checkStartingMotors();  // a cycle starts in motion
     if (!warn_) return;
     doubtUnits();
-    doubtBalance();
+    if (!motion_.cycle) doubtBalance();
     doubtSlopes();
     doubtTurns();
     doubtSpeed();

@@ -128,15 +128,14 @@ Limits::Limits(const Model& model, const LimitOptions& options, const VectorXd& 
   voltages_ = listVoltages(model);
 }
 
-bool Limits::addTo(std::vector<StageSpec>& stages) const {
+bool Limits::addTo(std::vector<StageSpec>& stages, bool cycle) const {
   for (size_t k = 0; k < stages.size(); ++k) {
     StageSpec& stage = stages[k];
     stage.effort_limits = efforts_;
     const bool step = k + 1 < stages.size() && stage.kind == StageKind::Dynamics;
     if (step) append(voltages_, stage.path_constraints);
-    if (k == 0) continue;
-    append(states_, stage.path_constraints);
-    if (step) append(powers_, stage.path_constraints);
+    if (k > 0) append(states_, stage.path_constraints);
+    if (step && (k > 0 || cycle)) append(powers_, stage.path_constraints);
   }
   return efforts_.array().isFinite().any();
 }

@@ -8,6 +8,7 @@
 #include "bielle/model/error.h"
 #include "math/so3.h"
 #include "model/number_text.h"
+#include "motion/cycle.h"
 #include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
 #include "motion/kinematic_guess.h"
@@ -217,9 +218,16 @@ std::vector<ContactTarget> listSoles(const Stance& stance) {
   return soles;
 }
 
-MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
+Goal makeCycleSpeedGoal(const ContactSchedule& schedule, double speed, const Vector3d& direction) {
+  Goal goal{GoalKind::Speed, "speed", speed, calcTolerance(speed, 0.02), 0, schedule.numStages()};
+  goal.direction = direction;
+  return goal;
+}
+
+MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& requested_task,
                           const LocomotionOptions& requested) {
   check(requested);
+  LocomotionTask task = requested_task;
   LocomotionOptions options = requested;
   if (options.timing.time_step == 0)
     options.timing.time_step = chooseTimeStep(task, options.timing, options.swing, calcSpringStage(model, stance));
@@ -234,11 +242,12 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
               makeStageWeights(model, size, options)};
   check(scene);
   if (options.timing.flight == 0) keepReach(scene);
+  MotionPlan plan;
+  if (task.lead > 0) plan.cycle = cutCycle(stance.middle, task, scene.gait);
   std::vector<ContactTarget> soles;
   for (const GaitPhase& phase : scene.gait.phases)
     for (const ContactTarget& sole : makeTargets(scene, phase)) soles.push_back(sole);
   scene.ramp = chooseRamp(model, task.ground, soles);
-  MotionPlan plan;
   plan.name = task.name;
   plan.ground = task.ground;
   plan.ground.friction = options.friction;
@@ -262,11 +271,15 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
       plan.guess.xs.push_back(guess[node]);
     }
   }
-  plan.stages.push_back(makeTerminalStage(scene));
+  plan.stages.push_back(plan.cycle ? makeSeam(scene) : makeTerminalStage(scene));
   plan.guess.xs.push_back(guess.back());
   const auto end = task.plan.getStance(static_cast<int>(task.plan.steps.size()));
   plan.goals = makeFootholdGoals(scene, plan.schedule);
   plan.q_start = stance.q;
+  if (plan.cycle) {
+    plan.q_end = carryPosture(model, stance.q, *plan.cycle);
+    return plan;
+  }
   plan.q_end = areLevel(listSoles(stance))
                    ? carryPosture(model, stance.q, calcMiddle(end[0], end[1]) * stance.middle.inverse())
                    : guess.back().head(model.nq()).eval();  // on level feet

@@ -208,4 +208,10 @@ StageSpec makeTerminalStage(const Scene& scene) {
   return stage;
 }
 
+StageSpec makeSeam(const Scene& scene) {
+  StageSpec stage = makeRegularizedStage(scene, scene.gait.nodes.back());
+  stage.state.weight = stage.control.weight = 0;
+  return stage;
+}
+
 }  // namespace bielle

@@ -35,6 +35,8 @@ StageSpec makeStage(const Scene& scene, int k, const std::vector<ContactTarget>&
 /// A foot lands and stops instantly.
 StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector<ContactTarget>& contacts);
 StageSpec makeTerminalStage(const Scene& scene);
+/// The last node of a cycle, where the next one begins: it costs nothing.
+StageSpec makeSeam(const Scene& scene);
 /// The standing posture, moved along the gait, at rest: nq + nv.
 VectorXd makeGuess(const Scene& scene, const GaitNode& node);
 

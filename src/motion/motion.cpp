@@ -31,12 +31,24 @@ void leaveTorquesFree(const Model& model, std::vector<StageSpec>& stages) {
   for (StageSpec& stage : stages) stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
 }
 
+void requireFixedCycle(const ProblemOptions& options) {
+  const auto require = [](bool ok, const char* problem, const char* remedy) {
+    requireOption(ok, "periodic", problem, remedy);
+  };
+  require(!options.timings.areGiven(), "a cycle has no free durations", "leave out --free-timings");
+  require(options.objective.objective != Objective::PeakTorque, "a cycle of least peak torque is not solved",
+          "take --objective effort or energy");
+  require(options.formulation == Formulation::Reduced, "the loops of its first state have to be closed",
+          "leave out --formulation full");
+}
+
 }  // namespace
 
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
+  if (plan.cycle) requireFixedCycle(options);
   for (StageSpec& stage : plan.stages) stage.step = options.step;
   Motion motion;
-  motion.within_limits = Limits(model, options.limits, plan.q_start).addTo(plan.stages);
+  motion.within_limits = Limits(model, options.limits, plan.q_start).addTo(plan.stages, plan.cycle.has_value());
   freeTimings(options.timings, plan.schedule, plan.stages);
   for (StageSpec& stage : plan.stages)  // at an impact h vanishes, and gains have no effect
     if (stage.dt > 0) limitGains(options.step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
@@ -92,6 +104,12 @@ VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X) {
   carried.head<3>() = X.act(q.head<3>());
   const Eigen::Quaterniond turn(X.R), base(Eigen::Vector4d(q.segment<4>(3)));
   carried.segment<4>(3) = (turn * base).coeffs();
+  return carried;
+}
+
+VectorXd carryState(const Model& model, const VectorXd& x, const SE3& X) {
+  VectorXd carried = x;
+  carried.head(model.nq()) = carryPosture(model, x.head(model.nq()), X);
   return carried;
 }
 

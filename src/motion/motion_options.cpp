@@ -53,15 +53,25 @@ void describe(OptionFields& f, LocomotionOptions& o) {
            "velocity gain of the stabilisation of closures (full formulation)");
 }
 
+namespace {
+
+constexpr const char* kPeriodic =
+    "one cycle of two steady steps, whose end is its beginning, moved; steps, start_support and end_support do not "
+    "count";
+
+}  // namespace
+
 void describe(OptionFields& f, WalkOptions& o) {
   f.number("speed", o.speed, "m/s", {}, "speed of the steady steps; negative: backward");
   f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
+  f.flag("periodic", o.periodic, kPeriodic);
   describe(f, o.gait);
 }
 
 void describe(OptionFields& f, SideWalkOptions& o) {
   f.number("speed", o.speed, "m/s", {}, "speed of the steady steps to the left; negative: to the right");
   f.integer("steps", o.steps, {2, 200}, "number of steps: one opens the stance, the next one closes it");
+  f.flag("periodic", o.periodic, kPeriodic);
   describe(f, o.gait);
 }
 
@@ -69,6 +79,7 @@ void describe(OptionFields& f, TurnOptions& o) {
   f.number("angle", o.angle, "rad", {}, "angle to turn to the left; negative: to the right");
   f.number("radius", o.radius, "m", kNotNegative, "radius of the arc to walk along; 0: turn on the spot");
   f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
+  f.flag("periodic", o.periodic, kPeriodic);
   describe(f, o.gait);
 }
 
@@ -184,6 +195,7 @@ LocomotionOptions HopOptions::makeGaitDefaults() {
 void describe(OptionFields& f, RunOptions& o) {
   f.number("speed", o.speed, "m/s", {}, "speed of the steady steps; negative: backward");
   f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
+  f.flag("periodic", o.periodic, kPeriodic);
   f.number("flight", o.flight, "s", kPositive, "time in the air between two steps");
   f.number("stance", o.stance, "s", kNotNegative, "time with one foot on the ground");
   describeGait(f, o.gait);

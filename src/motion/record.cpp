@@ -87,6 +87,7 @@ void requireWhole(const MotionRecord& record) {
   const Eigen::Index entries = MotionRecord::kFootholdEntries * static_cast<Eigen::Index>(record.contact_names.size());
   require(record.footholds.size() == 0 || (record.footholds.rows() == nodes && record.footholds.cols() == entries),
           "footholds");
+  require(record.cycle.size() == 0 || record.cycle.size() == kCycleEntries, "cycle");
 }
 
 std::vector<RecordTable> listTables(const MotionRecord& r) {
@@ -128,6 +129,10 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
     if (k == stages) break;
     recordStage(problem, evaluator, trajectory.xs[k], trajectory.us[k], k, record);
     time += problem.getTimeScale(k, trajectory.xs[k], trajectory.us[k]) * problem.spec(k).dt;
+  }
+  if (motion.cycle) {
+    const SE3& X = *motion.cycle;
+    record.cycle = Eigen::Vector4d(time, X.p.x(), X.p.y(), calcHeading(X));
   }
   return record;
 }

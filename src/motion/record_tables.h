@@ -13,6 +13,8 @@ struct RecordTable {
   RowMatrixXd MotionRecord::*data;
   int entries;  // number of columns that form the last axis of a three-dimensional array, 0: none
 };
+inline constexpr int kCycleEntries = 4;  // of MotionRecord::cycle, where there is one
+
 std::vector<RecordTable> listTables(const MotionRecord& record);
 
 // Sets the size of every table; the names must be set.

@@ -55,10 +55,11 @@ StepError findStepError(const Model& model, const MotionRecord& record) {
 }
 
 // Whether a linkage is near the margin that keeps it from its dead points, within two nodes of a stage.
-bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Index stage, double margin) {
+bool isNearDeadPoint(const Motion& motion, const MotionRecord& record, Eigen::Index stage, double margin) {
+  const Model& model = motion.problem->model();
   constexpr double kNear = 1.5;  // over the margin
   const Eigen::Index first = std::max<Eigen::Index>(0, stage - 2), last = std::min(record.q.rows(), stage + 4);
-  for (const Linkage& linkage : listLinkages(model, record.q.row(0).transpose()))
+  for (const Linkage& linkage : listLinkages(model, motion.problem->initialState().head(model.nq())))
     for (Eigen::Index k = first; k < last; ++k) {
       const double value = calcTransmission(linkage, model, record.q.row(k).transpose());
       if (std::min(value, 1 / value) < kNear * margin) return true;
@@ -68,10 +69,11 @@ bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Inde
 
 // The least margin with which linkages would keep kNearDeadPoint from the dead points that they come nearer to; 0 where none does, or
 // where the start itself is no farther.
-double findMargin(const Model& model, const MotionRecord& record) {
+double findMargin(const Motion& motion, const MotionRecord& record) {
+  const Model& model = motion.problem->model();
   constexpr double kReserve = 1.05;  // transmissions are not straight lines over the distance
   double margin = 0;
-  for (const Linkage& linkage : listLinkages(model, record.q.row(0).transpose())) {
+  for (const Linkage& linkage : listLinkages(model, motion.problem->initialState().head(model.nq()))) {
     double share = 1;
     Eigen::Index nearest = 0;
     for (Eigen::Index k = 0; k < record.q.rows(); ++k) {
@@ -124,7 +126,7 @@ std::optional<Motion> avoidDeadPoints(const Motion& solved, const MotionRecord& 
   if (!widened || !solved.request->parts.empty()) return {};
   if (problem.objective.objective != Objective::Effort || problem.timings.areGiven()) return {};
   const StepError error = findStepError(model, record);
-  if (error.share <= kLargestStepError || !isNearDeadPoint(model, record, error.stage, margin)) return {};
+  if (error.share <= kLargestStepError || !isNearDeadPoint(solved, record, error.stage, margin)) return {};
   margin = kWideDeadPointMargin;
   return makeMotion(model, *solved.request, problem);
 }
@@ -135,7 +137,7 @@ std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const Moti
   double& margin = problem.limits.dead_point_margin;
   if (!problem.limits.enforced || margin < LimitOptions().dead_point_margin) return {};
   if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
-  const double needed = findMargin(model, record);
+  const double needed = findMargin(solved, record);
   if (needed <= margin) return {};
   margin = needed;
   RefinedMotion apart{makeMotion(model, *solved.request, problem), {}};

@@ -83,6 +83,8 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
     plans.push_back(
         part.plan(model, plans.empty() ? standing : makeStandingRobot(model, plans.back().q_end, standing.neighbours)));
     plans.back().name = part.name;
+    requireOption(!plans.back().cycle, part.name + ".periodic", "a cycle does not start where another motion ends",
+                  "leave it out");
   }
   MotionPlan sequence;
   sequence.name = "sequence";

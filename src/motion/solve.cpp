@@ -8,6 +8,7 @@
 #include "motion/applied_options.h"
 #include "motion/feasibility.h"
 #include "motion/join.h"
+#include "motion/periodic_motion.h"
 #include "motion/refinement.h"
 #include "solve/peak_problem.h"
 
@@ -25,8 +26,21 @@ bool haveRows(const ShootingProblem& problem, const Multipliers& multipliers) {
   return true;
 }
 
+Solution attemptCycle(const Motion& motion, const FddpOptions& solver, const FddpObserver& observer,
+                      const StartingPoint& start) {
+  const std::unique_ptr<PeriodicProblem> problem = makePeriodicProblem(motion);
+  Multipliers first = problem->wrap(start.multipliers);
+  first = haveRows(*problem, first) ? Multipliers{first.values, solver.constraints.initial_penalty} : Multipliers();
+  FddpResult result = bielle::solve(*problem, problem->wrap(start.trajectory), solver, observer, first);
+  Solution out{motion, problem->unwrap(result.trajectory), std::move(result.summary),
+               problem->unwrap(std::move(result.multipliers))};
+  if (out.converged()) setCyclicFeedback(out);
+  return out;
+}
+
 Solution attempt(const Motion& motion, const FddpOptions& solver, const FddpObserver& observer,
                  const StartingPoint& start) {
+  if (motion.cycle) return attemptCycle(motion, solver, observer, start);
   const std::unique_ptr<PeakProblem> peak = makePeakProblem(motion);
   const ShootingProblem& problem = peak ? static_cast<const ShootingProblem&>(*peak) : *motion.problem;
   // The penalty that a solve ended with is too stiff for another motion.

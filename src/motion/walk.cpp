@@ -35,7 +35,10 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
   const Stance stance = makeStance(model, options.gait, standing);
   LocomotionTask task;
   task.name = name;
-  task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, options.steps, first);
+  if (options.periodic) requireLevel(model, listSoles(stance), std::string(name) + " that repeats");
+  task.lead = options.periodic ? kCycleLead : 0;
+  task.plan =
+      planFootsteps(stance.feet[0], stance.feet[1], command, options.periodic ? kCycleSteps : options.steps, first);
   task.ground = makeGroundUnder(model, listSoles(stance));
   if (!task.ground.steps.empty())  // down from what one foot stands on
     for (Footstep& step : task.plan.steps) {
@@ -50,6 +53,13 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
   return {std::move(plan), stance.middle};
 }
 
+template <typename Options>
+std::vector<Goal> makeSpeed(const Options& options, const ContactSchedule& schedule, const Vector3d& direction,
+                            int steps_per_cycle) {
+  if (options.periodic) return {makeCycleSpeedGoal(schedule, options.speed, direction)};
+  return makeSpeedGoals(schedule, options.speed, direction, steps_per_cycle);
+}
+
 void addGoals(std::vector<Goal> goals, MotionPlan& plan) {
   plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
 }
@@ -59,7 +69,7 @@ void addGoals(std::vector<Goal> goals, MotionPlan& plan) {
 MotionPlan planWalk(const Model& model, const WalkOptions& o, const StandingRobot& standing) {
   StepsPlan plan = planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d::UnitX(), o.speed,
                              Side::Right, o, standing);
-  addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(0)), plan.motion);
+  addGoals(makeSpeed(o, plan.motion.schedule, plan.start.R.col(0), 1), plan.motion);
   return std::move(plan.motion);
 }
 
@@ -67,7 +77,7 @@ MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const Stan
   const Side opening = o.speed > 0 ? Side::Left : Side::Right;
   StepsPlan plan = planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d::UnitY(),
                              o.speed, opening, o, standing);
-  addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(1), 2), plan.motion);
+  addGoals(makeSpeed(o, plan.motion.schedule, plan.start.R.col(1), 2), plan.motion);
   return std::move(plan.motion);
 }
 
@@ -78,7 +88,8 @@ MotionPlan planTurn(const Model& model, const TurnOptions& o, const StandingRobo
   StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(), 0,
                              yaw > 0 ? Side::Left : Side::Right, o, standing);
   const int nodes = plan.motion.schedule.numStages();
-  addGoals({{GoalKind::Turn, "angle", o.angle, calcTolerance(o.angle, 0.02), 0, nodes}}, plan.motion);
+  const double angle = o.periodic ? 2 * yaw : o.angle;
+  addGoals({{GoalKind::Turn, "angle", angle, calcTolerance(angle, 0.02), 0, nodes}}, plan.motion);
   return std::move(plan.motion);
 }
 

@@ -257,6 +257,8 @@ ProblemText formatProblem(const Model& model, const MotionSummary& summary, cons
   const auto refuse = [&summary](const std::string& element, const std::string& problem, const std::string& remedy) {
     throw InputError(summary.file, element, problem, remedy);
   };
+  if (record.cycle.size() > 0)
+    refuse("periodic", "its first state is free, which the format does not have", "solve it without --periodic");
   if (!summary.converged) refuse("converged", "the motion is no optimum", "solve it to convergence");
   if (summary.formulation != Formulation::Reduced || summary.step != StepRule::Midpoint)
     refuse("formulation", "problems are written for closed states and midpoint steps",

@@ -80,6 +80,16 @@ RowMatrixXd takeFootholds(const std::string& path, size_t nodes, size_t contacts
   return RowMatrixXd::Map(array.numbers.data(), nodes, contacts * MotionRecord::kFootholdEntries);
 }
 
+VectorXd takeCycle(const std::string& path, NpyArrays& arrays) {
+  if (arrays.count("cycle") == 0) return {};
+  const NpyArray array = takeArray(path, "cycle", false, arrays);
+  const VectorXd cycle = VectorXd::Map(array.numbers.data(), static_cast<Eigen::Index>(array.numbers.size()));
+  if (array.shape != std::vector<size_t>{kCycleEntries} || !cycle.allFinite())
+    throw InputError(path, "array 'cycle'", "it is not the period, x, y and yaw of a cycle",
+                     "give a trajectory that Bielle wrote");
+  return cycle;
+}
+
 }  // namespace
 
 std::string formatNpz(const MotionRecord& record) {
@@ -97,6 +107,8 @@ std::string formatNpz(const MotionRecord& record) {
                            {record.footholds.data(), record.footholds.data() + record.footholds.size()},
                            {},
                            false};
+  if (record.cycle.size() > 0)
+    arrays["cycle"] = {{kCycleEntries}, {record.cycle.data(), record.cycle.data() + record.cycle.size()}, {}, false};
   addMultipliers(record.multipliers, arrays);
   return formatArchive(arrays);
 }
@@ -127,6 +139,7 @@ MotionRecord readRecord(const std::string& path) {
     record.*table.data = RowMatrixXd::Map(array.numbers.data(), rows, table.columns.size());
   }
   record.footholds = takeFootholds(path, nodes, record.contact_names.size(), arrays);
+  record.cycle = takeCycle(path, arrays);
   record.multipliers = takeMultipliers(path, nodes, arrays);
   return record;
 }

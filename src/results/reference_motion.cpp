@@ -123,10 +123,18 @@ ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, co
   const double duration = record.time[record.time.size() - 1] - record.time[0];
   if (!(duration > 0))
     throw InputError("", "motion", "it takes no time", "give the result of a motion with more than one node");
+  ReferenceMotion motion;
+  if (record.cycle.size() > 0) {
+    const double whole = std::max(1.0, std::round(duration * rate));
+    if (std::abs(whole - duration * rate) > 1e-6)
+      motion.warnings.push_back("the motion is written at " + formatNumber(whole / duration, "%.6g") +
+                                " frames per second, of which its period is " + formatNumber(whole));
+    rate = whole / duration;
+    motion.cycle = record.cycle;
+  }
   const Eigen::Index frames = static_cast<Eigen::Index>(std::floor(duration * rate + 1e-6)) + 1;
   const std::vector<int> bodies = listMjcfBodies(model);
   const Eigen::Index num_bodies = static_cast<Eigen::Index>(bodies.size());
-  ReferenceMotion motion;
   motion.rate = rate;
   motion.joint_names = listMotionJoints(model);
   for (int body : bodies) motion.body_names.push_back(model.bodies()[body].name);
@@ -181,6 +189,12 @@ std::string formatReferenceMotion(const ReferenceMotion& motion, ReferenceFormat
       makeArray(is_isaac ? motion.body_com_vel : motion.body_lin_vel, 3);
   arrays[is_amp ? "body_angular_velocities" : "body_ang_vel_w"] = makeArray(motion.body_ang_vel, 3);
   arrays["motor_torque"] = makeArray(motion.motor_torque);
+  if (motion.cycle.size() > 0) {
+    const Eigen::Vector3d offset = motion.cycle.tail<3>();
+    arrays["loop_mode"] = makeTexts({"wrap"});
+    arrays["period"].numbers = {motion.cycle[0]};
+    arrays["cycle_offset"] = {{3}, {offset.data(), offset.data() + 3}, {}, false};
+  }
   return formatArchive(arrays);
 }
 

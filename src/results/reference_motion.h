@@ -21,10 +21,12 @@ struct ReferenceMotion {
   RowMatrixXd body_lin_vel, body_ang_vel;  ///< 3 columns per body, of the origin of its frame, in the world
   RowMatrixXd body_com_vel;                ///< 3 columns per body, of its centre of mass, in the world
   RowMatrixXd motor_torque;                ///< N m or N
+  VectorXd cycle;                          ///< of a motion that repeats, as in the record; else empty
   std::vector<std::string> warnings;       ///< of hinges that nearly lock
 };
 
-/// \param q_ref  of formatMjcf()
+/// \param rate  of a motion that repeats, the nearest one at which its period is a whole number of frames is taken: the last frame
+/// is then the first one, moved   \param q_ref  of formatMjcf()
 /// \throws InputError when the motion has no time, or its loops cannot be closed at a frame
 ReferenceMotion makeReferenceMotion(const Model& model, ConstVectorRef q_ref, const MotionRecord& record, double rate);
 
@@ -35,7 +37,8 @@ enum class ReferenceFormat {
 };
 inline bool isOfIsaacLab(ReferenceFormat format) { return format != ReferenceFormat::Mjlab; }
 
-/// As a NumPy archive; all have the names of joints, bodies and motors, and motor_torque, as well. Those of mjlab have
+/// As a NumPy archive; all have the names of joints, bodies and motors, and motor_torque, as well; of a motion that
+/// repeats loop_mode ("wrap"), period (s) and cycle_offset (x, y, yaw). Those of mjlab have
 /// velocities of the frames' origins, and quaternions w, x, y, z. Those of Isaac Lab have velocities of centres of mass
 /// (its `body_lin_vel_w` and `write_root_com_velocity_to_sim`), quaternions x, y, z, w from version 3 on, and the version.
 /// \param isaac_lab  its version: 2 or 3

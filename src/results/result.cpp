@@ -12,6 +12,7 @@
 #include "formats/aside_file.h"
 #include "formats/text_file.h"
 #include "math/largest.h"
+#include "motion/periodic_motion.h"
 #include "results/ground_json.h"
 #include "results/json_text.h"
 #include "results/result_files.h"
@@ -94,6 +95,18 @@ Json makeDeadPoints(const MotionResult& result) {
   return linkages;
 }
 
+// Null of a motion that does not repeat.
+Json makePeriodic(const MotionResult& result) {
+  if (!result.cycle) return {};
+  const VectorXd& cycle = result.record.cycle;
+  const std::optional<double>& floquet = result.cycle->floquet_multiplier;
+  return {{"period_s", cycle[0]},
+          {"offset", {{"x_m", cycle[1]}, {"y_m", cycle[2]}, {"yaw_rad", cycle[3]}}},
+          {"mirrored", false},
+          {"closing_error", result.cycle->closing_error},
+          {"floquet_multiplier", floquet ? Json(*floquet) : Json()}};
+}
+
 Json makeConstraints(const FddpSummary& solver) {
   return {{"largest_violation", solver.violation},
           {"complementarity", solver.complementarity},
@@ -167,6 +180,7 @@ Json makeSummary(const MotionResult& result) {
           {"electrical_energy", makeEnergy(result)},
           {"phases", makePhases(result)},
           {"free_timings", makeTimings(result)},
+          {"periodic", makePeriodic(result)},
           {"ground", describeGround(result.ground)},
           {"log_columns", {"iteration", "cost", "gap", "violation", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
@@ -217,6 +231,10 @@ MotionResult makeResult(const RunInfo& run, const Solution& solution) {
   result.record = makeRecord(motion, trajectory);
   result.record.multipliers = solution.multipliers;
   result.objective = motion.problem_options.objective;
+  if (motion.cycle)
+    result.cycle = {
+        calcClosingError(motion.problem->model(), *motion.cycle, trajectory.xs.front(), trajectory.xs.back()),
+        solution.floquet_multiplier};
   setFigures(motion.problem->model(), result);
   const MotionTrack track = makeTrack(motion.problem->model(), result.record);
   for (const Goal& goal : motion.goals) result.goals.push_back({goal, measureGoal(goal, track)});

@@ -104,7 +104,14 @@ struct LocomotionTask {
   Side support = Side::Left;              ///< foot that stands before the first flight, if there are flights
   Vector3d direction = Vector3d::Zero();  ///< unit vector of the walking direction, or zero if there is none
   double speed = 0;                       ///< of the CoM along it, at steady steps, m/s
+  /// Of a cycle of two steps: how many are planned before it, and at least two more after it, which make it steady and are then left
+  /// out; 0: the whole motion.
+  int lead = 0;
 };
+/// Steps after which a gait has forgotten how it began: its pendulum to e^{-T / tau} at each, T their duration.
+inline constexpr int kCycleLead = 12;
+/// Steps to plan for a cycle.
+inline constexpr int kCycleSteps = 2 * kCycleLead + 2;
 
 /// Mean speed of the centre of mass over the steady steps: from the second landing to the last but two (in short
 /// motions from the first to the last but one), over a whole number of cycles of `steps_per_cycle` steps. Motions start
@@ -112,7 +119,10 @@ struct LocomotionTask {
 std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
                                  int steps_per_cycle = 1);
 
-/// Its goals are the footholds.
+/// The speed of a cycle, over all of it.
+Goal makeCycleSpeedGoal(const ContactSchedule& schedule, double speed, const Vector3d& direction);
+
+/// Its goals are the footholds. A cycle begins in the middle of a stance phase (of both feet, of a run of one), where the robot stands.
 /// \throws InputError when the request is impossible: footholds out of the legs' reach, soles that collide, durations
 MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
                           const LocomotionOptions& options);

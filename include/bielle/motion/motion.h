@@ -1,6 +1,7 @@
 #pragma once
 /// \file A motion: from a few intuitive numbers to a shooting problem with its initial guess.
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,12 +29,15 @@ struct MotionOutline {
   ShootingTrajectory guess;  ///< quasi-static: where a solve begins unless told otherwise
   OptionValues options;      ///< every option of the motion by name
   std::vector<Goal> goals;   ///< requested quantities, to be measured on the trajectory
+  /// Of a motion that repeats, one cycle: where it ends, over the ground, from where it began. Its first state is free, and its last
+  /// one is that, moved by this (carryState).
+  std::optional<SE3> cycle{};
 };
 
-/// A motion before it becomes a problem; a sequence joins several. It starts and ends standing.
+/// A motion before it becomes a problem; a sequence joins several. It starts and ends standing, unless it is a cycle.
 struct MotionPlan : MotionOutline {
   std::vector<StageSpec> stages;  ///< N running stages and the terminal stage
-  VectorXd q_start, q_end;        ///< standing postures, nq
+  VectorXd q_start, q_end;  ///< standing postures, nq; of a cycle, whose start they are not, those about which it moves
 };
 
 struct MotionRequest;
@@ -67,10 +71,11 @@ constexpr double kGuessRegularization = 1e-5;
 ObjectiveOptions scaleObjective(const Motion& effort, const ShootingTrajectory& trajectory,
                                 const ObjectiveOptions& options, const LimitOptions& limits = {});
 
-/// Turns a plan into a problem that starts at rest, adding limits, free durations, objective and step rule to its stages.
+/// Turns a plan into a problem that starts at rest, or a cycle into one of which solve() makes a PeriodicProblem, adding limits, free durations, objective and step rule to its stages.
 /// Gains are limited to values that are stable for a step (limitGains).
 /// \throws InputError for an unknown motor or phase, a limit that is not positive, a margin or bound out of its range, a joint
-/// whose range has zero width or excludes where the motion starts
+/// whose range has zero width or excludes where the motion starts; for a cycle of free durations, of least peak torque or in the full
+/// formulation
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as far as possible: with a = v = 0,
@@ -108,6 +113,9 @@ StandingRobot makeStandingRobot(const Model& model, const VectorXd& q, Neighbour
 /// The posture q moved over the ground by X, a displacement and a rotation about the vertical. A robot without a
 /// free-flyer stays in place.
 VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X);
+
+/// The state (q, v) moved likewise: velocities stay, since that of a free-flyer is in its own frame.
+VectorXd carryState(const Model& model, const VectorXd& x, const SE3& X);
 
 /// Stabilisation gains of contacts and closures, 1/s^2 and 1/s.
 struct ContactGains {

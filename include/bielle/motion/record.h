@@ -31,6 +31,9 @@ struct MotionRecord {
   /// position (m) and quaternion x, y, z, w of its frame in the world. NaN: no landing within the window.
   RowMatrixXd footholds;
   static constexpr int kFootholdEntries = 8;  ///< columns of `footholds` per contact
+  /// Of a motion that repeats (MotionOutline::cycle): its period, s, and where its end is from its beginning: turned about the
+  /// vertical through the world's origin by a yaw, then displaced by x and y: period, x, y, yaw. Else empty.
+  VectorXd cycle;
   Multipliers multipliers;  ///< of the constraints, for warm starts; without penalty if they are not known
 };
 

@@ -17,10 +17,11 @@
 namespace bielle {
 
 struct RunOptions {
-  double speed = 1;      ///< forward, of the steady steps; negative: backward, m/s
-  int steps = 8;         ///< the last one brings the feet together
-  double flight = 0.08;  ///< time in the air of every step but the last, rounded to time steps, s
-  double stance = 0.24;  ///< time on the ground of each foot, s
+  double speed = 1;       ///< forward, of the steady steps; negative: backward, m/s
+  int steps = 8;          ///< the last one brings the feet together
+  double flight = 0.08;   ///< time in the air of every step but the last, rounded to time steps, s
+  double stance = 0.24;   ///< time on the ground of each foot, s
+  bool periodic = false;  ///< one cycle of two of the steady steps alone
   LocomotionOptions gait = makeGaitDefaults();
 
   static LocomotionOptions makeGaitDefaults();

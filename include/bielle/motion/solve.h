@@ -26,7 +26,10 @@ struct Solution {
   ShootingTrajectory trajectory;
   FddpSummary summary;  ///< iterations, times and log of all attempts
   Multipliers multipliers{};
-  std::vector<Gains> gains{};  ///< N, of the solver's last sweep; none for the least peak torque
+  /// N, of the solver's last sweep; none for the least peak torque. Of a cycle that converged those of its endless repetition, with
+  /// feet that stay where they land: calcCyclicFeedback() (src/solve/periodic_problem.h).
+  std::vector<Gains> gains{};
+  std::optional<double> floquet_multiplier{};  ///< the largest of such a cycle, modulus
 
   bool converged() const { return summary.termination == FddpTermination::Converged; }
 };

@@ -1,27 +1,31 @@
 #pragma once
 /// \file Walking on level ground: forward, sideways, on the spot and along an arc.
 ///
-/// All four take footholds from footsteps.h Eq. (1), start from the standing posture, and end standing at rest.
+/// All four take footholds from footsteps.h Eq. (1), start from the standing posture, and end standing at rest; periodic ones are a
+/// cycle of two steps out of the middle of such a motion, a turn's by the angle of its steps.
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {
 
 struct WalkOptions {
-  double speed = 0.5;  ///< forward, of the steady steps; negative: backward, m/s
-  int steps = 6;       ///< the last one brings the feet together
+  double speed = 0.5;     ///< forward, of the steady steps; negative: backward, m/s
+  int steps = 6;          ///< the last one brings the feet together
+  bool periodic = false;  ///< one cycle of two of the steady steps alone
   LocomotionOptions gait;
 };
 
 struct SideWalkOptions {
-  double speed = 0.2;  ///< to the left, of the steady steps; negative: to the right, m/s
-  int steps = 6;       ///< every other one opens the stance, the next one closes it
+  double speed = 0.2;     ///< to the left, of the steady steps; negative: to the right, m/s
+  int steps = 6;          ///< every other one opens the stance, the next one closes it
+  bool periodic = false;  ///< one cycle of two of the steady steps alone
   LocomotionOptions gait;
 };
 
 struct TurnOptions {
-  double angle = 1.57;  ///< to the left; negative: to the right, rad
-  double radius = 0;    ///< of the arc that the middle of the feet follows; 0: on the spot, m
-  int steps = 8;        ///< the last one brings the feet together
+  double angle = 1.57;    ///< to the left; negative: to the right, rad
+  double radius = 0;      ///< of the arc that the middle of the feet follows; 0: on the spot, m
+  int steps = 8;          ///< the last one brings the feet together
+  bool periodic = false;  ///< one cycle of two of the steady steps alone
   LocomotionOptions gait;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 /// \file The result of a solve as three files in a directory, its record (motion/record.h) as a file, and its electrical energy.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,7 +41,7 @@ ElectricalEnergy calcElectricalEnergy(const Model& model, const MotionRecord& re
 void writeCsv(const std::string& path, const MotionRecord& record);
 
 /// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6, footholds, if there
-/// are any, N + 1 x contacts x 8. Multipliers, if known, are `multipliers` (node after node), `multiplier_rows` (N + 1, how many
+/// are any, N + 1 x contacts x 8; `cycle` of motions that repeat. Multipliers, if known, are `multipliers` (node after node), `multiplier_rows` (N + 1, how many
 /// each node has) and `multiplier_penalty` (1).
 void writeNpz(const std::string& path, const MotionRecord& record);
 
@@ -88,6 +89,12 @@ struct MotionFacts {
   Ground ground;
 };
 
+/// Of a motion that repeats.
+struct CycleFigures {
+  double closing_error = 0;  ///< largest entry of its last state (-) its first one, moved; rad, m, rad/s, m/s
+  std::optional<double> floquet_multiplier{};  ///< Solution::floquet_multiplier
+};
+
 struct MotionResult : MotionFacts {
   ContactSchedule schedule;  ///< with the final time steps
   FddpSummary solver;
@@ -101,6 +108,7 @@ struct MotionResult : MotionFacts {
   double slip_position = 0, slip_angle = 0;  ///< largest displacement of a foot from its touchdown, m and rad
   double com_start = 0, com_lowest = 0;      ///< height of the centre of mass, m
   std::vector<DeadPointTrace> dead_points;   ///< how near each linkage comes to one
+  std::optional<CycleFigures> cycle{};
 
   bool converged() const { return solver.termination == FddpTermination::Converged; }
   bool interrupted() const { return solver.termination == FddpTermination::Interrupted; }

@@ -1,0 +1,130 @@
+// Motions that repeat, against the middle of long ones and against what a cycle is.
+#include <catch2/catch.hpp>
+
+#include "bielle/model/error.h"
+#include "bielle/motion/run.h"
+#include "bielle/motion/solve.h"
+#include "bielle/motion/walk.h"
+#include "own_robots.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+SolveOptions makeOneThread() {
+  SolveOptions options;
+  options.solver.threads = 1;
+  return options;
+}
+
+// Largest entry of the last state (-) the first one, moved by hand: the base turned about the vertical and displaced.
+double calcSeam(const Model& model, const Solution& solution, const Vector3d& offset) {
+  const VectorXd &first = solution.trajectory.xs.front(), &last = solution.trajectory.xs.back();
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(offset.z(), Vector3d::UnitZ()));
+  VectorXd q = first.head(model.nq());
+  q.head<3>() = turn * Vector3d(first.head<3>()) + Vector3d(offset.x(), offset.y(), 0);
+  q.segment<4>(3) = (turn * Eigen::Quaterniond(Eigen::Vector4d(first.segment<4>(3)))).coeffs();
+  return std::max(model.difference(q, last.head(model.nq())).lpNorm<Eigen::Infinity>(),
+                  (last.tail(model.nv()) - first.tail(model.nv())).lpNorm<Eigen::Infinity>());
+}
+
+// Running costs between two nodes.
+double calcCost(const Solution& solution, int first, int last) {
+  RobotEvaluator evaluator(*solution.motion.problem);
+  double cost = 0;
+  for (int k = first; k < last; ++k)
+    cost += evaluator.evaluate(k, solution.trajectory.xs[k], solution.trajectory.us[k]).cost;
+  return cost;
+}
+
+// The node in the middle of the double support after a step of a walk.
+int findMiddle(const ContactSchedule& schedule, int step) {
+  int node = 0;
+  for (int i = 0; i < 2 * step; ++i) node += schedule.phases[i].nodes;
+  return node + (schedule.phases[2 * step].nodes + 1) / 2;
+}
+
+Solution solveCycle(const Motion& motion) {
+  REQUIRE(motion.cycle);
+  Solution solution = solve(motion, makeOneThread());
+  CAPTURE(solution.summary.message, solution.summary.iterations);
+  REQUIRE(solution.converged());
+  REQUIRE(solution.floquet_multiplier);
+  CHECK(*solution.floquet_multiplier < 1);
+  CHECK(solution.gains.size() == solution.trajectory.us.size());
+  return solution;
+}
+
+}  // namespace
+
+TEST_CASE("periodic walk: it costs no more than two steps in the middle of a long one") {
+  WalkOptions options;
+  options.periodic = true;
+  const Solution cycle = solveCycle(makeWalk(getBipetto(), options));
+  const Model& model = cycle.motion.problem->model();
+  const double length = 2 * options.speed * options.gait.timing.stepDuration();
+  CHECK(calcSeam(model, cycle, {length, 0, 0}) < 1e-7);
+  CHECK(calcSeam(model, cycle, {length + 1e-3, 0, 0}) > 1e-4);
+  const ContactSchedule& schedule = cycle.motion.schedule;
+  CHECK(schedule.phases.size() == 5);  // from double support to double support
+  CHECK(schedule.phases.front().contacts.size() == 2);
+  CHECK(schedule.phases.back().contacts.size() == 2);
+
+  options.periodic = false;
+  options.steps = 10;
+  const Solution whole = solve(makeWalk(getBipetto(), options), makeOneThread());
+  REQUIRE(whole.converged());
+  const int begin = findMiddle(whole.motion.schedule, 4), end = findMiddle(whole.motion.schedule, 6);
+  REQUIRE(end - begin == schedule.numStages());
+  const double once = calcCost(cycle, 0, schedule.numStages()), middle = calcCost(whole, begin, end);
+  CAPTURE(once, middle);
+  CHECK(once == Approx(cycle.summary.cost).epsilon(1e-9));  // the end costs nothing
+  CHECK(once <= middle * (1 + 1e-6));
+  CHECK(once > 0.9 * middle);
+
+  // The record and its file have the period and the displacement.
+  const MotionRecord record = makeRecord(cycle.motion, cycle.trajectory);
+  REQUIRE(record.cycle.size() == 4);
+  CHECK(record.cycle[0] == Approx(record.time.tail(1)[0]));
+  CHECK(record.cycle[1] == Approx(length));
+  CHECK(std::abs(record.cycle[2]) + std::abs(record.cycle[3]) < 1e-12);
+}
+
+TEST_CASE("periodic turn: the cycle turns by two of its steps", "[long]") {
+  TurnOptions options;
+  options.periodic = true;
+  const Solution cycle = solveCycle(makeTurn(getBipetto(), options));
+  const double yaw = 2 * options.angle / (options.steps - 1);
+  // About the middle of the feet at the start.
+  const MotionRecord record = makeRecord(cycle.motion, cycle.trajectory);
+  CHECK(record.cycle[3] == Approx(yaw));
+  CHECK(calcSeam(cycle.motion.problem->model(), cycle, record.cycle.tail<3>()) < 1e-7);
+}
+
+TEST_CASE("periodic side walk and run: their ends are their beginnings, moved", "[long]") {
+  SideWalkOptions side;
+  side.periodic = true;
+  const Solution aside = solveCycle(makeSideWalk(getBipetto(), side));
+  CHECK(calcSeam(aside.motion.problem->model(), aside, {0, 2 * side.speed * side.gait.timing.stepDuration(), 0}) <
+        1e-7);
+  RunOptions run;
+  run.periodic = true;
+  const Solution ahead = solveCycle(makeRun(getBipetto(), run));
+  CHECK(calcSeam(ahead.motion.problem->model(), ahead, {2 * run.speed * (run.stance + run.flight), 0, 0}) < 1e-7);
+}
+
+TEST_CASE("periodic motions: what they cannot be is refused") {
+  WalkOptions options;
+  options.periodic = true;
+  ProblemOptions problem;
+  problem.timings.phases.emplace_back(kAllPhases, TimingBounds());
+  CHECK_THROWS_AS(makeWalk(getBipetto(), options, problem), InputError);
+  problem = {};
+  problem.objective.objective = Objective::PeakTorque;
+  CHECK_THROWS_AS(makeWalk(getBipetto(), options, problem), InputError);
+  CHECK_THROWS_AS(makeWalk(getBipetto(), options, {Formulation::Full}), InputError);
+  MotionRequest sequence = makeSequenceRequest({"squat", "walk"});
+  sequence.options.set("walk.periodic", true);
+  CHECK_THROWS_AS(makeMotion(getBipetto(), sequence), InputError);
+}
