@@ -14,7 +14,7 @@ using namespace bielle;
 
 namespace {
 
-Model loadOwn(const std::string& place) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/" + place).model; }
+Model loadLeafRobot(const std::string& place) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/" + place).model; }
 
 // Largest acceleration that motor torques leave on these contacts, by the derivatives' own dynamics.
 double calcAcceleration(const Model& model, const std::vector<ContactTarget>& contacts, const VectorXd& q,
@@ -27,7 +27,7 @@ double calcAcceleration(const Model& model, const std::vector<ContactTarget>& co
 }  // namespace
 
 TEST_CASE("leaf springs: beside the middle of its feet a robot rests where they balance its weight") {
-  const Model model = loadOwn("robots/spring_biped");
+  const Model model = loadLeafRobot("robots/spring_biped");
   const StandingRobot standing = makeStandingRobot(model);
   const std::vector<ContactTarget> contacts = makeContactTargets(standing, 0, 0);
   AssemblyProblem aside;
@@ -60,13 +60,13 @@ TEST_CASE("leaf springs: beside the middle of its feet a robot rests where they 
   const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), moved.q).u;
   CHECK((u.cwiseAbs().maxCoeff() > 100 || calcAcceleration(model, contacts, moved.q, u) > 0.1));
 
-  const Model stiff = loadOwn("robots/bipetto");
+  const Model stiff = loadLeafRobot("robots/bipetto");
   const StandingRobot other = makeStandingRobot(stiff);
   CHECK(settlePosture(stiff, makeContactTargets(other, 0, 0), other.q) == other.q);
 }
 
 TEST_CASE("leaf springs: stages follow the fastest of their modes") {
-  const Model model = loadOwn("robots/spring_biped");
+  const Model model = loadLeafRobot("robots/spring_biped");
   const StandingRobot standing = makeStandingRobot(model);
   const std::vector<ContactTarget> contacts = makeContactTargets(standing, 0, 0);
   CHECK(calcSpringStage(model, standing.q, contacts) == 0.005);  // 34 Hz
@@ -80,7 +80,7 @@ TEST_CASE("leaf springs: stages follow the fastest of their modes") {
   CHECK(soft <= 0.013);
   for (const char* place : {"robots/bipetto", "examples/better_leg"}) {  // without springs, and with slow ones
     CAPTURE(place);
-    const Model other = loadOwn(place);
+    const Model other = loadLeafRobot(place);
     CHECK(makeSquat(other).problem->spec(0).dt == 0.015);
     CHECK(makeWalk(other).problem->spec(0).dt == 0.012);
   }
