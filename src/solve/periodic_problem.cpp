@@ -14,9 +14,9 @@ struct PeriodicEvaluation : NodeEvaluation {
   std::unique_ptr<NodeEvaluation> inner;  // not of the first node
 };
 
-// Of rows of (3), over which they are compared with other constraints: a thirtieth of a rad, m, rad/s or m/s is much of them. With 1
+// Of rows of (3), over which they are compared with other constraints: a hundredth of a rad, m, rad/s or m/s is much of them. With 1
 // cycles take half as many iterations more, with 10 to 100 about the same number.
-constexpr double kClosingScale = 30;
+constexpr double kClosingScale = 100;
 
 NodeEvaluation* getInnerNode(const NodeEvaluation* at) {
   return at ? static_cast<const PeriodicEvaluation&>(*at).inner.get() : nullptr;
