@@ -215,7 +215,7 @@ TEST_CASE("campaign: dry runs stop at once when the user asks for it, and equal 
       "few.yaml", "motions: [" + replaceOnce(squat, "NAME", "a") + ", " + replaceOnce(squat, "NAME", "b") +
                       "]\noptions: {seed: [1, 2]}\npush: {phase: [0.5, 1.5, 2.5], impulse: 1}\n"));
   std::set<std::string> warnings;
-  CHECK(tasks::checkCommands(few, program, directory.path() + "/log", warnings));
+  CHECK(tasks::checkCommands(few, "/bin/true", program, directory.path() + "/log", warnings));
   CHECK(countLines(calls) == 2);
 }
 

@@ -190,6 +190,49 @@ def measure_delays(runner):
     return ["motion", *map(str, delays)], rows
 
 
+# Of the parts of rsu_biped, about 2 and 125 kg.
+SMALL = ("{trunk_height: 0.06, hip_height: 0.13, plate_height: 0.03, trunk_mass: 0.6, hip_offset: 0.04, thigh_length: 0.07, "
+         "shank_length: 0.075, ankle_height: 0.03, sole_length: 0.06, sole_width: 0.045, sole_offset: 0.005, motor_mass: 0.05, "
+         "hip_link_mass: 0.05, link_density: 0.3, foot_mass: 0.05, rod_density: 0.05, pulley_mass: 0.005, armature: 1e-5, "
+         "ankle_arm: 0.015, ankle_crank: 0.015, ankle_half_width: 0.018, ankle_housing: 0.01, ankle_motor_height: 0.05}")
+LARGE = ("{trunk_height: 0.3, hip_height: 0.88, plate_height: 0.08, trunk_mass: 45, hip_offset: 0.13, thigh_length: 0.45, "
+         "shank_length: 0.43, ankle_height: 0.09, sole_length: 0.28, sole_width: 0.14, sole_offset: 0.03, motor_mass: 4.5, "
+         "hip_link_mass: 2, link_density: 8, foot_mass: 1.5, rod_density: 1, armature: 0.2, ankle_arm: 0.06, ankle_crank: 0.06, "
+         "ankle_half_width: 0.06}")
+
+
+def measure_sizes(runner):
+    rows = []
+    for name, robot, speed in (("bipetto", "bipetto", 0.4), ("bipetto", "bipetto", 0.8), ("cleobot", "cleobot", 0.4),
+                               ("rsu_biped", "rsu_biped", 0.4), ("legs of 15 cm", SMALL, 0.15), ("legs of 88 cm", LARGE, 0.8),
+                               ("rsu_biped on the Moon", "gravity: [0, 0, -1.62]", 0.2)):
+        if robot.startswith(("{", "gravity")):
+            file = pathlib.Path(runner.place() + ".yaml")
+            parts, gravity = (robot, "") if robot.startswith("{") else ("{}", robot)
+            file.write_text(f"help: {name}\n{gravity}\ntree: {{biped: {{part: rsu_biped, set: {parts}}}}}\n", encoding="utf-8")
+            robot = str(file)
+        plan = runner.solve("walk", robot, ["--speed", speed]).directory
+        for world in WORLDS[:2]:
+            s = simulate(runner, plan, "--control", "mpc", "--threads", 1, "--world", world)
+            planned = next(goal["achieved"] for goal in s["plan"]["goals"] if goal["name"] == "speed")
+            rows.append([name, world, f"{planned:.3f}", f"{s['steady_speed']:.3f}", f"{100 * s['steady_speed'] / planned:.1f}",
+                         f"{1e3 * s['largest_deviation']:.0f}"])
+    return ["robot", "world", "planned [m/s]", "walked [m/s]", "[%]", "trunk off its plan [mm]"], rows
+
+
+def measure_loads(runner):
+    loads = (1, 2, 3, 4, 6, 8, 10)
+    rows = []
+    for robot, link in (("bipetto", "trunk"), ("cleobot", "trunk"), ("rsu_biped", "trunk")):
+        plan = runner.solve("walk", robot, ["--speed", 0.4]).directory
+        for place, at in (("in the middle", "0,0,0.1"), ("10 cm ahead", "0.1,0,0.1"), ("10 cm to the left", "0,0.1,0.1")):
+            for control in ("gains", "mpc"):
+                rows.append([robot, place, control,
+                             *(tell_fall(simulate(runner, plan, "--control", control, "--threads", 1, "--payload", load,
+                                                  "--payload-at", f"{link},{at}")) for load in loads)])
+    return ["robot", "load", "control", *(f"{load} kg" for load in loads)], rows
+
+
 def measure_minutes(runner):
     rows = []
     for robot in ("bipetto", "cleobot"):
@@ -270,7 +313,7 @@ def measure_real_time(runner):
 
 
 MEASUREMENTS = {"gains": measure_gains, "sensors": measure_sensors, "errors": measure_errors, "delays": measure_delays,
-                "minutes": measure_minutes, "real_time": measure_real_time}
+                "minutes": measure_minutes, "real_time": measure_real_time, "sizes": measure_sizes, "loads": measure_loads}
 
 
 # The page
@@ -308,6 +351,10 @@ seconds until a robot falls by the torques of its plan alone (`open`), by gains 
 those of the estimated trunk, root mean squares; drift is that over the ground at the end."""),
     ("Errors of the robot", "errors", lambda: """Bipetto's walk at 0.4 m/s in Bielle's world: how many of five runs
 stand, seeds 1 to 5."""),
+    ("Loads", "loads", lambda: """Robots that carry what neither plan nor controller knows (`--payload`), on the trunk at the middle of
+the hips, 10 cm above it: walks at 0.4 m/s in Bielle's world, *stands*, or seconds until the robot falls."""),
+    ("Sizes", "sizes", lambda: """Speed of the steady steps under predictive control, over that of the plan; the same options for all. The goal
+is 98 to 102 %, from 2 to 113 kg and from 1.62 to 9.81 m/s²."""),
     ("Delay", "delays", lambda: """Gains in Bielle's world, `--jitter 1`: *stands*, or seconds until the robot falls,
 by `--delay` in ms."""),
     ("Pushes under gains", "pushes", lambda: """The largest impulse [N s] that Bipetto survives, walking at 0.4 m/s,

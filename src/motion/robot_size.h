@@ -31,7 +31,7 @@ void scaleWeights(const RobotSize& size, MotionOptions& options);
 void scaleWeights(const RobotSize& size, LocomotionOptions& options);
 
 /// Of the squares of torques and forces, nu: a force counts by the torque about an arm of kScrewArm.
-VectorXd makeControlWeights(const Model& model, const RobotSize& size);
+VectorXd makeControlWeights(const Model& model, const RobotSize& size = {});
 
 /// Weights of the tangents of q and v, 2 nv.
 void scaleStateWeights(const Model& model, const RobotSize& size, VectorXd& weights);

@@ -6,7 +6,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/math/se3.h"
-#include "motion/motor_scale.h"
+#include "motion/robot_size.h"
 
 namespace bielle::paper {
 namespace {
