@@ -15,7 +15,7 @@ TEST_CASE("files that name a generator: errors give the file, the line, the para
     CHECK_THROWS_WITH(loadRobot(file),
                       Catch::StartsWith(file + ": ") && Catch::Contains(place) && Catch::Contains(problem));
   };
-  refuse("generator: no_such\n", "key 'generator' (line 1)", "no such generator; choose one of: cleobot");
+  refuse("generator: no_such\n", "key 'generator' (line 1)", "no such generator as 'no_such'; choose one of: cleobot");
   refuse("generator: [leg_biped]\n", "key 'generator' (line 1)", "not a name");
   refuse("generator: leg_biped\nset:\n  nee: belt\n", "key 'set': key 'nee' (line 3)",
          "no such parameter; the nearest is 'knee'");

@@ -17,8 +17,8 @@
 namespace bielle {
 namespace {
 
-constexpr int kIterations = 10;  // of a window with fixed footholds
-constexpr double kEarly = 0.9;   // of the swing that is then left
+constexpr int kAimIterations = 10;  // of a window with fixed footholds
+constexpr double kSwingLeft = 0.9;   // of the swing that is then left
 constexpr int kWalks = 2;
 constexpr double kGain = 3;
 // So many landings are walked through. Steps of longer walks are alike: the others are corrected as those of the same foot before.
@@ -82,8 +82,8 @@ void WindowPlanner::aimFootholds() {
 Eigen::Vector2d WindowPlanner::findSlope(const AimedLanding& landing) {
   int begin = landing.stage;
   while (begin > horizon_->begin() && !stands(begin - 1, landing.contact)) --begin;
-  startFromGuess(landing.stage - static_cast<int>(kEarly * (landing.stage - begin)));
-  Receding solver = makeSolver(kIterations);
+  startFromGuess(landing.stage - static_cast<int>(kSwingLeft * (landing.stage - begin)));
+  Receding solver = makeSolver(kAimIterations);
   if (solver.step(trajectory_).termination == FddpTermination::Failed) return Eigen::Vector2d::Zero();
   const std::vector<VectorXd> multipliers = solver.multipliers().values;
   const FootTask& foot = *findAimedLanding(landing.free);

@@ -12,7 +12,7 @@
 namespace bielle {
 namespace {
 
-constexpr int kMostSteps = 300;
+constexpr int kMostClosingSteps = 300;
 constexpr double kMet = 1e-11;           // of held coordinates, rad or m
 constexpr double kLongestMove = 0.3;     // of a step, over all coordinates of the linkage, rad or m
 constexpr double kShortestMove = 1e-11;  // likewise
@@ -86,7 +86,7 @@ class HeldLinkage {
     state_ = last_;
     double error = updateGap(set, state_, values, gap_);
     double damping = kLeastDamping;
-    for (int i = 0; i < kMostSteps && error > 0 && gap_.head(n).cwiseAbs().maxCoeff() > kMet; ++i) {
+    for (int i = 0; i < kMostClosingSteps && error > 0 && gap_.head(n).cwiseAbs().maxCoeff() > kMet; ++i) {
       if (!takeStep(which, damping)) break;
       const bool is_closed = closeCluster<double>(*cluster_, scratch_, state_.basis, d_, no_guess_, next_);
       const double there = is_closed ? updateGap(set, next_, values, trial_) : error;

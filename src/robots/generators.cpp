@@ -117,7 +117,7 @@ Generator findGenerator(const std::string& name, const OptionValues& settings) {
     if (const std::string file = findComposition(name); !file.empty()) return makeComposedGenerator(file, settings);
   std::vector<std::string> known;
   for (const Generator& generator : listGenerators()) known.push_back(generator.name);
-  throw InputError("", "robot '" + name + "'", "there is no such generator",
+  throw InputError("", "robot '" + name + "'", "there is no such generator as '" + name + "'",
                    "choose one of: " + listItems(known) + ", or give a file that composes a robot");
 }
 

@@ -119,7 +119,7 @@ Execution carryOut(const Plan& plan, Controller& controller, World& world, const
                    const ExecutionOptions& o, const ExecutionObserver& observer) {
   const Policy& reference = plan.reference();
   const Model& model = world.model();
-  const double duration = o.duration > 0 ? o.duration : reference.duration() + o.hold;
+  const double duration = o.duration > 0 ? o.duration : plan.end.value_or(reference.duration() + o.hold);
   const int ticks = countPeriods(duration, o.control_period);
   const int most_ticks = ticks + countPeriods(kMostExtension, o.control_period);
   const int ticks_per_row = countPeriods(o.record_period, o.control_period);

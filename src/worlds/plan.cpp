@@ -83,6 +83,35 @@ std::optional<SerialModel> makeSerial(const Model& closed, const MotionSummary& 
   return makeSerialModel(closed, makeStandingPosture(closed), parseSerialArmature(summary.run.serial_armature));
 }
 
+// A motion that repeats is carried out kCycles times; as many again are there in case that this does not decide whether it stands.
+void repeat(const Motion& motion, Plan& plan) {
+  constexpr int kCycles = 10;
+  const Model& model = motion.problem->model();
+  const std::vector<Policy::Stage> cycle = plan.policy.stages();
+  const std::vector<ContactPhase> phases = plan.schedule.phases;
+  const double period = plan.policy.duration();
+  std::vector<Policy::Stage> stages;
+  plan.schedule.phases.clear();
+  SE3 X;
+  for (int i = 0; i < 2 * kCycles; ++i, X = *motion.cycle * X) {
+    for (Policy::Stage stage : cycle) {
+      VectorXd x(stage.q.size() + stage.v.size());
+      x << stage.q, stage.v;
+      stage.q = carryState(model, x, X).head(model.nq());
+      stage.start += i * period;
+      stage.phase += i * static_cast<int>(phases.size());
+      stages.push_back(std::move(stage));
+    }
+    for (ContactPhase phase : phases) {
+      for (ContactTarget& target : phase.contacts) target.X_WT = X * target.X_WT;
+      plan.schedule.phases.push_back(std::move(phase));
+    }
+  }
+  const VectorXd u = stages.back().u;
+  plan.policy = Policy(model, std::move(stages), u);
+  plan.end = kCycles * period;
+}
+
 // A plan from its request. `guess`: directory of a solution, or empty.
 Plan finishPlan(const LoadedRobot& robot, MotionSummary summary, Belief belief, const MotionRequest& request,
                 const std::string& guess, const ControlOptions& options) {
@@ -105,8 +134,9 @@ Plan finishPlan(const LoadedRobot& robot, MotionSummary summary, Belief belief, 
   int iterations = 0;
   if (!is_known) solution = solveForGains(summary.file, solution.motion, solution.trajectory, iterations);
   Plan plan{control == PlanControl::Gains ? makePolicy(solution) : makePolicy(solution.motion, solution.trajectory)};
-  plan.policy.setLookAhead(options.predictive.look_ahead);
   plan.schedule = solution.motion.schedule;
+  if (solution.motion.cycle && control != PlanControl::Predictive) repeat(solution.motion, plan);
+  plan.policy.setLookAhead(options.predictive.look_ahead);
   plan.ground = solution.motion.ground;
   plan.goals = solution.motion.goals;
   plan.robot = robot;
