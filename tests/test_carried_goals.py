@@ -81,4 +81,17 @@ def main():
         assert ("warning: speed: " in pushed and " was planned" in pushed) == (abs(pair[0] / pair[1] - 1) > 0.05), (pushed, pair)
 
 
+def check_cycle():
+    """A cycle is repeated by gains, without a seam, for as long as is asked."""
+    with tempfile.TemporaryDirectory() as place:
+        run("solve", "walk", "--robot", "rsu_biped", "--periodic", "-o", "cycle", "--no-check", "--no-report", where=place)
+        cycle = read_summary(place, "cycle")["periodic"]
+        told = run("simulate", "cycle", "-o", "walked", "--control", "gains", "--duration", "4", "--no-report", where=place).stdout
+        walked = read_summary(place, "walked")
+        assert walked["outcome"] == "stood" and walked["largest_deviation"] < 2e-3, told
+        planned = cycle["offset"]["x_m"] / cycle["period_s"]
+        assert abs(walked["distance"] / walked["duration"] / planned - 1) < 0.01, (told, planned)
+
+
 main()
+check_cycle()
