@@ -162,7 +162,7 @@ def main():
                                 (("depth: 0.9,", "deepness: 0.9,"), "deepness"), (("fps: 30", "fps: 0"), "no rate"),
                                 (("payload: [0, 3]", "payload: [3, 3]"), "again"), (("licence", "license"), "license"),
                                 (("set: {depth: 0.85, com_weight: 1, " + SHORT + "}", "options: {max-iteratoins: 1}"),
-                                 "key 'max-iteratoins' (line 6): `bielle solve squat` rejects it"),
+                                 "key 'max-iteratoins' (line 7): `bielle solve squat` rejects it"),
                                 (("robot: bipetto, payload", "robot: no_such_robot, payload"), "no_such_robot")):
             refused = run(place, SPEC.replace(*change), status=2)
             assert problem in refused.stderr, (change, refused.stderr)

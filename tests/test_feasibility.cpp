@@ -107,9 +107,8 @@ TEST_CASE(
   const double least = 6 * std::stod(error.substr(error.find("however the load is shared, ") + 28));
   CHECK(least > 0.5 * needed);
   CHECK(least < needed);
-  CHECK_THAT(getError([&] { listDoubts(makeSquat(model, squat, limitKnees(0.99 * least))); }),
-             Catch::Contains("cannot be held"));
-  CHECK_NOTHROW(listDoubts(makeSquat(model, squat, limitKnees(1.01 * least))));
+  CHECK_THAT(listDoubts(makeSquat(model, squat, limitKnees(0.99 * least))), Catch::Contains("cannot be held"));
+  CHECK_THAT(listDoubts(makeSquat(model, squat, limitKnees(1.01 * least))), !Catch::Contains("cannot be held"));
   const double remedy = std::stod(error.substr(error.find("--limit knee_left=") + 18));
   CHECK(remedy == Approx(1.05 * needed).epsilon(0.01));
   const Motion strong = makeSquat(model, squat, limitKnees(remedy));

@@ -172,7 +172,8 @@ def check_motion(where, way, make, motion, arguments, places):
         print(f"{name}: {now['iterations']} iterations, cost {now['cost']:.7g}, off by {cost:.1e}; places {off:.1e}, torques {torques:.1e}")
         # Rounding may decide whether a last iteration, which changes nothing any more, is still made.
         assert abs(now["iterations"] - was["iterations"]) <= 1, f"{name}: {was['iterations']} iterations at the origin"
-        assert cost < 1e-8 and off < 1e-6 and torques < 1e-6, name
+        # Torques are known to the root of what is left of the cost, of which a last change of 1e-11 is not seen in ten digits.
+        assert cost < 1e-10 and off < 1e-6 and torques < math.sqrt(1e-11), name
     return at_home, result
 
 
