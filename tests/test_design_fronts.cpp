@@ -183,7 +183,7 @@ TEST_CASE("design: a front that is killed goes on and ends at the same bytes") {
     CAPTURE(i);
     // To the digits of the table, one is better than its neighbours in one way and worse in the other.
     if (i > 1) CHECK(front[i][0] >= front[i - 1][0]);
-    if (i > 1) CHECK(front[i][1] <= front[i - 1][1]);
+    if (i > 1) CHECK(front[i][1] < front[i - 1][1]);
     CHECK_NOTHROW(loadRobot(whole + "/front/" + (i < 10 ? "0" : "") + std::to_string(i)));
   }
   CHECK(std::any_of(front.begin() + 1, front.end(), [&](const auto& d) { return dominates(d, front[0]); }));
@@ -250,7 +250,7 @@ TEST_CASE("design: a front with constraints is refined within them, and resumed 
     CHECK(e.constraints.at(0) < 0.7 * 1.001);
     refined += e.stage == "slsqp" && e.limits.values.size() > 0;
   }
-  CHECK(refined > 0);
+  CHECK(refined > 5);
   CHECK(violated > 0);
   CHECK(lines > 30);
   fs::create_directory(cut);

@@ -189,7 +189,7 @@ TEST_CASE("design goals: a search by gradients does not gain by squatting less")
 
 TEST_CASE("design goals: a start that misses its goal is told, and the best design is solved as `bielle solve` does") {
   const RobotDirectory directory;
-  const std::string spec = directory.write("spec.yaml", makeSpec("1e-6")), out = directory.path() + "/out";
+  const std::string spec = directory.write("spec.yaml", makeSpec("1e-3")), out = directory.path() + "/out";
   const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", out});
   INFO(result.err << result.out);
   REQUIRE(result.status == 0);

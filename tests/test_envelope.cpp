@@ -293,7 +293,7 @@ TEST_CASE("envelope: an optimum followed to first order, against optima of chang
   check(makeCleobot(), makeWalkMaker(Formulation::Reduced), 1);
 }
 
-TEST_CASE("envelope: where Gauss-Newton Hessians are far off or point the wrong way, second-order terms do not") {
+TEST_CASE("envelope: where Gauss-Newton Hessians point the wrong way, second-order terms do not") {
   struct Case {
     std::string name;
     Parametrization robot;
@@ -301,7 +301,6 @@ TEST_CASE("envelope: where Gauss-Newton Hessians are far off or point the wrong 
     int variable;
     Measure measure;
     int motor;
-    bool reversed = false;  // by Gauss-Newton
   };
   const MakeMotion jump = [](const Model& model, const StandingRobot& standing) {
     JumpOptions options;
@@ -317,8 +316,8 @@ TEST_CASE("envelope: where Gauss-Newton Hessians are far off or point the wrong 
       {"five-bar leg jumps", makeFivebar(), jump, 2, Measure::RmsTorque, 0},
       {"five-bar leg jumps", makeFivebar(), jump, 2, Measure::Energy, 0},
       {"five-bar leg squats", makeFivebar(), squat, 0, Measure::Energy, 1},
-      {"Bipetto squats", makeBipetto(1), makeSquatMaker(Formulation::Reduced), 0, Measure::PeakTorque, 4, true},
-      {"Bipetto walks", makeBipetto(1), makeWalkMaker(Formulation::Reduced), 0, Measure::RmsTorque, 4, true}};
+      {"Bipetto squats", makeBipetto(1), makeSquatMaker(Formulation::Reduced), 0, Measure::PeakTorque, 4},
+      {"Bipetto walks", makeBipetto(1), makeWalkMaker(Formulation::Reduced), 0, Measure::RmsTorque, 4}};
   for (const Case& c : cases) {
     const FollowedMotors motors(c.robot, c.make, c.variable);
     const OptimumDerivative derivative = motors.differentiate();
@@ -330,9 +329,9 @@ TEST_CASE("envelope: where Gauss-Newton Hessians are far off or point the wrong 
                 first, slope(motors.sweep(2)), slope(motors.sweep(3)), second, solved, derivative.sweeps,
                 derivative.residual);
     CAPTURE(c.name, getName(c.measure), first, second, solved);
-    CHECK((first * solved < 0) == c.reversed);
+    CHECK(first * solved < 0);
     CHECK(second == Approx(solved).epsilon(0.02).scale(0));
-    CHECK(std::abs(first - solved) > 20 * std::abs(second - solved));
+    CHECK(first != Approx(solved).epsilon(0.02).scale(0));
   }
 }
 

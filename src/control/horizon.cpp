@@ -23,9 +23,6 @@ void checkNodes(const PredictiveOptions& options) {
 // throw the swing leg about.
 constexpr double kJointShare = 0.01;
 
-// Of the weight of the base's velocity at the end of a window: with 1, a robot with springs in its legs does not come to rest.
-constexpr double kBaseShare = 2;
-
 // Where a window should end. \param joints  nv: shares of the weights of each joint
 StateCost makeEndCost(const Model& model, const VectorXd& q, const VectorXd& joints, const PredictiveOptions& o) {
   const int nv = model.nv();
@@ -34,7 +31,6 @@ StateCost makeEndCost(const Model& model, const VectorXd& q, const VectorXd& joi
   if (model.hasFreeFlyer()) {
     weights.head<6>() << o.end_place, o.end_place, o.end_posture, o.end_posture, o.end_posture, o.end_place;
     weights.segment<6>(nv).setConstant(o.end_velocity);
-    weights.segment<3>(nv) *= kBaseShare;
   }
   scaleStateWeights(model, calcRobotSize(model, makeStandingRobot(model, q)), weights);
   return {1, q, VectorXd::Zero(nv), weights};

@@ -1,5 +1,6 @@
 #include "motion/robot_size.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "motion/motor_scale.h"
@@ -8,7 +9,14 @@ namespace bielle {
 
 namespace {
 
+// Springs have a time of their own, by which no other robot is similar.
+bool hasSprings(const Model& model) {
+  return !model.pointSprings().empty() || std::any_of(model.jointForces().begin(), model.jointForces().end(),
+                                                      [](const JointForce& force) { return force.stiffness != 0; });
+}
+
 RobotSize calcSize(const Model& model, double height) {
+  if (!model.hasFreeFlyer() || hasSprings(model)) return {};
   const double gravity = model.gravity().norm();
   if (!(height > 0 && gravity > 0 && model.mass() > 0)) return {};
   const double length = height / kReferenceHeight;

@@ -22,7 +22,7 @@ struct RobotSize {
 inline constexpr double kReferenceHeight = 0.432282447583715, kReferenceMass = 25.6760512, kReferenceGravity = 9.81;
 
 /// By the height of the centre of mass over the contacts, mass and gravity; that of the reference robot where one of them is
-/// missing.
+/// missing, of legs on a rail, whose motors do not hold a whole robot, and of robots with springs.
 RobotSize calcRobotSize(const Model& model, const StandingRobot& standing);
 RobotSize calcRobotSize(const Model& model, const Stance& stance);
 
