@@ -70,7 +70,8 @@ WindowPlanner::Solution WindowPlanner::makeEmpty() const {
 }
 
 WindowPlanner::Solution WindowPlanner::makeFirst() {
-  if (horizon_->isSolved()) aimFootholds();
+  // Robots with springs are left as they were: where they stand under predictive control they drift, and sooner at their footholds.
+  if (horizon_->isSolved() && !hasSprings(model_)) aimFootholds();
   startFromGuess(0);
   if (!horizon_->isSolved()) solveFromRest();
   Receding first = makeSolver(kFirstIterations);

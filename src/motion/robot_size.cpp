@@ -7,13 +7,12 @@
 
 namespace bielle {
 
-namespace {
-
-// Springs have a time of their own, by which no other robot is similar.
 bool hasSprings(const Model& model) {
   return !model.pointSprings().empty() || std::any_of(model.jointForces().begin(), model.jointForces().end(),
                                                       [](const JointForce& force) { return force.stiffness != 0; });
 }
+
+namespace {
 
 RobotSize calcSize(const Model& model, double height) {
   if (!model.hasFreeFlyer() || hasSprings(model)) return {};

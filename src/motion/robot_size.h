@@ -26,6 +26,9 @@ inline constexpr double kReferenceHeight = 0.432282447583715, kReferenceMass = 2
 RobotSize calcRobotSize(const Model& model, const StandingRobot& standing);
 RobotSize calcRobotSize(const Model& model, const Stance& stance);
 
+/// Springs have a time of their own, by which no other robot is similar.
+bool hasSprings(const Model& model);
+
 /// Weights of integrals over time, which a sum of their values at single instants needs times RobotSize::time.
 void scaleWeights(const RobotSize& size, MotionOptions& options);
 void scaleWeights(const RobotSize& size, LocomotionOptions& options);
