@@ -170,9 +170,9 @@ def check_motion(where, way, make, motion, arguments, places):
         cost = abs(now["cost"] / was["cost"] - 1)
         off, torques = compare(name, place, trajectory, moved)
         print(f"{name}: {now['iterations']} iterations, cost {now['cost']:.7g}, off by {cost:.1e}; places {off:.1e}, torques {torques:.1e}")
-        # Rounding decides how many of the last iterations are made, which change the cost by 1e-11 of itself, and torques by its root.
-        assert abs(now["iterations"] - was["iterations"]) <= 4, f"{name}: {was['iterations']} iterations at the origin"
-        assert cost < 1e-9 and off < 1e-6 and torques < 1e-5, name
+        # Rounding may decide whether a last iteration, which changes nothing any more, is still made.
+        assert abs(now["iterations"] - was["iterations"]) <= 1, f"{name}: {was['iterations']} iterations at the origin"
+        assert cost < 1e-10 and off < 1e-6 and torques < 1e-6, name
     return at_home, result
 
 

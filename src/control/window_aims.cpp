@@ -18,7 +18,7 @@ namespace bielle {
 namespace {
 
 constexpr int kAimIterations = 10;  // of a window with fixed footholds
-constexpr double kSwingLeft = 0.9;   // of the swing that is then left
+constexpr double kSwingLeft = 0.9;  // of the swing that is then left
 constexpr int kWalks = 2;
 constexpr double kGain = 3;
 // So many landings are walked through. Steps of longer walks are alike: the others are corrected as those of the same foot before.

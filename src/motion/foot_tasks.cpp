@@ -29,10 +29,11 @@ Shape makeSoleCapsule(const ContactFrame& contact) {
 
 BodyFrame getFrame(const ContactFrame& contact) { return {contact.body, contact.X_BF}; }
 
-// z up, x where that of a foothold lies seen from above.
-Matrix3d makeLevelAxes(const SE3& X_WF) {
+// z up, x where that of a foothold, or of the base, lies seen from above. Rows in these axes are violated as much whichever way the
+// robot faces, and so the solver goes the same way.
+Matrix3d makeLevelAxes(const Matrix3d& R) {
   constexpr double kRounding = 1e-9;  // rad: what faces x does so exactly
-  const double heading = std::atan2(X_WF.R(1, 0), X_WF.R(0, 0));
+  const double heading = std::atan2(R(1, 0), R(0, 0));
   return makeAxisRotation(Vector3d::UnitZ(), std::abs(heading) < kRounding ? 0 : heading);
 }
 
@@ -100,7 +101,7 @@ void addLanding(const Model& model, const RobotSize& size, int contact, const SE
   const BodyFrame frame = getFrame(foot);
   const bool point = foot.kind == ContactKind::Point3D, edge = foot.kind == ContactKind::Edge5D;
   const Vector3d position = Vector3d::Constant(kPosition * size.length), angle = Vector3d::Constant(kAngle);
-  const Matrix3d axes = makeLevelAxes(X_WF);
+  const Matrix3d axes = makeLevelAxes(X_WF.R);
   PathConstraint place = point ? makeEquation("landing of " + foot.name,
                                               makeTurned(makeFrameTranslation(frame, X_WF.p), axes), 3, position)
                                : makeEquation("landing of " + foot.name, makeFramePlacement(frame, X_WF), 6,
@@ -113,9 +114,8 @@ void addLanding(const Model& model, const RobotSize& size, int contact, const SE
   place.lower.head<2>() = region.lower;
   Vector6d rates;
   rates << Vector3d::Constant(kVelocity * size.velocity()), Vector3d::Constant(kVelocity / size.time);
-  PathConstraint velocity = makeEquation(
-      "landing velocity of " + foot.name,
-      makeTurned(makeFrameVelocity(frame), speed > 0 ? axes : Matrix3d(Matrix3d::Identity())), point ? 3 : 6, rates);
+  PathConstraint velocity = makeEquation("landing velocity of " + foot.name, makeTurned(makeFrameVelocity(frame), axes),
+                                         point ? 3 : 6, rates);
   velocity.lower.head<3>().setConstant(-speed);
   velocity.upper.head<3>() << speed, speed, -speed;
   if (edge) {
@@ -200,8 +200,11 @@ void addRest(const Model& model, const RobotSize& size, StageSpec& terminal) {
   Vector3d bound(flies ? 0 : kFree, flies ? 0 : kFree, 0);
   if (is_planar)  // along the axes of the world that are in its plane
     bound = model.joints()[1].axis.cwiseAbs().unaryExpr([](double x) { return x > 0.5 ? kFree : 0.0; });
-  constraints.push_back({"rest of the centre of mass at the end", makeComVelocity(Vector3d::Zero()), -bound, bound,
-                         Vector3d::Constant(kVelocity * size.velocity())});
+  const Matrix3d axes =
+      flies ? makeLevelAxes(Eigen::Quaterniond(Eigen::Vector4d(terminal.state.q_ref.segment<4>(3))).toRotationMatrix())
+            : Matrix3d::Identity();
+  constraints.push_back({"rest of the centre of mass at the end", makeTurned(makeComVelocity(Vector3d::Zero()), axes),
+                         -bound, bound, Vector3d::Constant(kVelocity * size.velocity())});
   if (flies)
     constraints.push_back(makeEquation("rest of the torso at the end", makeJointVelocity({3, 4, 5}), 3,
                                        Vector3d::Constant(kVelocity / size.time)));
