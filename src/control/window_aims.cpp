@@ -1,13 +1,13 @@
-// Where feet aim, such that the windows of a solved motion keep its footholds.
+// Where feet aim, so that the windows of a solved motion keep its footholds.
 //
-// A window does not see what a shorter step leaves to be walked beyond its end: feet that are free to land elsewhere would land short
-// of their footholds. With slopes s added to the cost the planned footholds are the best of the window; and with the weight w of
-// the distance r from a foothold,
+// A window does not see that a shorter step leaves more to walk beyond its end, so feet that are free to land elsewhere land short of
+// their footholds. Adding slopes s to the cost makes the planned footholds optimal within the window. With the weight w of the
+// distance r from a foothold,
 //     s.r + 1/2 w r.r = 1/2 w |r + s/w|^2 + constant                                                                (1)
-// is the cost of the distance from a point beside it, at which the foot aims. So nothing draws a foot back more than before that a
-// push sends elsewhere. The slopes are the multipliers of fixed footholds, in the window that begins early in the swing. Since
-// later windows of a swing want others, the motion is then walked through by its own predictions, and where feet land off by d, s
-// grows by 3 w d, twice.
+// is the cost of the distance from a point beside it, at which the foot aims. The curvature stays w, so a foot that a push sends
+// elsewhere is drawn back no more than before. The slopes are the multipliers of fixed footholds in the window that begins early in the
+// swing. Later windows of the same swing would need others; so the motion is then walked through by its own predictions, and where a foot
+// lands off by d, s grows by 3 w d. This is done twice.
 #include <algorithm>
 
 #include "bielle/dynamics/kinematics.h"
@@ -21,7 +21,7 @@ constexpr int kAimIterations = 10;  // of a window with fixed footholds
 constexpr double kSwingLeft = 0.9;  // of the swing that is then left
 constexpr int kWalks = 2;
 constexpr double kGain = 3;
-// So many landings are walked through. Steps of longer walks are alike: the others are corrected as those of the same foot before.
+// Landings that are walked through. The steps of a longer walk are alike: later ones are corrected like the same foot's before.
 constexpr size_t kMostLandings = 12;
 
 const FootTask* findAimedLanding(const StageSpec& spec) {
@@ -78,7 +78,7 @@ void WindowPlanner::aimFootholds() {
   solver_ = makeSolver(options_.iterations);
 }
 
-// Of the cost of the window from early in its swing on, by where a foot lands along x and y of its foothold, 1/m.
+// Slope of the cost of the window that begins early in the swing, by where the foot lands along x and y of its foothold, 1/m.
 Eigen::Vector2d WindowPlanner::findSlope(const AimedLanding& landing) {
   int begin = landing.stage;
   while (begin > horizon_->begin() && !stands(begin - 1, landing.contact)) --begin;
@@ -111,7 +111,7 @@ void WindowPlanner::aim(const AimedLanding& landing) {
   problem_.replaceStage(horizon_->getNode(landing.stage), std::move(spec));
 }
 
-// Without a measurement, until the last foot has landed; finds where each lands.
+// Follows the predictions, without measurements, until the last of these feet has landed; finds where each lands.
 void WindowPlanner::walkThrough(std::vector<AimedLanding>& landings) {
   for (AimedLanding& landing : landings) landing.off.setZero();
   startFromGuess(0);

@@ -70,7 +70,7 @@ WindowPlanner::Solution WindowPlanner::makeEmpty() const {
 }
 
 WindowPlanner::Solution WindowPlanner::makeFirst() {
-  // Robots with springs are left as they were: where they stand under predictive control they drift, and sooner at their footholds.
+  // Not for robots with springs: standing under predictive control they drift, and fall sooner on their planned footholds.
   if (horizon_->isSolved() && !hasSprings(model_)) aimFootholds();
   startFromGuess(0);
   if (!horizon_->isSolved()) solveFromRest();

@@ -80,7 +80,7 @@ class WindowPlanner {
   struct AimedLanding {
     int stage = 0, contact = 0;
     StageSpec free;  // as it was made
-    // Of the cost by the distance from the foothold along its x and y, 1/m; and that where the foot lands, m.
+    // Along x and y of the foothold: s of window_aims.cpp Eq. (1), 1/m, and where the foot lands, m.
     Eigen::Vector2d slope = Eigen::Vector2d::Zero(), off = Eigen::Vector2d::Zero();
   };
   void aimFootholds();

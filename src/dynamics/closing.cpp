@@ -47,6 +47,7 @@ class HeldLinkage {
         state_(*cluster_),
         next_(*cluster_),
         A_(MatrixXd::Zero(cluster_->size, cluster_->size)),
+        ldlt_(cluster_->size),
         z_(VectorXd::Zero(cluster_->size)),
         d_(VectorXd::Zero(cluster_->model.nv())) {}
 
@@ -138,19 +139,8 @@ class HeldLinkage {
       }
     }
     A_.diagonal().array() += damping;
-    // A Cholesky factor in place; the matrix is positive definite by its diagonal.
-    for (Eigen::Index k = 0; k < A_.rows(); ++k) {
-      double pivot = A_(k, k);
-      for (Eigen::Index j = 0; j < k; ++j) pivot -= A_(k, j) * A_(k, j);
-      pivot = std::sqrt(std::max(pivot, 0.1 * damping));
-      A_(k, k) = pivot;
-      for (Eigen::Index r = k + 1; r < A_.rows(); ++r) {
-        double sum = A_(r, k);
-        for (Eigen::Index j = 0; j < k; ++j) sum -= A_(r, j) * A_(k, j);
-        A_(r, k) = sum / pivot;
-      }
-    }
-    solveSmallCholesky(A_, z_);
+    ldlt_.compute(A_);
+    ldlt_.solveInPlace(z_);
     d_.setZero();
     for (Eigen::Index c = 0; c < z_.size(); ++c)
       for (Eigen::Index k = 0; k < d_.size(); ++k) d_[k] += N(k, c) * z_[c];
@@ -174,6 +164,7 @@ class HeldLinkage {
   ClusterScratch scratch_;
   ClusterState last_, state_, next_;  // last_ is regular
   MatrixXd A_;                        // of Eq. (1)
+  Eigen::LDLT<MatrixXd> ldlt_;
   VectorXd z_, d_, gap_, trial_, no_guess_;
   std::vector<MatrixXd> N_X_;
   std::vector<Eigen::JacobiSVD<MatrixXd>> svds_;

@@ -102,7 +102,6 @@ Json makePeriodic(const MotionResult& result) {
   const std::optional<double>& floquet = result.cycle->floquet_multiplier;
   return {{"period_s", cycle[0]},
           {"offset", {{"x_m", cycle[1]}, {"y_m", cycle[2]}, {"yaw_rad", cycle[3]}}},
-          {"mirrored", false},
           {"closing_error", result.cycle->closing_error},
           {"floquet_multiplier", floquet ? Json(*floquet) : Json()}};
 }

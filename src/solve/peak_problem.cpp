@@ -4,39 +4,12 @@
 #include <limits>
 #include <stdexcept>
 
-#include "solve/pool.h"
+#include "solve/wrapped_problem.h"
 
 namespace bielle {
 namespace {
 
 constexpr double kLeastShare = 1e-6;  // of the limits: (2) must stay invertible
-
-struct PeakEvaluation : NodeEvaluation {
-  std::unique_ptr<NodeEvaluation> inner;
-};
-
-const PeakEvaluation& getPeak(const NodeEvaluation* at) { return static_cast<const PeakEvaluation&>(*at); }
-const NodeEvaluation* getInner(const NodeEvaluation* at) { return at ? getPeak(at).inner.get() : nullptr; }
-
-// Tasks of the inner problem, and what they point to.
-struct PeakScratch : ProblemScratch {
-  std::unique_ptr<ProblemScratch> inner;
-  std::vector<EvaluateTask> evaluations;
-  std::vector<LinearizeTask> linearizations;
-  std::vector<IntegrateTask> integrations;
-  std::vector<DifferenceTask> differences;
-  Pool<StageModel> models;
-  Pool<VectorXd> vectors;
-
-  VectorXd& takeVector(Eigen::Index size) {
-    return vectors.take([size](const VectorXd& v) { return v.size() == size; },
-                        [size](VectorXd& v) { v.resize(size); });
-  }
-  StageModel& takeModel(int ndx, int nu, int ndx_next) {
-    return models.take([=](const StageModel& model) { return model.hasSizes(ndx, nu, ndx_next); },
-                       [=](StageModel& model) { model.resize(ndx, nu, ndx_next); });
-  }
-};
 
 }  // namespace
 
@@ -60,15 +33,10 @@ void PeakProblem::getControlBounds(int stage, VectorRef lower, VectorRef upper) 
   upper[nu] = most_;
 }
 
-std::unique_ptr<NodeEvaluation> PeakProblem::makeEvaluation() const {
-  auto out = std::make_unique<PeakEvaluation>();
-  out->inner = inner_.makeEvaluation();
-  return out;
-}
+std::unique_ptr<NodeEvaluation> PeakProblem::makeEvaluation() const { return wrapEvaluation(inner_); }
 
 std::unique_ptr<ProblemScratch> PeakProblem::makeScratch() const {
-  auto out = std::make_unique<PeakScratch>();
-  out->inner = inner_.makeScratch();
+  auto out = std::make_unique<WrappedScratch>(inner_);
   const int size = batchSize();
   out->evaluations.reserve(size);
   out->linearizations.reserve(size);
@@ -89,13 +57,13 @@ std::unique_ptr<ProblemScratch> PeakProblem::makeScratch() const {
 }
 
 void PeakProblem::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memory) const {
-  auto& scratch = static_cast<PeakScratch&>(*memory);
+  auto& scratch = static_cast<WrappedScratch&>(*memory);
   std::vector<EvaluateTask>& inner = scratch.evaluations;
   inner.resize(count);
   const int nx = inner_.stateSize();
   for (int i = 0; i < count; ++i) {
     const EvaluateTask& task = tasks[i];
-    auto& at = static_cast<PeakEvaluation&>(*task.out);
+    auto& at = static_cast<WrappedEvaluation&>(*task.out);
     at.x = *task.x;
     at.inner->x = at.x.head(nx);
     if (task.node < numStages()) {
@@ -109,7 +77,7 @@ void PeakProblem::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memor
   }
   inner_.evaluate(inner.data(), count, scratch.inner.get());
   for (int i = 0; i < count; ++i) {
-    auto& at = static_cast<PeakEvaluation&>(*tasks[i].out);
+    auto& at = static_cast<WrappedEvaluation&>(*tasks[i].out);
     at.status = at.inner->status;
     at.failure = at.inner->failure;
     at.cost = at.inner->cost;
@@ -124,7 +92,7 @@ void PeakProblem::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memor
 }
 
 void PeakProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* memory) const {
-  auto& scratch = static_cast<PeakScratch&>(*memory);
+  auto& scratch = static_cast<WrappedScratch&>(*memory);
   std::vector<LinearizeTask>& inner = scratch.linearizations;
   inner.resize(count);
   scratch.models.takeBack();
@@ -134,7 +102,7 @@ void PeakProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* mem
     const int ndx = inner_.tangentSize(node), nu = running ? inner_.controlSize(node) : 0;
     const int ndx_next = running ? inner_.tangentSize(node + 1) : 0;
     inner[i].node = node;
-    inner[i].at = static_cast<PeakEvaluation&>(*tasks[i].at).inner.get();
+    inner[i].at = getInner(tasks[i].at);
     inner[i].next = getInner(tasks[i].next);
     inner[i].weights = tasks[i].weights;
     inner[i].out = &scratch.takeModel(ndx, nu, ndx_next);
@@ -205,7 +173,7 @@ void PeakProblem::setHessian(int node, const NodeEvaluation& at, const StageMode
 }
 
 void PeakProblem::integrate(const IntegrateTask* tasks, int count, ProblemScratch* memory) const {
-  auto& scratch = static_cast<PeakScratch&>(*memory);
+  auto& scratch = static_cast<WrappedScratch&>(*memory);
   std::vector<IntegrateTask>& inner = scratch.integrations;
   inner.resize(count);
   scratch.vectors.takeBack();
@@ -224,7 +192,7 @@ void PeakProblem::integrate(const IntegrateTask* tasks, int count, ProblemScratc
 }
 
 void PeakProblem::difference(const DifferenceTask* tasks, int count, ProblemScratch* memory) const {
-  auto& scratch = static_cast<PeakScratch&>(*memory);
+  auto& scratch = static_cast<WrappedScratch&>(*memory);
   std::vector<DifferenceTask>& inner = scratch.differences;
   inner.resize(count);
   scratch.vectors.takeBack();

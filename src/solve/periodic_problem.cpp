@@ -5,42 +5,18 @@
 #include <stdexcept>
 #include <utility>
 
-#include "solve/pool.h"
+#include "solve/wrapped_problem.h"
 
 namespace bielle {
 namespace {
-
-struct PeriodicEvaluation : NodeEvaluation {
-  std::unique_ptr<NodeEvaluation> inner;  // not of the first node
-};
 
 // Of rows of (3), over which they are compared with other constraints: a hundredth of a rad, m, rad/s or m/s is much of them. With 1
 // cycles take half as many iterations more, with 10 to 100 about the same number.
 constexpr double kClosingScale = 100;
 
-NodeEvaluation* getInnerNode(const NodeEvaluation* at) {
-  return at ? static_cast<const PeriodicEvaluation&>(*at).inner.get() : nullptr;
-}
-
-// Tasks of the inner problem, and what they point to.
-struct PeriodicScratch : ProblemScratch {
-  std::unique_ptr<ProblemScratch> inner;
-  std::vector<EvaluateTask> evaluations;
-  std::vector<LinearizeTask> linearizations;
-  std::vector<IntegrateTask> integrations;
-  std::vector<DifferenceTask> differences;
-  Pool<StageModel> models;
-  Pool<VectorXd> vectors;
+struct PeriodicScratch : WrappedScratch {
+  using WrappedScratch::WrappedScratch;
   ConstraintWeights weights;  // of the last node
-
-  VectorXd& takeVector(Eigen::Index size) {
-    return vectors.take([size](const VectorXd& v) { return v.size() == size; },
-                        [size](VectorXd& v) { v.resize(size); });
-  }
-  StageModel& takeModel(int ndx, int nu, int ndx_next) {
-    return models.take([=](const StageModel& model) { return model.hasSizes(ndx, nu, ndx_next); },
-                       [=](StageModel& model) { model.resize(ndx, nu, ndx_next); });
-  }
 };
 
 PeriodicScratch& getScratch(ProblemScratch* memory) { return static_cast<PeriodicScratch&>(*memory); }
@@ -86,16 +62,10 @@ std::string PeriodicProblem::getConstraintName(int node, int row) const {
                     : "end of the cycle against its beginning, row " + std::to_string(row - rows);
 }
 
-std::unique_ptr<NodeEvaluation> PeriodicProblem::makeEvaluation() const {
-  auto out = std::make_unique<PeriodicEvaluation>();
-  out->inner = inner_.makeEvaluation();
-  return out;
-}
+std::unique_ptr<NodeEvaluation> PeriodicProblem::makeEvaluation() const { return wrapEvaluation(inner_); }
 
 std::unique_ptr<ProblemScratch> PeriodicProblem::makeScratch() const {
-  auto out = std::make_unique<PeriodicScratch>();
-  out->inner = inner_.makeScratch();
-  return out;
+  return std::make_unique<PeriodicScratch>(inner_);
 }
 
 // Eq. (2)
@@ -122,18 +92,18 @@ void PeriodicProblem::evaluate(EvaluateTask* tasks, int count, ProblemScratch* m
   inner.clear();
   for (int i = 0; i < count; ++i) {
     const EvaluateTask& task = tasks[i];
-    auto& at = static_cast<PeriodicEvaluation&>(*task.out);
+    auto& at = static_cast<WrappedEvaluation&>(*task.out);
     at.x = *task.x;
     if (task.node < numStages()) at.u = *task.u;
     if (task.node == 0) continue;
     at.inner->x = getState(at.x);
     if (task.node < numStages()) at.inner->u = at.u;
-    const NodeEvaluation* previous = task.node > 1 ? getInnerNode(task.previous) : nullptr;
+    const NodeEvaluation* previous = task.node > 1 ? getInner(task.previous) : nullptr;
     inner.push_back({task.node - 1, &at.inner->x, &at.inner->u, previous, at.inner.get()});
   }
   inner_.evaluate(inner.data(), static_cast<int>(inner.size()), scratch.inner.get());
   for (int i = 0; i < count; ++i) {
-    auto& at = static_cast<PeriodicEvaluation&>(*tasks[i].out);
+    auto& at = static_cast<WrappedEvaluation&>(*tasks[i].out);
     if (tasks[i].node == 0) {
       at.cost = 0;
       at.x_next.resize(stateSize());
@@ -192,8 +162,8 @@ void PeriodicProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch*
     const bool running = node < inner_.numStages();
     LinearizeTask task;
     task.node = node;
-    task.at = getInnerNode(tasks[i].at);
-    task.next = getInnerNode(tasks[i].next);
+    task.at = getInner(tasks[i].at);
+    task.next = getInner(tasks[i].next);
     task.weights = tasks[i].weights;
     if (task.weights && !running) {
       const int rows = inner_.constraintSize(node);
@@ -222,7 +192,7 @@ void PeriodicProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch*
 }
 
 void PeriodicProblem::linearizeStart(LinearizeTask& task, ProblemScratch* inner) const {
-  const NodeEvaluation& next = *getInnerNode(task.next);
+  const NodeEvaluation& next = *getInner(task.next);
   StageModel& out = *task.out;
   const VectorXd x = getState(task.at->x_next);
   VectorXd gap(n_);
@@ -257,7 +227,7 @@ void PeriodicProblem::setModel(const LinearizeTask& task, const StageModel& inne
 void PeriodicProblem::addClosing(const LinearizeTask& task, ProblemScratch* inner) const {
   if (!task.weights) return;
   StageModel& out = *task.out;
-  const NodeEvaluation& last = *getInnerNode(task.at);
+  const NodeEvaluation& last = *getInner(task.at);
   const VectorXd gradient = kClosingScale * task.weights->gradient.tail(n_),
                  hessian = kClosingScale * kClosingScale * task.weights->hessian.tail(n_);
   const MatrixXd by_theta = differentiate(task.at->x.tail(n_), true, last, inner);
@@ -278,7 +248,7 @@ void PeriodicProblem::integrate(const IntegrateTask* tasks, int count, ProblemSc
     if (tasks[i].node == 0) continue;
     VectorXd& dx = scratch.takeVector(tasks[i].dx->size() - n_);
     dx = tasks[i].dx->head(dx.size());
-    inner.push_back({tasks[i].node - 1, getInnerNode(tasks[i].at), &dx, &scratch.takeVector(inner_.stateSize())});
+    inner.push_back({tasks[i].node - 1, getInner(tasks[i].at), &dx, &scratch.takeVector(inner_.stateSize())});
   }
   inner_.integrate(inner.data(), static_cast<int>(inner.size()), scratch.inner.get());
   auto done = inner.begin();
@@ -299,8 +269,8 @@ void PeriodicProblem::difference(const DifferenceTask* tasks, int count, Problem
     if (tasks[i].node == 0) continue;
     VectorXd& x1 = scratch.takeVector(inner_.stateSize());
     x1 = getState(*tasks[i].x1);
-    inner.push_back({tasks[i].node - 1, getInnerNode(tasks[i].at), &x1,
-                     &scratch.takeVector(inner_.tangentSize(tasks[i].node - 1))});
+    inner.push_back(
+        {tasks[i].node - 1, getInner(tasks[i].at), &x1, &scratch.takeVector(inner_.tangentSize(tasks[i].node - 1))});
   }
   inner_.difference(inner.data(), static_cast<int>(inner.size()), scratch.inner.get());
   auto done = inner.begin();

@@ -62,8 +62,7 @@ std::string describeBreak(const World& world) {
 // A sole that rolls over its edge turns by less before it lets go, and the softest ground of ours gives way by less.
 constexpr double kMostTilt = 0.2, kMostDepth = 5e-3;  // rad, m
 
-constexpr double kMostExtension = 5,
-                 kBalancePeriod = 5e-3;  // until it is decided, between looks at the balance before, s
+constexpr double kBalancePeriod = 5e-3;  // between looks at the balance, s
 
 int countPeriods(double duration, double period) {
   return std::max(1, static_cast<int>(std::lround(duration / period)));
@@ -115,11 +114,15 @@ const char* getName(Outcome outcome) {
   return "?";
 }
 
+double getEnd(const Plan& plan, const ExecutionOptions& o) {
+  return o.duration > 0 ? o.duration : plan.end.value_or(plan.reference().duration() + o.hold);
+}
+
 Execution carryOut(const Plan& plan, Controller& controller, World& world, const PerceptionOptions& sensors,
                    const ExecutionOptions& o, const ExecutionObserver& observer) {
   const Policy& reference = plan.reference();
   const Model& model = world.model();
-  const double duration = o.duration > 0 ? o.duration : plan.end.value_or(reference.duration() + o.hold);
+  const double duration = getEnd(plan, o);
   const int ticks = countPeriods(duration, o.control_period);
   const int most_ticks = ticks + countPeriods(kMostExtension, o.control_period);
   const int ticks_per_row = countPeriods(o.record_period, o.control_period);

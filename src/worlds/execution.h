@@ -94,6 +94,9 @@ std::string describeFeet(const Model& model, const Execution& execution);
 /// The force of all pushes at an instant [s], N (world).
 Vector3d calcPush(const std::vector<Push>& pushes, double time);
 
+/// When a run ends unless it is not decided yet, s.
+double getEnd(const Plan& plan, const ExecutionOptions& options);
+
 /// From the state in which the plan starts.
 /// \param controller  for the robot of the plan, from which that of the world may differ in its dimensions (robot_errors.h)
 /// \param sensors  what the controller is told

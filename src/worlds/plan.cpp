@@ -83,21 +83,20 @@ std::optional<SerialModel> makeSerial(const Model& closed, const MotionSummary& 
   return makeSerialModel(closed, makeStandingPosture(closed), parseSerialArmature(summary.run.serial_armature));
 }
 
-// A motion that repeats is carried out kCycles times; as many again are there in case that this does not decide whether it stands.
-void repeat(const Motion& motion, Plan& plan) {
+// A motion that repeats is carried out ten times, or for as long as is asked, and goes on while it is seen whether the robot stands.
+void repeat(const Motion& motion, double duration, Plan& plan) {
   constexpr int kCycles = 10;
   const Model& model = motion.problem->model();
   const std::vector<Policy::Stage> cycle = plan.policy.stages();
   const std::vector<ContactPhase> phases = plan.schedule.phases;
   const double period = plan.policy.duration();
+  plan.end = duration > 0 ? duration : kCycles * period;
   std::vector<Policy::Stage> stages;
   plan.schedule.phases.clear();
   SE3 X;
-  for (int i = 0; i < 2 * kCycles; ++i, X = *motion.cycle * X) {
+  for (int i = 0; i * period < *plan.end + kMostExtension; ++i, X = *motion.cycle * X) {
     for (Policy::Stage stage : cycle) {
-      VectorXd x(stage.q.size() + stage.v.size());
-      x << stage.q, stage.v;
-      stage.q = carryState(model, x, X).head(model.nq());
+      stage.q = carryPosture(model, stage.q, X);
       stage.start += i * period;
       stage.phase += i * static_cast<int>(phases.size());
       stages.push_back(std::move(stage));
@@ -109,7 +108,6 @@ void repeat(const Motion& motion, Plan& plan) {
   }
   const VectorXd u = stages.back().u;
   plan.policy = Policy(model, std::move(stages), u);
-  plan.end = kCycles * period;
 }
 
 // A plan from its request. `guess`: directory of a solution, or empty.
@@ -135,7 +133,7 @@ Plan finishPlan(const LoadedRobot& robot, MotionSummary summary, Belief belief, 
   if (!is_known) solution = solveForGains(summary.file, solution.motion, solution.trajectory, iterations);
   Plan plan{control == PlanControl::Gains ? makePolicy(solution) : makePolicy(solution.motion, solution.trajectory)};
   plan.schedule = solution.motion.schedule;
-  if (solution.motion.cycle && control != PlanControl::Predictive) repeat(solution.motion, plan);
+  if (solution.motion.cycle && control != PlanControl::Predictive) repeat(solution.motion, options.duration, plan);
   plan.policy.setLookAhead(options.predictive.look_ahead);
   plan.ground = solution.motion.ground;
   plan.goals = solution.motion.goals;

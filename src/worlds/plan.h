@@ -21,7 +21,11 @@ enum class PlanControl {
 struct ControlOptions {
   PlanControl control = PlanControl::Predictive;
   PredictiveOptions predictive;  ///< its look_ahead is that of gains, too (Policy::setLookAhead)
+  double duration = 0;           ///< for which a motion that repeats is to last, s; 0: ten cycles
 };
+
+/// A run goes on for up to so long until it is decided whether the robot stands, s.
+inline constexpr double kMostExtension = 5;
 
 /// What is to be carried out, and what it was planned for.
 struct Plan {

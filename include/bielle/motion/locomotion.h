@@ -104,11 +104,12 @@ struct LocomotionTask {
   Side support = Side::Left;              ///< foot that stands before the first flight, if there are flights
   Vector3d direction = Vector3d::Zero();  ///< unit vector of the walking direction, or zero if there is none
   double speed = 0;                       ///< of the CoM along it, at steady steps, m/s
-  /// Of a cycle of two steps: how many are planned before it, and at least two more after it, which make it steady and are then left
-  /// out; 0: the whole motion.
+  /// Of a cycle of two steps: the number of steps planned before it. These and the steps after it, at least two more, only make the
+  /// cycle steady and are left out of the motion. 0: the whole motion.
   int lead = 0;
 };
-/// Steps after which a gait has forgotten how it began: its pendulum to e^{-T / tau} at each, T their duration.
+/// Steps after which a gait no longer depends on how it began: each step of duration T leaves e^{-T / tau} of a deviation of its
+/// pendulum.
 inline constexpr int kCycleLead = 12;
 /// Steps to plan for a cycle.
 inline constexpr int kCycleSteps = 2 * kCycleLead + 2;

@@ -71,7 +71,8 @@ constexpr double kGuessRegularization = 1e-5;
 ObjectiveOptions scaleObjective(const Motion& effort, const ShootingTrajectory& trajectory,
                                 const ObjectiveOptions& options, const LimitOptions& limits = {});
 
-/// Turns a plan into a problem that starts at rest, or a cycle into one of which solve() makes a PeriodicProblem, adding limits, free durations, objective and step rule to its stages.
+/// Turns a plan into a problem, adding limits, free durations, objective and step rule to its stages. It starts at rest; the start of
+/// a cycle is free (solve() wraps it in a PeriodicProblem).
 /// Gains are limited to values that are stable for a step (limitGains).
 /// \throws InputError for an unknown motor or phase, a limit that is not positive, a margin or bound out of its range, a joint
 /// whose range has zero width or excludes where the motion starts; for a cycle of free durations, of least peak torque or in the full

@@ -96,13 +96,13 @@ std::vector<std::string> listIdleInPlan(const SimulateArguments& arguments, cons
 }
 
 // What a robot does that is still pushed at the end is decided by how long it is looked at.
-void requirePushesToEnd(const ExecutionOptions& o, double planned) {
-  const double end = o.duration > 0 ? o.duration : planned + o.hold;
+void requirePushesToEnd(const Plan& plan, const ExecutionOptions& o) {
+  const double end = getEnd(plan, o);
   for (const Push& push : o.pushes) {
     const double over = push.time + push.duration;
     if (over <= end + kClockTolerance) continue;
-    const std::string longer = o.duration > 0 ? "--duration " + formatNumber(over + o.hold)
-                                              : "--hold " + formatNumber(over + o.hold - planned);
+    const std::string longer = o.duration > 0 || plan.end ? "--duration " + formatNumber(over + o.hold)
+                                                          : "--hold " + formatNumber(over - end + 2 * o.hold);
     throw InputError(
         "", "--push at " + formatNumber(push.time) + " s",
         "it is over at " + formatNumber(over) + " s, but the simulation ends at " + formatNumber(end) + " s",
@@ -203,10 +203,11 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   requirePlan(arguments);
   const std::string reason = chooseControl(arguments);
   roundPeriods(arguments);
+  arguments.control.duration = arguments.execution.duration;
   const Plan plan = obtainPlan(arguments);
   std::vector<std::string> warnings = arguments.robot.empty() ? plan.robot.warnings : std::vector<std::string>();
   for (const std::string& each : listIdleOptions(arguments)) warnings.push_back(each);
-  requirePushesToEnd(arguments.execution, plan.reference().duration());
+  requirePushesToEnd(plan, arguments.execution);
   for (const std::string& each : listIdleInPlan(arguments, plan)) warnings.push_back(each);
   const PlanController controller = makeController(plan, arguments.control);
   const StandingPlace place = findPlace(plan.robot.model, plan.schedule.phases.front().contacts);

@@ -1,0 +1,266 @@
+#include "dynamics/followed_linkage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+
+#include "bielle/dynamics/kinematics.h"
+#include "dynamics/loop_problem.h"
+#include "math/decompositions.h"
+#include "math/direction.h"
+#include "math/largest.h"
+#include "math/so3.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kStride = 0.1;    // along a way, rad or L
+constexpr double kRegular = 0.05;  // of the largest: least singular value of a regular posture
+
+}  // namespace
+
+FollowedLinkage::FollowedLinkage(const Model& model, const LoopCluster& cluster)
+    : model_(selectClosures(model, cluster.closures)),
+      set_(makeConstraintSet(model_)),
+      ws_(model_),
+      dofs_(cluster.dofs),
+      length_(calcTypicalLength(model, cluster.closures)) {
+  std::set<int> joints;
+  for (int k : dofs_) {
+    joints.insert(model.dofs()[k].joint);
+    const Joint& joint = model.joints()[model.dofs()[k].joint];
+    const bool is_length = joint.kind == JointKind::Prismatic ||
+                           (joint.kind == JointKind::Planar && k - joint.idx_v < 2) ||
+                           (joint.kind == JointKind::FreeFlyer && k - joint.idx_v < 3);
+    units_.push_back(is_length ? length_ : 1);
+  }
+  for (int joint : joints) changes_.push_back({{ModelPlace::Kind::Joint, joint}, {}});
+  for (int c = 0; c < static_cast<int>(model_.closures().size()); ++c) {
+    if (model_.closures()[c].kind == ClosureKind::Coupler) continue;
+    changes_.push_back({{ModelPlace::Kind::Frame1, c}, {}});
+    changes_.push_back({{ModelPlace::Kind::Frame2, c}, {}});
+  }
+}
+
+FollowedLinkage::Rows FollowedLinkage::calcRows(const VectorXd& q, bool with_changes) {
+  updatePositions(model_, ws_, q);
+  const int n = numDofs();
+  Rows out{VectorXd(set_.rows), MatrixXd(set_.rows, n), {}};
+  if (with_changes) out.P = MatrixXd::Zero(set_.rows, 6 * static_cast<Eigen::Index>(changes_.size()));
+  MatrixXd H = MatrixXd::Zero(6, model_.nv());
+  for (size_t c = 0; c < set_.closures.size(); ++c) {
+    const Closure& closure = set_.closures[c];
+    const int row = set_.offsets[c], size = getRows(closure.kind);
+    out.r.segment(row, size) = calcClosureResidual(ws_, closure);
+    H.setZero();
+    calcClosureResidualJacobian(ws_, closure, H.topRows(size));
+    for (int k = 0; k < n; ++k) out.J.block(row, k, size, 1) = units_[k] * H.col(dofs_[k]).head(size);
+    if (closure.kind == ClosureKind::Coupler) continue;
+    if (with_changes) addChanges(static_cast<int>(c), out.P);
+    out.r.segment(row, 3) /= length_;
+    out.J.middleRows(row, 3) /= length_;
+    if (with_changes) out.P.middleRows(row, 3) /= length_;
+  }
+  return out;
+}
+
+VectorXd FollowedLinkage::move(const VectorXd& q, const VectorXd& step) const {
+  VectorXd dq = VectorXd::Zero(model_.nv());
+  for (int k = 0; k < numDofs(); ++k) dq[dofs_[k]] = units_[k] * step[k];
+  return model_.integrate(q, dq);
+}
+
+double FollowedLinkage::calcDistance(const VectorXd& from, const VectorXd& to) const {
+  const VectorXd d = model_.difference(from, to);
+  double most = 0;
+  for (int k = 0; k < numDofs(); ++k) most = std::max(most, std::abs(d[dofs_[k]]) / units_[k]);
+  return most;
+}
+
+void FollowedLinkage::findPlaneLoops(const VectorXd& q, double most) {
+  updatePositions(model_, ws_, q);
+  for (int c = 0; c < static_cast<int>(set_.closures.size()); ++c) {
+    const Closure& closure = set_.closures[c];
+    std::vector<Axis> loop;
+    bool is_plane = closure.kind != ClosureKind::Coupler;
+    for (int k : closure.dofs) {
+      const JointKind kind = model_.joints()[model_.dofs()[k].joint].kind;
+      is_plane =
+          is_plane && (kind == JointKind::Revolute || kind == JointKind::Continuous || kind == JointKind::Prismatic);
+      loop.push_back({{ModelPlace::Kind::Joint, model_.dofs()[k].joint}, kind == JointKind::Prismatic});
+    }
+    if (closure.kind == ClosureKind::Hinge5D) loop.push_back({{ModelPlace::Kind::Frame1, c}, false});
+    std::stable_sort(loop.begin(), loop.end(), [](const Axis& a, const Axis& b) { return a.slides < b.slides; });
+    if (!is_plane || loop.size() < 3 || loop[1].slides) continue;
+    const Vector3d normal = getDirection(loop[0].place);
+    for (const Axis& axis : loop) {
+      const Vector3d direction = getDirection(axis.place);
+      is_plane = is_plane && (axis.slides ? std::abs(direction.dot(normal)) : direction.cross(normal).norm()) < most;
+    }
+    if (is_plane) plane_loops_.push_back(loop);
+  }
+}
+
+FollowedLinkage::Rows FollowedLinkage::calcParallelRows(const VectorXd& q) {
+  updatePositions(model_, ws_, q);
+  Eigen::Index count = 0, row = 0;
+  for (const std::vector<Axis>& loop : plane_loops_) count += 2 * static_cast<Eigen::Index>(loop.size());
+  Rows out{VectorXd::Zero(count), {}, MatrixXd::Zero(count, 6 * static_cast<Eigen::Index>(changes_.size()))};
+  for (const std::vector<Axis>& loop : plane_loops_) {
+    const Vector3d normal = getDirection(loop[0].place);
+    const Matrix3d turn = calcRotationOfZ(normal);
+    for (size_t i = 1; i < loop.size(); ++i, row += 2) {
+      const Vector3d direction = getDirection(loop[i].place);
+      if (loop[i].slides) {
+        out.r[row] = direction.dot(normal);
+        addTurns(loop[i].place, direction.cross(normal).transpose(), out.P.row(row));
+        addTurns(loop[0].place, normal.cross(direction).transpose(), out.P.row(row));
+        continue;
+      }
+      const double side = direction.dot(normal) < 0 ? -1 : 1;
+      for (int a = 0; a < 2; ++a) {
+        const Vector3d across = turn.col(a);
+        out.r[row + a] = across.dot(direction) - side * across.dot(normal);
+        addTurns(loop[i].place, direction.cross(across).transpose(), out.P.row(row + a));
+        addTurns(loop[0].place, -side * normal.cross(across).transpose(), out.P.row(row + a));
+      }
+    }
+  }
+  return out;
+}
+
+void FollowedLinkage::change(const VectorXd& twists) {
+  ModelParts parts = takeParts(model_);
+  for (size_t i = 0; i < changes_.size(); ++i) {
+    auto& [place, change] = changes_[i];
+    const SE3 more = exp6(Vector6d(twists.segment<6>(6 * static_cast<Eigen::Index>(i))));
+    change = change * more;
+    SE3& X = findPlacement(parts, place);
+    X = X * more;
+  }
+  model_ = ModelBuilder::restore(std::move(parts));
+  set_ = makeConstraintSet(model_);
+}
+
+SE3 FollowedLinkage::getPlacementInWorld(const ModelPlace& place) const {
+  if (place.kind == ModelPlace::Kind::Joint) {
+    const Joint& joint = model_.joints()[place.index];
+    return ws_.X_WB[joint.parent] * joint.X_PJ;
+  }
+  const Closure& closure = model_.closures()[place.index];
+  return place.kind == ModelPlace::Kind::Frame1 ? ws_.X_WB[closure.body1] * closure.X_B1
+                                                : ws_.X_WB[closure.body2] * closure.X_B2;
+}
+
+Vector3d FollowedLinkage::getDirection(const ModelPlace& place) const {
+  const bool is_joint = place.kind == ModelPlace::Kind::Joint;
+  return getPlacementInWorld(place).R *
+         (is_joint ? model_.joints()[place.index].axis : model_.closures()[place.index].axis);
+}
+
+void FollowedLinkage::addTurns(const ModelPlace& axis, const Eigen::RowVector3d& by_turn,
+                               Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>> row) const {
+  const bool is_joint = axis.kind == ModelPlace::Kind::Joint;
+  const int body = is_joint ? axis.index : model_.closures()[axis.index].body1;
+  for (size_t i = 0; i < changes_.size(); ++i) {
+    const ModelPlace& place = changes_[i].place;
+    const bool turns = place.kind == ModelPlace::Kind::Joint
+                           ? model_.isAncestorOrSelf(place.index, body)
+                           : !is_joint && place.kind == axis.kind && place.index == axis.index;
+    if (turns) row.segment<3>(6 * static_cast<Eigen::Index>(i) + 3) += by_turn * getPlacementInWorld(place).R;
+  }
+}
+
+void FollowedLinkage::addChanges(int c, MatrixXd& P) const {
+  const Closure& closure = set_.closures[c];
+  const int row = set_.offsets[c], size = getRows(closure.kind);
+  const SE3 X_W1 = ws_.X_WB[closure.body1] * closure.X_B1;
+  const RowsBy6 rate = calcClosureResidualRate(ws_, closure);
+  for (size_t i = 0; i < changes_.size(); ++i) {
+    const ModelPlace& place = changes_[i].place;
+    double sign = place.kind == ModelPlace::Kind::Frame2 ? -1 : 1;
+    if (place.kind == ModelPlace::Kind::Joint) {
+      sign = static_cast<int>(model_.isAncestorOrSelf(place.index, closure.body1)) -
+             static_cast<int>(model_.isAncestorOrSelf(place.index, closure.body2));
+    } else if (place.index != c) {
+      continue;
+    }
+    if (sign != 0)
+      P.block(row, 6 * static_cast<Eigen::Index>(i), size, 6) =
+          sign * rate * X_W1.inverseTimes(getPlacementInWorld(place)).toActionMatrix();
+  }
+}
+
+std::optional<LinkageFit> fitLinkage(FollowedLinkage& linkage, VectorXd q, int m, double least) {
+  constexpr int kMost = 40;
+  constexpr double kLongest = 0.3;
+  double last = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kMost; ++i) {
+    const FollowedLinkage::Rows rows = linkage.calcRows(q, false);
+    if (!rows.r.allFinite() || !rows.J.allFinite()) return {};
+    const Eigen::JacobiSVD<MatrixXd> svd(rows.J, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const VectorXd& sigma = svd.singularValues();
+    const int rank = m >= 0 ? m : static_cast<int>((sigma.array() > least).count());
+    if (rank > sigma.size() || (rank > 0 && !(sigma[rank - 1] > 1e-9))) return {};
+    const VectorXd along = svd.matrixU().leftCols(rank).transpose() * rows.r;
+    const double error = along.norm(), damping = error < 1e-3 ? 0 : 0.3 * std::min(0.1, error);
+    VectorXd step =
+        -svd.matrixV().leftCols(rank) *
+        (along.array() * sigma.head(rank).array() / (sigma.head(rank).array().square() + damping * damping)).matrix();
+    const double size = calcLargest(step);
+    if (size < 1e-14 || (size < 1e-11 && size > 0.3 * last)) {
+      const Eigen::Index n = rows.J.cols(), all = rows.J.rows();
+      return LinkageFit{q,
+                        sigma,
+                        svd.matrixV().rightCols(n - rank),
+                        svd.matrixU().rightCols(all - rank),
+                        rows.r,
+                        calcLargest(rows.r)};
+    }
+    if (size > kLongest) step *= kLongest / size;
+    q = linkage.move(q, step);
+    last = size;
+  }
+  return {};
+}
+
+LinkageWay followLinkage(FollowedLinkage& linkage, const LinkageFit& start, int m, int count, unsigned seed,
+                         double opening) {
+  std::mt19937 rng(seed);
+  const int freedoms = linkage.numDofs() - m;
+  LinkageWay way;
+  way.gap = start.gap;
+  const double regular = m > 0 ? kRegular * start.sigma[m - 1] : 0;
+  VectorXd first;
+  double stride = kStride;
+  for (int attempt = 0; attempt < 12 && static_cast<int>(way.postures.size()) < count; ++attempt) {
+    // One freedom: there and back again, with shorter strides where the way is short.
+    VectorXd heading = start.N * VectorXd::NullaryExpr(freedoms, [&](Eigen::Index) {
+                         return static_cast<double>(rng()) / 4294967296.0 - 0.5;
+                       });
+    if (freedoms == 1 && attempt % 2 == 1) heading = -first;
+    if (freedoms == 1 && attempt > 0 && attempt % 2 == 0) stride /= 3;
+    first = heading;
+    LinkageFit here = start;
+    const int most = freedoms == 1 ? (attempt % 2 ? count : count / 2) : std::max(2, count / 6);
+    for (int i = 0; i < most * 2 && static_cast<int>(way.postures.size()) < count; ++i) {
+      VectorXd step = here.N * (here.N.transpose() * heading);
+      const double size = calcLargest(step);
+      if (!(size > 1e-6)) break;
+      heading = step;
+      step *= stride / size;
+      std::optional<LinkageFit> next = fitLinkage(linkage, linkage.move(here.q, step), m);
+      if (!next || (m > 0 && next->sigma[m - 1] < regular) || linkage.calcDistance(here.q, next->q) > 3 * stride) break;
+      here = std::move(*next);
+      way.gap = std::max(way.gap, here.gap);
+      if (here.gap > opening) return way;
+      way.moved = std::max(way.moved, linkage.calcDistance(start.q, here.q));
+      if (i % 2 == 1 || freedoms > 1) way.postures.push_back(here.q);
+    }
+  }
+  return way;
+}
+
+}  // namespace bielle
