@@ -70,9 +70,11 @@ inline std::string compareParts(const Model& a, const Model& b) {
   if (a.closures().size() != b.closures().size() || a.numClosureRows() != b.numClosureRows()) return "closures";
   for (const Closure& closure : a.closures())
     if (const int i = b.findClosure(closure.name); i < 0 || b.closures()[i].kind != closure.kind) return closure.name;
-  const auto isShape = [](const Visual& visual) { return visual.shape != Visual::Shape::Mesh; };
-  if (std::count_if(a.visuals().begin(), a.visuals().end(), isShape) != static_cast<std::ptrdiff_t>(b.visuals().size()))
-    return "shapes";
+  const auto countPrimitives = [](const Model& model) {  // not every format has meshes
+    return std::count_if(model.visuals().begin(), model.visuals().end(),
+                         [](const Visual& visual) { return visual.shape != Visual::Shape::Mesh; });
+  };
+  if (countPrimitives(a) != countPrimitives(b)) return "shapes";
   for (const ContactFrame& contact : a.contacts()) {
     const int i = b.findContact(contact.name);
     if (i < 0 || b.contacts()[i].kind != contact.kind) return contact.name;

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/impact.h"
+#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/solve.h"
 #include "bielle/motion/walk.h"
@@ -406,4 +407,34 @@ TEST_CASE("walk: what cannot be done is refused by name") {
   CHECK_THROWS_WITH(makeTurn(getBipetto(), turn), Catch::Contains("radius"));
   const LoadedRobot fourbar = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar");
   CHECK_THROWS_AS(makeWalk(fourbar.model), InputError);
+}
+
+TEST_CASE("walk: on soles and on edges, the same whichever way the robot faces") {
+  const bool has_edges = GENERATE(false, true);
+  CAPTURE(has_edges);
+  ModelParts parts = takeParts(getBipetto());
+  for (ContactFrame& contact : parts.contacts)
+    if (has_edges) contact.kind = ContactKind::Edge5D, contact.half_width = 0;
+  const Model model = ModelBuilder::restore(std::move(parts));
+  WalkOptions walk;
+  walk.steps = 2;
+  walk.speed = 0.3;
+  walk.gait.timing.time_step = 0.02;
+  const auto solve = [&](double heading) {
+    const SE3 X{Eigen::AngleAxisd(heading, Vector3d::UnitZ()).toRotationMatrix(), Vector3d::Zero()};
+    const StandingRobot standing = makeStandingRobot(model, carryPosture(model, makeStandingPosture(model), X));
+    SolveOptions how;
+    how.refine = false;
+    return bielle::solve(makeMotion(model, planWalk(model, walk, standing), ProblemOptions()), how);
+  };
+  const Solution ahead = solve(0), turned = solve(2);
+  REQUIRE(ahead.converged());
+  REQUIRE(turned.converged());
+  // Step by step, and not only at the same optimum.
+  const auto &a = ahead.summary.log, &b = turned.summary.log;
+  for (size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
+    CHECK(b[i].cost == Approx(a[i].cost).epsilon(1e-9));
+    CHECK(b[i].violation == Approx(a[i].violation).epsilon(1e-6).margin(1e-9));
+  }
+  CHECK(turned.summary.cost == Approx(ahead.summary.cost).epsilon(1e-12));
 }
