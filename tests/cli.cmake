@@ -90,3 +90,8 @@ set_tests_properties(mcap mcap_core mujoco_3 PROPERTIES LABELS system SKIP_RETUR
 add_test(NAME keys COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_keys.py $<TARGET_FILE:bielle_command>
   ${PROJECT_SOURCE_DIR})
 set_tests_properties(keys PROPERTIES LABELS system)
+
+# What messages name exists, and remedies that give a value or an option help.
+add_test(NAME remedies COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_remedies.py $<TARGET_FILE:bielle_command>
+  ${PROJECT_SOURCE_DIR})
+set_tests_properties(remedies PROPERTIES LABELS system)

@@ -13,7 +13,7 @@ set(bielle_long_tests
   # Differences over every mechanism and discretization.
   energy timings
   # Thousands of wrong files, and numbers that nobody should ask for.
-  mutated_robots hostile_numbers
+  mutated_robots hostile_numbers remedies
   # Robots in other programs, of which the first tier has a few on the page README.md.
   validate_robots validate_springs
   # Designs and robots of parts, of which the first tier has those of the pages.

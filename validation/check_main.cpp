@@ -7,6 +7,7 @@
 
 #include "bielle/model/error.h"
 #include "check.h"
+#include "cli/failure_message.h"
 #include "formats/companion.h"
 #include "formats/text_file.h"
 #include "model/missing_part.h"
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Checks a result of `bielle solve` from its files alone: forces and energies with Simbody's dynamics, steps, "
       "loops, feet, friction, limits. Exit status: 0 passed, 1 a check failed, 2 bad input."};
+  app.failure_message(bielle::cli::describeFailure);
   app.name("bielle check");
   std::string directory;
   bool json = false, brief = false;

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bielle/model/error.h"
+#include "cli/failure_message.h"
 #include "results/number_option.h"
 #include "results/standard_output.h"
 #include "validate.h"
@@ -51,6 +52,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Compares the dynamics of robots with Simbody's or MuJoCo's at random closed states. Exit status: 0 all agree, 1 "
       "a row failed, 2 bad input."};
+  app.failure_message(bielle::cli::describeFailure);
   app.name("bielle validate");
   std::vector<std::string> robots;
   ValidationOptions options;

@@ -16,6 +16,7 @@
 #include "cli/objective.h"
 #include "cli/table.h"
 #include "motion/applied_options.h"
+#include "motion/feasibility.h"
 #include "results/interrupt.h"
 #include "results/output_place.h"
 #include "results/setting.h"
@@ -205,13 +206,6 @@ StartingPoint readStart(const std::string& directory, const Motion& motion) {
   }
 }
 
-// Whatever does not depend on the motion that is asked for.
-int checkRequest(const Model& model, const MotionRequest& request, const ProblemOptions& problem) {
-  request.options.check();
-  Limits(model, problem.limits, makeStandingPosture(model));
-  return kOk;
-}
-
 int solve(const SolveArguments& arguments, MotionRequest request) {
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] = splitSetting("--set", setting, "com_weight=1e5");
@@ -230,11 +224,14 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   problem.limits = makeLimits(arguments);
   problem.timings = makeTimings(arguments.timings);
   problem.step = arguments.step.value_or(serial ? StepRule::Euler : StepRule::Midpoint);
-  if (arguments.dry_run) return checkRequest(model, request, problem);
   const Motion motion = makeMotion(model, request, problem);
   SolveOptions options;
   options.solver = arguments.solver;
   if (!arguments.warm_start.empty()) options.start = readStart(arguments.warm_start, motion);
+  if (arguments.dry_run) {
+    checkFeasibility(motion, options.start ? &*options.start : nullptr, makeObserver(arguments).warn);
+    return kOk;
+  }
   makeOutputDirectory(arguments.directory);
   watchInterrupts();
   const MotionResult result =
@@ -282,8 +279,12 @@ void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) 
   sub.add_option("-o,--output", arguments->directory,
                  "directory for trajectory.csv, trajectory.npz, summary.json, the robot (mechanism.urdf, .yaml) and "
                  "report.html; "
-                 "created if necessary")
-      ->required();
+                 "created if necessary; required unless --dry-run is given");
+}
+
+// What the options of one command say together.
+void requireOutput(const SolveArguments& arguments) {
+  if (arguments.directory.empty() && !arguments.dry_run) throw CLI::RequiredError("--output");
 }
 
 // Options common to all motions.
@@ -340,7 +341,8 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
   sub.add_flag("--quiet", arguments->quiet, "do not print a line per iteration");
   sub.add_flag("--no-report", arguments->no_report, "do not write report.html");
   sub.add_flag("--no-check", arguments->no_check, "do not run `bielle check` on the result");
-  sub.add_flag("--dry-run", arguments->dry_run, "check the options and the robot only: plan nothing, write nothing");
+  sub.add_flag("--dry-run", arguments->dry_run,
+               "plan the motion and check it as before the first iteration: solve nothing, write nothing");
 }
 
 constexpr const char* kOutcome =
@@ -361,7 +363,10 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   addSolverOptions(sub, arguments);
   sub.footer("Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " +
              motion.example + "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" + kOutcome);
-  sub.callback([&action, arguments, request] { action = [=] { return solve(*arguments, *request); }; });
+  sub.callback([&action, arguments, request] {
+    requireOutput(*arguments);
+    action = [=] { return solve(*arguments, *request); };
+  });
 }
 
 constexpr const char* kSequenceExample =
@@ -395,8 +400,10 @@ void addSequence(CLI::App& command, Action& action) {
              kSequenceExample +
              "\n  bielle solve sequence --robot bipetto --motions walk,turn,walk --set walk2.speed=0.3 -o " +
              "there\n" + kOutcome);
-  sub.callback(
-      [&action, arguments, motions] { action = [=] { return solve(*arguments, makeSequenceRequest(*motions)); }; });
+  sub.callback([&action, arguments, motions] {
+    requireOutput(*arguments);
+    action = [=] { return solve(*arguments, makeSequenceRequest(*motions)); };
+  });
 }
 
 }  // namespace

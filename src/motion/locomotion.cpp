@@ -78,18 +78,27 @@ void check(const Scene& scene) {
                    formatNumber(height, "%.3g") + " m at the start, to take off and land",
                "request a shorter flight, or a longer stance");
     }
+  int refused = 0;  // the first step, the way to which is too far
+  double widest = 0, across = 0, up = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     if (phase.isDoubleSupport() || phase.flies()) continue;
     const int side = phase.stands(Side::Left) ? 0 : 1, i = phase.steps_done;
     const Vector3d apart = scene.task.plan.steps[i].X_WF.p - scene.task.plan.getStance(i)[side].p;
-    if (std::hypot(apart.head<2>().norm() / 2, kCrouch * height + std::abs(apart.z()) / 2) > kStretch * strut)
-      refuse(i + 1,
-             "its foothold is out of reach: the feet would be " + formatNumber(apart.norm()) + " m apart, " +
-                 formatNumber(std::abs(apart.z()), "%.3g") + " m of it in height; these legs bridge " +
-                 formatNumber(2 * std::sqrt(std::pow(kStretch * strut, 2) - std::pow(kCrouch * height, 2)), "%.2g") +
-                 " m on the level, or climb " + formatNumber(2 * (kStretch * strut - kCrouch * height), "%.2g") + " m",
-             "give lengths in metres; request a lower speed, or shorter, lower or more steps");
+    const double level = apart.head<2>().norm(), height_apart = std::abs(apart.z());
+    widest = std::max(widest, level);
+    if (refused > 0 || std::hypot(level / 2, kCrouch * height + height_apart / 2) <= kStretch * strut) continue;
+    refused = i + 1, across = level, up = height_apart;
   }
+  if (refused == 0) return;
+  const double bridged = 2 * std::sqrt(std::pow(kStretch * strut, 2) - std::pow(kCrouch * height, 2));
+  const double speed = up > 1e-3 ? 0 : 0.8 * bridged / widest * scene.task.speed;  // that of stairs changes no step
+  refuse(refused,
+         "its foothold is out of reach: the feet would be " + formatNumber(across, "%.3g") + " m apart" +
+             (up > 1e-3 ? ", and " + formatNumber(up, "%.3g") + " m in height" : "") + "; these legs bridge " +
+             formatNumber(bridged, "%.2g") + " m on the level, or climb " +
+             formatNumber(2 * (kStretch * strut - kCrouch * height), "%.2g") + " m",
+         "give lengths in metres; request shorter or lower steps" +
+             (speed != 0 ? ", by a speed of e.g. " + formatNumber(speed, "%.2g") + " m/s" : ""));
 }
 
 std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& schedule) {

@@ -11,6 +11,7 @@
 #include "bielle/motion/registry.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
+#include "cli/failure_message.h"
 #include "cli/simulate/free.h"
 #include "cli/simulate/output.h"
 #include "cli/simulate/watch.h"
@@ -247,6 +248,7 @@ int main(int argc, char** argv) {
       "Executes a motion in a physics simulation with contact: a result of `bielle solve`, or a motion that is solved "
       "first. A controller reads the robot's state and commands its motors; feet stand or slip as friction allows. "
       "Given a robot alone, lets it move freely, with or without feet, under torques, springs and pushes."};
+  app.failure_message(bielle::cli::describeFailure);
   app.name("bielle simulate");
   SimulateArguments arguments;
   addOptions(app, arguments);
