@@ -54,23 +54,27 @@ Solution attempt(const Motion& motion, const FddpOptions& solver, const FddpObse
   return out;
 }
 
-// The better of two attempts, with the iterations and times of both.
+// What the solve before this one took.
+void addWork(const FddpSummary& before, FddpSummary& summary) {
+  for (const auto count :
+       {&FddpSummary::iterations, &FddpSummary::linearizations, &FddpSummary::rollouts, &FddpSummary::searches})
+    summary.*count += before.*count;
+  for (const auto seconds : {&FddpSummary::seconds, &FddpSummary::evaluate_seconds, &FddpSummary::linearize_seconds,
+                             &FddpSummary::sweep_seconds, &FddpSummary::rollout_seconds, &FddpSummary::search_seconds})
+    summary.*seconds += before.*seconds;
+}
+
+// The better of two attempts, with what both took.
 Solution join(Solution first, Solution second) {
   const bool both = second.summary.termination == FddpTermination::Infeasible;
-  const FddpSummary &before = first.summary, &after = second.summary;
-  Solution& better = both && before.violation < after.violation ? first : second;
-  FddpSummary out = better.summary;
-  out.iterations = before.iterations + after.iterations;
-  out.multiplier_updates = before.multiplier_updates + after.multiplier_updates;
-  out.seconds = before.seconds + after.seconds;
-  out.evaluate_seconds = before.evaluate_seconds + after.evaluate_seconds;
-  out.linearize_seconds = before.linearize_seconds + after.linearize_seconds;
-  out.sweep_seconds = before.sweep_seconds + after.sweep_seconds;
-  out.rollout_seconds = before.rollout_seconds + after.rollout_seconds;
-  out.log = before.log;
-  out.log.insert(out.log.end(), after.log.begin(), after.log.end());
-  if (both) out.message += "; the better of two attempts";
-  better.summary = std::move(out);
+  const bool is_first = both && first.summary.violation < second.summary.violation;
+  Solution &better = is_first ? first : second, &other = is_first ? second : first;
+  std::vector<FddpIteration> log = first.summary.log;
+  log.insert(log.end(), second.summary.log.begin(), second.summary.log.end());
+  better.summary.log = std::move(log);
+  better.summary.multiplier_updates += other.summary.multiplier_updates;
+  addWork(other.summary, better.summary);
+  if (both) better.summary.message += "; the better of two attempts";
   return std::move(better);
 }
 
@@ -113,10 +117,9 @@ std::string format(const FddpSummary& summary) {
 
 bool areKeptFromDeadPoints(const LimitOptions& limits) { return limits.enforced && limits.dead_point_margin > 0; }
 
-// The second solve, with the iterations and the time of both.
+// The second solve, with what both took.
 FddpSummary addUp(const FddpSummary& first, FddpSummary second) {
-  second.iterations += first.iterations;
-  second.seconds += first.seconds;
+  addWork(first, second);
   return second;
 }
 

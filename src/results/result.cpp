@@ -114,6 +114,19 @@ Json makeConstraints(const FddpSummary& solver) {
           {"multiplier_updates", solver.multiplier_updates}};
 }
 
+// What the iterations did, and how long, summed over the threads.
+Json makeWork(const FddpSummary& solver) {
+  return {{"linearizations", solver.linearizations},
+          {"rollouts", solver.rollouts},
+          {"searches", solver.searches},
+          {"seconds",
+           {{"evaluate", solver.evaluate_seconds},
+            {"linearize", solver.linearize_seconds},
+            {"sweep", solver.sweep_seconds},
+            {"rollout", solver.rollout_seconds - solver.search_seconds},
+            {"search", solver.search_seconds}}}};
+}
+
 }  // namespace
 
 Json listGoals(const std::vector<GoalOutcome>& outcomes) {
@@ -161,6 +174,7 @@ Json makeSummary(const MotionResult& result) {
           {"cost", result.solver.cost},
           {"iterations", result.solver.iterations},
           {"seconds", result.solver.seconds},
+          {"work", makeWork(result.solver)},
           {"solver_gap", result.solver.gap},
           {"constraints", makeConstraints(result.solver)},
           {"nodes", time.size()},

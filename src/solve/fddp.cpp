@@ -170,8 +170,7 @@ FddpSolve::End FddpSolve::searchLine() {
 bool FddpSolve::tryFullStep(int segments) {
   const RolloutInput input = startSearch();
   if (mustClose()) return tryClosed(input, segments);
-  Trial& trial = memory_.rollout.getTrial(0);
-  memory_.rollout.cut(input, 1, segments);
+  Trial& trial = rollOut(input, 1, segments);
   return !isOvershooting(trial) && accept(trial);
 }
 
@@ -182,8 +181,7 @@ bool FddpSolve::tryShorterStep(int segments) {
   if (mustClose() || !trial.ok) return false;
   const double alpha = findMinimum(trial);
   if (alpha < kShortest || alpha >= 1) return false;
-  memory_.rollout.cut(startSearch(), alpha, segments);
-  return accept(trial);
+  return accept(rollOut(startSearch(), alpha, segments));
 }
 
 // Whether the models are wrong about the last trial because of the rows that it violates although they are free in them.

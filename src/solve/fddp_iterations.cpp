@@ -124,6 +124,7 @@ FddpIterations::End FddpIterations::linearizeAndSweep() {
   const int failed =
       std::exchange(prepared_, false) ? backward.finish(getBackwardInput()) : backward.update(getBackwardInput());
   swept_ = true;
+  ++summary_.linearizations;
   if (failed < 0) return {};
   summary_.message = "node " + std::to_string(failed) + ": " + backward.getFailure(failed);
   return FddpTermination::Failed;
@@ -306,6 +307,7 @@ FddpSummary FddpIterations::finish(FddpTermination termination) {
   summary_.linearize_seconds = memory_.backward.linearizeSeconds();
   summary_.sweep_seconds += memory_.backward.sweepSeconds();
   summary_.rollout_seconds = memory_.rollout.getSeconds();
+  summary_.search_seconds = memory_.rollout.getSearchSeconds();
   const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax ||
                       termination == FddpTermination::Infeasible;
   if (judged && line_.step == 0) {  // the iterate from which no step was taken

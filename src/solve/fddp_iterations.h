@@ -72,6 +72,7 @@ class FddpIterations {
 
   // Searches: false if no step is acceptable.
   RolloutInput startSearch();
+  Trial& rollOut(const RolloutInput& input, double alpha, int segments);
   bool searchInOnePiece(const RolloutInput& input);
   bool tryClosed(const RolloutInput& input, int segments);
   bool accept(Trial& trial);

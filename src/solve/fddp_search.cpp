@@ -53,6 +53,13 @@ RolloutInput FddpIterations::startSearch() {
           threads_};
 }
 
+// A step in segments: the first trial.
+Trial& FddpIterations::rollOut(const RolloutInput& input, double alpha, int segments) {
+  ++summary_.rollouts;
+  memory_.rollout.cut(input, alpha, segments);
+  return memory_.rollout.getTrial(0);
+}
+
 // Steps of all lengths, each in one piece.
 bool FddpIterations::searchInOnePiece(const RolloutInput& input) {
   Rollout& rollout = memory_.rollout;
@@ -62,6 +69,7 @@ bool FddpIterations::searchInOnePiece(const RolloutInput& input) {
     if (isInterrupted()) return false;
     const int num = std::min(num_trials, options_.num_step_lengths - i);
     rollout.search(input, alpha, num);
+    ++summary_.searches;
     for (int j = 0; j < num; ++j, alpha *= 0.5)
       if (accept(rollout.getTrial(j))) return true;
   }
@@ -76,8 +84,11 @@ bool FddpIterations::tryClosed(const RolloutInput& input, int segments) {
   trial.ok = closesTwice(segments);
   if (!trial.ok) return false;
   const auto closes = [&] { return trial.gap_max <= options_.gap_tolerance; };
-  rollout.cut(input, 1, segments);
-  if (trial.ok && !closes()) rollout.close(input);
+  rollOut(input, 1, segments);
+  if (trial.ok && !closes()) {
+    rollout.close(input);
+    ++summary_.rollouts;
+  }
   return closes() && accept(trial);
 }
 

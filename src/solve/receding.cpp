@@ -98,8 +98,7 @@ class RecedingStep : private FddpIterations {
     double alpha = 1;
     for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.25) {
       if (isInterrupted()) return false;
-      memory_.rollout.cut(input, alpha, segments);
-      if (accept(memory_.rollout.getTrial(0))) return true;
+      if (accept(rollOut(input, alpha, segments))) return true;
     }
     return false;
   }

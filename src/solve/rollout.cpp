@@ -50,7 +50,7 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments, int num_t
   }
   for (VectorXd* x : {&joint_gap_, &joint_slope_, &shift_}) x->setZero(largest);
   control_.setZero(most_controls);
-  seconds_ = 0;
+  seconds_ = search_seconds_ = 0;
 }
 
 void Rollout::cut(const RolloutInput& input, double alpha, int segments) {
@@ -102,7 +102,9 @@ void Rollout::search(const RolloutInput& input, double alpha, int num) {
     track.end = N_;
     track.rolling = rolling_ ? 2 * i : -1;
   }
+  const double before = seconds_;
   rollOut(input, num);
+  search_seconds_ += seconds_ - before;
   for (int i = 0; i < num; ++i) updateGaps(input, 1, trials_[i]);
 }
 

@@ -52,8 +52,9 @@ class Rollout {
   Trial& getTrial(int i) { return trials_[i]; }
   /// Whether the trial's evaluations are those of the input's NodeEvaluations: trials side by side do not keep theirs.
   bool hasEvaluations() const { return !rolling_; }
-  /// Time of all rollouts since resize(), summed over the threads.
+  /// Time of all rollouts since resize(), summed over the threads, and of those of search().
   double getSeconds() const { return seconds_; }
+  double getSearchSeconds() const { return search_seconds_; }
 
  private:
   // Consecutive stages of a trial.
@@ -100,7 +101,7 @@ class Rollout {
   int num_segments_ = 0;  // of the last cut()
   bool rolling_ = false;
   VectorXd joint_gap_, joint_slope_, shift_, control_;
-  double seconds_ = 0;
+  double seconds_ = 0, search_seconds_ = 0;
 };
 
 }  // namespace bielle
