@@ -216,6 +216,31 @@ TEST_CASE("files of today's MuJoCo: frames, sites in equalities, inertia by shap
   CHECK(d.closures < kTolerance);
 }
 
+TEST_CASE("the mass of shapes that only MuJoCo 2 discards counts, and is told") {
+  // In MuJoCo 2.2.2 the first of them weighs 1 kg and the second 1.5 kg, in 3.14 both 1.5 kg.
+  const RobotDirectory directory;
+  const auto load = [&](const std::string& compiler, const std::string& contact, const std::string& inertial) {
+    return loadRobot(directory.write("robot.xml", "<mujoco><compiler " + compiler + "/><worldbody><body name=\"b\">" +
+                                                      inertial +
+                                                      "<joint name=\"j\"/><geom type=\"box\" size=\"1 1 1\" " +
+                                                      "mass=\"1\"/>\n<geom type=\"sphere\" size=\"1\" mass=\"0.5\" " +
+                                                      contact + "/></body></worldbody></mujoco>"));
+  };
+  const auto tells = [](const LoadedRobot& robot) {
+    return std::any_of(robot.warnings.begin(), robot.warnings.end(), [](const std::string& warning) {
+      return warning.find("<geom> (line 2): its mass counts, as in MuJoCo 3; MuJoCo 2 leaves it out") !=
+             std::string::npos;
+    });
+  };
+  const std::string discards = "discardvisual=\"true\"", visual = "contype=\"0\" conaffinity=\"0\"",
+                    inertial = "<inertial pos=\"0 0 0\" mass=\"4\" diaginertia=\"1 1 1\"/>";
+  CHECK(tells(load(discards, visual, "")));
+  CHECK(load(discards, visual, "").model.bodies()[1].inertia.mass == Approx(1.5));
+  for (const LoadedRobot& robot :
+       {load(discards, "contype=\"0\"", ""), load(discards, visual, inertial), load("", visual, "")})
+    CHECK_FALSE(tells(robot));
+}
+
 TEST_CASE("line breaks mean nothing: equalities and tendons without names may share a line") {
   std::string xml =
       R"(<mujoco><worldbody><body name="a"><joint name="a" axis="0 1 0"/><geom size="0.1"/><site name="s"/></body>

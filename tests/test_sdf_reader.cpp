@@ -258,6 +258,9 @@ TEST_CASE("SDF files that are no robot are errors with a remedy") {
   const auto getSdfError = [](const std::string& text) { return getError([&] { loadSdf(text); }); };
   const std::string whole = makeFourBar("");
   CHECK_THAT(getSdfError("<robot/>"), Catch::Contains("its outermost element is not <sdf>; give an SDF file"));
+  CHECK_THAT(
+      getSdfError(replaceOnce(whole, " version=\"1.9\"", "")),
+      Catch::Contains("<sdf> (line ") && Catch::Contains("it has no version; give the one that it was written for"));
   for (size_t length = 1; length + 20 < whole.size(); length += 53) {
     const std::string error = getSdfError(whole.substr(0, length));
     CAPTURE(error);

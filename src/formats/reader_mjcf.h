@@ -195,7 +195,7 @@ class MjcfReader {
   double first_group_ = 0, last_group_ = 5, least_mass_ = 0, least_moment_ = 0, total_mass_ = 0;
   bool has_gravity_ = true, has_equalities_ = true, is_safe_ = true;  // flags of <option>
   double time_step_ = 0.002;                                          // s
-  bool balances_inertia_ = false, strips_path_ = false, is_exact_ = false;
+  bool balances_inertia_ = false, strips_path_ = false, is_exact_ = false, discards_visuals_ = false;
   std::set<std::string> taken_, joint_names_,
       named_;  // names of links; of joints; of joints named by an actuator and the like
   std::map<std::string, BodyPlace> places_, sites_;  // by name in the file

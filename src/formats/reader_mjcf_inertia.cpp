@@ -22,7 +22,8 @@ void MjcfReader::readInertiaSettings(MjcfElement& compiler) {
   total_mass_ = compiler.getNumber("settotalmass", total_mass_);
   balances_inertia_ = compiler.getFlag("balanceinertia", balances_inertia_);
   is_exact_ = compiler.getFlag("exactmeshinertia", is_exact_);
-  for (const char* without_effect : {"discardvisual", "fusestatic", "convexhull", "usethread", "texturedir"})
+  discards_visuals_ = compiler.getFlag("discardvisual", discards_visuals_);
+  for (const char* without_effect : {"fusestatic", "convexhull", "usethread", "texturedir"})
     compiler.find(without_effect);
 }
 
@@ -164,6 +165,10 @@ Inertia MjcfReader::readSolid(const Child& child) {
   Inertia solid = is_mesh ? readMeshSolid(e, e.getText("mesh")) : calcPrimitive(e, shape);
   solid.mass = given ? *given : density * solid.mass;
   solid.I_com *= solid.mass;
+  if (discards_visuals_ && solid.mass > 0 && e.getNumber("contype", 1) == 0 && e.getNumber("conaffinity", 1) == 0)
+    e.note(
+        "its mass counts, as in MuJoCo 3; MuJoCo 2 leaves it out (discardvisual). Give the body an <inertial>, which "
+        "all read alike");
   return solid.transformed(shape.X_BG);
 }
 

@@ -313,6 +313,9 @@ void SdfReader::noteElements(const XMLElement& element) {
 // libsdformat reads files of later versions without an error, and leaves out what it does not know.
 void SdfReader::checkVersion(const XMLElement& root) {
   const std::string version = getAttribute(&root, "version");
+  if (version.empty())
+    fail("<sdf> (line " + std::to_string(root.GetLineNum()) + ")", "it has no version",
+         "give the one that it was written for, e.g. version=\"" SDF_PROTOCOL_VERSION "\"");
   const auto parse = [](const std::string& text) {
     int major = 0, minor = 0;
     std::sscanf(text.c_str(), "%d.%d", &major, &minor);
