@@ -9,8 +9,10 @@
 #include "bielle/robots/robot_loader.h"
 #include "design/constraint.h"
 #include "design/evaluation.h"
+#include "design/joint_reach.h"
 #include "design/page_data.h"
 #include "design/spec.h"
+#include "leg_biped.h"
 #include "robot_directory.h"
 #include "robots/fivebar_leg.h"
 #include "robots/solid.h"
@@ -440,4 +442,49 @@ TEST_CASE("design: corners of what a motor can give lie on its limits") {
   motor.drive = {}, motor.velocity_limit = HUGE_VAL;
   CHECK(listEnvelopeCorners(motor, 100, 100) ==
         std::vector<std::pair<double, double>>{{100, -50}, {100, 50}, {-100, 50}, {-100, -50}});
+}
+
+TEST_CASE("designs tell how far joints reach through their linkages, before and after") {
+  // A four-bar at the knee (robots/parts/knee/four_bar.yaml) is dead where crank and rod are in line, l +- c from the motor to the end
+  // of the arm, which is at the angle psi from the thigh, cos psi = sin(knee - middle); at the middle the ratio is arm / crank.
+  const double thigh = 0.22, arm = 0.05, middle = 1.2;
+  const auto make = [&](double crank) {
+    return makeLegBiped({{"knee", "four_bar"},
+                         {"ankle", "rsu"},
+                         {"thigh_length", thigh},
+                         {"knee_crank", crank},
+                         {"knee_arm", arm},
+                         {"knee_middle", middle}});
+  };
+  const auto find = [](const std::vector<JointReach>& reaches, const std::string& joint) {
+    const auto it =
+        std::find_if(reaches.begin(), reaches.end(), [&](const auto& reach) { return reach.joint == joint; });
+    REQUIRE(it != reaches.end());
+    return *it;
+  };
+  for (const double crank : {0.035, 0.045}) {
+    CAPTURE(crank);
+    const Model model = make(crank);
+    const std::vector<JointReach> reaches = listReaches(model);
+    const JointReach knee = find(reaches, "knee_left");
+    const int dof = model.joints()[static_cast<size_t>(model.findJoint("knee_left"))].idx_v;
+    const auto calcKnee = [&](double reach) {
+      return middle + std::asin((thigh * thigh + arm * arm - reach * reach) / (2 * thigh * arm));
+    };
+    const double rod = std::hypot(thigh, crank - arm);
+    CHECK(knee.lower == Approx(std::max(model.lowerLimits()[dof], calcKnee(rod + crank))).margin(1e-6));
+    CHECK(knee.upper == Approx(std::min(model.upperLimits()[dof], calcKnee(rod - crank))).margin(1e-6));
+    REQUIRE(knee.ratio.has_value());
+    CHECK(knee.ratio->first <= arm / crank);
+    CHECK(knee.ratio->second >= arm / crank);
+    CHECK_FALSE(find(reaches, "ankley_left").ratio.has_value());  // two motors
+  }
+  CHECK(listReachChanges(make(0.04), make(0.04)).empty());
+  std::vector<std::string> changed;
+  for (const ReachChange& change : listReachChanges(make(0.035), make(0.045))) {
+    changed.push_back(change.before.joint);
+    CHECK(change.before.upper - change.before.lower < change.after.upper - change.after.lower);
+  }
+  CHECK(changed == std::vector<std::string>{"knee_left", "knee_right"});
+  CHECK(formatRange({"knee", -1e-12, 2.1, {}}) == "0 .. 2.1");
 }

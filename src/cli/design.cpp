@@ -10,6 +10,7 @@
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "cli/task_options.h"
+#include "design/joint_reach.h"
 #include "design/marks.h"
 #include "design/page_data.h"
 #include "design/run.h"
@@ -93,6 +94,9 @@ void printRun(const DesignEvaluator& evaluator, const DesignSpec& spec, const De
   if (evaluator.start().margin && run.evaluation.margin)
     rows.push_back({"margin", formatNumber(*evaluator.start().margin, "%.3f") + " -> " +
                                   formatNumber(*run.evaluation.margin, "%.3f") + " from dead points"});
+  for (const ReachChange& change : listReachChanges(robot.startModel(), robot.make(run.best)))
+    rows.push_back({"range", change.before.joint + " " + formatRange(change.before) + " -> " +
+                                 formatRange(change.after) + " through its linkage"});
   for (size_t i = 0; i < std::min(spec.constraints.size(), run.evaluation.constraints.size()); ++i)
     if (const std::string text = describeViolation(spec.constraints[i], run.evaluation.constraints[i]); !text.empty())
       rows.push_back({"violated", text});

@@ -8,6 +8,7 @@
 #include "bielle/results/result.h"
 #include "bielle/results/robot_info.h"
 #include "design/figures.h"
+#include "design/joint_reach.h"
 #include "design/marks.h"
 #include "design/motor_change.h"
 #include "design/run.h"
@@ -198,6 +199,19 @@ void writeMotion(std::ostream& out, const Model& model, const Model& best, const
   writeRow(out, "conditioning of the linkages", before.conditioning, after.conditioning);
 }
 
+// Joints whose ranges or ratios change through their linkages.
+void writeReaches(std::ostream& out, const std::vector<ReachChange>& changes) {
+  if (changes.empty()) return;
+  out << "\n| joint, through its linkage | before | after |\n|---|---|---|\n";
+  for (const ReachChange& change : changes) {
+    out << "| " << change.before.joint << ": range | " << formatRange(change.before) << " | "
+        << formatRange(change.after) << " |\n";
+    if (change.before.ratio && change.after.ratio)
+      out << "| " << change.before.joint << ": ratio | " << formatRatio(change.before) << " | "
+          << formatRatio(change.after) << " |\n";
+  }
+}
+
 std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRun& run) {
   const Parametrization& robot = evaluator.robot();
   TextStream out;
@@ -214,6 +228,7 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
   writeRow(out, "value", evaluator.start().value, run.value);
   if (evaluator.start().margin && run.evaluation.margin)
     writeRow(out, "margin from dead points", *evaluator.start().margin, *run.evaluation.margin);
+  writeReaches(out, listReachChanges(robot.startModel(), robot.make(run.best)));
   writeConstraints(out, evaluator, run);
   writeGoals(out, evaluator.start().goals, run.evaluation.goals);
   if (run.evaluation.status != DesignStatus::Feasible)
