@@ -20,7 +20,7 @@ KNEE = "motor_knee_right"
 # What no problem can be exported of, and what the message says to do.
 REFUSED = {
     "formulation full": "without --formulation", "step euler": "without --formulation and --step",
-    "serial": "without --formulation and --step", "free timings": "without --free-timings",
+    "serial": "without --model serial", "free timings": "without --free-timings",
     "peak torque": "for effort or energy", "serial midpoint": "without --model serial"}
 
 OPTIONS = {

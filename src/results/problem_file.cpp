@@ -260,10 +260,10 @@ ProblemText formatProblem(const Model& model, const MotionSummary& summary, cons
   if (record.cycle.size() > 0)
     refuse("periodic", "its first state is free, which the format does not have", "solve it without --periodic");
   if (!summary.converged) refuse("converged", "the motion is no optimum", "solve it to convergence");
+  const Motion motion = remakeMotion(model, summary);
   if (summary.formulation != Formulation::Reduced || summary.step != StepRule::Midpoint)
     refuse("formulation", "problems are written for closed states and midpoint steps",
            "solve the motion without --formulation and --step");
-  const Motion motion = remakeMotion(model, summary);
   requireSame(summary,
               record.q.rows() == motion.problem->numStages() + 1 && record.q.cols() == model.nq() &&
                   record.u.cols() == model.nu(),
