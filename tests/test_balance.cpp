@@ -9,6 +9,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "own_robots.h"
 #include "worlds/balance.h"
+#include "worlds/carried_goals.h"
 #include "worlds/execution.h"
 #include "worlds/make_world.h"
 
@@ -212,6 +213,29 @@ TEST_CASE(
   CHECK(e.outcome == Outcome::Fell);
   CHECK_THAT(e.message, Catch::StartsWith("its capture point is ") && Contains(" m beyond its soles") &&
                             Contains("closure 'knee' does not close"));
+}
+
+TEST_CASE(
+    "what happened is told where it differs from the plan by more than a twentieth, or from 0 by more than the "
+    "tolerance") {
+  const auto list = [](GoalKind kind, double requested, double planned, double carried) {
+    Goal goal;
+    goal.kind = kind;
+    goal.name = "it";
+    goal.requested = requested;
+    goal.tolerance = 0.01;
+    return listDifferences({{goal, planned}}, {{goal, carried}});
+  };
+  CHECK(list(GoalKind::Speed, 0.4, 0.39, 0.375).empty());
+  CHECK(list(GoalKind::Speed, 0.4, 0.39, 0.365) ==
+        std::vector<std::string>{"it: 0.365 m/s where 0.39 m/s was planned"});
+  CHECK(list(GoalKind::Speed, -0.4, -0.39, -0.365).size() == 1);
+  // A jump on the spot ends where it began, but for rounding in the plan and less than a millimetre in a world.
+  CHECK(list(GoalKind::Displacement, 0, -4e-11, 4e-5).empty());
+  CHECK(list(GoalKind::Displacement, 0, -4e-11, 0.02).size() == 1);
+  CHECK(list(GoalKind::Footholds, 0, 1e-13, 9e-3).empty());
+  CHECK(list(GoalKind::Footholds, 0, 1e-13, 0.02).size() == 1);
+  CHECK(list(GoalKind::Speed, 0.4, 0.39, NAN).empty());
 }
 
 }  // namespace bielle::worlds

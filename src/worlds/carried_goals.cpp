@@ -85,7 +85,7 @@ std::vector<std::string> listDifferences(const std::vector<GoalOutcome>& planned
     const double plan = planned[i].achieved, other = carried[i].achieved;
     if (std::isnan(other)) continue;  // it ended before
     const bool is_foothold = goal.kind == GoalKind::Footholds;
-    const double allowed = is_foothold || plan == 0 ? goal.tolerance : kLargestShare * std::abs(plan);
+    const double allowed = is_foothold || goal.requested == 0 ? goal.tolerance : kLargestShare * std::abs(plan);
     if (std::abs(other - plan) <= allowed) continue;
     const std::string name = getUnit(goal.kind), unit = name == "1" ? "" : " " + name;
     differences.push_back(

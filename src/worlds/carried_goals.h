@@ -13,7 +13,8 @@ std::vector<GoalOutcome> measurePlannedGoals(const Plan& plan);
 /// anew, within the room that it has. A goal that ends after the record is not achieved (NaN).
 std::vector<GoalOutcome> measureCarriedGoals(const Plan& plan, PlanControl control, const MotionRecord& record);
 
-/// A sentence for each goal for which the two differ by more than 5 % of the plan's (for footholds: that was missed).
+/// A sentence for each goal for which the two differ by more than 5 % of the plan's (of footholds, and where 0 is requested, by more
+/// than the tolerance).
 std::vector<std::string> listDifferences(const std::vector<GoalOutcome>& planned,
                                          const std::vector<GoalOutcome>& carried);
 
