@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <cstdio>
+
+#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/impact.h"
 #include "bielle/dynamics/kinematics.h"
@@ -23,6 +27,28 @@ bool record(NumericalStatus status, State& s) {
   if (!valid)
     for (size_t i = 0; i + 1 < s.out.size(); ++i) s.out[i].setConstant(std::numeric_limits<double>::quiet_NaN());
   return valid;
+}
+
+// Dynamics of a state that the robot cannot be in are those of no motion.
+void warnOfOpenLoops(const Model& m, const py::object& q) {
+  constexpr double kTold = 1e-6;  // m or rad
+  if (m.closures().empty()) return;
+  const ConstraintSet loops = makeConstraintSet(m);
+  const py::array gaps = mapStates({{"q", q, m.nq()}}, {{}}, [&] {
+    return [&, ws = std::make_shared<Workspace>(m)](State& s) {
+      updatePositions(m, *ws, s.in[0]);
+      s.out[0][0] = calcLargestGap(*ws, loops);
+    };
+  })[0];
+  const double* const begin = static_cast<const double*>(gaps.data());
+  const double largest = gaps.size() > 0 ? *std::max_element(begin, begin + gaps.size()) : 0;
+  if (!(largest > kTold)) return;
+  char text[160];  // with one digit: Python tells the same text once a line
+  std::snprintf(
+      text, sizeof text,
+      "loops are open by up to %.0e (m or rad): the robot cannot be in this state; close(q) gives one near it",
+      largest);
+  if (PyErr_WarnEx(PyExc_RuntimeWarning, text, 1) < 0) throw py::error_already_set();
 }
 
 void solveForward(const Model& m, const ConstraintSet& set, ConstrainedMemory& memory, State& s) {
@@ -51,6 +77,7 @@ void addForward(ModelType& type) {
         [result, getShapes, solve](const Model& m, const py::object& q, const py::object& v, const py::object& u,
                                    const py::object& contacts) {
           const ConstraintSet set = readConstraints(m, contacts);
+          warnOfOpenLoops(m, q);
           return makeNamed(
               result, mapStates({{"q", q, m.nq()}, {"v", v, m.nv()}, {"u", u, m.nu()}}, getShapes(m, set), [&] {
                 return [&, memory = std::make_shared<ConstrainedMemory>(m)](State& s) { solve(m, set, *memory, s); };
@@ -116,6 +143,7 @@ void addInverse(ModelType& type) {
       "static_torques",
       [](const Model& m, const py::object& q, const py::object& contacts) {
         const ConstraintSet set = readConstraints(m, contacts);
+        warnOfOpenLoops(m, q);
         return mapStates({{"q", q, m.nq()}}, {{m.nu()}},
                          [&] { return [&](State& s) { s.out[0] = calcStaticTorques(m, set, s.in[0]).u; }; })[0];
       },
@@ -128,6 +156,7 @@ void addImpact(ModelType& type) {
       "impact",
       [](const Model& m, const py::object& q, const py::object& v, const py::object& contacts) {
         const ConstraintSet set = readConstraints(m, contacts);
+        warnOfOpenLoops(m, q);
         return makeNamed("Impact", mapStates({{"q", q, m.nq()}, {"v", v, m.nv()}}, {{m.nv()}, {set.rows}, {}}, [&] {
                            return [&, iws = std::make_shared<ImpactWorkspace>(m)](State& s) {
                              if (!record(updateImpact(m, *iws, set, s.in[0], s.in[1]), s)) return;
@@ -143,6 +172,7 @@ void addImpact(ModelType& type) {
       [](const Model& m, const py::object& q, const py::object& v, const py::object& contacts) {
         const ConstraintSet set = readConstraints(m, contacts);
         const Shape square = {m.nv(), m.nv()}, rows = {set.rows, m.nv()};
+        warnOfOpenLoops(m, q);
         return makeNamed(
             "ImpactDerivatives", mapStates({{"q", q, m.nq()}, {"v", v, m.nv()}}, {square, square, rows, rows, {}}, [&] {
               return [&, iws = std::make_shared<ImpactWorkspace>(m)](State& s) {

@@ -1,6 +1,7 @@
 """Robots, models, and functions of states."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -269,3 +270,23 @@ def test_ratio_of_a_knee(model):
     joints = [v[index(name)] for name in sweep.joints]
     motors = [v[index(name)] for name in sweep.motors]
     assert start.ratio.R @ joints == pytest.approx(motors)
+
+
+def test_dynamics_of_open_loops_are_told(model, state):
+    q, v, u = state
+    opened = np.array(q)
+    opened[list(model.q_names).index("knee_left")] += 0.05
+    gap = np.abs(model.closure_residual(opened)).max()
+    assert gap > 1e-4
+    calls = [lambda q: model.forward_dynamics(q, v, u), lambda q: model.forward_dynamics_derivatives(q, v, u),
+             lambda q: model.static_torques(q), lambda q: model.impact(q, v, ("foot_left",)),
+             lambda q: model.impact_derivatives(q, v, ("foot_left",))]
+    for call in calls:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            call(q)
+            call(model.close(opened))  # the remedy
+        for states in (opened, np.stack([q, opened])):
+            with pytest.warns(RuntimeWarning, match="loops are open by up to .*e-.*close") as told:
+                call(states)
+            assert len(told) == 1
