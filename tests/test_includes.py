@@ -40,7 +40,7 @@ OTHERS = {
     "zip.h": ["src/results/npz.cpp"],
     "nlopt": ["src/motion/slsqp.cpp", "src/design/nlopt_search.h"],
     "pagmo/": ["src/design/front_search.cpp"],
-    "CLI/": ["src/cli/", "src/results/number_option.h", "validation/"],
+    "CLI/": ["src/cli/", "src/results/failure_message.h", "src/results/number_option.h", "validation/"],
     "nlohmann/": ["src/", "validation/", "workers/", "tests/"],
     "cctools/": ["workers/"],
     "Simbody": ["src/worlds/", "validation/"],

@@ -7,10 +7,10 @@
 
 #include "bielle/model/error.h"
 #include "check.h"
-#include "cli/failure_message.h"
 #include "formats/companion.h"
 #include "formats/text_file.h"
 #include "model/missing_part.h"
+#include "results/failure_message.h"
 #include "results/standard_output.h"
 
 using namespace bielle;

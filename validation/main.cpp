@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bielle/model/error.h"
-#include "cli/failure_message.h"
+#include "results/failure_message.h"
 #include "results/number_option.h"
 #include "results/standard_output.h"
 #include "validate.h"
