@@ -1,6 +1,7 @@
 bielle_test(dynamics SOURCES test_dynamics.cpp LIBS bielle_dynamics)
 bielle_test(closed_field SOURCES test_closed_field.cpp LIBS bielle_dynamics)
 bielle_test(couplers SOURCES test_couplers.cpp LIBS bielle_dynamics)
+bielle_test(rods SOURCES test_rods.cpp LIBS bielle_robots)
 bielle_test(joint_forces SOURCES test_joint_forces.cpp LIBS bielle_dynamics)
 bielle_test(assembly SOURCES test_assembly.cpp test_loop_conflicts.cpp LIBS bielle_dynamics)
 bielle_test(rounded_linkages SOURCES test_rounded_linkages.cpp LIBS bielle_robots)

@@ -52,9 +52,16 @@ void tieTips(ModelBuilder& builder, std::mt19937& rng, ClosureKind closure, cons
   updatePositions(tree, ws, q);
   const auto place = [&](const std::string& link) { return ws.X_WB[tree.frames()[tree.findFrame(link)].body]; };
   const SE3 X_B1 = randomPlacement(rng);
+  const Vector3d axis = randomVector(rng, 3).normalized();
+  SE3 X_12;
+  if (closure == ClosureKind::Distance) X_12 = randomPlacement(rng);
+  if (closure == ClosureKind::Slider) X_12.p = randomVector(rng, 1, 0.3)[0] * axis;
   builder.addFrame("tip1", "a2k", X_B1);
-  builder.addFrame("tip2", "b2k", place("b2k").inverseTimes(place("a2k") * X_B1));
-  builder.addClosure("loop", closure, "tip1", "tip2", randomVector(rng, 3).normalized(), kp, kd);
+  builder.addFrame("tip2", "b2k", place("b2k").inverseTimes(place("a2k") * X_B1 * X_12));
+  if (closure == ClosureKind::Distance)
+    builder.addDistance("loop", "tip1", "tip2", X_12.p.norm(), kp, kd);
+  else
+    builder.addClosure("loop", closure, "tip1", "tip2", axis, kp, kd);
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ namespace bielle::testing {
 inline constexpr JointKind kJointKinds[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
                                             JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
                                             JointKind::FreeFlyer};
-inline constexpr ClosureKind kClosureKinds[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D,
-                                                ClosureKind::Coupler};
+inline constexpr ClosureKind kClosureKinds[] = {ClosureKind::Weld6D,  ClosureKind::Ball3D,   ClosureKind::Hinge5D,
+                                                ClosureKind::Coupler, ClosureKind::Distance, ClosureKind::Slider};
 
 VectorXd randomVector(std::mt19937& rng, int n, double scale = 1);
 SE3 randomPlacement(std::mt19937& rng);

@@ -33,6 +33,7 @@ ModelParts moveParts(const Model& model, const ModelVariation& direction, double
     move(closure.X_B1, direction.frames1[c]);
     move(closure.X_B2, direction.frames2[c]);
     closure.offset += step * direction.offsets[c];
+    closure.length += step * direction.lengths[c];
     for (size_t i = 0; i < closure.terms.size(); ++i)
       closure.terms[i].coefficient += step * direction.coefficients[c][static_cast<Eigen::Index>(i)];
   }

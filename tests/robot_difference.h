@@ -104,7 +104,12 @@ inline double compareClosure(const Workspace& wa, const Closure& ca, const Works
   const SE3 a1 = getPlacement(wa, ca.body1, ca.X_B1), a2 = getPlacement(wa, ca.body2, ca.X_B2),
             b1 = getPlacement(wb, cb.body1, cb.X_B1), b2 = getPlacement(wb, cb.body2, cb.X_B2);
   double worst = ((a1.p - a2.p) - (b1.p - b2.p)).norm();
-  if (ca.kind == ClosureKind::Weld6D)
+  if (ca.kind == ClosureKind::Distance) worst = std::max(worst, std::abs(ca.length - cb.length));
+  if (ca.kind == ClosureKind::Slider) {  // the points may be anywhere along their axes
+    const Vector3d axis = b1.R * cb.axis, apart = (a1.p - a2.p) - (b1.p - b2.p);
+    worst = std::max((apart - axis.dot(apart) * axis).norm(), (a1.R * ca.axis).cross(axis).norm());
+  }
+  if (ca.kind == ClosureKind::Weld6D || ca.kind == ClosureKind::Slider)
     worst = std::max(worst, (a1.R * a2.R.transpose() - b1.R * b2.R.transpose()).norm());
   if (ca.kind == ClosureKind::Hinge5D) {
     const Vector3d of_a = (a1.R * ca.axis).cross(a2.R * ca.axis), of_b = (b1.R * cb.axis).cross(b2.R * cb.axis);

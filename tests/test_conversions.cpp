@@ -153,6 +153,7 @@ TEST_CASE("generated robots come back from MJCF") {
 TEST_CASE("random mechanisms come back from MJCF: every joint, closure, base, springs and belts") {
   unsigned seed = 0;
   for (const MechanismKind& kind : listMechanismKinds()) {
+    if (kind.closure == ClosureKind::Slider) continue;  // which MuJoCo does not have
     CAPTURE(kind);
     std::mt19937 rng(++seed);
     const Mechanism plain = makeRandomMechanism(rng, kind.joint, kind.closure, kind.base);

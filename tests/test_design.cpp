@@ -16,6 +16,7 @@
 #include "design/draft.h"
 #include "design/run.h"
 #include "design_trials.h"
+#include "get_error.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -51,6 +52,36 @@ std::vector<DesignVariable> makeKnee() {
 const std::vector<ObjectiveTerm> kKneePeak = {{Measure::PeakTorque, {"motor_knee_left", "motor_knee_right"}, 1}};
 
 }  // namespace
+
+TEST_CASE("design: lengths of rods without a body, of left and right alike") {
+  ModelBuilder builder("rods");
+  Joint joint;
+  joint.kind = JointKind::Revolute, joint.axis = Vector3d::UnitY();
+  for (const std::string side : {"left", "right"}) {
+    joint.name = side, joint.X_PJ.p.x() += 0.3;
+    builder.addLink(side + "_bar", "world", joint, {1, {0, 0, 0.1}, 0.01 * Matrix3d::Identity()});
+    builder.addFrame(side + "_end", side + "_bar", {Matrix3d::Identity(), {0, 0, 0.2}});
+    builder.addDistance(side + "_rod", side + "_end", "world");
+  }
+  const Model model = builder.build();
+  const double left = std::hypot(0.3, 0.2), right = std::hypot(0.6, 0.2);
+  const auto makeRods = [](double lower, const std::string& second = "right_rod") {
+    std::vector<LengthChange> rods(2);
+    rods[0].rod = "left_rod", rods[1].rod = second;
+    return std::vector{makeLength("rod", lower, 0.5, rods)};
+  };
+  const Parametrization robot(model, makeRods(0.3));
+  CHECK(robot.start()[0] == left);
+  const Model made = robot.make(VectorXd::Constant(1, 0.4));
+  CHECK(made.closures()[0].length == Approx(0.4).epsilon(1e-15));
+  CHECK(made.closures()[1].length == Approx(right + 0.4 - left).epsilon(1e-15));
+  CHECK(robot.make(robot.start()).closures()[1].length == right);
+  const auto getRodError = [&](double lower, const std::string& second) {
+    return getError([&] { Parametrization(model, makeRods(lower, second)); });
+  };
+  CHECK_THAT(getRodError(0.3, "left"), Contains("rod 'left': there is no closure of type distance with this name"));
+  CHECK_THAT(getRodError(-0.1, "right_rod"), Contains("the length of 'left_rod' is zero, or would become zero"));
+}
 
 TEST_CASE("design: lengths of a four-bar are those of its maker") {
   FourBarChainOptions options;

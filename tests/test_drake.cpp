@@ -32,12 +32,15 @@ Model readDrake(const std::string& urdf) {
 }
 
 bool isCoupler(const Closure& closure) { return closure.kind == ClosureKind::Coupler; }
+bool isLost(const Closure& closure) {
+  return isCoupler(closure) || closure.kind == ClosureKind::Distance || closure.kind == ClosureKind::Slider;
+}
 
 void removeCouplersAndMeshes(ModelParts& parts) {
   const auto remove = [](auto& from, const auto& which) {
     from.erase(std::remove_if(from.begin(), from.end(), which), from.end());
   };
-  remove(parts.closures, isCoupler);
+  remove(parts.closures, isLost);
   remove(parts.visuals, [](const Visual& visual) { return visual.shape == Visual::Shape::Mesh; });
 }
 
@@ -114,8 +117,9 @@ double calcGap(const Model& model, ConstVectorRef q) {
   return calcLargestGap(ws, makeConstraintSet(model));
 }
 
-// Couplers of `back` are those of `model` up to a factor; returns how many of `model` have none, each of which must be told.
-int countLostCouplers(const Model& model, const Model& back, const std::vector<std::string>& warnings) {
+// Couplers of `back` are those of `model` up to a factor; returns how many of `model`, and how many distances and sliders, have
+// none, each of which must be told.
+int countLost(const Model& model, const Model& back, const std::vector<std::string>& warnings) {
   const auto match = [&](const Closure& a, const Closure& b) {
     if (a.terms.size() != b.terms.size()) return false;
     VectorXd of_a = VectorXd::Zero(model.nv() + 1), of_b = of_a;
@@ -133,6 +137,10 @@ int countLostCouplers(const Model& model, const Model& back, const std::vector<s
       CHECK(std::any_of(model.closures().begin(), model.closures().end(),
                         [&](const Closure& a) { return isCoupler(a) && match(a, b); }));
   for (const Closure& a : model.closures()) {
+    if (isLost(a) && !isCoupler(a)) {
+      ++lost;
+      CHECK(contains(warnings, "closure '" + a.name + "': it is left out: Drake"));
+    }
     if (!isCoupler(a) || std::any_of(back.closures().begin(), back.closures().end(),
                                      [&](const Closure& b) { return isCoupler(b) && match(a, b); }))
       continue;
@@ -154,7 +162,7 @@ void checkDrakeRoundTrip(const Model& model, ConstVectorRef q_closed) {
   if (!d.missing.empty()) return;
   CHECK(calcMotorError(model, back) < kTolerance);
 
-  const int lost = countLostCouplers(model, back, text.warnings);
+  const int lost = countLost(model, back, text.warnings);
   // The same configurations are closed, and there it moves alike: rows were added, rank was not.
   const VectorXd neutral = model.makeNeutral(), q = mapConfiguration(model, back, neutral, q_closed);
   CHECK(calcGap(model, q_closed) < 1e-9);

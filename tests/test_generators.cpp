@@ -322,6 +322,8 @@ TEST_CASE("writer: every number comes back to the last bit, attitudes to roundin
         CHECK(model.closures()[c].X_B1.p == copy.closures()[c].X_B1.p);
         CHECK(model.closures()[c].X_B2.p == copy.closures()[c].X_B2.p);
         CHECK(model.closures()[c].offset == copy.closures()[c].offset);
+        CHECK(model.closures()[c].length == copy.closures()[c].length);
+        if (hasAxis(kind.closure)) CHECK(model.closures()[c].axis == copy.closures()[c].axis);
       }
       for (size_t s = 0; s < model.pointSprings().size(); ++s)
         CHECK(model.pointSprings()[s].stiffness == copy.pointSprings()[s].stiffness);

@@ -263,6 +263,7 @@ TEST_CASE("conflicts: derivatives of residuals by configuration and by a change 
       check(change, {ModelPlace::Kind::Frame2, 0});
     }
     check(Change::Offset, {ModelPlace::Kind::Offset, 1});
+    if (kind == ClosureKind::Distance) check(Change::Offset, {ModelPlace::Kind::Offset, 0});
   }
 }
 

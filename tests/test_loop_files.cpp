@@ -69,12 +69,14 @@ TEST_CASE("a <loop_joint> of a URDF closes a loop") {
   };
   checkLoop(loadIn(directory, makeSquare(makeLoop("spherical"))), ClosureKind::Ball3D, 1);
   checkLoop(loadIn(directory, makeSquare(makeLoop("continuous", "<axis xyz=\"0 1 0\"/>"))), ClosureKind::Hinge5D, 1);
+  const Model slider = loadIn(directory, makeSquare(makeLoop("prismatic", "<axis xyz=\"0 0 1\"/>"))).model;
+  CHECK(slider.closures()[0].kind == ClosureKind::Slider);
+  CHECK(slider.closures()[0].axis == Vector3d::UnitZ());
   const auto getLoopError = [&](const std::string& loop) {
     return getError([&] { loadIn(directory, makeSquare(loop)); });
   };
-  CHECK_THAT(
-      getLoopError(makeLoop("prismatic")),
-      Catch::Contains("robot.urdf: <loop_joint> (line 9): its type 'prismatic' cannot close a loop; use spherical"));
+  CHECK_THAT(getLoopError(makeLoop("screw")),
+             Catch::Contains("robot.urdf: <loop_joint> (line 9): its type 'screw' cannot close a loop; use spherical"));
   CHECK_THAT(getLoopError(replaceOnce(makeLoop("fixed"), "\"right\"", "\"none\"")),
              Catch::Contains("<link2> (line 10): there is no link 'none'; declare"));
   CHECK_THAT(getLoopError(replaceOnce(makeLoop("fixed"), "0 0.5 0", "0 nan 0")),

@@ -74,6 +74,7 @@ TEST_CASE("MuJoCo has the mass matrix and the bias of every robot") {
 TEST_CASE("MuJoCo has the mass matrix, the bias and the closures of every joint and closure kind") {
   unsigned seed = 0;
   for (const MechanismKind& kind : listMechanismKinds()) {
+    if (kind.closure == ClosureKind::Slider) continue;  // which MuJoCo does not have
     const Mechanism mechanism = makeMechanism(kind.joint, kind.closure, kind.base, ++seed);
     const Model& model = mechanism.model;
     CAPTURE(kind);

@@ -114,6 +114,7 @@ TEST_CASE("Balls as hinges are the same robot, with its mass matrix and closed l
   unsigned seed = 0;
   for (JointKind joint : {JointKind::Spherical, JointKind::FreeFlyer})
     for (ClosureKind closure : kClosureKinds) {
+      if (closure == ClosureKind::Slider) continue;  // which MuJoCo does not have
       std::mt19937 rng(++seed);
       const Mechanism mechanism = makeRandomMechanism(rng, joint, closure, MechanismBase::Fixed);
       CAPTURE(getName(joint), getName(closure));

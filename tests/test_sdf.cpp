@@ -61,6 +61,7 @@ double calcSdfError(const Model& model, ConstVectorRef q_ref, const std::string&
     CHECK(joint->ParentLinkName() == (parent == 0 ? "world" : model.bodies()[parent].name));
     CHECK(joint->Type() == (closure.kind == ClosureKind::Weld6D   ? sdf::JointType::FIXED
                             : closure.kind == ClosureKind::Ball3D ? sdf::JointType::BALL
+                            : closure.kind == ClosureKind::Slider ? sdf::JointType::PRISMATIC
                                                                   : sdf::JointType::CONTINUOUS));
   }
   return worst;

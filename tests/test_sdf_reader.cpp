@@ -118,6 +118,25 @@ TEST_CASE("robots come back from SDF with their bodies, loops, ranges and spring
   }
 }
 
+TEST_CASE("a second prismatic joint onto a link of SDF is a slider, also where it is written") {
+  const std::string rail =
+      "<joint name=\"r1\" type=\"prismatic\"><pose>0 0.1 0 0 0 1</pose><parent>a</parent><child>d</child><axis><xyz "
+      "expressed_in=\"__model__\">1 0 0</xyz></axis></joint>";
+  const Model model = loadSdf(makeFourBar("<link name=\"d\"/>" + rail + replaceOnce(rail, "r1", "r2"))).model;
+  REQUIRE(model.closures().size() == 2);
+  const Closure& slider = model.closures()[model.findClosure("r2")];
+  CHECK(slider.kind == ClosureKind::Slider);
+  CHECK((slider.X_B2.R * slider.axis - Vector3d::UnitX()).norm() < 1e-14);
+  CHECK(model.joints()[model.findJoint("r1")].kind == JointKind::Prismatic);
+  const AssemblyResult closed = findClosedConfiguration(model);
+  CHECK(closed.status == NumericalStatus::Ok);
+  CHECK(calcMobility(model, closed.q).mobility == 2);  // of the four-bar and of the two rails
+  const Model again = loadSdf(formatSdf(model, closed.q).xml).model;
+  const Closure& written = again.closures()[again.findClosure("r2")];
+  CHECK(written.kind == ClosureKind::Slider);
+  CHECK((written.X_B2.R * written.axis - slider.X_B2.R * slider.axis).norm() < 1e-12);
+}
+
 TEST_CASE("joints of SDF: frames that poses are relative to, ranges, springs, and a second joint that closes a loop") {
   const LoadedRobot robot = loadSdf(makeFourBar(R"(
 <frame name="knee" attached_to="a"><pose>0 0 1 0 0 0</pose></frame>
@@ -276,9 +295,10 @@ TEST_CASE("SDF files that are no robot are errors with a remedy") {
                  "</gearbox_reference_body><parent>b</parent><child>d</child><axis><xyz>1 0 0</xyz></axis><axis2>"
                  "<xyz>1 0 0</xyz></axis2></joint><link name=\"d\"/>")),
              Catch::Contains("joint 'x': joints of type gearbox, revolute2 and screw are not supported; replace it"));
-  const std::string rail =
-      "<joint name=\"r1\" type=\"prismatic\"><parent>a</parent><child>d</child><axis><xyz>1 0 0</xyz></axis></joint>";
-  CHECK_THAT(getSdfError(makeFourBar("<link name=\"d\"/>" + rail + replaceOnce(rail, "r1", "r2"))),
+  const std::string universal =
+      "<joint name=\"r1\" type=\"universal\"><parent>a</parent><child>d</child><axis><xyz>1 0 0</xyz></axis>"
+      "<axis2><xyz>0 1 0</xyz></axis2></joint>";
+  CHECK_THAT(getSdfError(makeFourBar("<link name=\"d\"/>" + universal + replaceOnce(universal, "r1", "r2"))),
              Catch::Contains(
                  "joint 'r2': its child 'd' hangs on another joint too, and it cannot close a loop; cut the loop"));
   CHECK_THAT(getSdfError(makeFourBar("<model name=\"n\"><link name=\"l\"/></model>")),

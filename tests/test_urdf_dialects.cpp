@@ -96,8 +96,8 @@ TEST_CASE("URDF dialects: loops of four kinds of files close a four-bar") {
     CHECK(robot.warnings.empty());
     checkMobility(robot.model, 1);
   }
-  CHECK_THAT(getLoadError(writeFourBar() + "<loop name=\"c\" type=\"prismatic\"/>"),
-             Catch::Contains("<loop> (line 9): its type 'prismatic' cannot close a loop; use spherical"));
+  CHECK_THAT(getLoadError(writeFourBar() + "<loop name=\"c\" type=\"screw\"/>"),
+             Catch::Contains("<loop> (line 9): its type 'screw' cannot close a loop; use spherical"));
   CHECK_THAT(getLoadError(writeFourBar() + "<constraint type=\"fixed\"><parent link=\"crank\"/></constraint>"),
              Catch::Contains("<constraint> (line 9): it has no <child>; name the link"));
   CHECK_THAT(getLoadError(writeFourBar() +

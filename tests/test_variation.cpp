@@ -39,6 +39,10 @@ std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model
   for (auto* twists : {&all.joints, &all.frames1, &all.frames2, &all.contacts})
     for (Vector6d& twist : *twists) twist = randomVector(rng, 6);
   for (size_t c = 0; c < model.closures().size(); ++c) {
+    if (model.closures()[c].kind == ClosureKind::Distance) {
+      out.emplace_back(model);
+      all.lengths[c] = out.back().lengths[c] = 0.4;
+    }
     if (model.closures()[c].kind != ClosureKind::Coupler) continue;
     ModelVariation ratios(model);
     ratios.coefficients[c] = randomVector(rng, static_cast<int>(model.closures()[c].terms.size()));

@@ -16,10 +16,13 @@ namespace {
 // Rows whose pivot, after scaling, is below this are redundant; loops are closed to 1e-8 (CheckBounds::closed).
 constexpr double kRankThreshold = 1e-8;
 
-// Displacement of frame 2 in frame 1, without free rotations: about the axis of a hinge, about any axis of a ball.
+// Displacement of frame 2 in frame 1, without what is free: about the axis of a hinge, about any axis of a ball, along that of a
+// slider. Of a distance, by how much it is too long, along x.
 Vector6d calcGap(const Closure& closure, const SE3& X_12) {
   Vector6d gap = Vector6d::Zero();
   gap.head<3>() = X_12.p;
+  if (closure.kind == ClosureKind::Distance) return (X_12.p.norm() - closure.length) * Vector6d::Unit(0);
+  if (closure.kind == ClosureKind::Slider) gap << X_12.p - closure.axis.dot(X_12.p) * closure.axis, log3(X_12.R);
   if (closure.kind == ClosureKind::Weld6D) gap.tail<3>() = log3(X_12.R);
   if (closure.kind == ClosureKind::Hinge5D) {
     const Vector3d axis2 = X_12.R * closure.axis, normal = closure.axis.cross(axis2);
@@ -28,7 +31,9 @@ Vector6d calcGap(const Closure& closure, const SE3& X_12) {
   return gap;
 }
 
-Vector6d dropFreeAxes(const Closure& closure, Vector6d rate) {
+Vector6d dropFreeAxes(const Closure& closure, const SE3& X_12, Vector6d rate) {
+  if (closure.kind == ClosureKind::Distance) return X_12.p.normalized().dot(rate.head<3>()) * Vector6d::Unit(0);
+  if (closure.kind == ClosureKind::Slider) rate.head<3>() -= closure.axis.dot(rate.head<3>()) * closure.axis;
   if (closure.kind == ClosureKind::Ball3D) rate.tail<3>().setZero();
   if (closure.kind == ClosureKind::Hinge5D) rate.tail<3>() -= closure.axis.dot(rate.tail<3>()) * closure.axis;
   return rate;
@@ -122,7 +127,7 @@ class Tracer {
       const Vector6d V1 = closure.X_B1.actInvMotion(simbody.calcTwist(closure.body1));
       const Vector6d V2 = closure.X_B2.actInvMotion(simbody.calcTwist(closure.body2));
       out.gaps.push_back(calcGap(closure, X_12));
-      out.gap_rates.push_back(dropFreeAxes(closure, V1 - X_12.actMotion(V2)));
+      out.gap_rates.push_back(dropFreeAxes(closure, X_12, V1 - X_12.actMotion(V2)));
     }
     return out;
   }

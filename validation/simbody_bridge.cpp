@@ -22,6 +22,16 @@ VectorXd toVector(const SimTK::Vector& v) {
 Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
   if (closure.kind == ClosureKind::Weld6D) return log6(X_12);
   Vector6d gap = Vector6d::Zero();
+  if (closure.kind == ClosureKind::Distance) {
+    const double L = closure.length;
+    gap[0] = (X_12.p.squaredNorm() - L * L) / (2 * L);
+    return gap;
+  }
+  if (closure.kind == ClosureKind::Slider) {
+    const Vector3d p = X_12.R.transpose() * X_12.p;
+    gap << p - closure.axis.dot(p) * closure.axis, log3(X_12.R);
+    return gap;
+  }
   gap.head<3>() = X_12.p;
   if (closure.kind == ClosureKind::Ball3D) return gap;
   const Vector3d axis2 = X_12.R * closure.axis, normal = closure.axis.cross(axis2);
@@ -29,14 +39,20 @@ Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
   return gap;
 }
 
-// Unit twists of frame 1, relative to frame 2, that a closure forbids; notation.h.
+// Unit twists of frame 1, relative to frame 2, that a closure forbids; notation.h. Of a coupler or a distance, the first entry.
 MatrixXd listDirections(const Closure& closure) {
-  if (closure.kind == ClosureKind::Coupler) return Vector6d::Unit(0);
+  if (closure.kind == ClosureKind::Coupler || closure.kind == ClosureKind::Distance) return Vector6d::Unit(0);
   const Eigen::Matrix<double, 6, 6> all = Eigen::Matrix<double, 6, 6>::Identity();
   if (closure.kind == ClosureKind::Weld6D) return all;
   if (closure.kind == ClosureKind::Ball3D) return all.leftCols(3);
   const Vector3d normal = closure.axis.unitOrthogonal();
   MatrixXd directions = MatrixXd::Zero(6, 5);
+  if (closure.kind == ClosureKind::Slider) {
+    directions.col(0).head<3>() = normal;
+    directions.col(1).head<3>() = closure.axis.cross(normal);
+    directions.rightCols(3) = all.rightCols(3);
+    return directions;
+  }
   directions.leftCols(3) = all.leftCols(3);
   directions.col(3).tail<3>() = normal;
   directions.col(4).tail<3>() = closure.axis.cross(normal);
@@ -139,7 +155,9 @@ VectorXd SimbodyBridge::calcWrenchForces(const std::vector<Vector6d>& wrenches) 
     for (const CouplerTerm& term : closure.terms) coupled[term.dof] += term.coefficient * wrenches[c][0];
     if (closure.kind == ClosureKind::Coupler) continue;
     const SE3 X_W1 = getPlacement(closure.body1) * closure.X_B1;
-    const Vector3d force = X_W1.R * wrenches[c].head<3>(), moment = X_W1.R * wrenches[c].tail<3>();
+    Vector3d force = X_W1.R * wrenches[c].head<3>(), moment = X_W1.R * wrenches[c].tail<3>();
+    if (closure.kind == ClosureKind::Distance)  // a tension
+      force = wrenches[c][0] / closure.length * ((getPlacement(closure.body2) * closure.X_B2).p - X_W1.p);
     const auto apply = [&](int body, double sign) {
       const Vector3d arm = X_W1.p - getPlacement(body).p;
       body_forces[s_->bodies[body].getMobilizedBodyIndex()] +=

@@ -63,6 +63,14 @@ void SimbodyBridge::System::readForces(const SimTK::Vector& multipliers, OracleS
       }
     }
     const SE3 X_1B = X_B1.inverse();
+    if (closures[c].kind == ClosureKind::Distance) {  // its tension
+      const auto locate = [&](int body, const SE3& X) {
+        return toEigen(bodies[body].findStationLocationInGround(state, toSimTK(X.p)));
+      };
+      const Vector3d along = (locate(closures[c].body2, closures[c].X_B2) - locate(body1, X_B1)).normalized();
+      out.wrenches.push_back(along.dot(wrench_W.head<3>()) * Vector6d::Unit(0));
+      continue;
+    }
     out.wrenches.push_back(X_1B.actForce(SE3{R_WB.transpose(), Vector3d::Zero()}.actForce(wrench_W)));
   }
 }

@@ -25,6 +25,7 @@ TEST_CASE("every joint kind with every closure kind agrees with MuJoCo", "[sweep
   options.tolerance = 1e-10;
   double without_rate = 0;
   for (const MechanismKind& kind : listMechanismKinds()) {
+    if (kind.closure == ClosureKind::Slider) continue;  // which MuJoCo does not have
     if (selection.isLeftOut()) continue;
     const Mechanism mechanism = makeRandomMechanism(rng, kind.joint, kind.closure, kind.base);
     options.start = mechanism.q_closed;

@@ -190,7 +190,9 @@ TEST_CASE("closed chains move freely for two seconds with Simbody, at the order 
   std::mt19937 rng(14);
   const std::pair<JointKind, ClosureKind> kinds[] = {{JointKind::Spherical, ClosureKind::Hinge5D},
                                                      {JointKind::Planar, ClosureKind::Weld6D},
-                                                     {JointKind::Universal, ClosureKind::Ball3D}};
+                                                     {JointKind::Universal, ClosureKind::Ball3D},
+                                                     {JointKind::Revolute, ClosureKind::Distance},
+                                                     {JointKind::Spherical, ClosureKind::Slider}};
   for (const auto& [joint, closure] : kinds) {
     const Mechanism mechanism = makeRandomMechanism(rng, joint, closure, MechanismBase::FreeFlyer);
     const Model model = makeModelWithoutArmature(mechanism.model);

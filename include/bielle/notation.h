@@ -37,12 +37,15 @@
 /// ## Closures and contacts
 /// A closure ties frame 1 (on body 1) to frame 2 (on body 2). With the placement X_12 of frame 2 in frame 1:
 /// - residual  6D: Log6(X_12);  3D: the origin p_12;  5D: p_12 and the angle vector between the two hinge axes, in the
-///   plane normal to the axis;
+///   plane normal to the axis;  slider: R_12^T p_12 in the plane normal to the axis, and log(R_12);
+///   distance of length L: (|p_12|^2 - L^2) / (2 L);
 /// - velocity  nu_c = V_1 - X_12 V_2, both body twists carried to frame 1 (the paper's eq. 8), of which a 3D closure
-///   keeps the linear rows and a 5D closure the linear rows and the two angular rows normal to its axis;
+///   keeps the linear rows, a 5D closure the linear rows and the two angular rows normal to its axis, a slider the two
+///   linear rows normal to its axis and the angular rows, and a distance the linear part along p_12 / L;
 /// - acceleration  a_c = A_1 - X_12 A_2 + [V_1 x] X_12 V_2 (the paper's eq. 9), the derivative of nu_c in frame 1;
 /// - lambda is the wrench, in frame 1, that acts **on body 1**; body 2 gets the opposite one. So J = d nu_c / d v
-///   enters (1) with a plus sign and positive power of lambda is power given to the mechanism.
+///   enters (1) with a plus sign and positive power of lambda is power given to the mechanism. Of a distance, lambda is
+///   the tension of the rod, N: it pulls both points towards each other.
 /// A coupler ties coordinates instead of frames, sum c_i q_i = c_0: residual c_0 - sum c_i q_i, velocity sum c_i v_i,
 /// acceleration sum c_i a_i, and lambda adds c_i lambda to the generalized force of coordinate i.
 ///

@@ -91,6 +91,7 @@ SearchResult minimize(const py::function& objective, const py::object& start, co
 
 void bindVariables(py::module_& module) {
   Value<LengthChange>(module, "LengthChange", "The distance between two places of one body; the second one moves.")
+      .field("rod", &LengthChange::rod, "or the name of a closure that is a distance, and nothing else")
       .field("begin", &LengthChange::from, "a joint, frame, contact or closure frame")
       .field("end", &LengthChange::to, "another one on the same body, which moves along the line between them")
       .field("across", &LengthChange::across, "unit vector (3,): only the part perpendicular to it counts; zero: all")

@@ -247,8 +247,19 @@ void bindBuilder(py::module_& module) {
              double kd) { self.addClosure(name, kind, frame1, frame2, readMatrix<Vector3d>(axis, "axis"), kp, kd); },
           py::arg("name"), py::arg("kind"), py::arg("frame1"), py::arg("frame2"),
           py::arg("axis") = py::make_tuple(0, 0, 1), py::arg("kp") = 0, py::arg("kd") = 0,
-          "Closes a loop: two frames coincide as specified by the ClosureKind.\n\n"
-          "axis: (3,), of a hinge, in frame 1; kp [1/s^2], kd [1/s]: Baumgarte stabilization.")
+          "Closes a loop: two frames coincide, or keep their distance, as specified by the ClosureKind.\n\n"
+          "axis: (3,), of a hinge or slider, in frame 1; kp [1/s^2], kd [1/s]: Baumgarte stabilization.")
+      .def(
+          "add_distance",
+          [](ModelBuilder& self, const std::string& name, const std::string& frame1, const std::string& frame2,
+             const py::object& length, double kp, double kd) {
+            self.addDistance(name, frame1, frame2, read<std::optional<double>>(length, "length"), kp, kd);
+          },
+          py::arg("name"), py::arg("frame1"), py::arg("frame2"), py::arg("length") = py::none(), py::arg("kp") = 0,
+          py::arg("kd") = 0,
+          "A massless rod with a ball at either end: keeps the origins of two frames at a distance.\n\n"
+          "length: m, above 0; None: their distance where all coordinates are neutral; kp [1/s^2], kd [1/s]: Baumgarte "
+          "stabilization.")
       .def("add_coupler", &ModelBuilder::addCoupler, py::arg("name"), py::arg("coefficients"), py::arg("offset") = 0,
            py::arg("kp") = 0, py::arg("kd") = 0,
            "A belt or a gear: the sum of coefficients times coordinates is the offset, rad or m.\n\n"

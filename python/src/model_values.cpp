@@ -20,7 +20,9 @@ void bindEnums(py::module_& module) {
       .value("WELD_6D", ClosureKind::Weld6D)
       .value("BALL_3D", ClosureKind::Ball3D)
       .value("HINGE_5D", ClosureKind::Hinge5D)
-      .value("COUPLER", ClosureKind::Coupler);
+      .value("COUPLER", ClosureKind::Coupler)
+      .value("DISTANCE", ClosureKind::Distance)
+      .value("SLIDER", ClosureKind::Slider);
   py::enum_<ContactKind>(module, "ContactKind")
       .value("POINT_3D", ContactKind::Point3D)
       .value("EDGE_5D", ContactKind::Edge5D)
@@ -110,7 +112,8 @@ void bindConstraints(py::module_& module) {
       .field("body2", &Closure::body2, "index")
       .field("X_B1", &Closure::X_B1, "placement of frame 1 in body 1")
       .field("X_B2", &Closure::X_B2, "placement of frame 2 in body 2")
-      .field("axis", &Closure::axis, "free axis of a hinge in both frames (3,)")
+      .field("axis", &Closure::axis, "free axis of a hinge or slider in both frames (3,)")
+      .field("length", &Closure::length, "of a distance, m")
       .field("kp", &Closure::kp, "stabilisation, 1/s^2")
       .field("kd", &Closure::kd, "1/s")
       .field("terms", &Closure::terms, "terms of a coupler")

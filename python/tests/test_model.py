@@ -200,6 +200,27 @@ def test_couplers_and_springs_from_nothing():
         builder.add_coupler("slack", {"a": 1})
 
 
+def test_a_rod_without_a_body():
+    """A point on a planar table of two slides, held at a distance from the origin: it circles, and the rod pulls by m w^2 r."""
+    builder = bielle.ModelBuilder("conker")
+    builder.set_gravity([0, 0, 0])
+    carriage = bielle.Joint(name="x", kind=bielle.JointKind.PRISMATIC, axis=[1, 0, 0])
+    builder.add_link("carriage", "world", carriage, bielle.Inertia())
+    joint = bielle.Joint(name="y", kind=bielle.JointKind.PRISMATIC, axis=[0, 1, 0])
+    builder.add_link("mass", "carriage", joint, bielle.Inertia(mass=2, I_com=np.eye(3)))
+    builder.add_distance("rod", "mass", "world", 0.5)
+    model = builder.build()
+    rod = model.closures[0]
+    assert rod.kind == bielle.ClosureKind.DISTANCE and rod.length == 0.5 and model.num_closure_rows == 1
+    assert model.closure_residual([0.3, 0.4]) == pytest.approx([0])
+    motion = model.forward_dynamics([0.3, 0.4], [-0.8, 0.6], [])
+    assert motion.a == pytest.approx([-0.6 * 2, -0.8 * 2])
+    assert motion.forces == pytest.approx([2 * 1 / 0.5])
+    for length in (0, -1, np.nan):
+        with pytest.raises(bielle.InputError):
+            builder.add_distance("none", "mass", "world", length)
+
+
 def test_a_spring_between_two_points():
     """A mass on a vertical slide, pulled by a spring from a point beside it."""
     builder = bielle.ModelBuilder("mass")

@@ -12,6 +12,7 @@ RobotDraft::RobotDraft(const Model& model)
     : model_(model), visuals_(model.visuals()), shapes_(model.shapes()), motors_(model.motors()) {
   for (const Joint& joint : model.joints()) joints_.push_back(joint.X_PJ);
   for (const Frame& frame : model.frames()) frames_.push_back(frame.X_BF);
+  for (const Closure& closure : model.closures()) rods_.push_back(closure.length);
   for (const Body& body : model.bodies()) inertias_.push_back(body.inertia);
 }
 
@@ -57,6 +58,17 @@ int RobotDraft::findLink(const std::string& name) const {
   if (body == model_.numBodies())
     throw InputError(model_.name(), "link '" + name + "'", "there is no such body", "`bielle info` lists them");
   return body;
+}
+
+size_t RobotDraft::findRod(const std::string& closure) const {
+  const std::vector<Closure>& closures = model_.closures();
+  const auto found = std::find_if(closures.begin(), closures.end(), [&](const Closure& c) {
+    return c.name == closure && c.kind == ClosureKind::Distance;
+  });
+  if (found == closures.end())
+    throw InputError(model_.name(), "rod '" + closure + "'", "there is no closure of type distance with this name",
+                     "`bielle info` lists them");
+  return static_cast<size_t>(found - closures.begin());
 }
 
 void RobotDraft::scaleMass(const std::string& link, double factor) {
@@ -150,13 +162,15 @@ Model RobotDraft::build() const {
     builder.addFrame(name, getLink(body), X_BF);
     return name;
   };
-  for (const Closure& c : m.closures()) {
+  for (size_t i = 0; i < rods_.size(); ++i) {
+    Closure c = m.closures()[i];
+    c.length = rods_[i];
     if (c.kind == ClosureKind::Coupler) {
       builder.copyClosure(m, c);
       continue;
     }
-    builder.addClosure(c.name, c.kind, place(c.name + "/frame1", c.body1, c.X_B1),
-                       place(c.name + "/frame2", c.body2, c.X_B2), c.axis, c.kp, c.kd);
+    const std::string frame1 = place(c.name + "/frame1", c.body1, c.X_B1);
+    builder.addClosure(frame1, place(c.name + "/frame2", c.body2, c.X_B2), c);
   }
   for (const Motor& motor : motors_) builder.addMotor(motor);
   for (const Joint& joint : m.joints())

@@ -25,6 +25,11 @@ class RobotDraft {
   /// Moves a joint with everything that it carries, or a frame with the closures, springs and contacts attached to it.
   void setPlace(const std::string& name, const Vector3d& p);
 
+  /// Length of a closure that is a distance, m.
+  /// \throws InputError when there is no such one
+  double getRod(const std::string& closure) const { return rods_[findRod(closure)]; }
+  void setRod(const std::string& closure, double length) { rods_[findRod(closure)] = length; }
+
   /// Stretches a link along `direction` (unit) by `factor`, with `origin` and the mass per length unchanged:
   ///     D = 1 + (factor - 1) d d^T,   m' = factor m,   c' = origin + D (c - origin),   S' = factor D S D         (1)
   /// with S = tr(I) / 2 - I the second moments about the centre of mass; a physical inertia remains physical. Boxes and
@@ -46,12 +51,14 @@ class RobotDraft {
  private:
   int findMovable(const std::string& name, bool& is_joint) const;
   int findLink(const std::string& name) const;
+  size_t findRod(const std::string& closure) const;
   int findFrameAt(int body, const SE3& X_BF) const;
   int findFrameAt(int body, const Vector3d& p) const;
   std::string getLink(int body) const { return body == 0 ? "world" : model_.bodies()[body].name; }
 
   Model model_;
   std::vector<SE3> joints_, frames_;
+  std::vector<double> rods_;  // of closures
   std::vector<Inertia> inertias_;
   std::vector<Visual> visuals_;
   std::vector<Shape> shapes_;

@@ -27,8 +27,13 @@ Line getLine(const RobotDraft& draft, const LengthChange& change) {
   return line;
 }
 
+double getLength(const RobotDraft& draft, const LengthChange& change) {
+  return change.rod.empty() ? getLine(draft, change).along.norm() : draft.getRod(change.rod);
+}
+
 // `length` over the one in the robot as it was.
 void setLength(RobotDraft& draft, const LengthChange& change, double length, double original) {
+  if (!change.rod.empty()) return draft.setRod(change.rod, length);
   const Line line = getLine(draft, change);
   const double now = line.along.norm();
   draft.setPlace(change.to, line.from + line.aside + length / now * line.along);
@@ -59,6 +64,10 @@ std::vector<std::string> listTargets(const DesignVariable& variable, const Model
     out.push_back((variable.isChoice() ? "the type of motor '" : "the ratio of motor '") +
                   robot.motors()[static_cast<size_t>(m)].name + "'");
   for (const LengthChange& change : variable.lengths) {
+    if (!change.rod.empty()) {
+      out.push_back("the length of '" + change.rod + "'");
+      continue;
+    }
     const auto [first, second] = std::minmax(change.from, change.to);
     out.push_back("the distance of '" + first + "' and '" + second + "'" + describeDirection(" across", change.across));
   }
@@ -95,12 +104,15 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
     for (const ShiftChange& shift : variable.shifts) draft.getPlace(shift.of);
     for (size_t k = 0; k < variable.lengths.size(); ++k) {
       const LengthChange& change = variable.lengths[k];
-      const double length = getLine(draft, change).along.norm();
+      const double length = getLength(draft, change);
       if (k == 0) start_[static_cast<Eigen::Index>(i)] = length;
       if (!(length > 1e-9 && length + variable.lower - start_[static_cast<Eigen::Index>(i)] > 1e-9))
-        throw InputError(source_, element,
-                         "the distance of '" + change.from + "' and '" + change.to + "' is zero, or would become zero",
-                         "name two separate places, or raise the lower bound");
+        throw InputError(
+            source_, element,
+            (change.rod.empty() ? "the distance of '" + change.from + "' and '" + change.to + "'"
+                                : "the length of '" + change.rod + "'") +
+                " is zero, or would become zero",
+            change.rod.empty() ? "name two separate places, or raise the lower bound" : "raise the lower bound");
       setLength(draft, change, length, length);
     }
   }
@@ -325,9 +337,9 @@ Model Parametrization::changePlaces(const VectorXd& x) const {
     for (const ShiftChange& shift : variables_[i].shifts)
       draft.setPlace(shift.of, draft.getPlace(shift.of).p + x[k] * shift.along);
     for (const LengthChange& change : variables_[i].lengths) {
-      const double length = getLine(original, change).along.norm();
+      const double length = getLength(original, change);
       // An unchanged value is reproduced up to the rounding of a square root.
-      if (x[k] != start_[k] || getLine(draft, change).along.norm() != length)
+      if (x[k] != start_[k] || getLength(draft, change) != length)
         setLength(draft, change, length + x[k] - start_[k], length);
     }
   }

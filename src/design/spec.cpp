@@ -24,7 +24,7 @@ const YamlKeys kDesignKeys("design", "",
 const YamlKeys kVariableKeys("design", "variables[]",
                              {"name", "unit", "bounds", "length", "shift", "parameter", "ratio", "gear", "motor",
                               "choices", "mass", "start"});
-const YamlKeys kLengthKeys("design", "variables[].length[]", {"from", "to", "across", "stretch"});
+const YamlKeys kLengthKeys("design", "variables[].length[]", {"from", "to", "across", "stretch", "rod"});
 const YamlKeys kShiftKeys("design", "variables[].shift[]", {"of", "along"});
 const YamlKeys kGearKeys("design", "variables[].gear", {"loss", "mass"});
 const YamlKeys kTermKeys("design", "objective[]", {"measure", "motors", "weight", "region"});
@@ -45,6 +45,11 @@ std::vector<Entry> getItems(const Entry& entry) { return entry.isList() ? entry.
 LengthChange readLength(const Entry& entry) {
   const Fields fields = entry.getFields(kLengthKeys);
   LengthChange change;
+  if (const Entry* rod = find(fields, "rod")) {
+    if (fields.size() > 1) rod->fail("it has places beside a rod", "give either `rod` or `from` and `to`");
+    change.rod = rod->getText();
+    return change;
+  }
   change.from = require(fields, "from", entry).getText();
   change.to = require(fields, "to", entry).getText();
   if (const Entry* across = find(fields, "across")) change.across = readDirection(*across);

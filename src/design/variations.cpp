@@ -42,6 +42,7 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
     addTwist(from.closures()[c].X_B1, to.closures()[c].X_B1, out.frames1[c]);
     addTwist(from.closures()[c].X_B2, to.closures()[c].X_B2, out.frames2[c]);
     out.offsets[c] += weight * (to.closures()[c].offset - from.closures()[c].offset);
+    out.lengths[c] += weight * (to.closures()[c].length - from.closures()[c].length);
     for (size_t i = 0; i < from.closures()[c].terms.size(); ++i)
       out.coefficients[c][static_cast<Eigen::Index>(i)] +=
           weight * (to.closures()[c].terms[i].coefficient - from.closures()[c].terms[i].coefficient);

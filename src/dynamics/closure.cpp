@@ -3,9 +3,10 @@
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/closure_rows.h"
 #include "math/constants.h"
 #include "math/lanes.h"
-#include "model/joint.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {
@@ -23,9 +24,6 @@ template <typename T>
 SE3Of<T> calcRelativePlacement(const WorkspaceOf<T>& ws, const Closure& c) {
   return getFrame1(ws, c).inverseTimes(ws.X_WB[c.body2] * c.X_B2);
 }
-
-// The two reduced joint vectors normal to the hinge axis, as columns.
-Eigen::Matrix<double, 3, 2> getHingeNormals(const Closure& c) { return makePlaneBasis(c.axis).leftCols<2>(); }
 
 // theta / sin(theta) of the angle between the hinge axes, whose sine is positive.
 double calcHingeFactor(double sine, double cosine) {
@@ -57,36 +55,6 @@ T sumTerms(const Closure& c, const VectorX<T>& x, int CouplerTerm::*index) {
   for (const CouplerTerm& term : c.terms) sum += term.coefficient * x[term.*index];
   return sum;
 }
-
-// Transforms full vectors from world coordinates to frame 1 and writes their rows to columns of a matrix.
-template <typename T>
-class RowWriter {
- public:
-  RowWriter(const WorkspaceOf<T>& ws, const Closure& c) : kind_(c.kind), X_W1_(getFrame1(ws, c)) {
-    if (kind_ == ClosureKind::Hinge5D) normals_ = getHingeNormals(c);
-  }
-
-  // out = s times the rows of `full`.
-  void write(double s, const Vector6<T>& full, T* out) const {
-    if (kind_ == ClosureKind::Coupler) {  // not a matter of frames
-      out[0] = 0;
-      return;
-    }
-    const Vector6<T> local = X_W1_.actInvMotion(full);
-    for (int i = 0; i < 3; ++i) out[i] = s * local[i];
-    if (kind_ == ClosureKind::Ball3D) return;
-    if (kind_ == ClosureKind::Weld6D) {
-      for (int i = 3; i < 6; ++i) out[i] = s * local[i];
-    } else {
-      for (int i = 0; i < 2; ++i) out[3 + i] = s * normals_.col(i).dot(angular(local));
-    }
-  }
-
- private:
-  ClosureKind kind_;
-  SE3Of<T> X_W1_;
-  Eigen::Matrix<double, 3, 2> normals_;
-};
 
 }  // namespace
 
@@ -127,25 +95,36 @@ VectorUpTo6<T> selectRows(const Closure& c, const Vector6<T>& full) {
     case ClosureKind::Ball3D:
       return linear(full);
     case ClosureKind::Coupler:
+    case ClosureKind::Distance:
       return full.template head<1>();
     case ClosureKind::Hinge5D:
+    case ClosureKind::Slider:
       break;
   }
+  const auto normals = getAxisNormals(c);
   VectorUpTo6<T> rows(5);
-  rows << linear(full), getHingeNormals(c).transpose() * angular(full);
+  if (c.kind == ClosureKind::Slider)
+    rows << normals.transpose() * linear(full), angular(full);
+  else
+    rows << linear(full), normals.transpose() * angular(full);
   return rows;
 }
 
 template <typename T>
 Vector6<T> expandRows(const Closure& c, const VectorUpTo6<T>& lambda) {
   Vector6<T> full = Vector6<T>::Zero();
-  if (c.kind == ClosureKind::Coupler) {
+  if (c.kind == ClosureKind::Coupler || c.kind == ClosureKind::Distance) {
     full[0] = lambda[0];
+    return full;
+  }
+  if (c.kind == ClosureKind::Slider) {
+    linear(full) = getAxisNormals(c) * lambda.template head<2>();
+    angular(full) = lambda.template tail<3>();
     return full;
   }
   linear(full) = linear(lambda);
   if (c.kind == ClosureKind::Weld6D) angular(full) = angular(lambda);
-  if (c.kind == ClosureKind::Hinge5D) angular(full) = getHingeNormals(c) * lambda.template tail<2>();
+  if (c.kind == ClosureKind::Hinge5D) angular(full) = getAxisNormals(c) * lambda.template tail<2>();
   return full;
 }
 
@@ -168,8 +147,18 @@ template <typename T>
 VectorUpTo6<T> calcClosureResidual(const Closure& c, const SE3Of<T>& X) {
   if (c.kind == ClosureKind::Weld6D) return log6(X);
   if (c.kind == ClosureKind::Ball3D) return X.p;
+  if (c.kind == ClosureKind::Distance) {
+    VectorUpTo6<T> row(1);
+    row[0] = (X.p.dot(X.p) - c.length * c.length) * (0.5 / c.length);
+    return row;
+  }
+  if (c.kind == ClosureKind::Slider) {
+    VectorUpTo6<T> rows(5);
+    rows << getAxisNormals(c).transpose() * (X.R.transpose() * X.p), log3(X.R);
+    return rows;
+  }
   const Vector3<T> axis = c.axis.cast<T>(), n2 = X.R * axis;
-  const Eigen::Vector2<T> sine = getHingeNormals(c).transpose() * axis.cross(n2);
+  const Eigen::Vector2<T> sine = getAxisNormals(c).transpose() * axis.cross(n2);
   VectorUpTo6<T> rows(5);
   rows << X.p, calcHingeTurn(sine, axis.dot(n2));
   return rows;
@@ -178,7 +167,7 @@ VectorUpTo6<T> calcClosureResidual(const Closure& c, const SE3Of<T>& X) {
 // Frame 2 turns in frame 1 with omega = -nu_ang. With the direction u of the turn in the plane of the normals and v = axis x u,
 //     d(theta u)/dt = u (u . omega) + v (theta cot(theta) (v . omega) + theta (axis . omega)).
 Eigen::Matrix<double, 2, 3> calcHingeTurnRate(const Closure& c, const Matrix3d& R) {
-  const Eigen::Matrix<double, 2, 3> normals = getHingeNormals(c).transpose();
+  const Eigen::Matrix<double, 2, 3> normals = getAxisNormals(c).transpose();
   const Vector3d n2 = R * c.axis;
   const Eigen::Vector2d sine = normals * c.axis.cross(n2);
   const double s = sine.norm(), cosine = c.axis.dot(n2), theta = std::atan2(s, cosine);
@@ -198,6 +187,15 @@ RowsBy6 calcClosureResidualRate(const Closure& c, const SE3& X) {
   if (c.kind == ClosureKind::Weld6D) return -calcLogJacobian6(X) * X.inverse().toActionMatrix();
   RowsBy6 rate = RowsBy6::Zero(getRows(c.kind), 6);
   if (c.kind == ClosureKind::Coupler) return rate;
+  if (c.kind == ClosureKind::Distance) {
+    rate.leftCols<3>() = -X.p.transpose() / c.length;
+    return rate;
+  }
+  if (c.kind == ClosureKind::Slider) {  // origin 1 moves in frame 2 with R^T nu_lin
+    rate.topLeftCorner<2, 3>() = -getAxisNormals(c).transpose() * X.R.transpose();
+    rate.bottomRightCorner<3, 3>() = -calcRightJacobianInverse3(Vector3d(-log3(X.R)));
+    return rate;
+  }
   rate.topLeftCorner<3, 3>() = -Matrix3d::Identity();
   rate.topRightCorner<3, 3>() = skew(X.p);
   if (c.kind == ClosureKind::Hinge5D) rate.bottomRightCorner<2, 3>() = calcHingeTurnRate(c, X.R);
@@ -206,8 +204,10 @@ RowsBy6 calcClosureResidualRate(const Closure& c, const SE3& X) {
 
 ClosureGap calcClosureGap(const Workspace& ws, const Closure& closure) {
   const RowVectorUpTo6 r = calcClosureResidual(ws, closure);
-  if (closure.kind == ClosureKind::Coupler) return {0, std::abs(r[0])};
-  return {r.head<3>().norm(), r.tail(r.size() - 3).norm()};
+  if (closure.kind == ClosureKind::Distance)
+    return {std::abs(calcRelativePlacement(ws, closure).p.norm() - closure.length), 0};
+  const int lengths = getLengthRows(closure.kind);
+  return {r.head(lengths).norm(), r.tail(r.size() - lengths).norm()};
 }
 
 void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, MatrixRef H) {
@@ -225,7 +225,9 @@ void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, Ma
 RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& c) {
   requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocity", "updateVelocities");
   if (c.kind == ClosureKind::Coupler) return RowVectorUpTo6::Constant(1, sumTerms(c, ws.v, &CouplerTerm::dof));
-  return selectRows(c, getFrame1(ws, c).actInvMotion(ws.V[c.body1] - ws.V[c.body2]));
+  RowVectorUpTo6 rows(getRows(c.kind));
+  ClosureRows<double>(ws, c).write(1, ws.V[c.body1] - ws.V[c.body2], rows.data());
+  return rows;
 }
 
 template <typename T>
@@ -235,8 +237,9 @@ VectorUpTo6<T> calcClosureAcceleration(const WorkspaceOf<T>& ws, const Closure& 
     row[0] = sumTerms(c, ws.a, &CouplerTerm::dof);
     return row;
   }
-  const Vector6<T> a = ws.A[c.body1] - ws.A[c.body2] + crossMotion(ws.V[c.body1], ws.V[c.body2]);
-  return selectRows<T>(c, getFrame1(ws, c).actInvMotion(a));
+  VectorUpTo6<T> rows(getRows(c.kind));
+  ClosureRows<T>(ws, c).writeAcceleration(rows.data());
+  return rows;
 }
 
 RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& c) {
@@ -253,24 +256,24 @@ void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& c, typename Ar
     for (const CouplerTerm& term : c.terms) J(0, term.dof) = term.coefficient;
     return;
   }
-  const RowWriter<T> rows(ws, c);
+  const ClosureRows<T> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) rows.write(c.signs[i], ws.J.col(c.dofs[i]), &J(0, c.dofs[i]));
 }
 
 void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_dq, MatrixRef da_dv) {
   requireStage(ws, WorkspaceStage::Acceleration, "calcClosureDerivatives", "updateAccelerations");
-  const RowWriter<double> rows(ws, c);
+  const ClosureRows<double> rows(ws, c);
   const Vector6d &V1 = ws.V[c.body1], &V2 = ws.V[c.body2], &A2 = ws.A[c.body2];
   const Vector6d V12 = V1 + V2;
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const double s = c.signs[i];
     const Vector6d J = ws.J.col(k), dV = ws.dV.col(k);
-    const Vector6d J_V2 = crossMotion(J, V2);
+    const Vector6d J_V2 = crossMotion(J, V2), dnu = dV + J_V2;
     const Vector6d dq = ws.dA.col(k) - crossMotion(V12, dV) + crossMotion(J, A2) - crossMotion(V1, J_V2);  // Eq. (1)
     const Vector6d dv = ws.dJ.col(k) + dV - crossMotion(V12, J);                                           // Eq. (2)
-    rows.write(s, dq, &da_dq(0, k));
-    rows.write(s, dv, &da_dv(0, k));
+    rows.writeAccelerationChange(s, J, dnu, dq, &da_dq(0, k));
+    rows.writeAccelerationChange(s, Vector6d::Zero(), J, dv, &da_dv(0, k));
   }
 }
 
@@ -284,7 +287,7 @@ void addStabilizationDerivatives(const Workspace& ws, const Closure& c, MatrixRe
     }
     return;
   }
-  const RowWriter<double> rows(ws, c);
+  const ClosureRows<double> rows(ws, c);
   const SE3 X_W1 = getFrame1(ws, c);
   RowsBy6 rate = RowsBy6::Zero(getRows(c.kind), 6);
   if (c.kp != 0) rate = calcClosureResidualRate(ws, c);
@@ -293,7 +296,7 @@ void addStabilizationDerivatives(const Workspace& ws, const Closure& c, MatrixRe
     const int k = c.dofs[i];
     const double s = c.signs[i];
     const Vector6d J = ws.J.col(k);
-    rows.write(s * c.kd, ws.dV.col(k) + crossMotion(J, ws.V[c.body2]), row.data());  // Eq. (3)
+    rows.writeVelocityChange(s * c.kd, J, ws.dV.col(k) + crossMotion(J, ws.V[c.body2]), row.data());  // Eq. (3)
     ds_dq.col(k) += row - (c.kp * s) * (rate * X_W1.actInvMotion(J));
     rows.write(s * c.kd, J, row.data());  // Eq. (4)
     ds_dv.col(k) += row;
@@ -302,39 +305,48 @@ void addStabilizationDerivatives(const Workspace& ws, const Closure& c, MatrixRe
 
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& c, MatrixRef dnu_dq) {
   requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocityDerivative", "updateVelocities");
-  const RowWriter<double> rows(ws, c);
+  const ClosureRows<double> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const Vector6d dnu = ws.dV.col(k) + crossMotion(ws.J.col(k), ws.V[c.body2]);  // Eq. (3)
-    rows.write(c.signs[i], dnu, &dnu_dq(0, k));
+    rows.writeVelocityChange(c.signs[i], ws.J.col(k), dnu, &dnu_dq(0, k));
   }
 }
 
 template <typename T>
 Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& c, typename ArgumentsOf<T>::ConstVector lambda) {
   if (c.kind == ClosureKind::Coupler) return Vector6<T>::Zero();
-  return getFrame1(ws, c).actForce(expandRows<T>(c, lambda));
+  Vector6<T> W = expandRows<T>(c, lambda);
+  if (c.kind == ClosureKind::Distance) linear(W) = (W[0] / c.length * calcRelativePlacement(ws, c).p).eval();
+  return getFrame1(ws, c).actForce(W);
 }
 
 void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& c, const Vector6d& wrench,
                                MatrixRef dID_dq) {
-  if (c.body2 == 0) return;  // no effect on the world
+  const ClosureRows<double> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const Vector6d moved = c.signs[i] * crossForce(ws.J.col(k), wrench);
-    for (int j : model.supportDofs(c.body2)) dID_dq(j, k) += ws.J.col(j).dot(moved);  // Eq. (5)
+    if (c.body2 != 0)                                                                   // no effect on the world
+      for (int j : model.supportDofs(c.body2)) dID_dq(j, k) += ws.J.col(j).dot(moved);  // Eq. (5)
+    if (c.kind != ClosureKind::Distance) continue;
+    const Vector6d turned = c.signs[i] * rows.calcTurned(wrench, ws.J.col(k));
+    for (size_t l = 0; l < c.dofs.size(); ++l) dID_dq(c.dofs[l], k) -= c.signs[l] * ws.J.col(c.dofs[l]).dot(turned);
   }
 }
 
 void addGeneralizedForceDerivative(const Model& model, const Workspace& ws, const Closure& c, const Vector6d& wrench,
                                    MatrixRef out) {
   const std::vector<Dof>& dofs = model.dofs();
+  const ClosureRows<double> rows(ws, c);
   for (size_t ik = 0; ik < c.dofs.size(); ++ik) {
     const int k = c.dofs[ik];
     const Vector6d moved = crossForce(ws.J.col(k), wrench);
+    const Vector6d turned = c.signs[ik] * rows.calcTurned(wrench, ws.J.col(k));
     const bool moves_frame1 = c.signs[ik] > 0;
     for (size_t ij = 0; ij < c.dofs.size(); ++ij) {
       const int j = c.dofs[ij];
+      out(j, k) += c.signs[ij] * ws.J.col(j).dot(turned);
       const bool same_joint = dofs[j].joint == dofs[k].joint;
       const bool moves_axis = same_joint ? !(dofs[j].first_of_universal && dofs[k].second_of_universal)
                                          : model.isAncestorOrSelf(dofs[k].joint, dofs[j].joint);

@@ -1,12 +1,9 @@
 #include "dynamics/cluster_motion.h"
 
+#include "dynamics/closure_rows.h"
+
 namespace bielle {
 namespace {
-
-template <typename T>
-SE3Of<T> getFrame1(const ClusterViewOf<T>& view, const Closure& c) {
-  return view.ws.X_WB[c.body1] * c.X_B1;
-}
 
 // Difference of a path sum of coordinate c between the bodies of a closure of the cluster.
 template <typename T>
@@ -66,12 +63,12 @@ void updateVelocityLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion
   sumPaths(cluster, motion.dV, [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * view.ws.dV.col(view.dofs[k]); });
   for (size_t i = 0; i < view.closures.size(); ++i) {
     const Closure &placed = view.closures[i], &own = cluster.closures.closures[i];
-    const SE3Of<T> X_W1 = getFrame1(view, placed);
-    const int row = cluster.closures.offsets[i], rows = getRows(own.kind);
+    const ClosureRows<T> rows(view.ws, placed);
+    const int row = cluster.closures.offsets[i];
     for (int c = 0; c < cluster.size; ++c) {
-      const Vector6<T> dnu = calcDifference(motion, motion.dV, own, c) +
-                             crossMotion(calcDifference(motion, motion.J, own, c), view.ws.V[placed.body2]);
-      motion.C_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dnu));
+      const Vector6<T> J = calcDifference(motion, motion.J, own, c);
+      const Vector6<T> dnu = calcDifference(motion, motion.dV, own, c) + crossMotion(J, view.ws.V[placed.body2]);
+      rows.writeVelocityChange(1, J, dnu, &motion.C_q(row, c));
     }
   }
   applyMinusPlus(motion, motion.C_q, motion.Z);
@@ -91,17 +88,18 @@ void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& mo
   sumPaths(cluster, motion.dW, [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * getTurn(k); });
   for (size_t i = 0; i < view.closures.size(); ++i) {
     const Closure &placed = view.closures[i], &own = cluster.closures.closures[i];
-    const SE3Of<T> X_W1 = getFrame1(view, placed);
+    const ClosureRows<T> rows(ws, placed);
     const Vector6<T>&V1 = ws.V[placed.body1], &V2 = ws.V[placed.body2], &A2 = ws.A[placed.body2];
     const Vector6<T> V12 = V1 + V2;
-    const int row = cluster.closures.offsets[i], rows = getRows(own.kind);
+    const int row = cluster.closures.offsets[i];
     for (int c = 0; c < cluster.size; ++c) {
       const Vector6<T> J = calcDifference(motion, motion.J, own, c), dV = calcDifference(motion, motion.dV, own, c);
-      const Vector6<T> dq = calcDifference(motion, motion.dA, own, c) - crossMotion(V12, dV) + crossMotion(J, A2) -
-                            crossMotion(V1, crossMotion(J, V2));
+      const Vector6<T> J_V2 = crossMotion(J, V2), dnu = dV + J_V2;
+      const Vector6<T> dq =
+          calcDifference(motion, motion.dA, own, c) - crossMotion(V12, dV) + crossMotion(J, A2) - crossMotion(V1, J_V2);
       const Vector6<T> dv = calcDifference(motion, motion.dW, own, c) - crossMotion(V12, J);
-      motion.C_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dq));
-      motion.C_v.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dv));
+      rows.writeAccelerationChange(1, J, dnu, dq, &motion.C_q(row, c));
+      rows.writeAccelerationChange(1, Vector6<T>::Zero(), J, dv, &motion.C_v(row, c));
     }
   }
   applyMinusPlus(motion, motion.C_q, motion.dy);
@@ -124,13 +122,15 @@ void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<
     const Closure& own = cluster.closures.closures[i];
     const Vector6<T> W =
         calcClosureWrench(view.ws, view.closures[i], forces.segment(cluster.closures.offsets[i], getRows(own.kind)));
+    const ClosureRows<T> rows(view.ws, view.closures[i]);
     const int dof1 = cluster.body_dof[own.body1];
     for (int c = 0; c < cluster.size; ++c) {
+      const Vector6<T> turned = rows.calcTurned(W, calcDifference(motion, motion.J, own, c));
       Vector6<T> twist1 = Vector6<T>::Zero();
       if (dof1 >= 0) twist1 = motion.J.col(n * c + dof1);
       for (size_t d = 0; d < own.dofs.size(); ++d) {
         const int k = own.dofs[d];
-        const Vector6<T> moved = crossForce(twist1 - motion.J.col(n * c + k), W);
+        const Vector6<T> moved = crossForce(twist1 - motion.J.col(n * c + k), W) + turned;
         out(k, c) += own.signs[d] * view.ws.J.col(view.dofs[k]).dot(moved);
       }
     }

@@ -56,7 +56,7 @@ void updateVelocityLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion
 /// d_y, d_v, dA~ and dW~; needs updateVelocityLift and the accelerations of the view.
 template <typename T>
 void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion);
-/// out (n x r) = d(J^T f)/dq N for forces f on all rows (m), fixed in their frames 1: closure.h, Eq. (6); needs
+/// out (n x r) = d(J^T f)/dq N for forces f on all rows (m): closure.h, Eq. (6); needs
 /// updateTwists.
 template <typename T>
 void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,

@@ -59,9 +59,10 @@ FollowedLinkage::Rows FollowedLinkage::calcRows(const VectorXd& q, bool with_cha
     for (int k = 0; k < n; ++k) out.J.block(row, k, size, 1) = units_[k] * H.col(dofs_[k]).head(size);
     if (closure.kind == ClosureKind::Coupler) continue;
     if (with_changes) addChanges(static_cast<int>(c), out.P);
-    out.r.segment(row, 3) /= length_;
-    out.J.middleRows(row, 3) /= length_;
-    if (with_changes) out.P.middleRows(row, 3) /= length_;
+    const int lengths = getLengthRows(closure.kind);
+    out.r.segment(row, lengths) /= length_;
+    out.J.middleRows(row, lengths) /= length_;
+    if (with_changes) out.P.middleRows(row, lengths) /= length_;
   }
   return out;
 }
@@ -91,7 +92,7 @@ void FollowedLinkage::findPlaneLoops(const VectorXd& q, double most) {
           is_plane && (kind == JointKind::Revolute || kind == JointKind::Continuous || kind == JointKind::Prismatic);
       loop.push_back({{ModelPlace::Kind::Joint, model_.dofs()[k].joint}, kind == JointKind::Prismatic});
     }
-    if (closure.kind == ClosureKind::Hinge5D) loop.push_back({{ModelPlace::Kind::Frame1, c}, false});
+    if (hasAxis(closure.kind)) loop.push_back({{ModelPlace::Kind::Frame1, c}, closure.kind == ClosureKind::Slider});
     std::stable_sort(loop.begin(), loop.end(), [](const Axis& a, const Axis& b) { return a.slides < b.slides; });
     if (!is_plane || loop.size() < 3 || loop[1].slides) continue;
     const Vector3d normal = getDirection(loop[0].place);

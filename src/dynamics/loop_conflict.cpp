@@ -112,10 +112,9 @@ std::vector<Candidate> listCandidates(const Model& model, const std::vector<int>
   for (int c : closures) {
     const Closure& closure = model.closures()[c];
     for (int k : closure.dofs) joints.insert(model.dofs()[k].joint);
-    if (closure.kind == ClosureKind::Coupler)
+    if (closure.kind == ClosureKind::Coupler || closure.kind == ClosureKind::Distance)
       out.push_back({{ModelPlace::Kind::Offset, c}, Change::Offset});
-    else
-      add(ModelPlace::Kind::Frame1, c), add(ModelPlace::Kind::Frame2, c);
+    if (closure.kind != ClosureKind::Coupler) add(ModelPlace::Kind::Frame1, c), add(ModelPlace::Kind::Frame2, c);
   }
   for (int j : joints) add(ModelPlace::Kind::Joint, j);
   return out;
@@ -127,7 +126,7 @@ bool hasTurn(const Model& model, const LeastGap& gap) {
   double turn = 0;
   for (int c : gap.closures) {
     const Closure& closure = model.closures()[c];
-    const int rows = getRows(closure.kind), lengths = closure.kind == ClosureKind::Coupler ? 0 : 3;
+    const int rows = getRows(closure.kind), lengths = getLengthRows(closure.kind);
     turn = std::max(turn, gap.r.segment(row + lengths, rows - lengths).norm());
     row += rows;
   }
@@ -197,7 +196,7 @@ std::pair<std::string, SE3> describePlace(const Model& model, const ModelPlace& 
     return {"joint '" + joint.name + "'" + onBody(joint.parent), joint.X_PJ};
   }
   const Closure& closure = model.closures()[place.index];
-  if (place.kind == ModelPlace::Kind::Offset) return {"coupler '" + closure.name + "'", {}};
+  if (place.kind == ModelPlace::Kind::Offset) return {getName(closure.kind) + (" '" + closure.name + "'"), {}};
   const bool first = place.kind == ModelPlace::Kind::Frame1;
   const int body = first ? closure.body1 : closure.body2;
   const SE3& X = first ? closure.X_B1 : closure.X_B2;
@@ -207,7 +206,9 @@ std::pair<std::string, SE3> describePlace(const Model& model, const ModelPlace& 
 std::string describe(const Model& model, const LoopRemedy& remedy) {
   const auto [place, X] = describePlace(model, remedy.place);
   if (remedy.place.kind == ModelPlace::Kind::Offset)
-    return "the offset of " + place + " by " + formatNumber(remedy.offset, "%.4g");
+    return model.closures()[remedy.place.index].kind == ClosureKind::Distance
+               ? "the length of " + place + " by " + formatNumber(1e3 * remedy.offset, "%.4g") + " mm"
+               : "the offset of " + place + " by " + formatNumber(remedy.offset, "%.4g");
   const Vector3d move = X.R * remedy.change.p, turn = X.R * log3(remedy.change.R);
   if (move.norm() > 0)
     return place + " by " + formatNumber(1e3 * move.norm(), "%.4g") + " mm along " + formatDirection(move);
@@ -258,7 +259,8 @@ Model applyRemedy(const Model& model, const LoopRemedy& remedy) {
       parts.closures[i].X_B2 = parts.closures[i].X_B2 * remedy.change;
       break;
     case ModelPlace::Kind::Offset:
-      parts.closures[i].offset += remedy.offset;
+      (parts.closures[i].kind == ClosureKind::Distance ? parts.closures[i].length : parts.closures[i].offset) +=
+          remedy.offset;
       break;
   }
   return ModelBuilder::restore(std::move(parts));

@@ -22,7 +22,7 @@
 namespace bielle {
 
 /// A place of the mechanism: of a joint in the body that carries it, of an end of a closure in its body, or the offset
-/// of a coupler.
+/// of a coupler or length of a distance.
 struct ModelPlace {
   enum class Kind { Joint, Frame1, Frame2, Offset } kind = Kind::Joint;
   int index = 0;  ///< body/joint index, or index into Model::closures()
@@ -32,8 +32,8 @@ struct ModelPlace {
 struct LoopRemedy {
   ModelPlace place;
   SE3 change;         ///< a translation or a rotation
-  double offset = 0;  ///< of a coupler
-  double size = 0;    ///< translation, m; or angle or offset times L of Eq. (1)
+  double offset = 0;  ///< of a coupler, or the length of a distance, m
+  double size = 0;    ///< translation or length, m; or angle or offset of a coupler times L of Eq. (1)
 };
 
 struct LoopConflict {

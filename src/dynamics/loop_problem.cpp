@@ -35,10 +35,17 @@ ModelVariation makeVariation(const Model& model, Change change, const ModelPlace
       out.frames2[place.index] = makeTwist(change, k);
       break;
     case ModelPlace::Kind::Offset:
-      out.offsets[place.index] = 1;
+      (model.closures()[place.index].kind == ClosureKind::Distance ? out.lengths : out.offsets)[place.index] = 1;
       break;
   }
   return out;
+}
+
+// L for angles and the offsets of couplers, 1 for lengths.
+double getChangeUnit(const Model& model, double length, Change change, const ModelPlace& place) {
+  const bool is_length = change == Change::Translation ||
+                         (change == Change::Offset && model.closures()[place.index].kind == ClosureKind::Distance);
+  return is_length ? 1 : length;
 }
 
 }  // namespace
@@ -63,6 +70,7 @@ double calcTypicalLength(const Model& model, const std::vector<int>& closures) {
     const Closure& closure = model.closures()[c];
     for (int k : closure.dofs) joints.insert(model.dofs()[k].joint);
     add(closure.X_B1), add(closure.X_B2);
+    if (closure.kind == ClosureKind::Distance) sum += closure.length, ++count;
   }
   for (int j : joints) add(model.joints()[j].X_PJ);
   return count ? sum / count : 1;
@@ -78,12 +86,13 @@ LoopProblem::LoopProblem(const Model& model, double length, Change change, const
       length_(length),
       change_(change),
       place_(place),
+      unit_(getChangeUnit(model, length, change, place)),
       scale_(VectorXd::Ones(set_.rows)) {
   std::set<int> dofs;
   for (size_t c = 0; c < set_.closures.size(); ++c) {
     const Closure& closure = set_.closures[c];
     dofs.insert(closure.dofs.begin(), closure.dofs.end());
-    const int lengths = closure.kind == ClosureKind::Coupler ? 0 : 3;
+    const int lengths = getLengthRows(closure.kind);
     scale_.segment(set_.offsets[c] + lengths, getRows(closure.kind) - lengths).setConstant(length_);
   }
   dofs_.assign(dofs.begin(), dofs.end());
@@ -125,7 +134,7 @@ MatrixXd LoopProblem::calcJacobian(const LoopPoint& z) {
     updateVariation(changed_, ws_, variations_[k], still_, variation_);
     out.col(n + k) = calcResidualVariation(ws_, set_, variations_[k], variation_);
   }
-  if (change_ == Change::Rotation || change_ == Change::Offset) out.rightCols(directions()) /= length_;
+  out.rightCols(directions()) /= unit_;
   return scale_.asDiagonal() * out;
 }
 
@@ -136,9 +145,9 @@ VectorXd LoopProblem::calcChange(const LoopPoint& z) const {
     case Change::Translation:
       return z.change.p;
     case Change::Rotation:
-      return length_ * log3(z.change.R);
+      return unit_ * log3(z.change.R);
     case Change::Offset:
-      return VectorXd::Constant(1, length_ * z.offset);
+      return VectorXd::Constant(1, unit_ * z.offset);
   }
   return {};
 }
@@ -168,8 +177,8 @@ LoopPoint LoopProblem::move(const LoopPoint& z, const VectorXd& step) const {
   LoopPoint out = z;
   out.q = model_.integrate(z.q, dq);
   if (change_ == Change::Translation) out.change.p += step.tail<3>();
-  if (change_ == Change::Rotation) out.change.R = z.change.R * exp3(Vector3d(step.tail<3>() / length_));
-  if (change_ == Change::Offset) out.offset += step[n] / length_;
+  if (change_ == Change::Rotation) out.change.R = z.change.R * exp3(Vector3d(step.tail<3>() / unit_));
+  if (change_ == Change::Offset) out.offset += step[n] / unit_;
   return out;
 }
 

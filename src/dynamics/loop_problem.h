@@ -68,6 +68,7 @@ class LoopProblem {
   double length_;
   Change change_;
   ModelPlace place_;
+  double unit_;  // m per m, rad or unit of the offset of a coupler
   std::vector<int> dofs_;
   VectorXd scale_;  // rows of the set, m per m or rad
   std::vector<ModelVariation> variations_;

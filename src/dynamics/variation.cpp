@@ -1,6 +1,7 @@
 #include "bielle/dynamics/variation.h"
 
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/closure_rows.h"
 #include "dynamics/joint_force.h"
 #include "dynamics/point_spring.h"
 #include "dynamics/saddle_point.h"
@@ -18,11 +19,24 @@ FrameTwists getFrameTwists(const ConstraintSet& set, size_t c, const ModelVariat
   return {change.contacts[set.getContact(static_cast<int>(c))], Vector6d::Zero()};
 }
 
-Vector6d calcDisplacement1(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
-                           const VariationWorkspace& variation) {
+// D_1 and D_1 - D_2, in the world.
+struct Displacements {
+  Vector6d first, relative;
+};
+
+Displacements calcDisplacements(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
+                                const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
-  return variation.D[closure.body1] +
-         getPlacement(ws, closure.body1, closure.X_B1).actMotion(getFrameTwists(set, c, change).frame1);
+  const FrameTwists twists = getFrameTwists(set, c, change);
+  const Vector6d D_1 =
+      variation.D[closure.body1] + getPlacement(ws, closure.body1, closure.X_B1).actMotion(twists.frame1);
+  return {D_1,
+          D_1 - variation.D[closure.body2] - getPlacement(ws, closure.body2, closure.X_B2).actMotion(twists.frame2)};
+}
+
+// The relative change of the length of a distance; 0 of others.
+double getStretch(const ConstraintSet& set, size_t c, const ModelVariation& change) {
+  return set.closures[c].kind == ClosureKind::Distance ? change.lengths[c] / set.closures[c].length : 0;
 }
 
 // Eq. (9) without dc_0: sum of dc_k x_k + c_k dx_k.
@@ -36,21 +50,25 @@ RowVectorUpTo6 calcTermVariation(const Closure& coupler, const VectorXd& coeffic
   return RowVectorUpTo6::Constant(1, sum);
 }
 
-// Rows of a closure, from a full vector in the world.
-RowVectorUpTo6 readRows(const Workspace& ws, const Closure& closure, const Vector6d& world) {
-  return selectRows<double>(closure, getPlacement(ws, closure.body1, closure.X_B1).actInvMotion(world));
-}
-
 RowVectorUpTo6 calcResidualRows(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
                                 const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
   if (closure.kind == ClosureKind::Coupler)
     return RowVectorUpTo6::Constant(1, change.offsets[c]) -
            calcTermVariation(closure, change.coefficients[c], ws.q, &CouplerTerm::idx_q, variation.motion.q);
-  const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1), X_W2 = getPlacement(ws, closure.body2, closure.X_B2);
-  const Vector6d D_1 = calcDisplacement1(ws, set, c, change, variation);
-  const Vector6d D_2 = variation.D[closure.body2] + X_W2.actMotion(getFrameTwists(set, c, change).frame2);
-  return calcClosureResidualRate(ws, closure) * X_W1.actInvMotion(D_1 - D_2);  // Eq. (7)
+  const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1);
+  const Vector6d D = calcDisplacements(ws, set, c, change, variation).relative;
+  RowVectorUpTo6 rows = calcClosureResidualRate(ws, closure) * X_W1.actInvMotion(D);  // Eq. (7)
+  if (const double stretch = getStretch(set, c, change); stretch != 0)
+    rows -= stretch * (calcClosureResidual(ws, closure) + RowVectorUpTo6::Constant(1, closure.length));
+  return rows;
+}
+
+// Eq. (7), in the world.
+Vector6d calcFullVelocityChange(const Workspace& ws, const Closure& closure, const Vector6d& D_1,
+                                const VariationWorkspace& variation) {
+  const int b1 = closure.body1, b2 = closure.body2;
+  return variation.dV[b1] - variation.dV[b2] - crossMotion(D_1, ws.V[b1] - ws.V[b2]);
 }
 
 RowVectorUpTo6 calcVelocityRows(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
@@ -58,9 +76,13 @@ RowVectorUpTo6 calcVelocityRows(const Workspace& ws, const ConstraintSet& set, s
   const Closure& closure = set.closures[c];
   if (closure.kind == ClosureKind::Coupler)
     return calcTermVariation(closure, change.coefficients[c], ws.v, &CouplerTerm::dof, variation.motion.v);
-  const int b1 = closure.body1, b2 = closure.body2;
-  const Vector6d D_1 = calcDisplacement1(ws, set, c, change, variation);
-  return readRows(ws, closure, variation.dV[b1] - variation.dV[b2] - crossMotion(D_1, ws.V[b1] - ws.V[b2]));  // Eq. (7)
+  const auto [D_1, D] = calcDisplacements(ws, set, c, change, variation);
+  RowVectorUpTo6 rows(getRows(closure.kind));
+  ClosureRows<double>(ws, closure)
+      .writeVelocityChange(1, D, calcFullVelocityChange(ws, closure, D_1, variation), rows.data());
+  if (const double stretch = getStretch(set, c, change); stretch != 0)
+    rows -= stretch * calcClosureVelocity(ws, closure);
+  return rows;
 }
 
 RowVectorUpTo6 calcAccelerationRows(const Workspace& ws, const ConstraintSet& set, size_t c,
@@ -70,10 +92,15 @@ RowVectorUpTo6 calcAccelerationRows(const Workspace& ws, const ConstraintSet& se
     return calcTermVariation(closure, change.coefficients[c], ws.a, &CouplerTerm::dof, variation.motion.a);
   const int b1 = closure.body1, b2 = closure.body2;
   const Vector6d a = ws.A[b1] - ws.A[b2] + crossMotion(ws.V[b1], ws.V[b2]);
-  const Vector6d D_1 = calcDisplacement1(ws, set, c, change, variation);
-  return readRows(ws, closure,
-                  variation.dA[b1] - variation.dA[b2] + crossMotion(variation.dV[b1], ws.V[b2]) +
-                      crossMotion(ws.V[b1], variation.dV[b2]) - crossMotion(D_1, a));  // Eq. (8)
+  const auto [D_1, D] = calcDisplacements(ws, set, c, change, variation);
+  const Vector6d da = variation.dA[b1] - variation.dA[b2] + crossMotion(variation.dV[b1], ws.V[b2]) +
+                      crossMotion(ws.V[b1], variation.dV[b2]) - crossMotion(D_1, a);  // Eq. (8)
+  RowVectorUpTo6 rows(getRows(closure.kind));
+  ClosureRows<double>(ws, closure)
+      .writeAccelerationChange(1, D, calcFullVelocityChange(ws, closure, D_1, variation), da, rows.data());
+  if (const double stretch = getStretch(set, c, change); stretch != 0)
+    rows -= stretch * calcClosureAcceleration(ws, closure);
+  return rows;
 }
 
 // Calls write(c, rows) with the rows of closure c, for all closures.
@@ -164,6 +191,7 @@ ModelVariation::ModelVariation(const Model& model)
       frames1(model.closures().size(), Vector6d::Zero()),
       frames2(frames1),
       offsets(model.closures().size(), 0),
+      lengths(offsets),
       points1(model.pointSprings().size(), Vector3d::Zero()),
       points2(points1),
       springs(model.pointSprings().size(), Eigen::Vector4d::Zero()),
@@ -203,7 +231,9 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
     if (closure.kind == ClosureKind::Coupler) continue;
     const Vector6d W =
         calcClosureWrench<double>(ws, closure, lambda.segment(constraints.offsets[c], getRows(closure.kind)));
-    const Vector6d dW = crossForce(calcDisplacement1(ws, constraints, c, change, variation), W);
+    const auto [D_1, D] = calcDisplacements(ws, constraints, c, change, variation);
+    const Vector6d dW =
+        crossForce(D_1, W) + ClosureRows<double>(ws, closure).calcTurned(W, D) - getStretch(constraints, c, change) * W;
     variation.F[closure.body1] -= W, variation.dF[closure.body1] -= dW;
     variation.F[closure.body2] += W, variation.dF[closure.body2] += dW;
   }

@@ -75,11 +75,15 @@ class DrakeWriter {
          "its frame is turned: a universal joint turns about x and y of its link");
   }
 
+  // Whether Drake's constraints of balls can hold it.
+  static bool isBalls(const Closure& c) {
+    return c.kind == ClosureKind::Ball3D || c.kind == ClosureKind::Hinge5D || c.kind == ClosureKind::Weld6D;
+  }
+
   // A link fixed to the ground, for what is tied to it.
   void addGround() {
     bool is_used = false;
-    for (const Closure& c : parts_.closures)
-      is_used |= c.kind != ClosureKind::Coupler && (c.body1 == 0 || c.body2 == 0);
+    for (const Closure& c : parts_.closures) is_used |= isBalls(c) && (c.body1 == 0 || c.body2 == 0);
     for (const PointSpring& spring : parts_.point_springs) is_used |= spring.body1 == 0 || spring.body2 == 0;
     if (!is_used) return;
     std::set<std::string> taken;
@@ -112,6 +116,12 @@ class DrakeWriter {
         return;
       case ClosureKind::Coupler:  // a <mimic> of the tree, or told there
         return;
+      case ClosureKind::Distance:
+        return warn(element,
+                    "it is left out: Drake's files have no rod; MultibodyPlant::AddDistanceConstraint() makes one of " +
+                        formatNumber(c.length) + " m");
+      case ClosureKind::Slider:
+        return warn(element, "it is left out: Drake has no such constraint; cut the loop at another joint instead");
     }
   }
 

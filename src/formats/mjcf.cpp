@@ -6,6 +6,7 @@
 #include <set>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
 #include "formats/mjcf_bodies.h"
 #include "formats/reader_mjcf.h"
@@ -88,6 +89,13 @@ class MjcfWriter {
         writeCoupler(closure, section);
         continue;
       }
+      if (closure.kind == ClosureKind::Distance) {
+        writeDistance(closure, section);
+        continue;
+      }
+      if (closure.kind == ClosureKind::Slider)
+        throw InputError(model_.name(), "closure '" + closure.name + "'", "MuJoCo has no equality for a slider",
+                         "make it a prismatic joint of the tree, and cut the loop at another joint");
       const auto tie = [&](const char* tag, const std::string& suffix, const Vector3d& anchor) {
         addElement(section, tag,
                    {{"name", closure.name + suffix},
@@ -107,7 +115,7 @@ class MjcfWriter {
   }
 
   // An equality of joints ties two of them; the sum over more joints is the length of a fixed tendon. A spring between
-  // points is a spatial one.
+  // points, or a distance, is a spatial one.
   void writeTendons(XMLElement& section) {
     for (const Closure& closure : model_.closures()) {
       if (closure.terms.size() <= 2) continue;
@@ -116,7 +124,26 @@ class MjcfWriter {
         addElement(tendon, "joint",
                    {{"joint", model_.joints()[term.joint].name}, {"coef", formatMjcf(term.coefficient)}});
     }
+    for (const Closure& closure : model_.closures())
+      if (closure.kind == ClosureKind::Distance)
+        writeSites(findTendonEnds(model_, closure), addElement(section, "spatial", {{"name", closure.name}}));
     for (const PointSpring& spring : model_.pointSprings()) writePointSpring(spring, section);
+  }
+
+  static void writeSites(const std::array<TendonEnd, 2>& ends, XMLElement& tendon) {
+    for (const TendonEnd& end : ends) addElement(tendon, "site", {{"site", end.site}});
+  }
+
+  // The equality acts on the difference from the length at q_ref.
+  void writeDistance(const Closure& closure, XMLElement& section) const {
+    Workspace ws(model_);
+    updatePlacements(model_, ws, q_ref_);
+    const double length =
+        (getPlacement(ws, closure.body2, closure.X_B2).p - getPlacement(ws, closure.body1, closure.X_B1).p).norm();
+    addElement(section, "tendon",
+               {{"name", closure.name},
+                {"tendon1", closure.name},
+                {"polycoef", formatMjcf(closure.length - length) + " 0 0 0 0"}});
   }
 
   // A preload moves the rest of the spring, which MuJoCo wants to be 0 or more.
@@ -134,7 +161,7 @@ class MjcfWriter {
       warn("point spring '" + spring.name + "'", "its preload without a stiffness pulls, and is left out");
     }
     if (spring.damping != 0) setAttributes(tendon, {{"damping", formatMjcf(spring.damping)}});
-    for (int end : {1, 2}) addElement(tendon, "site", {{"site", findSpringSite(model_, spring, end)}});
+    writeSites(findTendonEnds(model_, spring), tendon);
   }
 
   // MuJoCo's equalities act on differences from q_ref: the length of the tendon, or y = p0 + p1 x for joints 1 and 2.

@@ -6,7 +6,8 @@
 /// Coordinates follow the bodies; mjcf_coordinates.h maps those of a joint.
 ///
 /// Motors are actuators of their names, in the order of u, in N m or N. A weld is a `weld`, a ball a `connect`, a hinge
-/// two `connect`s NAME.1 and NAME.2 on its axis. A sole is a box, an edge a capsule, a point a sphere, which the lowest points
+/// two `connect`s NAME.1 and NAME.2 on its axis, a distance a spatial tendon whose length is fixed; a slider is refused, because
+/// MuJoCo has no such equality. A sole is a box, an edge a capsule, a point a sphere, which the lowest points
 /// of the contact belong to: NAME.1 with the contact's name; they touch only the ground. References are keyframes. A point spring is
 /// a spatial tendon of its name between two sites, its preload a shift of its spring length. A preload without a stiffness
 /// gets kMjcfPreloadStiffness, by which a joint that turns by 1 rad changes it by 1e-9 N m. Windings, gears, losses and limits of

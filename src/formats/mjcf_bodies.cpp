@@ -21,16 +21,33 @@ std::string formatMjcf(ConstVectorRef values) {
   return text;
 }
 
-std::string findSpringSite(const Model& model, const PointSpring& spring, int end) {
-  const int body = end == 1 ? spring.body1 : spring.body2;
-  const Vector3d& point = end == 1 ? spring.point1 : spring.point2;
+namespace {
+
+std::string findSite(const Model& model, const std::string& tendon, int end, int body, const Vector3d& point) {
   for (const Frame& frame : model.frames())
     if (frame.body == body && frame.X_BF.p == point && frame.name != model.bodies()[body].name &&
         model.findContact(frame.name) < 0)
       return frame.name;
-  std::string name = spring.name + "." + std::to_string(end);
+  std::string name = tendon + "." + std::to_string(end);
   while (model.findFrame(name) >= 0 || model.findContact(name) >= 0) name += "'";
   return name;
+}
+
+template <typename Tendon>
+std::array<TendonEnd, 2> makeEnds(const Model& model, const Tendon& tendon, const Vector3d& point1,
+                                  const Vector3d& point2) {
+  return {{{findSite(model, tendon.name, 1, tendon.body1, point1), tendon.body1, point1},
+           {findSite(model, tendon.name, 2, tendon.body2, point2), tendon.body2, point2}}};
+}
+
+}  // namespace
+
+std::array<TendonEnd, 2> findTendonEnds(const Model& model, const PointSpring& spring) {
+  return makeEnds(model, spring, spring.point1, spring.point2);
+}
+
+std::array<TendonEnd, 2> findTendonEnds(const Model& model, const Closure& distance) {
+  return makeEnds(model, distance, distance.X_B1.p, distance.X_B2.p);
 }
 
 namespace {
@@ -200,7 +217,7 @@ class BodyWriter {
       if (contact.body == body) writeSole(contact, e);
     for (const Frame& frame : model_.frames())
       if (frame.body == body && frame.name != model_.bodies()[body].name) writeFrame(frame, e);
-    writeSpringSites(body, e);
+    writeTendonSites(body, e);
   }
 
   // A box with rounded edges is written as the box around it.
@@ -249,17 +266,16 @@ class BodyWriter {
     setAttributes(addPlaced(e, "site", contact.X_BF, {{"name", contact.name}}), {{"size", "0.001"}});
   }
 
-  void writeSpringSites(int body, XMLElement& e) {
-    for (const PointSpring& spring : model_.pointSprings())
-      for (int end : {1, 2}) {
-        const std::string name = findSpringSite(model_, spring, end);
-        if ((end == 1 ? spring.body1 : spring.body2) == body && model_.findFrame(name) < 0)
+  void writeTendonSites(int body, XMLElement& e) {
+    const auto write = [&](const std::array<TendonEnd, 2>& ends) {
+      for (const TendonEnd& end : ends)
+        if (end.body == body && model_.findFrame(end.site) < 0)
           addElement(e, "site",
-                     {{"name", name},
-                      {"pos", formatMjcf(end == 1 ? spring.point1 : spring.point2)},
-                      {"size", "0.001"},
-                      {"group", "4"}});
-      }
+                     {{"name", end.site}, {"pos", formatMjcf(end.point)}, {"size", "0.001"}, {"group", "4"}});
+    };
+    for (const Closure& closure : model_.closures())
+      if (closure.kind == ClosureKind::Distance) write(findTendonEnds(model_, closure));
+    for (const PointSpring& spring : model_.pointSprings()) write(findTendonEnds(model_, spring));
   }
 
   void reportLimits(const Joint& joint, int first) {

@@ -1,5 +1,6 @@
 #pragma once
 // The bodies of a file of MuJoCo (mjcf.h), with their joints, shapes, soles and sites.
+#include <array>
 #include <set>
 #include <string>
 
@@ -12,8 +13,14 @@ namespace bielle {
 // Writes them into <worldbody>. Returns the names of meshes, which are left out.
 std::set<std::string> writeMjcfBodies(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options,
                                       FormatWarnings& warnings, XMLElement& world);
-// The site at end 1 or 2 of a point spring: a frame of the model there, or one made for it.
-std::string findSpringSite(const Model& model, const PointSpring& spring, int end);
+// An end of a spatial tendon, which is a point spring or a distance.
+struct TendonEnd {
+  std::string site;  // a frame of the model there, or one made for it
+  int body;
+  Vector3d point;  // in the body
+};
+std::array<TendonEnd, 2> findTendonEnds(const Model& model, const PointSpring& spring);
+std::array<TendonEnd, 2> findTendonEnds(const Model& model, const Closure& distance);
 
 // Numbers as attributes, in the shortest digits that read back the same.
 std::string formatMjcf(double value);

@@ -363,8 +363,11 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
       builder.addCoupler(c.name, c.coefficients, c.offset, c.kp, c.kd);
       continue;
     }
-    builder.addClosure(c.name, c.kind, frames.find(c.frame1, element), frames.find(c.frame2, element), c.axis, c.kp,
-                       c.kd);
+    const std::string frame1 = frames.find(c.frame1, element), frame2 = frames.find(c.frame2, element);
+    if (c.kind == ClosureKind::Distance)
+      builder.addDistance(c.name, frame1, frame2, c.length, c.kp, c.kd);
+    else
+      builder.addClosure(c.name, c.kind, frame1, frame2, c.axis, c.kp, c.kd);
   }
   addJointForces(urdf, yaml, builder);
   for (const PointSpringSpec& s : yaml.point_springs) {

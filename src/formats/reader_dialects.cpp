@@ -15,7 +15,8 @@ constexpr double kRotorMass = 1e-9, kRotorInertia = 1e-9;  // kg, kg m^2: nothin
 
 const std::map<std::string, ClosureKind> kClosureKinds = {
     {"spherical", ClosureKind::Ball3D}, {"ball", ClosureKind::Ball3D},   {"continuous", ClosureKind::Hinge5D},
-    {"revolute", ClosureKind::Hinge5D}, {"hinge", ClosureKind::Hinge5D}, {"fixed", ClosureKind::Weld6D}};
+    {"revolute", ClosureKind::Hinge5D}, {"hinge", ClosureKind::Hinge5D}, {"fixed", ClosureKind::Weld6D},
+    {"prismatic", ClosureKind::Slider}};
 
 // Of elements that change no mechanism. What is in neither list is told.
 const std::set<std::string> kHarmless = {"link",   "joint",        "material", "mujoco",
@@ -133,7 +134,7 @@ class DialectReader {
     const std::string type = getAttribute(&e, "type");
     const auto kind = kClosureKinds.find(type);
     if (kind == kClosureKinds.end())
-      fail(e, "its type '" + type + "' cannot close a loop", "use spherical, continuous, revolute or fixed");
+      fail(e, "its type '" + type + "' cannot close a loop", "use spherical, continuous, revolute, prismatic or fixed");
     closure.kind = kind->second;
     return closure;
   }
@@ -158,7 +159,7 @@ class DialectReader {
       return getPlace(is_plus ? end.FirstChildElement("origin") : is_family ? e.FirstChildElement(origin) : &end);
     };
     SE3 X_1 = find(end1, words.origin1), X_2 = find(end2, words.origin2);
-    if (closure.kind == ClosureKind::Hinge5D) {
+    if (hasAxis(closure.kind)) {
       const XMLElement *axis = e.FirstChildElement("axis"), *axis1 = e.FirstChildElement("parent_axis"),
                        *axis2 = e.FirstChildElement("child_axis");
       if (!axis) axis = axis1;
@@ -191,7 +192,7 @@ class DialectReader {
       X_CJ = {makeRotation({v[3], v[4], v[5]}), {v[0], v[1], v[2]}};
     }
     const SE3 X_WJ = X_WL_.at(child) * X_CJ;
-    if (closure.kind == ClosureKind::Hinge5D) {
+    if (hasAxis(closure.kind)) {
       const XMLElement& axis = getChild(e, "axis", "give one");
       const XMLElement& xyz = getChild(axis, "xyz", "give its direction");
       const std::vector<double> v = parse(xyz, getText(xyz), 3, "it");

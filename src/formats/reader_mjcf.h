@@ -63,6 +63,11 @@ class MjcfReader {
     bool is_used = false;
   };
 
+  // A spatial tendon; ends only if it runs straight between two sites.
+  struct SpatialTendon {
+    std::vector<BodyPlace> ends;
+  };
+
   struct MeshAsset {
     Visual visual;                          // file and scale
     Vector3d p_ref = Vector3d::Zero();      // taken off its vertices, which
@@ -90,6 +95,7 @@ class MjcfReader {
     std::string name, body1, body2;  // links
     SE3 X_L1, X_L2;
     Vector3d axis = Vector3d::UnitZ();
+    double length = 0;    // of a distance
     std::string coupler;  // a coupler is a ClosureSpec already
     int line = 0;
   };
@@ -183,6 +189,8 @@ class MjcfReader {
   void readTendon(const XMLElement& element);
   void readSpatialTendon(const XMLElement& element);
   void readTendonEquality(MjcfElement& e, const std::string& name);
+  void readRod(MjcfElement& e, const std::string& name, const SpatialTendon& tendon);
+  bool isTied(const std::string& tendon);
   void listNamed();
   void readActuator(const XMLElement& element);
   void readCustom(const XMLElement& element);
@@ -204,6 +212,7 @@ class MjcfReader {
   std::vector<Tie> ties_;
   std::map<std::string, ClosureSpec> couplers_;
   std::map<std::string, FixedTendon> tendons_;
+  std::map<std::string, SpatialTendon> spatial_tendons_;
   std::map<std::string, double> clamps_;
 };
 

@@ -37,7 +37,7 @@ void MjcfReader::readEquality(const XMLElement& element) {
   if (e.tag() == "connect" || e.tag() == "weld") return readTie(e, name);
   if (e.tag() == "joint") return readJointEquality(e, name);
   if (e.tag() == "tendon") return readTendonEquality(e, name);
-  e.fail("such equalities are not supported", "use connect, weld, joint or a tendon of joints, or remove it");
+  e.fail("such equalities are not supported", "use connect, weld, joint or tendon, or remove it");
 }
 
 // Loops are rigid here. In MuJoCo they are springs and dampers (its documentation, "Computation", section on parameters of the
@@ -137,10 +137,11 @@ void MjcfReader::addClosures() {
     if (!tie.coupler.empty()) {
       closure = couplers_.at(tie.coupler);
     } else {
-      const bool is_ball = tie.kind == ClosureKind::Ball3D;
+      const bool is_point = tie.kind == ClosureKind::Ball3D || tie.kind == ClosureKind::Distance;
       closure.axis = tie.axis;
-      closure.frame1 = findFrame(tie.body1, tie.X_L1, is_ball, tie.name + "_frame1");
-      closure.frame2 = findFrame(tie.body2, tie.X_L2, is_ball, tie.name + "_frame2");
+      if (tie.kind == ClosureKind::Distance) closure.length = tie.length;
+      closure.frame1 = findFrame(tie.body1, tie.X_L1, is_point, tie.name + "_frame1");
+      closure.frame2 = findFrame(tie.body2, tie.X_L2, is_point, tie.name + "_frame2");
     }
     yaml_.closures.push_back(closure);
   }
@@ -209,9 +210,24 @@ void MjcfReader::readTendon(const XMLElement& element) {
   if (!tendons_.emplace(name, tendon).second) e.fail("two tendons have this name", "rename one of them");
 }
 
-// A spring or damper between two sites; a tendon that bends or carries only load of its own has no like here.
+// Whether an equality holds its length, or ties it to that of another.
+bool MjcfReader::isTied(const std::string& tendon) {
+  bool is_tied = false;
+  if (has_equalities_ && !tendon.empty())
+    forEach("equality", [&](const XMLElement& element) {
+      is_tied |= getTag(element) == "tendon" && getAttribute(&element, "active") != "false" &&
+                 (getAttribute(&element, "tendon1") == tendon || getAttribute(&element, "tendon2") == tendon);
+    });
+  return is_tied;
+}
+
+// A spring or damper between two sites, or a rod if an equality holds its length; a tendon that bends or carries only load of its
+// own has no like here.
 void MjcfReader::readSpatialTendon(const XMLElement& element) {
   MjcfElement e(element, "", settings_, "tendon");
+  const std::string given = getAttribute(&element, "name");
+  const bool is_tied = isTied(given);
+  SpatialTendon& tendon = spatial_tendons_[given];
   std::vector<const XMLElement*> sites;
   for (const XMLElement* s : getChildren(element)) {
     if (getTag(*s) != "site") return e.leaveOut("it bends about a <" + getTag(*s) + ">, and is left out");
@@ -223,6 +239,7 @@ void MjcfReader::readSpatialTendon(const XMLElement& element) {
     return findSite(end, "site");
   };
   const BodyPlace one = find(*sites[0]), two = find(*sites[1]);
+  tendon.ends = {one, two};
   PointSpringSpec spec{one.link, two.link, {}};
   PointSpring& spring = spec.spring;
   spring.point1 = one.X_LB.p;
@@ -237,18 +254,46 @@ void MjcfReader::readSpatialTendon(const XMLElement& element) {
   for (const char* without_meaning : {"width", "material", "rgba", "group", "user"}) e.find(without_meaning);
   if (lengths.size() == 2 && lengths[1] != lengths[0])
     return e.leaveOut("its spring is slack between two lengths; it is left out");
+  if (spring.stiffness == 0 && spring.preload == 0 && spring.damping == 0 && is_tied) {
+    for (const char* without_effect : {"limited", "range", "frictionloss", "margin"}) e.find(without_effect);
+    return;
+  }
   if (spring.stiffness == 0 && spring.preload == 0 && spring.damping == 0)
     return e.leaveOut("it has no spring or damper, and is left out");
   if (e.isLimited("limited", "range")) e.note("the limits of its length are left out"), e.find("range");
   if (e.getNumber("frictionloss", 0) != 0) e.note("its frictionloss is left out");
-  spring.name = getAttribute(&element, "name");
+  spring.name = given;
   if (spring.name.empty()) spring.name = namePointSpring("tendon_" + std::to_string(e.line()), yaml_);
   yaml_.point_springs.push_back(spec);
+}
+
+// L - L_ref = a of the distance of two sites
+void MjcfReader::readRod(MjcfElement& e, const std::string& name, const SpatialTendon& tendon) {
+  if (!e.getText("tendon2").empty())
+    e.fail("it ties a spatial tendon to another tendon",
+           "remove tendon2: the length of a tendon of two sites can be fixed");
+  if (tendon.ends.empty())
+    e.fail("its tendon does not run straight between two sites", "give it two sites, or remove the equality");
+  const BodyPlace &one = tendon.ends[0], &two = tendon.ends[1];
+  const std::vector<double> p = e.getNumbers("polycoef", 1, 5);
+  Tie tie;
+  tie.kind = ClosureKind::Distance;
+  tie.name = name;
+  tie.line = e.line();
+  tie.body1 = one.link, tie.body2 = two.link;
+  tie.X_L1 = one.X_LB, tie.X_L2 = two.X_LB;
+  tie.length = (two.X_WB.p - one.X_WB.p).norm() + (p.empty() ? 0 : p[0]);
+  if (!(tie.length > kSamePlace))
+    e.fail("it leaves its tendon no length", "move a site, correct its polycoef, or connect the two sites instead");
+  ties_.push_back(tie);
 }
 
 // L1 - L1_ref = a + b (L2 - L2_ref) of sums of coordinates
 void MjcfReader::readTendonEquality(MjcfElement& e, const std::string& name) {
   const std::string first = e.getText("tendon1"), second = e.getText("tendon2");
+  for (const std::string& tendon : {first, second})
+    if (const auto it = spatial_tendons_.find(tendon); it != spatial_tendons_.end() && !tendon.empty())
+      return readRod(e, name, it->second);
   const auto [a, b] = readLine(e);
   ClosureSpec coupler;
   coupler.offset = a;

@@ -18,7 +18,7 @@ constexpr size_t kMostSdfJoints = 3000, kMostSdfBytes = 16'000'000;
 
 bool canClose(sdf::JointType type) {
   return type == sdf::JointType::REVOLUTE || type == sdf::JointType::CONTINUOUS || type == sdf::JointType::BALL ||
-         type == sdf::JointType::FIXED;
+         type == sdf::JointType::FIXED || type == sdf::JointType::PRISMATIC;
 }
 
 // Files that it includes: beside the file, or below a directory of that name.
@@ -175,12 +175,14 @@ std::string SdfReader::getChild(const sdf::Joint& joint) const {
   return link;
 }
 
-// Which joint carries a link: the first that leads to it, but one that cannot close a loop before any other.
+// Which joint carries a link: the first that leads to it, but one that cannot close a loop before any other, and one that slides,
+// whose coordinate and motor a loop would lose, before one that turns.
 void SdfReader::chooseCarriers() {
-  for (const bool closes : {false, true})
+  const auto rank = [](sdf::JointType type) { return !canClose(type) ? 0 : type == sdf::JointType::PRISMATIC ? 1 : 2; };
+  for (const int now : {0, 1, 2})
     for (uint64_t i = 0; i < model_->JointCount(); ++i) {
       const sdf::Joint& joint = *model_->JointByIndex(i);
-      if (canClose(joint.Type()) != closes) continue;
+      if (rank(joint.Type()) != now) continue;
       const std::string parent = getParent(joint), child = getChild(joint);
       bool is_free = !carriers_.count(child);
       for (std::string above = parent; is_free && parents_.count(above); above = parents_[above])
@@ -188,12 +190,12 @@ void SdfReader::chooseCarriers() {
       if (is_free && parent != child) {
         carriers_[child] = &joint;
         parents_[child] = parent;
-      } else if (closes) {
+      } else if (now > 0) {
         closing_.push_back(&joint);
       } else {
         fail("joint '" + joint.Name() + "'",
              "its child '" + child + "' hangs on another joint too, and it cannot close a loop",
-             "cut the loop at a revolute, ball or fixed joint");
+             "cut the loop at a revolute, prismatic, ball or fixed joint");
       }
     }
   for (uint64_t i = 0; i < model_->JointCount(); ++i) {

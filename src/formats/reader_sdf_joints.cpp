@@ -136,11 +136,13 @@ void SdfReader::addClosure(const sdf::Joint& joint) {
   Vector3d axis = Vector3d::UnitZ();
   const SE3 X_WJ = getPlace(joint.SemanticPose());
   if (joint.Type() == sdf::JointType::BALL) kind = ClosureKind::Ball3D;
-  if (joint.Type() == sdf::JointType::REVOLUTE || joint.Type() == sdf::JointType::CONTINUOUS) {
+  if (joint.Type() == sdf::JointType::PRISMATIC) kind = ClosureKind::Slider;
+  if (joint.Type() == sdf::JointType::REVOLUTE || joint.Type() == sdf::JointType::CONTINUOUS)
     kind = ClosureKind::Hinge5D;
+  if (hasAxis(kind)) {
     axis = X_WJ.R.transpose() * getLinkPlace(child).R * getAxis(joint, 0);
     UrdfJoint unused;
-    unused.joint.kind = JointKind::Revolute;
+    unused.joint.kind = kind == ClosureKind::Slider ? JointKind::Prismatic : JointKind::Revolute;
     const size_t forces = yaml_.joint_forces.size();
     readAxis(joint, 0, unused);
     if (unused.lower.size() > 0 || yaml_.joint_forces.size() > forces)

@@ -30,7 +30,7 @@ std::vector<std::string> listRobotKeys() {
 const char* const kRobotOrPart = "robot, part";
 const YamlKeys kRobotKeys("robot", "", listRobotKeys());
 const YamlKeys kClosureKeys(kRobotOrPart, "closures[]",
-                            {"name", "frames", "type", "axis", "joints", "offset", "kp", "kd"});
+                            {"name", "frames", "type", "axis", "length", "joints", "offset", "kp", "kd"});
 const YamlKeys kJointForceKeys(kRobotOrPart, "joint_forces.JOINT",
                                {"stiffness", "rest", "preload", "damping", "friction", "friction_speed"});
 const YamlKeys kPointSpringKeys(kRobotOrPart, "point_springs.NAME",
@@ -46,9 +46,11 @@ std::string lower(std::string text) {
 }
 
 ClosureKind readClosureKind(const Entry& entry) {
-  for (ClosureKind kind : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D, ClosureKind::Coupler})
+  for (ClosureKind kind : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D, ClosureKind::Coupler,
+                           ClosureKind::Distance, ClosureKind::Slider})
     if (lower(entry.getText()) == getName(kind)) return kind;
-  entry.fail("closure type '" + entry.getText() + "' is unknown", "use 6d (weld), 5d (hinge), 3d (ball) or coupler");
+  entry.fail("closure type '" + entry.getText() + "' is unknown",
+             "use 6d (weld), 5d (hinge), 3d (ball), slider, distance (rod) or coupler");
 }
 
 JointRetyping readJointType(const Entry& entry) {
@@ -148,10 +150,18 @@ void readClosures(const Entry& list, YamlFile& file) {
     else
       readTiedFrames(fields, entry, closure, file);
     if (const Entry* axis = find(fields, "axis")) {
-      if (closure.kind != ClosureKind::Hinge5D) axis->fail("only a hinge has an axis", "use type 5d or remove it");
+      if (!hasAxis(closure.kind))
+        axis->fail("only a hinge or a slider has an axis", "use type 5d or slider, or remove it");
       closure.axis = axis->getVector3();
       if (axis->isList())
         for (const std::string& number : axis->getTexts()) file.axes.add(number);
+    }
+    if (const Entry* length = find(fields, "length")) {
+      if (closure.kind != ClosureKind::Distance)
+        length->fail("only a distance has a length", "use type distance or remove it");
+      closure.length = length->getNumber();
+      if (!(*closure.length > 0))
+        length->fail("the length of a distance is above 0", "correct it; points that coincide are a ball (3d)");
     }
     if (const Entry* kp = find(fields, "kp")) closure.kp = kp->getNumber();
     if (const Entry* kd = find(fields, "kd")) closure.kd = kd->getNumber();

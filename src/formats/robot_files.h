@@ -55,6 +55,7 @@ struct ClosureSpec {
   Vector3d axis = Vector3d::UnitZ();
   std::map<std::string, double> coefficients;  ///< of a coupler, by joint
   double offset = 0;
+  std::optional<double> length;  ///< of a distance; by default that of the neutral posture
   double kp = 0, kd = 0;
 };
 
@@ -117,7 +118,7 @@ struct YamlFile {
   std::vector<std::string> serial_joints;
   std::vector<std::pair<std::string, std::array<double, 2>>> importance;  ///< joint -> of its position, of its velocity
   std::optional<Vector3d> gravity;
-  std::vector<RobotName> names;  ///< all that this file uses, to be found in the robot
+  std::vector<RobotName> names;    ///< all that this file uses, to be found in the robot
   Decimals axes;                   ///< of closures
   std::optional<double> rounding;  ///< instead of that of the numbers, rad and m
   std::vector<std::string> warnings;

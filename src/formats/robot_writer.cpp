@@ -108,7 +108,8 @@ class YamlWriter {
         addNames(findFrameName(model_, c.body1, c.X_B1, c.name + "_frame1"),
                  findFrameName(model_, c.body2, c.X_B2, c.name + "_frame2"));
       add("type", getName(c.kind));
-      if (c.kind == ClosureKind::Hinge5D) out_ << Key << "axis" << Value << c.axis;
+      if (hasAxis(c.kind)) out_ << Key << "axis" << Value << c.axis;
+      if (c.kind == ClosureKind::Distance) add("length", c.length);
       addUnless(0, "kp", c.kp);
       addUnless(0, "kd", c.kd);
       out_ << EndMap;

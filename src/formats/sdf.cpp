@@ -215,6 +215,8 @@ class SdfWriter {
   void writeClosure(const Closure& closure, XMLElement& robot) {
     const std::string element = "closure '" + closure.name + "'";
     if (closure.kind == ClosureKind::Coupler) return warn(element, "it is left out: SDF cannot couple joints");
+    if (closure.kind == ClosureKind::Distance)
+      return warn(element, "it is left out: SDF has no rod; a thin link on a universal and a ball joint serves as one");
     const std::string name = makeName(closure.name, "_closure");
     if (name != closure.name) warn(element, "it is renamed to '" + name + "' because its name is taken");
     // The child may not be the world.
@@ -223,12 +225,13 @@ class SdfWriter {
     const SE3& X = swap ? closure.X_B1 : closure.X_B2;
     const char* type = closure.kind == ClosureKind::Weld6D   ? "fixed"
                        : closure.kind == ClosureKind::Ball3D ? "ball"
+                       : closure.kind == ClosureKind::Slider ? "prismatic"
                                                              : "continuous";
     XMLElement& e = addElement(robot, "joint", {{"name", name}, {"type", type}});
     writePose(X, 0, e);
     addText(e, "parent", getLink(parent));
     addText(e, "child", getLink(child));
-    if (closure.kind == ClosureKind::Hinge5D) addText(addElement(e, "axis"), "xyz", formatExact(closure.axis));
+    if (hasAxis(closure.kind)) addText(addElement(e, "axis"), "xyz", formatExact(closure.axis));
     if (closure.kp != 0 || closure.kd != 0) warn(element, "its gains kp and kd are left out");
   }
 

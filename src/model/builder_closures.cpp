@@ -1,13 +1,17 @@
 // Closures of a model: their checks, their dofs and the clusters that they make; and the dofs of its point springs.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <set>
 
 #include "bielle/model/builder.h"
+#include "model/joint.h"
 
 namespace bielle {
 namespace {
+
+constexpr double kDefaultLength = std::numeric_limits<double>::quiet_NaN();  // until the model is built
 
 // Dofs that move one of the bodies of a closure or spring but not the other, and their signs.
 template <typename Tie>
@@ -21,28 +25,64 @@ void findRelativeDofs(const Model& model, Tie& tie) {
   }
 }
 
+// Of the origins of the frames of a closure, where all coordinates are neutral.
+double calcNeutralDistance(const Model& model, const Closure& closure) {
+  const VectorXd q = model.makeNeutral();
+  const auto locate = [&](int body, Vector3d p) {
+    for (; body > 0; body = model.joints()[body].parent) {
+      const Joint& joint = model.joints()[body];
+      p = joint.X_PJ.act(calcJointPlacement(joint, q.segment(joint.idx_q, joint.nq)).act(p));
+    }
+    return p;
+  };
+  return (locate(closure.body2, closure.X_B2.p) - locate(closure.body1, closure.X_B1.p)).norm();
+}
+
 }  // namespace
 
 void ModelBuilder::addClosure(const std::string& name, ClosureKind kind, const std::string& frame1,
                               const std::string& frame2, const Vector3d& axis, double kp, double kd) {
-  const std::string element = "closure '" + name + "'";
+  Closure closure;
+  closure.name = name;
+  closure.kind = kind;
+  closure.axis = axis;
+  closure.length = kDefaultLength;
+  closure.kp = kp;
+  closure.kd = kd;
+  addClosure(frame1, frame2, std::move(closure));
+}
+
+void ModelBuilder::addDistance(const std::string& name, const std::string& frame1, const std::string& frame2,
+                               std::optional<double> length, double kp, double kd) {
+  Closure closure;
+  closure.name = name;
+  closure.kind = ClosureKind::Distance;
+  closure.length = !length ? kDefaultLength : std::isnan(*length) ? 0 : *length;
+  closure.kp = kp;
+  closure.kd = kd;
+  addClosure(frame1, frame2, std::move(closure));
+}
+
+void ModelBuilder::addClosure(const std::string& frame1, const std::string& frame2, Closure closure) {
+  const std::string element = "closure '" + closure.name + "'";
   const FramePlace f1 = getFrame(frame1, element), f2 = getFrame(frame2, element);
   if (frame1 == frame2) fail(element, "it closes frame '" + frame1 + "' with itself", "name two frames on two bodies");
   if (f1.body == f2.body)
     fail(element, "frames '" + frame1 + "' and '" + frame2 + "' are on the same rigid body",
          "a closure needs a joint between its frames");
+  Vector3d& axis = closure.axis;
   if (!(axis.norm() > 1e-12) || !axis.allFinite())
-    fail(element, "its hinge axis is not a direction", "give a non-zero vector");
-  Closure closure;
-  closure.name = name;
-  closure.kind = kind;
+    fail(element, "its axis is not a direction", "give a non-zero vector");
+  if (std::abs(axis.squaredNorm() - 1) > 1e-15) axis.normalize();  // as it is read back
+  double& length = closure.length;
+  if (closure.kind != ClosureKind::Distance) length = 0;
+  if (closure.kind == ClosureKind::Distance && (length <= 0 || std::isinf(length)))
+    fail(element, "its length is not a finite number above 0", "correct it; points that coincide are a ball (3d)");
   closure.body1 = f1.body;
   closure.body2 = f2.body;
   closure.X_B1 = f1.X_BF;
   closure.X_B2 = f2.X_BF;
-  closure.axis = std::abs(axis.squaredNorm() - 1) > 1e-15 ? Vector3d(axis.normalized()) : axis;  // as it is read back
-  closure.kp = kp;
-  closure.kd = kd;
+  closure.dofs.clear(), closure.signs.clear();
   addChecked(std::move(closure));
 }
 
@@ -95,8 +135,8 @@ void ModelBuilder::copyClosure(const Model& from, const Closure& closure) {
     addFrame(closure.name + suffix, body == 0 ? "world" : from.bodies()[body].name, X_BF);
     return closure.name + suffix;
   };
-  addClosure(closure.name, closure.kind, place("/frame1", closure.body1, closure.X_B1),
-             place("/frame2", closure.body2, closure.X_B2), closure.axis, closure.kp, closure.kd);
+  const std::string frame1 = place("/frame1", closure.body1, closure.X_B1);
+  addClosure(frame1, place("/frame2", closure.body2, closure.X_B2), closure);
 }
 
 // Bodies of a coupler, dofs and signs of any closure.
@@ -119,6 +159,11 @@ void ModelBuilder::finishClosure(const Model& model, Closure& closure) const {
     return;
   }
   findRelativeDofs(model, closure);
+  if (closure.kind != ClosureKind::Distance || !std::isnan(closure.length)) return;
+  closure.length = calcNeutralDistance(model, closure);
+  if (closure.length <= 1e-12)
+    fail("closure '" + closure.name + "'", "its points coincide where all coordinates are neutral",
+         "give its length, or make it a ball (3d)");
 }
 
 void ModelBuilder::finishPointSprings(Model& model) const {

@@ -85,6 +85,10 @@ const char* getName(ClosureKind kind) {
       return "5d";
     case ClosureKind::Coupler:
       return "coupler";
+    case ClosureKind::Distance:
+      return "distance";
+    case ClosureKind::Slider:
+      return "slider";
   }
   return "?";
 }
@@ -108,12 +112,32 @@ int getRows(ClosureKind kind) {
     case ClosureKind::Ball3D:
       return 3;
     case ClosureKind::Hinge5D:
+    case ClosureKind::Slider:
       return 5;
     case ClosureKind::Coupler:
+    case ClosureKind::Distance:
       return 1;
   }
   return 0;
 }
+
+int getLengthRows(ClosureKind kind) {
+  switch (kind) {
+    case ClosureKind::Weld6D:
+    case ClosureKind::Ball3D:
+    case ClosureKind::Hinge5D:
+      return 3;
+    case ClosureKind::Slider:
+      return 2;
+    case ClosureKind::Distance:
+      return 1;
+    case ClosureKind::Coupler:
+      return 0;
+  }
+  return 0;
+}
+
+bool hasAxis(ClosureKind kind) { return kind == ClosureKind::Hinge5D || kind == ClosureKind::Slider; }
 
 Model::Model() : data_(std::make_shared<Data>()) {}
 

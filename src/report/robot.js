@@ -141,7 +141,10 @@ class RobotView extends BodyView {
       this.add(frame, lock, 'locks');
       const arrow = new Arrow('#7048e8', 0.0045 * this.size);
       this.add(this.add(frame, new THREE.Group(), 'closureForces'), arrow.object);
-      return {lock, arrow};
+      // A rod's force is its tension: it points to the other end.
+      const end = closure.kind === 'distance' &&
+          setPose(this.add(this.bodies[closure.body2], new THREE.Group()), closure.pose2);
+      return {lock, arrow, frame, end};
     });
   }
 
@@ -279,10 +282,15 @@ class RobotView extends BodyView {
         new THREE.Vector3(table.get(row, col), table.get(row, col + 1), table.get(row, col + 2));
     this.closures.forEach((drawn, c) => {
       if (!drawn) return;
-      const {lock, arrow} = drawn;
+      const {lock, arrow, frame, end} = drawn;
       lock.material.color.copy(getGapColor(run.gaps.get(share < 0.5 ? k : next, 2 * c)));
-      if (run.closure_wrenches.rows)
-        arrow.set(read(run.closure_wrenches, k, 6 * c).multiplyScalar(scales.closure), 0, 0, 0);
+      if (!run.closure_wrenches.rows) return;
+      let force = read(run.closure_wrenches, k, 6 * c);
+      if (end) {
+        frame.updateWorldMatrix(true, false);
+        force = frame.worldToLocal(end.getWorldPosition(new THREE.Vector3())).setLength(force.x);
+      }
+      arrow.set(force.multiplyScalar(scales.closure), 0, 0, 0);
     });
     this.contacts.forEach(({arrow, centre}, c) => {
       if (!run.contact_wrenches.rows) return;

@@ -51,7 +51,10 @@ class LinkLayout {
         out.distances.push_back({link.name, from.name, to.name, project(link, from.p), project(link, to.p), d.length});
     }
     for (const Closure& c : model_.closures())
-      if (c.kind == ClosureKind::Coupler) drawBelt(c, out);
+      if (c.kind == ClosureKind::Coupler)
+        drawBelt(c, out);
+      else if (c.kind == ClosureKind::Distance && showsBody(c.body1) && showsBody(c.body2))
+        out.links.push_back({c.name, {projectPoint(c.body1, c.X_B1.p), projectPoint(c.body2, c.X_B2.p)}, true});
     for (const PointSpring& spring : model_.pointSprings())
       if (showsBody(spring.body1) && showsBody(spring.body2))
         out.springs.push_back({projectPoint(spring.body1, spring.point1), projectPoint(spring.body2, spring.point2)});

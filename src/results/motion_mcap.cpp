@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
@@ -202,8 +203,11 @@ class MotionMcapWriter {
       for (size_t c = 0; c < model_.closures().size(); ++c) {
         const Closure& closure = model_.closures()[c];
         if (closure.kind == ClosureKind::Coupler) continue;  // it has no wrench
-        addWrench({closure.name, closure.body1, closure.X_B1, "closure/", kClosureColor},
-                  record_.closure_wrenches.row(k).segment<6>(6 * c).transpose(), closures, arrows);
+        Vector6d wrench = record_.closure_wrenches.row(k).segment<6>(6 * static_cast<Eigen::Index>(c)).transpose();
+        if (closure.kind == ClosureKind::Distance)  // a tension
+          wrench = getPlacement(ws_, closure.body1, closure.X_B1)
+                       .actInvForce(calcClosureWrench<double>(ws_, closure, wrench.head<1>()));
+        addWrench({closure.name, closure.body1, closure.X_B1, "closure/", kClosureColor}, wrench, closures, arrows);
       }
       const double time = record_.time[k];
       if (contacts.wrenches_size() > 0) sendAt("/wrenches/contacts", time, contacts);

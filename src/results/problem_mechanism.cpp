@@ -29,7 +29,8 @@ Json describeClosure(const Closure& closure) {
   addPlacement(json, "_B1", closure.X_B1);
   json["body2"] = closure.body2;
   addPlacement(json, "_B2", closure.X_B2);
-  if (closure.kind == ClosureKind::Hinge5D) json["axis"] = listVector(closure.axis);
+  if (hasAxis(closure.kind)) json["axis"] = listVector(closure.axis);
+  if (closure.kind == ClosureKind::Distance) json["length"] = closure.length;
   return json;
 }
 

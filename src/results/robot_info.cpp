@@ -78,7 +78,8 @@ Json describeClosures(const Model& model, const std::vector<Posture>& postures) 
   return closures;
 }
 
-// Distances between the pivots of each body that is part of a loop: its joint, those that it carries, the ends of closures.
+// Distances between the pivots of each body that is part of a loop: its joint, those that it carries, the ends of closures; and
+// rods without a body.
 Json describeLengths(const Model& model) {
   constexpr double kSame = 1e-6;  // m
   struct Pivot {
@@ -103,6 +104,12 @@ Json describeLengths(const Model& model) {
     pivots[closure.body2].push_back({closure.name, closure.X_B2.p});
   }
   Json lengths = Json::array();
+  for (const Closure& closure : model.closures())
+    if (closure.kind == ClosureKind::Distance)
+      lengths.push_back({{"body", closure.name},
+                         {"from", findFrameName(model, closure.body1, closure.X_B1)},
+                         {"to", findFrameName(model, closure.body2, closure.X_B2)},
+                         {"length", closure.length}});
   for (int body = 1; body < model.numBodies(); ++body) {
     if (!in_loop[body] || model.joints()[body].kind == JointKind::FreeFlyer) continue;
     for (auto a = pivots[body].begin(); a != pivots[body].end(); ++a)

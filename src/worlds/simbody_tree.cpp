@@ -211,7 +211,19 @@ void SimbodyTree::addClosure(const Closure& closure) {
     constraints.back() = {SimTK::Constraint::Weld(body1, toSimTK(closure.X_B1), body2, toSimTK(closure.X_B2))};
     return;
   }
-  constraints.back() = {SimTK::Constraint::Ball(body1, toSimTK(closure.X_B1.p), body2, toSimTK(closure.X_B2.p))};
+  const Vec3 point1 = toSimTK(closure.X_B1.p), point2 = toSimTK(closure.X_B2.p);
+  if (closure.kind == ClosureKind::Distance) {
+    constraints.back() = {SimTK::Constraint::Rod(body1, point1, body2, point2, closure.length)};
+    return;
+  }
+  if (closure.kind == ClosureKind::Slider) {
+    constraints.back() = {
+        SimTK::Constraint::PointOnLine(body1, UnitVec3(toSimTK(closure.X_B1.R * closure.axis)), point1, body2, point2),
+        SimTK::Constraint::ConstantOrientation(body1, toSimTKRotation(closure.X_B1.R), body2,
+                                               toSimTKRotation(closure.X_B2.R))};
+    return;
+  }
+  constraints.back() = {SimTK::Constraint::Ball(body1, point1, body2, point2)};
   if (closure.kind == ClosureKind::Ball3D) return;
   const Vector3d normal1 = closure.axis.unitOrthogonal(), normal2 = closure.axis.cross(normal1);
   const UnitVec3 axis2(toSimTK(closure.X_B2.R * closure.axis));

@@ -11,11 +11,13 @@
 
 namespace bielle {
 
-/// The distance between two places of one body (named as in src/design/draft.h); `to` moves along the line.
+/// The distance between two places of one body (named as in src/design/draft.h); `to` moves along the line. Or the length of a
+/// closure that is a distance, named by `rod` alone.
 struct LengthChange {
   std::string from, to;
   Vector3d across = Vector3d::Zero();  ///< unit vector in the body: only the part perpendicular to it counts; zero: all
   std::string stretched;               ///< link whose mass, inertia and drawing grow with the length, or empty
+  std::string rod = {};                ///< closure
 };
 
 /// A joint or frame moved along a direction of the body that it is fixed to.

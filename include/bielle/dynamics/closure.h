@@ -14,6 +14,15 @@
 ///
 /// A coupler has J_k = c_k, the coefficient of the coordinate. It is constant, so that (1) to (3) and (6) vanish, and
 /// its force acts on the coordinates alone, c_k lambda each: it has no wrench.
+///
+/// The rows of the other closures are constant projections of the full vectors, but for a distance of length L. In frame 1,
+/// with the vector p from point 1 to point 2 and the linear and angular parts nu_l, nu_w of the full velocity,
+///     nu = p . nu_l / L,    a = (p . a_l + p' . nu_l) / L,    p' = -(nu_l + nu_w x p)                              (7)
+/// which is polynomial, and exact also when open. A displacement D of frame 1 against frame 2 that changes the full velocity and
+/// acceleration by dnu and da, as (1) to (4) say, changes them by
+///     d nu = (p . dnu_l + dp . nu_l) / L,    d a = (p . da_l + dp . a_l + p' . dnu_l + dp' . nu_l) / L,
+///     dp = -(D_l + D_w x p),    dp' = -(dnu_l + dnu_w x p + nu_w x dp)                                             (8)
+/// and its force lambda p / L on body 1 turns in frame 1 by lambda dp / L.
 #include "bielle/dynamics/workspace.h"
 
 namespace bielle {
@@ -45,22 +54,24 @@ struct ConstraintSet {
 };
 ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTarget>& contacts = {});
 
-/// Selects the rows of a closure from a twist-like vector (6) in frame 1; of a coupler, the first entry.
+/// Selects the rows of a closure, but not of a distance, from a twist-like vector (6) in frame 1; of a coupler, the first entry.
 template <typename T>
 VectorUpTo6<T> selectRows(const Closure& closure, const Vector6<T>& full);
-/// Wrench in frame 1 of forces on the rows. The force of a coupler, which has no wrench, becomes the first entry.
+/// Wrench in frame 1 of forces on the rows. The force of a coupler, which has no wrench, and the tension of a distance, which
+/// is one along its rod, become the first entry.
 Vector6d expandRows(const Closure& closure, ConstVectorRef lambda);
 template <typename T>
 Vector6<T> expandRows(const Closure& closure, const VectorUpTo6<T>& lambda);
 
-/// Closing error, m and rad: zero if and only if closed; of a coupler offset - sum c_k q_k. The angle part of a hinge is as long
+/// Closing error, m and rad: zero if and only if closed; of a coupler offset - sum c_k q_k, of a distance (|p|^2 - L^2) / (2 L). The angle part of a hinge is as long
 /// as the angle between its axes, up to pi; where they are opposite, its direction is the first of the two normals.
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& closure);
 /// The same for the placement X_12 of frame 2 in frame 1.
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const Closure& closure, const SE3Of<T>& X_12);
-/// Norms of the residual: of its part in m, and of that in rad, to which couplers belong.
+/// Norms of the residual: of its part in m, for a distance by how much it is too long or short, and of that in rad, to which
+/// couplers belong.
 struct ClosureGap {
   double position = 0, angle = 0;
 };
@@ -96,17 +107,18 @@ void addStabilizationDerivatives(const Workspace& ws, const Closure& closure, Ma
 /// updateVelocities.
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& closure, MatrixRef dnu_dq);
 
-/// World wrench of a closure force on body 1; zero for a coupler.
+/// World wrench of a closure force on body 1, that of a distance along its rod; zero for a coupler.
 template <typename T>
 Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& closure,
                              typename ArgumentsOf<T>::ConstVector lambda);
 /// Adds to dID_dq the term that updateInverseDynamicsDerivatives omits: the wrench on body 2 moves with frame 1 (the
 /// paper's eq. 19),
 ///     d ID_j/dq_k += s J_j . (J_k x* W)   for j in the support of body 2, k in closure.dofs (5)
+/// and for a distance what its turning adds, Eq. (8).
 void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& closure, const Vector6d& wrench,
                                MatrixRef dID_dq);
 /// Adds to out (nv x nv) the derivative of the generalized force J^T lambda with respect to q, the wrench W being fixed
-/// in frame 1:
+/// in frame 1, but for that of a distance, which turns by Eq. (8):
 ///     d (J^T lambda)_j/dq_k = s_j J_j . (J_k x* W) ([k moves frame 1] - [k moves axis j]),   j, k in closure.dofs  (6)
 void addGeneralizedForceDerivative(const Model& model, const Workspace& ws, const Closure& closure,
                                    const Vector6d& wrench, MatrixRef out);

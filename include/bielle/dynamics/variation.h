@@ -21,7 +21,8 @@
 ///     d a_c = dA_1 - dA_2 + dV_1 x V_2 + V_1 x dV_2 - D_1 x (A_1 - A_2 + V_1 x V_2)                                (8)
 /// A coupler with coefficients c_k and offset c_0 has, with dc their changes,
 ///     d residual = dc_0 - sum dc_k q_k - c_k dq_k,   d nu_c = sum dc_k v_k + c_k dv_k                              (9)
-/// and d a_c alike; its force acts on coordinate k with c_k lambda.
+/// and d a_c alike; its force acts on coordinate k with c_k lambda. The rows of a distance, and its force, change as well as
+/// its direction p / L turns, by Eqs. (7) and (8) of closure.h with the displacement D_1 - D_2, and as L changes.
 /// The force f u of a point spring (model.h) changes, with dp_i the displacement of its point and dp'_i the change of the
 /// velocity of that, with r = p_2 - p_1 and u = r / l, by
 ///     dl = u . dr,   du = (dr - u dl) / l,   dl' = du . r' + u . dr'
@@ -56,6 +57,7 @@ struct ModelVariation {
   std::vector<Vector6d> frames2;         ///< and X_B2
   std::vector<VectorXd> coefficients;    ///< per closure of the model, of its CouplerTerm::coefficient
   std::vector<double> offsets;           ///< and Closure::offset
+  std::vector<double> lengths;           ///< and Closure::length
   std::vector<Vector3d> points1;         ///< per point spring of the model, of PointSpring::point1
   std::vector<Vector3d> points2;         ///< and point2
   std::vector<Eigen::Vector4d> springs;  ///< and of its stiffness, rest, preload and damping

@@ -49,9 +49,15 @@ class ModelBuilder {
   /// Adds an inertia to a link, which may have several.
   void addInertia(const std::string& link, const Inertia& inertia);
   void addFrame(const std::string& name, const std::string& link, const SE3& X_LF);
-  /// Closure between two frames (links are frames too).
+  /// Closure between two frames (links are frames too); not a coupler, and of a distance the default of addDistance().
   void addClosure(const std::string& name, ClosureKind kind, const std::string& frame1, const std::string& frame2,
                   const Vector3d& axis = Vector3d::UnitZ(), double kp = 0, double kd = 0);
+  /// Keeps the origins of two frames as far apart as a massless rod would.
+  /// \param length  m, above 0; by default their distance where all coordinates are neutral
+  void addDistance(const std::string& name, const std::string& frame1, const std::string& frame2,
+                   std::optional<double> length = {}, double kp = 0, double kd = 0);
+  /// One that ties frames, all told: its bodies, placements and dofs are filled here. A NaN stands for the default length.
+  void addClosure(const std::string& frame1, const std::string& frame2, Closure closure);
   /// Couples joints of one coordinate each: the sum of coefficient times coordinate is the offset.
   /// \param coefficients  by joint; at least two joints
   void addCoupler(const std::string& name, const std::map<std::string, double>& coefficients, double offset = 0,

@@ -45,10 +45,14 @@ struct Frame {
   SE3 X_BF;
 };
 
-enum class ClosureKind { Weld6D, Ball3D, Hinge5D, Coupler };
+enum class ClosureKind { Weld6D, Ball3D, Hinge5D, Coupler, Distance, Slider };
 const char* getName(ClosureKind kind);
-/// Number of scalar constraints: 6, 3, 5, 1.
+/// Number of scalar constraints: 6, 3, 5, 1, 1, 5.
 int getRows(ClosureKind kind);
+/// Of these, the number of the first ones that are lengths, in m; the others are angles, and that of a coupler counts as one.
+int getLengthRows(ClosureKind kind);
+/// Whether its free motion has an axis: a hinge turns about it, a slider slides along it.
+bool hasAxis(ClosureKind kind);
 
 /// One summand of a coupler: a coefficient times the coordinate of a joint with one.
 struct CouplerTerm {
@@ -58,17 +62,19 @@ struct CouplerTerm {
 };
 
 /// Ties frame 1 on body 1 to frame 2 on body 2, or, as a coupler, coordinates of joints: sum of coefficient times
-/// coordinate = offset, as belts, gears and differentials do. notation.h defines residual, velocity, acceleration and
+/// coordinate = offset, as belts, gears and differentials do. A distance keeps the origins of the frames as far apart as
+/// `length`, as a massless rod with a ball at either end does; a slider lets frame 2 slide along an axis. notation.h defines residual, velocity, acceleration and
 /// force.
 struct Closure {
   std::string name;
   ClosureKind kind = ClosureKind::Weld6D;
   int body1 = 0, body2 = 0;           ///< of a coupler both are the body that carries all its joints
   SE3 X_B1, X_B2;                     ///< placements of the frames in their bodies
-  Vector3d axis = Vector3d::UnitZ();  ///< free axis of a hinge, in frame 1 (and in frame 2)
+  Vector3d axis = Vector3d::UnitZ();  ///< free axis of a hinge or slider, in frame 1 (and in frame 2)
   double kp = 0, kd = 0;              ///< stabilisation gains, 1/s^2 and 1/s; zero as in the paper
   std::vector<CouplerTerm> terms;     ///< of a coupler, by increasing dof
   double offset = 0;                  ///< of a coupler
+  double length = 0;                  ///< of a distance, m
   /// Dofs that move one frame but not the other, in increasing order; sign +1 if they move frame 1, -1 for frame 2.
   /// The relative placement of the frames depends only on them. Of a coupler, all dofs from the body that carries its
   /// joints to these joints, with sign +1. Filled by the builder.
