@@ -1,5 +1,6 @@
 #include "mechanisms.h"
 
+#include <Eigen/SVD>
 #include <cmath>
 #include <ostream>
 
@@ -54,7 +55,16 @@ void tieTips(ModelBuilder& builder, std::mt19937& rng, ClosureKind closure, cons
   const SE3 X_B1 = randomPlacement(rng);
   const Vector3d axis = randomVector(rng, 3).normalized();
   SE3 X_12;
-  if (closure == ClosureKind::Distance) X_12 = randomPlacement(rng);
+  if (closure == ClosureKind::Distance) {  // along what moves most: near its dead points nothing is regular
+    X_12 = randomPlacement(rng);
+    const SE3 X_W1 = place("a2k") * X_B1;
+    Eigen::Matrix3Xd J = Eigen::Matrix3Xd::Zero(3, tree.nv());
+    for (const auto& [link, sign] : {std::pair("a2k", 1.0), {"b2k", -1.0}})
+      for (int k : tree.supportDofs(tree.frames()[tree.findFrame(link)].body))
+        J.col(k) += sign * linear(X_W1.actInvMotion(ws.J.col(k)));
+    const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeThinU);
+    X_12.p = (0.5 + 0.2 * randomVector(rng, 1)[0]) * svd.matrixU().col(0);
+  }
   if (closure == ClosureKind::Slider) X_12.p = randomVector(rng, 1, 0.3)[0] * axis;
   builder.addFrame("tip1", "a2k", X_B1);
   builder.addFrame("tip2", "b2k", place("b2k").inverseTimes(place("a2k") * X_B1 * X_12));

@@ -32,7 +32,7 @@ Model makeClusterModel(const Model& model, const LoopCluster& loops, const std::
     }
     builder.addFrame(closure.name + "|1", links[closure.body1], closure.X_B1);
     builder.addFrame(closure.name + "|2", links[closure.body2], closure.X_B2);
-    builder.addClosure(closure.name + "|1", closure.name + "|2", std::move(closure));
+    builder.addClosure(closure.name + "|1", closure.name + "|2", closure);
   }
   return builder.build();
 }
