@@ -10,6 +10,11 @@ import numpy as np
 RANK = 1e-6  # singular values of closures below this, over the largest, count as zero
 
 
+def read_polynomial(term):
+    """The polynomial of a coordinate in a coupler."""
+    return np.polynomial.Polynomial([0, term["coefficient"], *term.get("higher", [])])
+
+
 def skew(p):
     out = np.zeros(p.shape[:-1] + (3, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -p[..., 2], p[..., 1], -p[..., 0]
@@ -282,11 +287,13 @@ class State:
         parts = [(np.zeros((K, 0)), np.zeros((K, 0, m.nv)), np.zeros((K, 0)))]
         for c in m.closures if indices is None else [m.closures[i] for i in indices]:
             if c["kind"] == "coupler":
-                J = np.zeros((K, 1, m.nv))
+                J, residual, gamma = np.zeros((K, 1, m.nv)), np.full((K, 1), c["offset"]), np.zeros((K, 1))
                 for term in c["terms"]:
-                    J[:, 0, term["dof"]] = term["coefficient"]
-                sums = sum(term["coefficient"] * self.q[:, term["q"]] for term in c["terms"])
-                parts.append((c["offset"] - sums[:, None], J, np.zeros((K, 1))))
+                    p, q, v = read_polynomial(term), self.q[:, term["q"]], self.v[:, term["dof"]]
+                    residual[:, 0] -= p(q)
+                    J[:, 0, term["dof"]] = p.deriv()(q)
+                    gamma[:, 0] += p.deriv(2)(q) * v**2
+                parts.append((residual, J, gamma))
             else:
                 parts.append(self.calc_frames(c["kind"], c.get("axis"), c["body1"], read_placement(c, "_B1"), c["body2"],
                                               read_placement(c, "_B2")))
@@ -344,7 +351,7 @@ class State:
         for i, c in enumerate(self.mechanism.closures):
             if c["kind"] == "coupler":
                 for term in c["terms"]:
-                    tau[:, term["dof"]] += term["coefficient"] * wrenches[:, i, 0]
+                    tau[:, term["dof"]] += read_polynomial(term).deriv()(self.q[:, term["q"]]) * wrenches[:, i, 0]
                 continue
             world = carry_force(self.get_frame(c["body1"], read_placement(c, "_B1")), wrenches[:, i])
             tau += self.generalize(c["body1"], world) - self.generalize(c["body2"], world)

@@ -78,20 +78,27 @@ void tieTips(ModelBuilder& builder, std::mt19937& rng, ClosureKind closure, cons
 
 void addRandomCoupler(ModelBuilder& builder, std::mt19937& rng, const std::string& name,
                       const std::vector<std::string>& joints, const Model& tree, const VectorXd& q, double kp,
-                      double kd) {
+                      double kd, bool is_cam) {
   std::map<std::string, double> coefficients;
+  std::map<std::string, std::vector<double>> higher;
   double offset = 0;
   for (const std::string& joint : joints) {
     const double c = randomVector(rng, 1)[0], coefficient = c < 0 ? c - 0.5 : c + 0.5;
     coefficients[joint] = coefficient;
-    offset += coefficient * q[tree.joints()[tree.findJoint(joint)].idx_q];
+    const double at = q[tree.joints()[tree.findJoint(joint)].idx_q];
+    offset += coefficient * at;
+    if (!is_cam || joint != joints.back()) continue;
+    for (int k = 2; k <= 4; ++k) {
+      higher[joint].push_back(randomVector(rng, 1, 0.4)[0]);
+      offset += higher[joint].back() * std::pow(at, k);
+    }
   }
-  builder.addCoupler(name, coefficients, offset, kp, kd);
+  builder.addCoupler(name, coefficients, offset, kp, kd, higher);
 }
 
 namespace {
 
-enum class Extra { None, Belt, RepeatedBelt, Forces };
+enum class Extra { None, Belt, RepeatedBelt, Cam, Forces };
 
 // On joints in a loop and, with a free base, on one outside.
 void addRandomForces(ModelBuilder& builder, std::mt19937& rng, JointKind kind) {
@@ -162,8 +169,8 @@ Mechanism makeMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, 
     addRandomForces(builder, rng, kind);
     addRandomPointSprings(builder, rng, base);
   }
-  if (extra == Extra::Belt || extra == Extra::RepeatedBelt)
-    addRandomCoupler(builder, rng, "belt", listCoupled(kind), tree, out.q_closed, kp, kd);
+  if (extra == Extra::Belt || extra == Extra::RepeatedBelt || extra == Extra::Cam)
+    addRandomCoupler(builder, rng, "belt", listCoupled(kind), tree, out.q_closed, kp, kd, extra == Extra::Cam);
   out.model = builder.build();
   if (extra != Extra::RepeatedBelt) return out;
   Closure twin = out.model.closures().back();
@@ -199,6 +206,11 @@ std::ostream& operator<<(std::ostream& out, const MechanismKind& kind) {
 Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, bool repeated,
                               double kp, double kd) {
   return makeMechanism(rng, kind, closure, base, kp, kd, repeated ? Extra::RepeatedBelt : Extra::Belt);
+}
+
+Mechanism makeCammedMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
+                              double kd) {
+  return makeMechanism(rng, kind, closure, base, kp, kd, Extra::Cam);
 }
 
 Mechanism makeSprungMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base) {

@@ -46,14 +46,19 @@ std::ostream& operator<<(std::ostream& out, const MechanismKind& kind);
 Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
                               bool repeated, double kp = 0, double kd = 0);
 
+/// The same with a coupler beside the closure in which one joint has a polynomial of degree 4.
+Mechanism makeCammedMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
+                              double kp = 0, double kd = 0);
+
 /// The same with springs, dampers and friction on joints of its loop, and springs and dampers between points of bodies: of
 /// one branch, of both, of the ground and, with a free base, of the side branch.
 Mechanism makeSprungMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base);
 
-/// Couples joints of `tree`, with coefficients of 0.5 to 1.5 of either sign, so that it holds at q.
+/// Couples joints of `tree`, with coefficients of 0.5 to 1.5 of either sign, so that it holds at q; is_cam: with powers up to
+/// the fourth of the last one.
 void addRandomCoupler(ModelBuilder& builder, std::mt19937& rng, const std::string& name,
                       const std::vector<std::string>& joints, const Model& tree, const VectorXd& q, double kp = 0,
-                      double kd = 0);
+                      double kd = 0, bool is_cam = false);
 
 /// Planar four-bar (four parallel hinges about y) closed by a 6D weld: rank 3 of 6 rows. Lengths in metres.
 Mechanism makePlanarFourBar(double ground, double crank, double coupler, double rocker, double crank_angle);

@@ -34,8 +34,13 @@ ModelParts moveParts(const Model& model, const ModelVariation& direction, double
     move(closure.X_B2, direction.frames2[c]);
     closure.offset += step * direction.offsets[c];
     closure.length += step * direction.lengths[c];
-    for (size_t i = 0; i < closure.terms.size(); ++i)
-      closure.terms[i].coefficient += step * direction.coefficients[c][static_cast<Eigen::Index>(i)];
+    for (size_t i = 0; i < closure.terms.size(); ++i) {
+      const VectorXd change = step * direction.coefficients[c].row(static_cast<Eigen::Index>(i));
+      CouplerTerm& term = closure.terms[i];
+      term.coefficient += change[0];
+      term.higher.resize(static_cast<size_t>(change.size()) - 1);
+      for (size_t k = 0; k < term.higher.size(); ++k) term.higher[k] += change[static_cast<Eigen::Index>(k) + 1];
+    }
   }
   parts.armature += step * direction.armature;
   for (size_t s = 0; s < parts.point_springs.size(); ++s) {

@@ -95,10 +95,11 @@ inline double compareClosure(const Workspace& wa, const Closure& ca, const Works
                              ConstVectorRef qa, ConstVectorRef qb) {
   if (ca.kind == ClosureKind::Coupler) {
     double ra = -ca.offset, rb = -cb.offset;
-    for (const CouplerTerm& t : ca.terms) ra += t.coefficient * qa[t.idx_q];
-    for (const CouplerTerm& t : cb.terms) rb += t.coefficient * qb[t.idx_q];
-    // The first coefficient of a pair is 1 in MuJoCo.
-    const double factor = ca.terms.size() == 2 ? ca.terms[0].coefficient / cb.terms[0].coefficient : 1;
+    for (const CouplerTerm& t : ca.terms) ra += t.calcDerivative(0, qa[t.idx_q]);
+    for (const CouplerTerm& t : cb.terms) rb += t.calcDerivative(0, qb[t.idx_q]);
+    // A coefficient of a pair is 1 in MuJoCo: that of a linear term.
+    const size_t y = ca.terms[0].isLinear() ? 0 : 1;
+    const double factor = ca.terms.size() == 2 ? ca.terms[y].coefficient / cb.terms[y].coefficient : 1;
     return std::abs(ra - factor * rb);
   }
   const SE3 a1 = getPlacement(wa, ca.body1, ca.X_B1), a2 = getPlacement(wa, ca.body2, ca.X_B2),

@@ -72,6 +72,43 @@ TEST_CASE("a pair of gears: accelerations and force in closed form") {
   CHECK(out.lambda[0] == Approx(I1 * a1 - torque).epsilon(1e-12));
 }
 
+TEST_CASE("a cam: accelerations and force in closed form, and the energy of a swing stays") {
+  // y = x^2 - 0.5 x^3 between two rotors of moments I and J without gravity: with s = dy/dx, the energy (I + J s^2) w^2 / 2
+  // stays, so that (I + J s^2) w' + J s s' w^2 = 0.
+  constexpr double I = 0.3, J = 2;
+  ModelBuilder builder = makeRotors({I, J});
+  builder.addCoupler("cam", {{"r1", 0}, {"r2", -1}}, 0, 0, 0, {{"r1", {1, -0.5}}});
+  const Model model = builder.build();
+  const ConstraintSet set = makeConstraintSet(model);
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  const auto s = [](double x) { return 2 * x - 1.5 * x * x; };
+  const auto solve = [&](double x, double w) {
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, set, Eigen::Vector2d(x, x * x - 0.5 * x * x * x),
+                                      Eigen::Vector2d(w, s(x) * w), Eigen::Vector2d::Zero()) == NumericalStatus::Ok);
+    return cws.a[0];
+  };
+  for (const double x : {-0.7, 0.0, 0.4, 1.1}) {
+    const double w = 1.5 - x, slope = s(x), curvature = 2 - 3 * x;
+    const double a = -J * slope * curvature * w * w / (I + J * slope * slope);
+    CHECK(solve(x, w) == Approx(a).epsilon(1e-12).margin(1e-14));
+    CHECK(cws.a[1] == Approx(slope * a + curvature * w * w).epsilon(1e-12));
+    CHECK(cws.lambda[0] == Approx(-J * cws.a[1]).epsilon(1e-12));
+  }
+  // Runge and Kutta's rule over a swing.
+  double x = -0.6, w = 1;
+  const double energy = (I + J * s(x) * s(x)) * w * w / 2, h = 1e-3;
+  for (int i = 0; i < 1000; ++i) {
+    const double k1 = solve(x, w), k2 = solve(x + h / 2 * w, w + h / 2 * k1),
+                 k3 = solve(x + h / 2 * (w + h / 2 * k1), w + h / 2 * k2),
+                 k4 = solve(x + h * (w + h / 2 * k2), w + h * k3);
+    x += h * (w + h / 6 * (k1 + k2 + k3));
+    w += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+  }
+  CHECK(x > 0.2);
+  CHECK((I + J * s(x) * s(x)) * w * w / 2 == Approx(energy).epsilon(1e-9));
+}
+
 TEST_CASE("a differential: two motors turn pitch by their mean, roll by half their difference") {
   constexpr double Im = 0.1, Ip = 1.5, Ir = 0.7;
   ModelBuilder builder = makeRotors({Im, Im, Ip, Ir});  // r1, r2: motors; r3: pitch; r4: roll
@@ -144,6 +181,12 @@ TEST_CASE("the dofs of a coupler are those between its joints and the body that 
              }),
              Catch::Contains("two closures have this name"));
   CHECK_THAT(getError([&] { copy.addCoupler("bad", {{"to_a", 1}, {"to_b", NAN}}); }), Catch::Contains("not finite"));
+  const auto couple = [&](const std::string& joint, double coefficient, const std::vector<double>& higher) {
+    return getError([&] { copy.addCoupler("bad", {{"to_a", 1}, {"to_b", coefficient}}, 0, 0, 0, {{joint, higher}}); });
+  };
+  CHECK_THAT(couple("to_b", 1, {0.5, NAN}), Catch::Contains("not finite"));
+  CHECK_THAT(couple("to_b", 0, {0, 0}), Catch::Contains("is zero"));
+  CHECK_THAT(couple("to_c", 1, {0.5}), Catch::Contains("'to_c' has coefficients of powers but is not coupled"));
 }
 
 TEST_CASE("couplers in the loops of other closures, redundant or not: derivatives along closed motions", "[sweep]") {
@@ -151,10 +194,13 @@ TEST_CASE("couplers in the loops of other closures, redundant or not: derivative
   Selection selection;
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds)
-      for (bool repeated : {false, true}) {
+      for (const std::string how : {"belt", "repeated belt", "cam"}) {
         if (selection.isLeftOut()) continue;
-        CAPTURE(getName(kind), getName(closure), repeated);
-        const Mechanism mechanism = makeBeltedMechanism(rng, kind, closure, MechanismBase::FreeFlyer, repeated);
+        CAPTURE(getName(kind), getName(closure), how);
+        const bool repeated = how == "repeated belt";
+        const Mechanism mechanism = how == "cam"
+                                        ? makeCammedMechanism(rng, kind, closure, MechanismBase::FreeFlyer)
+                                        : makeBeltedMechanism(rng, kind, closure, MechanismBase::FreeFlyer, repeated);
         const Model& model = mechanism.model;
         const VectorXd& q = mechanism.q_closed;
         REQUIRE(model.clusters().size() == 1);

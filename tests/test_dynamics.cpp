@@ -71,15 +71,17 @@ TEST_CASE("centre of mass: Jacobian and velocity derivative") {
 
 TEST_CASE("closures: residual rate, velocity and acceleration are time derivatives of one another") {
   std::mt19937 rng(3);
-  for (ClosureKind closure_kind : kClosureKinds) {
+  for (const int i : {0, 1, 2, 3, 4}) {
+    const bool is_cam = i == 4;  // a coupler with a polynomial, beside one without
+    const ClosureKind closure_kind = kClosureKinds[std::min(i, 3)];
     for (bool open : {false, true}) {
-      CAPTURE(getName(closure_kind), open);
-      const Mechanism mechanism =
-          makeRandomMechanism(rng, JointKind::Spherical, closure_kind, MechanismBase::FreeFlyer);
+      CAPTURE(getName(closure_kind), is_cam, open);
+      const Mechanism mechanism = (is_cam ? makeCammedMechanism : makeRandomMechanism)(
+          rng, JointKind::Spherical, closure_kind, MechanismBase::FreeFlyer, 0, 0);
       const Model& model = mechanism.model;
       Workspace ws(model);
       const ConstraintSet set = makeConstraintSet(model);
-      const Closure& closure = set.closures[0];
+      const Closure& closure = set.closures.back();
       VectorXd q = mechanism.q_closed;
       updatePositions(model, ws, q);
       CHECK(calcClosureResidual(ws, closure).norm() < 1e-13);

@@ -165,6 +165,24 @@ TEST_CASE("impacts of edges on mechanisms: derivatives agree with differences") 
   }
 }
 
+TEST_CASE("impacts with polynomials in couplers: derivatives agree with differences") {
+  std::mt19937 rng(56);
+  for (JointKind kind : {JointKind::Revolute, JointKind::Prismatic, JointKind::Spherical})
+    for (bool open : {false, true}) {
+      CAPTURE(getName(kind), open);
+      const Mechanism mechanism = makeCammedMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
+      const Model& model = mechanism.model;
+      const ConstraintSet set = makeConstraintSet(model, {{1, randomPlacement(rng), 5, 4}});
+      VectorXd q = mechanism.q_closed;
+      if (open) q = model.integrate(q, randomVector(rng, model.nv(), 0.1));
+      const VectorXd v = randomVector(rng, model.nv(), 1);
+      ImpactWorkspace iws(model);
+      REQUIRE(updateImpact(model, iws, set, q, v) == NumericalStatus::Ok);
+      CHECK((iws.J * iws.v_plus).norm() < 1e-10);
+      checkImpactDerivatives(model, set, q, v, iws);
+    }
+}
+
 TEST_CASE("impacts allocate nothing after the first") {
   std::mt19937 rng(53);
   const Mechanism mechanism =

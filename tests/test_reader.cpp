@@ -200,6 +200,12 @@ TEST_CASE("couplers arrive from the YAML file and from <mimic>, with the gains a
   CHECK(belt.kp == 3);
   CHECK(belt.kd == 4);
 
+  const Model cam =
+      load(kToyUrdf, "closures:\n  - {name: cam, type: coupler, joints: {shoulder: [0, 0.25, -1], rod_joint: [2]}}");
+  const std::vector<CouplerTerm>& terms = cam.closures().at(0).terms;
+  CHECK((terms[0].coefficient == 0 && terms[0].higher == std::vector<double>{0.25, -1}));
+  CHECK((terms[1].coefficient == 2 && terms[1].isLinear()));
+
   // rod_joint = 1.5 shoulder + 0.2, beside the closure of the YAML file.
   const std::string mimic =
       replaceOnce(kToyUrdf, "<axis xyz=\"0 0 1\"/>", "<mimic joint=\"shoulder\" multiplier=\"1.5\" offset=\"0.2\"/>");

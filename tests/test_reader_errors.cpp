@@ -123,6 +123,8 @@ const std::vector<Mistake> kYamlMistakes = {
      "fewer than two", "fixed"},
     {kType, kType + "\nclosures: [{name: belt, type: coupler, joints: {shoulder: 1, elbow: 1}}]",
      "key 'closures'[0]: key 'joints': key 'elbow' (line 3)", "no joint 'elbow'", "known are root_joint, shoulder"},
+    {kType, kType + "\nclosures: [{name: belt, type: coupler, joints: {shoulder: 1, rod_joint: []}}]",
+     "key 'closures'[0]: key 'joints': key 'rod_joint'", "has no coefficient", "give a number, or a list"},
     {kType, kType + "\nclosures: [{name: belt, type: coupler, joints: {shoulder: 1, rod_joint: 0}}]", "closure 'belt'",
      "zero or not finite", "omit"},
     {kType, kType + "\nclosures: [{name: belt, type: coupler, joints: {shoulder: 1, root_joint: 1}}]", "closure 'belt'",

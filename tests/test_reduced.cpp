@@ -189,6 +189,22 @@ TEST_CASE("reduced step: couplers in the loops of other closures", "[sweep]") {
       }
 }
 
+TEST_CASE("reduced step: polynomials in couplers, with and without other loops") {
+  const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
+  std::mt19937 rng(19);
+  for (JointKind kind : {JointKind::Revolute, JointKind::Prismatic, JointKind::Spherical})
+    for (ClosureKind closure : {ClosureKind::Hinge5D, ClosureKind::Coupler}) {
+      CAPTURE(getName(rule), getName(kind), getName(closure));
+      const Mechanism mechanism = makeCammedMechanism(rng, kind, closure, MechanismBase::FreeFlyer);
+      const Model& model = mechanism.model;
+      const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
+      const State node = makeClosedState(model, mechanism.q_closed, 0.05, 1, rng);
+      checkLinearization(model, {{1, {}, 0, 10}}, state, node.x(), rng, StageKind::Dynamics, Formulation::Reduced,
+                         rule);
+      checkLinearization(model, {{1, {}, 0, 10}}, state, node.x(), rng, StageKind::Impact, Formulation::Reduced);
+    }
+}
+
 TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar", "[sweep]") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(12);

@@ -45,7 +45,8 @@ std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model
     }
     if (model.closures()[c].kind != ClosureKind::Coupler) continue;
     ModelVariation ratios(model);
-    ratios.coefficients[c] = randomVector(rng, static_cast<int>(model.closures()[c].terms.size()));
+    MatrixXd& change = ratios.coefficients[c];
+    change = randomVector(rng, static_cast<int>(change.size())).reshaped(change.rows(), change.cols());
     ratios.offsets[c] = 0.5;
     out.push_back(ratios);
     all.coefficients[c] = -ratios.coefficients[c];
@@ -167,6 +168,20 @@ TEST_CASE("variation: forward dynamics with springs and dampers on joints and be
     const Mechanism mechanism = makeSprungMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
     checkForwardDynamics(rng, mechanism.model, {}, mechanism.q_closed);
   }
+}
+
+TEST_CASE("variation: forward dynamics with polynomials in couplers, closed and open") {
+  std::mt19937 rng(26);
+  for (JointKind kind : {JointKind::Revolute, JointKind::Prismatic, JointKind::Spherical})
+    for (ClosureKind closure : {ClosureKind::Ball3D, ClosureKind::Coupler})
+      for (bool open : {false, true}) {
+        CAPTURE(getName(kind), getName(closure), open);
+        const Mechanism mechanism =
+            makeCammedMechanism(rng, kind, closure, MechanismBase::FreeFlyer, open ? 3 : 0, open ? 2 : 0);
+        VectorXd q = mechanism.q_closed;
+        if (open) q = mechanism.model.integrate(q, randomVector(rng, mechanism.model.nv(), 0.1));
+        checkForwardDynamics(rng, mechanism.model, {}, q);
+      }
 }
 
 TEST_CASE("variation: redundant rows, changes that leave them so") {

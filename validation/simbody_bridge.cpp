@@ -2,6 +2,7 @@
 
 #include <Simbody.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "math/decompositions.h"
@@ -37,6 +38,13 @@ Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
   const Vector3d axis2 = X_12.R * closure.axis, normal = closure.axis.cross(axis2);
   if (normal.norm() > 0) gap.tail<3>() = std::atan2(normal.norm(), closure.axis.dot(axis2)) * normal.normalized();
   return gap;
+}
+
+// Of a coupler by a coordinate.
+double calcSlope(const CouplerTerm& term, double q) {
+  double slope = term.coefficient;
+  for (size_t k = 0; k < term.higher.size(); ++k) slope += (k + 2.0) * term.higher[k] * std::pow(q, k + 1.0);
+  return slope;
 }
 
 // Unit twists of frame 1, relative to frame 2, that a closure forbids; notation.h. Of a coupler or a distance, the first entry.
@@ -152,7 +160,8 @@ VectorXd SimbodyBridge::calcWrenchForces(const std::vector<Vector6d>& wrenches) 
   VectorXd coupled = VectorXd::Zero(s_->model.nv());
   for (size_t c = 0; c < s_->closures.size(); ++c) {
     const Closure& closure = s_->closures[c];
-    for (const CouplerTerm& term : closure.terms) coupled[term.dof] += term.coefficient * wrenches[c][0];
+    for (const CouplerTerm& term : closure.terms)
+      coupled[term.dof] += calcSlope(term, s_->bodies[term.joint].getOneQ(s_->state, 0)) * wrenches[c][0];
     if (closure.kind == ClosureKind::Coupler) continue;
     const SE3 X_W1 = getPlacement(closure.body1) * closure.X_B1;
     Vector3d force = X_W1.R * wrenches[c].head<3>(), moment = X_W1.R * wrenches[c].tail<3>();
@@ -173,13 +182,20 @@ VectorXd SimbodyBridge::calcWrenchForces(const std::vector<Vector6d>& wrenches) 
 
 double SimbodyBridge::calcCouplerGap(const Closure& coupler) const {
   double gap = coupler.offset;
-  for (const CouplerTerm& term : coupler.terms) gap -= term.coefficient * s_->bodies[term.joint].getOneQ(s_->state, 0);
+  for (const CouplerTerm& term : coupler.terms) {
+    const double q = s_->bodies[term.joint].getOneQ(s_->state, 0);
+    gap -= term.coefficient * q;
+    for (size_t k = 0; k < term.higher.size(); ++k) gap -= term.higher[k] * std::pow(q, k + 2.0);
+  }
   return gap;
 }
 
 double SimbodyBridge::calcCouplerRate(const Closure& coupler) const {
   double rate = 0;
-  for (const CouplerTerm& term : coupler.terms) rate += term.coefficient * s_->bodies[term.joint].getOneU(s_->state, 0);
+  for (const CouplerTerm& term : coupler.terms) {
+    const SimTK::MobilizedBody& body = s_->bodies[term.joint];
+    rate += calcSlope(term, body.getOneQ(s_->state, 0)) * body.getOneU(s_->state, 0);
+  }
   return rate;
 }
 

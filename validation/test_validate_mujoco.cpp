@@ -39,6 +39,23 @@ TEST_CASE("every joint kind with every closure kind agrees with MuJoCo", "[sweep
   CHECK(without_rate > 1e-3);  // dJ/dt v is not negligible
 }
 
+TEST_CASE("polynomials in couplers of two joints agree with MuJoCo") {
+  std::mt19937 rng(24);
+  ValidationOptions options;
+  options.samples = 3;
+  options.tolerance = 1e-10;
+  for (JointKind joint : {JointKind::Spherical, JointKind::Universal})
+    for (ClosureKind closure : {ClosureKind::Hinge5D, ClosureKind::Coupler}) {
+      const Mechanism mechanism = makeCammedMechanism(rng, joint, closure, MechanismBase::FreeFlyer);
+      options.start = mechanism.q_closed;
+      const ValidationReport report = validateByMujoco(mechanism.model, options);
+      CAPTURE(getName(joint), getName(closure));
+      INFO(print(report));
+      CHECK(report.passed());
+      REQUIRE(report.findRow(kComplete));
+    }
+}
+
 TEST_CASE("springs and dampers on joints and between points, and friction, agree with MuJoCo") {
   std::mt19937 rng(23);
   ValidationOptions options;

@@ -75,6 +75,29 @@ TEST_CASE("couplers beside other closures, redundant or not, agree with Simbody"
     }
 }
 
+TEST_CASE("polynomials in couplers, beside other closures or not, agree with Simbody; a wrong one is seen") {
+  std::mt19937 rng(16);
+  ValidationOptions options;
+  options.samples = 3;
+  for (JointKind joint : {JointKind::Revolute, JointKind::Prismatic, JointKind::Spherical})
+    for (ClosureKind closure : {ClosureKind::Hinge5D, ClosureKind::Coupler}) {
+      const Mechanism mechanism = makeCammedMechanism(rng, joint, closure, MechanismBase::FreeFlyer);
+      options.start = mechanism.q_closed;
+      const ValidationReport report = validateRobot(mechanism.model, options);
+      CAPTURE(getName(joint), getName(closure));
+      INFO(print(report));
+      CHECK(report.passed());
+      for (const char* quantity :
+           {"accelerations, Simbody solver", "closure forces, Simbody solver", "da/dq along the closures"})
+        CHECK(report.findRow(quantity) != nullptr);
+      const Model wrong = changeModel(mechanism.model, [](ModelParts& parts) {
+        for (CouplerTerm& term : parts.closures.back().terms)
+          if (!term.isLinear()) term.higher[1] *= 1.001;
+      });
+      CHECK(!validateAgainst(mechanism.model, wrong, options).passed());
+    }
+}
+
 TEST_CASE("a wrong ratio of a coupler is seen") {
   std::mt19937 rng(15);
   const Mechanism mechanism =

@@ -46,8 +46,9 @@
 /// - lambda is the wrench, in frame 1, that acts **on body 1**; body 2 gets the opposite one. So J = d nu_c / d v
 ///   enters (1) with a plus sign and positive power of lambda is power given to the mechanism. Of a distance, lambda is
 ///   the tension of the rod, N: it pulls both points towards each other.
-/// A coupler ties coordinates instead of frames, sum c_i q_i = c_0: residual c_0 - sum c_i q_i, velocity sum c_i v_i,
-/// acceleration sum c_i a_i, and lambda adds c_i lambda to the generalized force of coordinate i.
+/// A coupler ties coordinates instead of frames, sum p_i(q_i) = c_0 with polynomials p_i, mostly c_i q_i: residual
+/// c_0 - sum p_i, velocity sum p_i' v_i, acceleration sum p_i' a_i + p_i'' v_i^2, and lambda adds p_i' lambda to the
+/// generalized force of coordinate i.
 ///
 /// A foot contact is a closure whose frame 1 is the contact frame and whose body 2 is the world: its lambda is the
 /// wrench of the ground on the foot, in the foot's frame. Contact frames have z along the outward normal of the ground

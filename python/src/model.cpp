@@ -261,9 +261,11 @@ void bindBuilder(py::module_& module) {
           "length: m, above 0; None: their distance where all coordinates are neutral; kp [1/s^2], kd [1/s]: Baumgarte "
           "stabilization.")
       .def("add_coupler", &ModelBuilder::addCoupler, py::arg("name"), py::arg("coefficients"), py::arg("offset") = 0,
-           py::arg("kp") = 0, py::arg("kd") = 0,
-           "A belt or a gear: the sum of coefficients times coordinates is the offset, rad or m.\n\n"
-           "coefficients: by name of joint, at least two; kp [1/s^2], kd [1/s]: Baumgarte stabilization.")
+           py::arg("kp") = 0, py::arg("kd") = 0, py::arg("higher") = std::map<std::string, std::vector<double>>(),
+           "A belt, a gear or a cam: the sum of coefficients times coordinates is the offset, rad or m.\n\n"
+           "coefficients: by name of joint, at least two; kp [1/s^2], kd [1/s]: Baumgarte stabilization; higher: lists "
+           "of\n"
+           "coefficients of the squares, cubes, .. of the coordinates of some of these joints.")
       .def("add_joint_force", &ModelBuilder::addJointForce, py::arg("joint"), py::arg("force"),
            "Spring, damper and friction (JointForce) on a joint of one coordinate.")
       .def("add_point_spring", &ModelBuilder::addPointSpring, py::arg("frame1"), py::arg("frame2"), py::arg("spring"),

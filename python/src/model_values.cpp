@@ -78,11 +78,13 @@ void bindTree(py::module_& module) {
 }
 
 void bindConstraints(py::module_& module) {
-  Value<CouplerTerm>(module, "CouplerTerm", "One summand of a coupler: a coefficient times a coordinate.")
+  Value<CouplerTerm>(module, "CouplerTerm",
+                     "One summand of a coupler: a coefficient times a coordinate, or a polynomial.")
       .field("joint", &CouplerTerm::joint, "index")
       .field("coefficient", &CouplerTerm::coefficient, "dimensionless, or m/rad, .. between units")
       .field("idx_q", &CouplerTerm::idx_q, "index into q")
-      .field("dof", &CouplerTerm::dof, "index into v");
+      .field("dof", &CouplerTerm::dof, "index into v")
+      .field("higher", &CouplerTerm::higher, "coefficients of q^2, q^3, ..");
   Value<JointForce>(module, "JointForce", "Spring, damper and friction on a joint of one coordinate.")
       .field("joint", &JointForce::joint, "index")
       .field("idx_q", &JointForce::idx_q, "index into q")

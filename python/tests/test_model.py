@@ -221,6 +221,23 @@ def test_a_rod_without_a_body():
             builder.add_distance("none", "mass", "world", length)
 
 
+def test_a_cam_from_nothing():
+    """Two rotors with b = a^2 - 0.5 a^3, a constant torque on b."""
+    builder = bielle.ModelBuilder("cam")
+    for name in ("a", "b"):
+        joint = bielle.Joint(name=name, kind=bielle.JointKind.REVOLUTE, axis=[0, 0, 1])
+        builder.add_link(f"link_{name}", "world", joint, bielle.Inertia(mass=1, I_com=np.eye(3)))
+    builder.add_coupler("cam", {"a": 0, "b": -1}, higher={"a": [1, -0.5]})
+    builder.add_joint_force("b", bielle.JointForce(preload=3))
+    model = builder.build()
+    assert model.closures[0].terms[0].higher == [1, -0.5]
+    x = 0.6
+    q, slope = [x, x**2 - 0.5 * x**3], 2 * x - 1.5 * x**2
+    assert model.closure_residual(q) == pytest.approx([0])
+    a = model.forward_dynamics(q, np.zeros(2), []).a
+    assert a == pytest.approx([3 * slope / (1 + slope**2), 3 * slope**2 / (1 + slope**2)])
+
+
 def test_a_spring_between_two_points():
     """A mass on a vertical slide, pulled by a spring from a point beside it."""
     builder = bielle.ModelBuilder("mass")

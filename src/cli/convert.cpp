@@ -153,7 +153,7 @@ void addConvert(CLI::App& command, Action& action) {
       "NOTES.\n"
       "A STEP file (mm) has the boxes, cylinders and spheres of the drawing, each link at its place in the closed "
       "posture.\n"
-      "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
+      "A URDF alone is a tree: loops are left out, linear couplers of two joints become <mimic>.\n"
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
       "  bielle convert bipetto --to mjcf --joints hinges -o trained.xml\n"

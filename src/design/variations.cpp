@@ -1,5 +1,7 @@
 #include "design/variations.h"
 
+#include <algorithm>
+
 #include "bielle/model/error.h"
 
 namespace bielle {
@@ -20,7 +22,9 @@ bool isSameButForPlaces(const Model& a, const Model& b) {
   }
   for (size_t c = 0; out && c < a.closures().size(); ++c) {
     const Closure &j = a.closures()[c], &k = b.closures()[c];
-    out = j.kind == k.kind && same(j.axis, k.axis) && j.kp == k.kp && j.kd == k.kd && j.terms.size() == k.terms.size();
+    out = j.kind == k.kind && same(j.axis, k.axis) && j.kp == k.kp && j.kd == k.kd &&
+          std::equal(j.terms.begin(), j.terms.end(), k.terms.begin(), k.terms.end(),
+                     [](const CouplerTerm& s, const CouplerTerm& t) { return s.higher.size() == t.higher.size(); });
   }
   for (size_t f = 0; out && f < a.jointForces().size(); ++f) {
     const JointForce &j = a.jointForces()[f], &k = b.jointForces()[f];
@@ -43,9 +47,13 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
     addTwist(from.closures()[c].X_B2, to.closures()[c].X_B2, out.frames2[c]);
     out.offsets[c] += weight * (to.closures()[c].offset - from.closures()[c].offset);
     out.lengths[c] += weight * (to.closures()[c].length - from.closures()[c].length);
-    for (size_t i = 0; i < from.closures()[c].terms.size(); ++i)
-      out.coefficients[c][static_cast<Eigen::Index>(i)] +=
-          weight * (to.closures()[c].terms[i].coefficient - from.closures()[c].terms[i].coefficient);
+    for (size_t i = 0; i < from.closures()[c].terms.size(); ++i) {
+      const CouplerTerm &s = from.closures()[c].terms[i], &t = to.closures()[c].terms[i];
+      auto row = out.coefficients[c].row(static_cast<Eigen::Index>(i));
+      row[0] += weight * (t.coefficient - s.coefficient);
+      for (size_t k = 0; k < s.higher.size(); ++k)
+        row[static_cast<Eigen::Index>(k) + 1] += weight * (t.higher[k] - s.higher[k]);
+    }
   }
   const auto getNumbers = [](const PointSpring& s) {
     return Eigen::Vector4d(s.stiffness, s.rest, s.preload, s.damping);

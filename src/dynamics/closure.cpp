@@ -48,12 +48,20 @@ Eigen::Vector2<Lanes> calcHingeTurn(const Eigen::Vector2<Lanes>& sine, const Lan
   return out;
 }
 
-// The row of a coupler for values of all coordinates: sum of coefficient times x[index].
-template <typename T>
-T sumTerms(const Closure& c, const VectorX<T>& x, int CouplerTerm::*index) {
-  T sum = 0;
-  for (const CouplerTerm& term : c.terms) sum += term.coefficient * x[term.*index];
-  return sum;
+// The row of a coupler: the sum of what `calc` makes of its terms.
+template <typename T, typename Calc>
+VectorUpTo6<T> sumTerms(const Closure& c, const Calc& calc) {
+  VectorUpTo6<T> row(1);
+  row[0] = 0;
+  for (const CouplerTerm& term : c.terms) row[0] += calc(term);
+  return row;
+}
+
+// The row of derivatives of a coupler: what `calc` makes of its terms in their columns, 0 in the others.
+template <typename Matrix, typename Calc>
+void writeTerms(const Closure& c, Matrix&& row, const Calc& calc) {
+  for (int k : c.dofs) row(0, k) = 0;
+  for (const CouplerTerm& term : c.terms) row(0, term.dof) = calc(term);
 }
 
 }  // namespace
@@ -136,8 +144,9 @@ template <typename T>
 VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& c) {
   requireStage(ws, WorkspaceStage::Placement, "calcClosureResidual", "updatePlacements or updatePositions");
   if (c.kind == ClosureKind::Coupler) {
-    VectorUpTo6<T> row(1);
-    row[0] = c.offset - sumTerms(c, ws.q, &CouplerTerm::idx_q);
+    VectorUpTo6<T> row =
+        sumTerms<T>(c, [&](const CouplerTerm& term) { return term.calcDerivative(0, ws.q[term.idx_q]); });
+    row[0] = c.offset - row[0];
     return row;
   }
   return calcClosureResidual(c, calcRelativePlacement(ws, c));
@@ -211,11 +220,8 @@ ClosureGap calcClosureGap(const Workspace& ws, const Closure& closure) {
 }
 
 void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, MatrixRef H) {
-  if (closure.kind == ClosureKind::Coupler) {
-    for (int k : closure.dofs) H(0, k) = 0;
-    for (const CouplerTerm& term : closure.terms) H(0, term.dof) = -term.coefficient;
-    return;
-  }
+  if (closure.kind == ClosureKind::Coupler)
+    return writeTerms(closure, H, [&](const CouplerTerm& term) { return -term.calcDerivative(1, ws.q[term.idx_q]); });
   const RowsBy6 rate = calcClosureResidualRate(ws, closure);
   const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1);
   for (size_t i = 0; i < closure.dofs.size(); ++i)
@@ -224,7 +230,9 @@ void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, Ma
 
 RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& c) {
   requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocity", "updateVelocities");
-  if (c.kind == ClosureKind::Coupler) return RowVectorUpTo6::Constant(1, sumTerms(c, ws.v, &CouplerTerm::dof));
+  if (c.kind == ClosureKind::Coupler)
+    return sumTerms<double>(
+        c, [&](const CouplerTerm& term) { return term.calcDerivative(1, ws.q[term.idx_q]) * ws.v[term.dof]; });
   RowVectorUpTo6 rows(getRows(c.kind));
   ClosureRows<double>(ws, c).write(1, ws.V[c.body1] - ws.V[c.body2], rows.data());
   return rows;
@@ -232,11 +240,12 @@ RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& c) {
 
 template <typename T>
 VectorUpTo6<T> calcClosureAcceleration(const WorkspaceOf<T>& ws, const Closure& c) {
-  if (c.kind == ClosureKind::Coupler) {
-    VectorUpTo6<T> row(1);
-    row[0] = sumTerms(c, ws.a, &CouplerTerm::dof);
-    return row;
-  }
+  if (c.kind == ClosureKind::Coupler)
+    return sumTerms<T>(c, [&](const CouplerTerm& term) {
+      const T &q = ws.q[term.idx_q], &v = ws.v[term.dof], &a = ws.a[term.dof];
+      return T(term.isLinear() ? term.coefficient * a
+                               : term.calcDerivative(1, q) * a + term.calcDerivative(2, q) * v * v);
+    });
   VectorUpTo6<T> rows(getRows(c.kind));
   ClosureRows<T>(ws, c).writeAcceleration(rows.data());
   return rows;
@@ -251,17 +260,23 @@ RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& c) {
 
 template <typename T>
 void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& c, typename ArgumentsOf<T>::Matrix J) {
-  if (c.kind == ClosureKind::Coupler) {
-    for (int k : c.dofs) J(0, k) = 0;
-    for (const CouplerTerm& term : c.terms) J(0, term.dof) = term.coefficient;
-    return;
-  }
+  if (c.kind == ClosureKind::Coupler)
+    return writeTerms(c, J, [&](const CouplerTerm& term) { return term.calcDerivative(1, ws.q[term.idx_q]); });
   const ClosureRows<T> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) rows.write(c.signs[i], ws.J.col(c.dofs[i]), &J(0, c.dofs[i]));
 }
 
 void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_dq, MatrixRef da_dv) {
   requireStage(ws, WorkspaceStage::Acceleration, "calcClosureDerivatives", "updateAccelerations");
+  if (c.kind == ClosureKind::Coupler) {  // Eq. (6)
+    writeTerms(c, da_dq, [&](const CouplerTerm& term) {
+      const double q = ws.q[term.idx_q], v = ws.v[term.dof];
+      return term.calcDerivative(2, q) * ws.a[term.dof] + term.calcDerivative(3, q) * v * v;
+    });
+    return writeTerms(c, da_dv, [&](const CouplerTerm& term) {
+      return 2 * term.calcDerivative(2, ws.q[term.idx_q]) * ws.v[term.dof];
+    });
+  }
   const ClosureRows<double> rows(ws, c);
   const Vector6d &V1 = ws.V[c.body1], &V2 = ws.V[c.body2], &A2 = ws.A[c.body2];
   const Vector6d V12 = V1 + V2;
@@ -282,8 +297,9 @@ void addStabilizationDerivatives(const Workspace& ws, const Closure& c, MatrixRe
   if (c.kd == 0 && c.kp == 0) return;
   if (c.kind == ClosureKind::Coupler) {
     for (const CouplerTerm& term : c.terms) {
-      ds_dq(0, term.dof) += c.kp * term.coefficient;
-      ds_dv(0, term.dof) += c.kd * term.coefficient;
+      const double q = ws.q[term.idx_q], slope = term.calcDerivative(1, q);
+      ds_dq(0, term.dof) += c.kp * slope + c.kd * term.calcDerivative(2, q) * ws.v[term.dof];
+      ds_dv(0, term.dof) += c.kd * slope;
     }
     return;
   }
@@ -305,6 +321,10 @@ void addStabilizationDerivatives(const Workspace& ws, const Closure& c, MatrixRe
 
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& c, MatrixRef dnu_dq) {
   requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocityDerivative", "updateVelocities");
+  if (c.kind == ClosureKind::Coupler)
+    return writeTerms(c, dnu_dq, [&](const CouplerTerm& term) {  // Eq. (6)
+      return term.calcDerivative(2, ws.q[term.idx_q]) * ws.v[term.dof];
+    });
   const ClosureRows<double> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
@@ -321,8 +341,12 @@ Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& c, typenam
   return getFrame1(ws, c).actForce(W);
 }
 
-void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& c, const Vector6d& wrench,
+void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& c, ConstVectorRef lambda,
                                MatrixRef dID_dq) {
+  for (const CouplerTerm& term : c.terms)
+    dID_dq(term.dof, term.dof) -= term.calcDerivative(2, ws.q[term.idx_q]) * lambda[0];  // Eq. (7)
+  if (c.kind == ClosureKind::Coupler) return;
+  const Vector6d wrench = calcClosureWrench<double>(ws, c, lambda);
   const ClosureRows<double> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
@@ -332,27 +356,6 @@ void addClosureForceDerivative(const Model& model, const Workspace& ws, const Cl
     if (c.kind != ClosureKind::Distance) continue;
     const Vector6d turned = c.signs[i] * rows.calcTurned(wrench, ws.J.col(k));
     for (size_t l = 0; l < c.dofs.size(); ++l) dID_dq(c.dofs[l], k) -= c.signs[l] * ws.J.col(c.dofs[l]).dot(turned);
-  }
-}
-
-void addGeneralizedForceDerivative(const Model& model, const Workspace& ws, const Closure& c, const Vector6d& wrench,
-                                   MatrixRef out) {
-  const std::vector<Dof>& dofs = model.dofs();
-  const ClosureRows<double> rows(ws, c);
-  for (size_t ik = 0; ik < c.dofs.size(); ++ik) {
-    const int k = c.dofs[ik];
-    const Vector6d moved = crossForce(ws.J.col(k), wrench);
-    const Vector6d turned = c.signs[ik] * rows.calcTurned(wrench, ws.J.col(k));
-    const bool moves_frame1 = c.signs[ik] > 0;
-    for (size_t ij = 0; ij < c.dofs.size(); ++ij) {
-      const int j = c.dofs[ij];
-      out(j, k) += c.signs[ij] * ws.J.col(j).dot(turned);
-      const bool same_joint = dofs[j].joint == dofs[k].joint;
-      const bool moves_axis = same_joint ? !(dofs[j].first_of_universal && dofs[k].second_of_universal)
-                                         : model.isAncestorOrSelf(dofs[k].joint, dofs[j].joint);
-      if (moves_frame1 != moves_axis)
-        out(j, k) += (moves_frame1 ? c.signs[ij] : -c.signs[ij]) * ws.J.col(j).dot(moved);  // Eq. (6)
-    }
   }
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// \file The rows of a closure in full vectors, and how they change as it moves: Eqs. (1) to (4) and (8) of closure.h.
+/// \file The rows of a closure in full vectors, and how they change as it moves: Eqs. (1) to (4), (8) and (9) of closure.h.
 #include "bielle/dynamics/closure.h"
 #include "model/joint.h"
 
@@ -56,7 +56,7 @@ class ClosureRows {
     write(s, dnu, out);
     if (c_.kind != ClosureKind::Distance) return;
     const Vector3<T> dp = calcPointRate(X_W1_.actInvMotion(D));
-    out[0] += s * per_length_ * dp.dot(linear(calcVelocity()));  // Eq. (8)
+    out[0] += s * per_length_ * dp.dot(linear(calcVelocity()));  // Eq. (9)
   }
 
   /// The same of the acceleration rows, for the change da of the full acceleration; needs the accelerations as well.
@@ -69,7 +69,7 @@ class ClosureRows {
     const Vector3<T> dp = calcPointRate(X_W1_.actInvMotion(D));
     const Vector3<T> dp_rate = calcPointRate(dnu_1) - angular(nu).cross(dp);
     out[0] += s * per_length_ *
-              (dp.dot(linear(a)) + calcPointRate(nu).dot(linear(dnu_1)) + dp_rate.dot(linear(nu)));  // Eq. (8)
+              (dp.dot(linear(a)) + calcPointRate(nu).dot(linear(dnu_1)) + dp_rate.dot(linear(nu)));  // Eq. (9)
   }
 
   /// What the turning of a distance in frame 1, by a displacement D of frame 1 against frame 2, adds to its world wrench W.
@@ -86,7 +86,7 @@ class ClosureRows {
     write(1, calcFullAcceleration(ws_, c_), out);
     if (c_.kind != ClosureKind::Distance) return;
     const Vector6<T> nu = calcVelocity();
-    out[0] += per_length_ * calcPointRate(nu).dot(linear(nu));  // Eq. (7)
+    out[0] += per_length_ * calcPointRate(nu).dot(linear(nu));  // Eq. (8)
   }
 
  private:
@@ -102,7 +102,7 @@ class ClosureRows {
   const Closure& c_;
   SE3Of<T> X_W1_;
   Eigen::Matrix<double, 3, 2> normals_;
-  Vector3<T> p_;  // of a distance, Eq. (7)
+  Vector3<T> p_;  // of a distance, Eq. (8)
   double per_length_ = 0;
 };
 

@@ -16,6 +16,15 @@ Vector6<T> calcDifference(const ClusterMotionOf<T>& motion, const Matrix6X<T>& s
   return out;
 }
 
+// Sum over the terms of a coupler, with k their dofs in the cluster: that of closure.h, Eq. (6), times a column of N or Z.
+template <typename T, typename Calc>
+T sumTerms(const Closure& placed, const Closure& own, const Calc& calc) {
+  T sum = 0;
+  for (size_t i = 0; i < own.terms.size(); ++i)
+    if (!own.terms[i].isLinear()) sum += calc(placed.terms[i], own.terms[i].dof);
+  return sum;
+}
+
 // Path sums of the terms that `add` contributes for dof k of the cluster, coordinate c.
 template <typename T, typename Add>
 void sumPaths(const ReducedCluster& cluster, Matrix6X<T>& sums, const Add& add) {
@@ -63,8 +72,15 @@ void updateVelocityLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion
   sumPaths(cluster, motion.dV, [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * view.ws.dV.col(view.dofs[k]); });
   for (size_t i = 0; i < view.closures.size(); ++i) {
     const Closure &placed = view.closures[i], &own = cluster.closures.closures[i];
-    const ClosureRows<T> rows(view.ws, placed);
     const int row = cluster.closures.offsets[i];
+    if (own.kind == ClosureKind::Coupler) {
+      for (int c = 0; c < cluster.size; ++c)
+        motion.C_q(row, c) = sumTerms<T>(placed, own, [&](const CouplerTerm& term, int k) {
+          return T(term.calcDerivative(2, view.ws.q[term.idx_q]) * view.ws.v[term.dof] * N(k, c));
+        });
+      continue;
+    }
+    const ClosureRows<T> rows(view.ws, placed);
     for (int c = 0; c < cluster.size; ++c) {
       const Vector6<T> J = calcDifference(motion, motion.J, own, c);
       const Vector6<T> dnu = calcDifference(motion, motion.dV, own, c) + crossMotion(J, view.ws.V[placed.body2]);
@@ -92,6 +108,19 @@ void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& mo
     const Vector6<T>&V1 = ws.V[placed.body1], &V2 = ws.V[placed.body2], &A2 = ws.A[placed.body2];
     const Vector6<T> V12 = V1 + V2;
     const int row = cluster.closures.offsets[i];
+    if (own.kind == ClosureKind::Coupler) {
+      for (int c = 0; c < cluster.size; ++c) {
+        motion.C_q(row, c) = sumTerms<T>(placed, own, [&](const CouplerTerm& term, int k) {
+          const T &q = ws.q[term.idx_q], &v = ws.v[term.dof], curvature = term.calcDerivative(2, q);
+          return T((curvature * ws.a[term.dof] + term.calcDerivative(3, q) * v * v) * N(k, c) +
+                   2 * curvature * v * Z(k, c));
+        });
+        motion.C_v(row, c) = sumTerms<T>(placed, own, [&](const CouplerTerm& term, int k) {
+          return T(2 * term.calcDerivative(2, ws.q[term.idx_q]) * ws.v[term.dof] * N(k, c));
+        });
+      }
+      continue;
+    }
     for (int c = 0; c < cluster.size; ++c) {
       const Vector6<T> J = calcDifference(motion, motion.J, own, c), dV = calcDifference(motion, motion.dV, own, c);
       const Vector6<T> J_V2 = crossMotion(J, V2), dnu = dV + J_V2;
@@ -119,10 +148,15 @@ void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<
   const int n = static_cast<int>(cluster.dofs.size());
   out.setZero();
   for (size_t i = 0; i < view.closures.size(); ++i) {
-    const Closure& own = cluster.closures.closures[i];
-    const Vector6<T> W =
-        calcClosureWrench(view.ws, view.closures[i], forces.segment(cluster.closures.offsets[i], getRows(own.kind)));
-    const ClosureRows<T> rows(view.ws, view.closures[i]);
+    const Closure &placed = view.closures[i], &own = cluster.closures.closures[i];
+    const int row = cluster.closures.offsets[i];
+    for (size_t t = 0; t < own.terms.size(); ++t)
+      if (const CouplerTerm& term = placed.terms[t]; !term.isLinear())
+        for (int c = 0, k = own.terms[t].dof; c < cluster.size; ++c)
+          out(k, c) += term.calcDerivative(2, view.ws.q[term.idx_q]) * forces[row] * motion.basis->N(k, c);
+    if (own.kind == ClosureKind::Coupler) continue;
+    const Vector6<T> W = calcClosureWrench(view.ws, placed, forces.segment(row, getRows(own.kind)));
+    const ClosureRows<T> rows(view.ws, placed);
     const int dof1 = cluster.body_dof[own.body1];
     for (int c = 0; c < cluster.size; ++c) {
       const Vector6<T> turned = rows.calcTurned(W, calcDifference(motion, motion.J, own, c));

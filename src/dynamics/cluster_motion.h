@@ -56,8 +56,10 @@ void updateVelocityLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion
 /// d_y, d_v, dA~ and dW~; needs updateVelocityLift and the accelerations of the view.
 template <typename T>
 void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion);
-/// out (n x r) = d(J^T f)/dq N for forces f on all rows (m): closure.h, Eq. (6); needs
-/// updateTwists.
+/// out (n x r) = d(J^T f)/dq N for forces f on all rows (m), fixed in their frames 1 but for those of distances, which turn by
+/// Eq. (9) of closure.h; needs updateTwists. With the wrench W of a closure and its dofs j and k, and with Eq. (7) of closure.h
+/// for couplers,
+///     d (J^T f)_j/dq_k = s_j J_j . (J_k x* W) ([k moves frame 1] - [k moves axis j])
 template <typename T>
 void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
                             typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out);

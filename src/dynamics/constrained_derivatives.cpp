@@ -29,8 +29,7 @@ void updateConstrainedSources(const Model& model, Workspace& ws, ConstrainedWork
   for (size_t c = 0; c < constraints.closures.size(); ++c) {
     const Closure& closure = constraints.closures[c];
     const int row = constraints.offsets[c], n = getRows(closure.kind);
-    const Vector6d W = calcClosureWrench(ws, closure, cws.lambda.segment(row, n));
-    addClosureForceDerivative(model, ws, closure, W, cws.da_dq);
+    addClosureForceDerivative(model, ws, closure, cws.lambda.segment(row, n), cws.da_dq);
     calcClosureDerivatives(ws, closure, cws.dlambda_dq.middleRows(row, n), cws.dlambda_dv.middleRows(row, n));
   }
   cws.da_du.setZero();  // the torques enter ID with a minus

@@ -65,9 +65,8 @@ NumericalStatus updateImpactDerivatives(const Model& model, ImpactWorkspace& iws
   iws.dv_dq += ws.dID_dq;
   for (size_t c = 0; c < constraints.closures.size(); ++c) {
     const Closure& closure = constraints.closures[c];
-    const Vector6d W =
-        calcClosureWrench(ws, closure, iws.impulse.segment(constraints.offsets[c], getRows(closure.kind)));
-    addClosureForceDerivative(model, ws, closure, W, iws.dv_dq);
+    addClosureForceDerivative(model, ws, closure, iws.impulse.segment(constraints.offsets[c], getRows(closure.kind)),
+                              iws.dv_dq);
   }
   iws.dv_dv = -ws.M;
   iws.saddle_point->updateInverse();

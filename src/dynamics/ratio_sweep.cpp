@@ -52,7 +52,9 @@ int findGearedJoint(const Model& model, const Linkage& linkage, int joint) {
   const JointKind kind = model.joints()[static_cast<size_t>(index)].kind;
   if (kind != JointKind::Revolute && kind != JointKind::Continuous) return -1;
   for (const Closure& closure : cluster.model.closures())
-    if (closure.kind != ClosureKind::Coupler) return -1;
+    if (closure.kind != ClosureKind::Coupler ||
+        !std::all_of(closure.terms.begin(), closure.terms.end(), [](const CouplerTerm& t) { return t.isLinear(); }))
+      return -1;
   const auto found = std::find(cluster.joints.begin(), cluster.joints.end(), index);
   return cluster.model.joints()[static_cast<size_t>(found - cluster.joints.begin()) + 1].idx_q;
 }

@@ -1,5 +1,7 @@
 #include "bielle/dynamics/variation.h"
 
+#include <algorithm>
+
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/closure_rows.h"
 #include "dynamics/joint_force.h"
@@ -39,13 +41,30 @@ double getStretch(const ConstraintSet& set, size_t c, const ModelVariation& chan
   return set.closures[c].kind == ClosureKind::Distance ? change.lengths[c] / set.closures[c].length : 0;
 }
 
-// Eq. (9) without dc_0: sum of dc_k x_k + c_k dx_k.
-RowVectorUpTo6 calcTermVariation(const Closure& coupler, const VectorXd& coefficients, const VectorXd& x,
-                                 int CouplerTerm::*index, const VectorXd& dx) {
+// The polynomial of the changes of a term's coefficients.
+CouplerTerm makeTermChange(const MatrixXd& coefficients, size_t term) {
+  const auto row = coefficients.row(static_cast<Eigen::Index>(term));
+  CouplerTerm out;
+  out.coefficient = row[0];
+  out.higher.assign(row.begin() + 1, row.end());
+  return out;
+}
+
+// Change of the value, rate or acceleration (order 0, 1, 2) of a coupler's sum of polynomials, Eq. (9) without dc_0.
+RowVectorUpTo6 calcTermVariation(const Workspace& ws, const Closure& coupler, const MatrixXd& coefficients, int order,
+                                 const MotionVariation& motion) {
   double sum = 0;
   for (size_t i = 0; i < coupler.terms.size(); ++i) {
-    const CouplerTerm& term = coupler.terms[i];
-    sum += coefficients[static_cast<Eigen::Index>(i)] * x[term.*index] + term.coefficient * dx[term.dof];
+    const CouplerTerm &term = coupler.terms[i], change = makeTermChange(coefficients, i);
+    const int k = term.dof;
+    const double q = ws.q[term.idx_q], v = ws.v[k], a = ws.a[k];
+    const auto p = [&](int n) { return term.calcDerivative(n, q); };
+    const auto dp = [&](int n) { return change.calcDerivative(n, q); };
+    if (order == 0) sum += dp(0) + p(1) * motion.q[k];
+    if (order == 1) sum += dp(1) * v + p(1) * motion.v[k] + p(2) * v * motion.q[k];
+    if (order == 2)
+      sum += dp(1) * a + p(1) * motion.a[k] + dp(2) * v * v + (p(2) * a + p(3) * v * v) * motion.q[k] +
+             2 * p(2) * v * motion.v[k];
   }
   return RowVectorUpTo6::Constant(1, sum);
 }
@@ -55,7 +74,7 @@ RowVectorUpTo6 calcResidualRows(const Workspace& ws, const ConstraintSet& set, s
   const Closure& closure = set.closures[c];
   if (closure.kind == ClosureKind::Coupler)
     return RowVectorUpTo6::Constant(1, change.offsets[c]) -
-           calcTermVariation(closure, change.coefficients[c], ws.q, &CouplerTerm::idx_q, variation.motion.q);
+           calcTermVariation(ws, closure, change.coefficients[c], 0, variation.motion);
   const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1);
   const Vector6d D = calcDisplacements(ws, set, c, change, variation).relative;
   RowVectorUpTo6 rows = calcClosureResidualRate(ws, closure) * X_W1.actInvMotion(D);  // Eq. (7)
@@ -75,7 +94,7 @@ RowVectorUpTo6 calcVelocityRows(const Workspace& ws, const ConstraintSet& set, s
                                 const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
   if (closure.kind == ClosureKind::Coupler)
-    return calcTermVariation(closure, change.coefficients[c], ws.v, &CouplerTerm::dof, variation.motion.v);
+    return calcTermVariation(ws, closure, change.coefficients[c], 1, variation.motion);
   const auto [D_1, D] = calcDisplacements(ws, set, c, change, variation);
   RowVectorUpTo6 rows(getRows(closure.kind));
   ClosureRows<double>(ws, closure)
@@ -89,7 +108,7 @@ RowVectorUpTo6 calcAccelerationRows(const Workspace& ws, const ConstraintSet& se
                                     const ModelVariation& change, const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
   if (closure.kind == ClosureKind::Coupler)
-    return calcTermVariation(closure, change.coefficients[c], ws.a, &CouplerTerm::dof, variation.motion.a);
+    return calcTermVariation(ws, closure, change.coefficients[c], 2, variation.motion);
   const int b1 = closure.body1, b2 = closure.body2;
   const Vector6d a = ws.A[b1] - ws.A[b2] + crossMotion(ws.V[b1], ws.V[b2]);
   const auto [D_1, D] = calcDisplacements(ws, set, c, change, variation);
@@ -200,8 +219,12 @@ ModelVariation::ModelVariation(const Model& model)
       shapes(model.shapes().size()),
       inertias(model.numBodies(), Matrix6d::Zero()),
       armature(VectorXd::Zero(model.nv())) {
-  for (const Closure& closure : model.closures())
-    coefficients.push_back(VectorXd::Zero(static_cast<Eigen::Index>(closure.terms.size())));
+  for (const Closure& closure : model.closures()) {
+    size_t degree = 1;
+    for (const CouplerTerm& term : closure.terms) degree = std::max(degree, 1 + term.higher.size());
+    coefficients.push_back(
+        MatrixXd::Zero(static_cast<Eigen::Index>(closure.terms.size()), static_cast<Eigen::Index>(degree)));
+  }
 }
 
 MotionVariation::MotionVariation(const Model& model) : q(VectorXd::Zero(model.nv())), v(q), a(q) {}
@@ -245,9 +268,13 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
                       change.joint_forces[f].dot(calcJointForceSlopes(force, ws));
   }
   for (size_t c = 0; c < constraints.closures.size(); ++c)
-    for (size_t i = 0; i < constraints.closures[c].terms.size(); ++i)
-      out[constraints.closures[c].terms[i].dof] -=
-          change.coefficients[c][static_cast<Eigen::Index>(i)] * lambda[constraints.offsets[c]];
+    for (size_t i = 0; i < constraints.closures[c].terms.size(); ++i) {
+      const CouplerTerm& term = constraints.closures[c].terms[i];
+      const double q = ws.q[term.idx_q];
+      out[term.dof] -= (makeTermChange(change.coefficients[c], i).calcDerivative(1, q) +
+                        term.calcDerivative(2, q) * motion.q[term.dof]) *
+                       lambda[constraints.offsets[c]];
+    }
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)

@@ -2,17 +2,21 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
+#include "bielle/model/error.h"
 #include "formats/mjcf_bodies.h"
 #include "formats/reader_mjcf.h"
 
 namespace bielle {
 namespace {
+
+constexpr int kMjcfDegree = 4;  // of the polynomials of equalities
 
 class MjcfWriter {
  public:
@@ -164,22 +168,39 @@ class MjcfWriter {
     writeSites(findTendonEnds(model_, spring), tendon);
   }
 
-  // MuJoCo's equalities act on differences from q_ref: the length of the tendon, or y = p0 + p1 x for joints 1 and 2.
+  // MuJoCo's equalities act on differences from q_ref: the length of the tendon, or y = p0 + p1 x + .. for joints 1 and 2.
   void writeCoupler(const Closure& closure, XMLElement& section) {
     double rest = closure.offset;  // of the differences
-    for (const CouplerTerm& term : closure.terms) rest -= term.coefficient * q_ref_[term.idx_q];
+    for (const CouplerTerm& term : closure.terms) rest -= term.calcDerivative(0, q_ref_[term.idx_q]);
+    const auto is_linear = [](const CouplerTerm& term) { return term.isLinear(); };
+    const auto linear = std::find_if(closure.terms.begin(), closure.terms.end(), is_linear);
     if (closure.terms.size() > 2) {
+      if (!std::all_of(closure.terms.begin(), closure.terms.end(), is_linear)) refusePolynomial(closure);
       addElement(section, "tendon",
                  {{"name", closure.name}, {"tendon1", closure.name}, {"polycoef", formatMjcf(rest) + " 0 0 0 0"}});
       return;
     }
-    const CouplerTerm &y = closure.terms[0], &x = closure.terms[1];
-    addElement(
-        section, "joint",
-        {{"name", closure.name},
-         {"joint1", model_.joints()[y.joint].name},
-         {"joint2", model_.joints()[x.joint].name},
-         {"polycoef", formatMjcf(rest / y.coefficient) + " " + formatMjcf(-x.coefficient / y.coefficient) + " 0 0 0"}});
+    if (linear == closure.terms.end()) refusePolynomial(closure);
+    const CouplerTerm &y = *linear, &x = closure.terms[&y == &closure.terms[0] ? 1 : 0];
+    if (x.higher.size() + 1 > kMjcfDegree) refusePolynomial(closure);
+    std::string polynomial = formatMjcf(rest / y.coefficient);
+    double factorial = 1;
+    for (int k = 1; k <= kMjcfDegree; ++k) {  // Taylor's about q_ref
+      factorial *= k;
+      const double slope = x.calcDerivative(k, q_ref_[x.idx_q]) / factorial;
+      polynomial += " " + (slope == 0 ? "0" : formatMjcf(-slope / y.coefficient));
+    }
+    addElement(section, "joint",
+               {{"name", closure.name},
+                {"joint1", model_.joints()[y.joint].name},
+                {"joint2", model_.joints()[x.joint].name},
+                {"polycoef", polynomial}});
+  }
+
+  [[noreturn]] void refusePolynomial(const Closure& closure) const {
+    throw InputError(model_.name(), "closure '" + closure.name + "'",
+                     "an equality of MuJoCo gives one joint by a polynomial of one other, of degree up to 4",
+                     "add a light link whose joint takes the place of one polynomial, and couple it to both");
   }
 
   void writeMotors(XMLElement& section) {

@@ -360,7 +360,7 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
   for (const ClosureSpec& c : yaml.closures) {
     const std::string element = "closure '" + c.name + "'";
     if (c.kind == ClosureKind::Coupler) {
-      builder.addCoupler(c.name, c.coefficients, c.offset, c.kp, c.kd);
+      builder.addCoupler(c.name, c.coefficients, c.offset, c.kp, c.kd, c.higher);
       continue;
     }
     const std::string frame1 = frames.find(c.frame1, element), frame2 = frames.find(c.frame2, element);

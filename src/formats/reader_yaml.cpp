@@ -123,7 +123,12 @@ void readCoupler(const Fields& fields, const Entry& entry, ClosureSpec& closure,
     frames->fail("a coupler connects coordinates, not frames", "give its joints with their coefficients");
   closure.name = require(fields, "name", entry).getText();
   for (const auto& [joint, coefficient] : require(fields, "joints", entry).getMap()) {
-    closure.coefficients.emplace(joint, coefficient.getNumber());
+    std::vector<double> polynomial =
+        coefficient.isList() ? coefficient.getNumbers() : std::vector<double>{coefficient.getNumber()};
+    if (polynomial.empty()) coefficient.fail("it has no coefficient", "give a number, or a list for q, q^2, ..");
+    closure.coefficients.emplace(joint, polynomial.front());
+    polynomial.erase(polynomial.begin());
+    if (!polynomial.empty()) closure.higher.emplace(joint, std::move(polynomial));
     file.names.push_back({RobotName::Kind::Joint, joint, coefficient});
   }
   if (const Entry* offset = find(fields, "offset")) closure.offset = offset->getNumber();

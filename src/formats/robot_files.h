@@ -38,9 +38,10 @@ struct UrdfFile {
   std::map<std::string, UrdfLink> links;
   std::vector<UrdfJoint> joints;
   std::vector<std::string> warnings;
-  RoundingTolerance rounding;  ///< of the numbers of its placements
-  bool has_own_base = false;   ///< it says itself what is free: the option of a free base has no effect
-  bool is_urdf = false;        ///< its floating joints have origins, from which other formats do not count
+  RoundingTolerance rounding;            ///< of the numbers of its placements
+  bool has_own_base = false;             ///< it says itself what is free: the option of a free base has no effect
+  bool is_urdf = false;                  ///< its floating joints have origins, from which other formats do not count
+  std::vector<std::string> dependent{};  ///< joints that it says depend on others
 };
 
 /// Joint kind that replaces that of the URDF, with the axes of a universal joint in the joint's frame.
@@ -53,11 +54,15 @@ struct ClosureSpec {
   std::string name, frame1, frame2;
   ClosureKind kind = ClosureKind::Weld6D;
   Vector3d axis = Vector3d::UnitZ();
-  std::map<std::string, double> coefficients;  ///< of a coupler, by joint
+  std::map<std::string, double> coefficients;         ///< of a coupler, by joint,
+  std::map<std::string, std::vector<double>> higher;  ///< and those of q^2, q^3, .. of joints that have them
   double offset = 0;
   std::optional<double> length;  ///< of a distance; by default that of the neutral posture
   double kp = 0, kd = 0;
 };
+
+/// A link that only turns with a motor, next to massless: nothing without mass has inertia.
+UrdfLink makeRotor(const std::string& name);
 
 /// A frame that the tree does not have.
 struct FrameSpec {

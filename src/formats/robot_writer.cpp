@@ -119,7 +119,16 @@ class YamlWriter {
 
   void writeTerms(const Closure& c) {
     out_ << Key << "joints" << Value << Flow << BeginMap;
-    for (const CouplerTerm& term : c.terms) add(model_.joints()[term.joint].name, term.coefficient);
+    for (const CouplerTerm& term : c.terms) {
+      const std::string& joint = model_.joints()[term.joint].name;
+      if (term.isLinear()) {
+        add(joint, term.coefficient);
+        continue;
+      }
+      out_ << Key << joint << Value << Flow << BeginSeq << formatExact(term.coefficient);
+      for (double c_k : term.higher) out_ << formatExact(c_k);
+      out_ << EndSeq;
+    }
     out_ << EndMap;
     addUnless(0, "offset", c.offset);
   }

@@ -43,7 +43,11 @@ class UrdfWriter {
       // The joint that mimics: the later one, or the other one if that mimics already.
       int y = 1;
       if (c.terms.size() == 2 && mimics_.count(c.terms[1].joint)) y = 0;
-      if (c.terms.size() != 2 || mimics_.count(c.terms[y].joint))
+      const bool is_linear =
+          std::all_of(c.terms.begin(), c.terms.end(), [](const CouplerTerm& term) { return term.isLinear(); });
+      if (c.terms.size() == 2 && !is_linear)
+        warn("closure '" + c.name + "'", "it is left out: <mimic> is linear; `--to bielle` and `--to mjcf` keep it");
+      else if (c.terms.size() != 2 || mimics_.count(c.terms[y].joint))
         warn("closure '" + c.name + "'", for_drake ? "it is left out: <mimic> couples a joint to one other"
                                                    : "it is left out because a URDF is a tree");
       else

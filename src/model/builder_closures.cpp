@@ -87,8 +87,12 @@ void ModelBuilder::addClosure(const std::string& frame1, const std::string& fram
 }
 
 void ModelBuilder::addCoupler(const std::string& name, const std::map<std::string, double>& coefficients, double offset,
-                              double kp, double kd) {
+                              double kp, double kd, const std::map<std::string, std::vector<double>>& higher) {
   const std::string element = "closure '" + name + "'";
+  for (const auto& [joint, values] : higher)
+    if (coefficients.count(joint) == 0)
+      fail(element, "joint '" + joint + "' has coefficients of powers but is not coupled",
+           "give it a coefficient, or 0");
   Closure closure;
   closure.name = name;
   closure.kind = ClosureKind::Coupler;
@@ -100,9 +104,14 @@ void ModelBuilder::addCoupler(const std::string& name, const std::map<std::strin
       fail(element,
            "it couples '" + joint + "', a " + getName(j.kind) + " joint of " + std::to_string(j.nv) + " coordinates",
            "couple revolute, continuous or prismatic joints");
-    if (!std::isfinite(coefficient) || coefficient == 0)
+    CouplerTerm term{index, coefficient, j.idx_q, j.idx_v};
+    if (const auto powers = higher.find(joint); powers != higher.end()) term.higher = powers->second;
+    while (!term.higher.empty() && term.higher.back() == 0) term.higher.pop_back();
+    const bool is_finite =
+        std::all_of(term.higher.begin(), term.higher.end(), [](double c) { return std::isfinite(c); });
+    if (!std::isfinite(coefficient) || !is_finite || (coefficient == 0 && term.isLinear()))
       fail(element, "the coefficient of joint '" + joint + "' is zero or not finite", "correct it, or omit the joint");
-    closure.terms.push_back({index, coefficient, j.idx_q, j.idx_v});
+    closure.terms.push_back(std::move(term));
   }
   if (closure.terms.size() < 2)
     fail(element, "it couples fewer than two joints", "name at least two, or make the joint fixed");
@@ -127,8 +136,13 @@ void ModelBuilder::addChecked(Closure closure) {
 void ModelBuilder::copyClosure(const Model& from, const Closure& closure) {
   if (closure.kind == ClosureKind::Coupler) {
     std::map<std::string, double> coefficients;
-    for (const CouplerTerm& term : closure.terms) coefficients[from.joints()[term.joint].name] = term.coefficient;
-    addCoupler(closure.name, coefficients, closure.offset, closure.kp, closure.kd);
+    std::map<std::string, std::vector<double>> higher;
+    for (const CouplerTerm& term : closure.terms) {
+      const std::string& joint = from.joints()[term.joint].name;
+      coefficients[joint] = term.coefficient;
+      higher[joint] = term.higher;
+    }
+    addCoupler(closure.name, coefficients, closure.offset, closure.kp, closure.kd, higher);
     return;
   }
   const auto place = [&](const char* suffix, int body, const SE3& X_BF) {

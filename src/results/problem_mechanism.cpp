@@ -20,8 +20,10 @@ Json describeClosure(const Closure& closure) {
   Json json = {{"name", closure.name}, {"kind", getName(closure.kind)}};
   if (closure.kind == ClosureKind::Coupler) {
     json["terms"] = Json::array();
-    for (const CouplerTerm& term : closure.terms)
+    for (const CouplerTerm& term : closure.terms) {
       json["terms"].push_back({{"dof", term.dof}, {"q", term.idx_q}, {"coefficient", term.coefficient}});
+      if (!term.isLinear()) json["terms"].back()["higher"] = term.higher;
+    }
     json["offset"] = closure.offset;
     return json;
   }

@@ -43,14 +43,20 @@ Json orNull(double limit) { return std::isfinite(limit) ? Json(limit) : Json(nul
 // A number for a joint of one coordinate, else a list.
 Json toJson(const VectorXd& q) { return q.size() == 1 ? Json(q[0]) : Json(std::vector<double>(q.begin(), q.end())); }
 
-// "motor - 2 knee"
+// "motor - 2 knee + 0.5 knee^2"
 std::string describeTerms(const Model& model, const Closure& coupler) {
   std::string text;
-  for (const CouplerTerm& term : coupler.terms) {
-    const double size = std::abs(term.coefficient);
-    text += term.coefficient < 0 ? (text.empty() ? "-" : " - ") : (text.empty() ? "" : " + ");
+  const auto add = [&text](double coefficient, const std::string& power) {
+    if (coefficient == 0) return;
+    const double size = std::abs(coefficient);
+    text += coefficient < 0 ? (text.empty() ? "-" : " - ") : (text.empty() ? "" : " + ");
     if (size != 1) text += formatNumber(size) + " ";
-    text += model.joints()[term.joint].name;
+    text += power;
+  };
+  for (const CouplerTerm& term : coupler.terms) {
+    const std::string& joint = model.joints()[term.joint].name;
+    add(term.coefficient, joint);
+    for (size_t k = 0; k < term.higher.size(); ++k) add(term.higher[k], joint + "^" + std::to_string(k + 2));
   }
   return text;
 }

@@ -1,6 +1,7 @@
 #include "robots/part_composer.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "formats/motor_catalogue.h"
 #include "model/listing.h"
@@ -197,8 +198,15 @@ class PartComposer {
       make(c.name);
       if (c.kind != ClosureKind::Coupler) use(c.frame1), use(c.frame2);
       std::map<std::string, double> coefficients;
+      std::map<std::string, std::vector<double>> higher;
       for (const auto& [joint, value] : c.coefficients) coefficients[resolve(joint, any)] += value;
+      for (const auto& [joint, values] : c.higher) {
+        std::vector<double>& sum = higher[resolve(joint, any)];
+        sum.resize(std::max(sum.size(), values.size()));
+        std::transform(values.begin(), values.end(), sum.begin(), sum.begin(), std::plus<>());
+      }
       c.coefficients = std::move(coefficients);
+      c.higher = std::move(higher);
     }
     append(own.closures, yaml.closures);
     for (MotorSpec& motor : own.motors) use(motor.joint), motor.role = part_.role;

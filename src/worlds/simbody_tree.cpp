@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <stdexcept>
 
 #include "bielle/model/error.h"
@@ -53,6 +55,38 @@ Matrix3d toRotation(ConstVectorRef xyzw) {
 }
 
 Eigen::Matrix2d rotation2(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
+
+// Of a coupler: sum of its polynomials less the offset.
+class SumOfPolynomials : public SimTK::Function {
+ public:
+  explicit SumOfPolynomials(const Closure& coupler) : coupler_(coupler) {}
+  double calcValue(const SimTK::Vector& x) const override {
+    double sum = -coupler_.offset;
+    for (int i = 0; i < getArgumentSize(); ++i) sum += derive(i, 0, x);
+    return sum;
+  }
+  double calcDerivative(const SimTK::Array_<int>& components, const SimTK::Vector& x) const override {
+    const bool is_mixed =
+        std::adjacent_find(components.begin(), components.end(), std::not_equal_to<>()) != components.end();
+    return is_mixed ? 0 : derive(components[0], static_cast<int>(components.size()), x);
+  }
+  int getArgumentSize() const override { return static_cast<int>(coupler_.terms.size()); }
+  int getMaxDerivativeOrder() const override { return std::numeric_limits<int>::max(); }
+
+ private:
+  // The sum of c_k k!/(k - n)! x^(k - n).
+  double derive(int i, int n, const SimTK::Vector& x) const {
+    const CouplerTerm& term = coupler_.terms[static_cast<size_t>(i)];
+    double sum = 0;
+    for (int k = std::max(n, 1); k <= static_cast<int>(term.higher.size()) + 1; ++k) {
+      const double c = k == 1 ? term.coefficient : term.higher[static_cast<size_t>(k) - 2];
+      sum += c * std::tgamma(k + 1) / std::tgamma(k - n + 1) * std::pow(x[i], k - n);
+    }
+    return sum;
+  }
+
+  Closure coupler_;
+};
 
 // What Simbody has no element for: a constant force with its potential, and friction made smooth (model.h).
 class PreloadAndFriction : public SimTK::Force::Custom::Implementation {
@@ -193,14 +227,21 @@ void SimbodyTree::addCoupler(const Closure& closure) {
   const int n = static_cast<int>(closure.terms.size());
   SimTK::Vector coefficients(n + 1);
   SimTK::Array_<SimTK::MobilizedBodyIndex> coupled;
+  bool is_linear = true;
   for (int i = 0; i < n; ++i) {
-    coefficients[i] = closure.terms[i].coefficient;
-    coupled.push_back(bodies[closure.terms[i].joint].getMobilizedBodyIndex());
+    const CouplerTerm& term = closure.terms[static_cast<size_t>(i)];
+    coefficients[i] = term.coefficient;
+    is_linear &= term.isLinear();
+    coupled.push_back(bodies[term.joint].getMobilizedBodyIndex());
   }
   coefficients[n] = -closure.offset;
+  SimTK::Function* function = nullptr;  // taken over by the constraint
+  if (is_linear)
+    function = new SimTK::Function::Linear(coefficients);
+  else
+    function = new SumOfPolynomials(closure);
   constraints.push_back({SimTK::Constraint::CoordinateCoupler(
-      matter, new SimTK::Function::Linear(coefficients), coupled,
-      SimTK::Array_<SimTK::MobilizerQIndex>(n, SimTK::MobilizerQIndex(0)))});  // takes the function over
+      matter, function, coupled, SimTK::Array_<SimTK::MobilizerQIndex>(n, SimTK::MobilizerQIndex(0)))});
 }
 
 void SimbodyTree::addClosure(const Closure& closure) {

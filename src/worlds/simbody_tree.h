@@ -20,8 +20,8 @@
 /// | free-flyer           | Free      | u = (R w, R v_lin)                                                          |
 ///
 /// 6D closure: Weld. 3D: Ball. 5D: Ball and two ConstantAngle constraints, the axis in body 2 normal to two directions
-/// of body 1. Coupler: CoordinateCoupler of a linear function. Distance: Rod. Slider: PointOnLine and ConstantOrientation.
-/// All together u = T(q) v, in the order of our dofs.
+/// of body 1. Coupler: CoordinateCoupler of a linear function or a sum of polynomials. Distance: Rod. Slider: PointOnLine and
+/// ConstantOrientation. All together u = T(q) v, in the order of our dofs.
 ///
 /// The time of a step goes with the number of constraints. A weld that has a leaf on a spherical joint at one side closes the
 /// same loop as a ball in place of that joint (model/ball_leaf.h): with LoopCut::FewestRows the leaf is

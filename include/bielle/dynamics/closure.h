@@ -12,16 +12,19 @@
 /// the paper's gamma_1, gamma_2 and gamma_3 (its eqs. 11 to 15): gamma_1 gives dA_k - V_1 x dV_k, gamma_2 gives dA_k -
 /// V_2 x dV_k and, as frame 1 turns, J_k x A_2; the rest is gamma_3.
 ///
-/// A coupler has J_k = c_k, the coefficient of the coordinate. It is constant, so that (1) to (3) and (6) vanish, and
-/// its force acts on the coordinates alone, c_k lambda each: it has no wrench.
+/// A coupler of the polynomials p_k has J_k = p_k', and its force acts on the coordinates alone, p_k' lambda each: it has no
+/// wrench. Of a linear term, the derivatives
+///     d a_c/dq_k = p_k'' a_k + p_k''' v_k^2,  d a_c/dv_k = 2 p_k'' v_k,  d nu_c/dq_k = p_k'' v_k                  (6)
+///     d (J^T lambda)_k/dq_k = p_k'' lambda                                                                        (7)
+/// vanish.
 ///
 /// The rows of the other closures are constant projections of the full vectors, but for a distance of length L. In frame 1,
 /// with the vector p from point 1 to point 2 and the linear and angular parts nu_l, nu_w of the full velocity,
-///     nu = p . nu_l / L,    a = (p . a_l + p' . nu_l) / L,    p' = -(nu_l + nu_w x p)                              (7)
+///     nu = p . nu_l / L,    a = (p . a_l + p' . nu_l) / L,    p' = -(nu_l + nu_w x p)                              (8)
 /// which is polynomial, and exact also when open. A displacement D of frame 1 against frame 2 that changes the full velocity and
 /// acceleration by dnu and da, as (1) to (4) say, changes them by
 ///     d nu = (p . dnu_l + dp . nu_l) / L,    d a = (p . da_l + dp . a_l + p' . dnu_l + dp' . nu_l) / L,
-///     dp = -(D_l + D_w x p),    dp' = -(dnu_l + dnu_w x p + nu_w x dp)                                             (8)
+///     dp = -(D_l + D_w x p),    dp' = -(dnu_l + dnu_w x p + nu_w x dp)                                             (9)
 /// and its force lambda p / L on body 1 turns in frame 1 by lambda dp / L.
 #include "bielle/dynamics/workspace.h"
 
@@ -63,7 +66,8 @@ Vector6d expandRows(const Closure& closure, ConstVectorRef lambda);
 template <typename T>
 Vector6<T> expandRows(const Closure& closure, const VectorUpTo6<T>& lambda);
 
-/// Closing error, m and rad: zero if and only if closed; of a coupler offset - sum c_k q_k, of a distance (|p|^2 - L^2) / (2 L). The angle part of a hinge is as long
+/// Closing error, m and rad: zero if and only if closed; of a coupler offset - sum p_k(q_k), of a distance
+/// (|p|^2 - L^2) / (2 L). The angle part of a hinge is as long
 /// as the angle between its axes, up to pi; where they are opposite, its direction is the first of the two normals.
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& closure);
@@ -97,13 +101,13 @@ RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& clos
 /// Jacobian rows, written to the columns closure.dofs of J (rows x nv), Eq. (4); other columns are left alone.
 template <typename T>
 void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& closure, typename ArgumentsOf<T>::Matrix J);
-/// Derivatives of the acceleration rows without stabilisation, Eqs. (1) and (2), to the columns closure.dofs; needs
+/// Derivatives of the acceleration rows without stabilisation, Eqs. (1), (2) and (6), to the columns closure.dofs; needs
 /// updateAccelerations.
 void calcClosureDerivatives(const Workspace& ws, const Closure& closure, MatrixRef da_dq, MatrixRef da_dv);
 /// Adds those of calcClosureStabilization, likewise; needs updateVelocities.
 void addStabilizationDerivatives(const Workspace& ws, const Closure& closure, MatrixRef ds_dq, MatrixRef ds_dv);
 
-/// Derivative of the velocity rows with respect to q at fixed v, Eq. (3), to the columns closure.dofs; needs
+/// Derivative of the velocity rows with respect to q at fixed v, Eqs. (3) and (6), to the columns closure.dofs; needs
 /// updateVelocities.
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& closure, MatrixRef dnu_dq);
 
@@ -111,16 +115,11 @@ void calcClosureVelocityDerivative(const Workspace& ws, const Closure& closure, 
 template <typename T>
 Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& closure,
                              typename ArgumentsOf<T>::ConstVector lambda);
-/// Adds to dID_dq the term that updateInverseDynamicsDerivatives omits: the wrench on body 2 moves with frame 1 (the
-/// paper's eq. 19),
-///     d ID_j/dq_k += s J_j . (J_k x* W)   for j in the support of body 2, k in closure.dofs (5)
-/// and for a distance what its turning adds, Eq. (8).
-void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& closure, const Vector6d& wrench,
+/// Adds to dID_dq what updateInverseDynamicsDerivatives omits of the closure force lambda: the wrench W on body 2 moves
+/// with frame 1 (the paper's eq. 19),
+///     d ID_j/dq_k += s J_j . (J_k x* W)   for j in the support of body 2, k in closure.dofs, (5)
+/// for a distance what its turning adds, Eq. (9); and a coupler has Eq. (7), with a minus.
+void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& closure, ConstVectorRef lambda,
                                MatrixRef dID_dq);
-/// Adds to out (nv x nv) the derivative of the generalized force J^T lambda with respect to q, the wrench W being fixed
-/// in frame 1, but for that of a distance, which turns by Eq. (8):
-///     d (J^T lambda)_j/dq_k = s_j J_j . (J_k x* W) ([k moves frame 1] - [k moves axis j]),   j, k in closure.dofs  (6)
-void addGeneralizedForceDerivative(const Model& model, const Workspace& ws, const Closure& closure,
-                                   const Vector6d& wrench, MatrixRef out);
 
 }  // namespace bielle

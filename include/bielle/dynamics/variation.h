@@ -19,10 +19,11 @@
 /// F being the sums over subtrees. For the closures, in frame 1 (notation.h),
 ///     d residual = R (D_1 - D_2),    d nu_c = dV_1 - dV_2 - D_1 x (V_1 - V_2)                                      (7)
 ///     d a_c = dA_1 - dA_2 + dV_1 x V_2 + V_1 x dV_2 - D_1 x (A_1 - A_2 + V_1 x V_2)                                (8)
-/// A coupler with coefficients c_k and offset c_0 has, with dc their changes,
-///     d residual = dc_0 - sum dc_k q_k - c_k dq_k,   d nu_c = sum dc_k v_k + c_k dv_k                              (9)
-/// and d a_c alike; its force acts on coordinate k with c_k lambda. The rows of a distance, and its force, change as well as
-/// its direction p / L turns, by Eqs. (7) and (8) of closure.h with the displacement D_1 - D_2, and as L changes.
+/// A coupler of polynomials p_k with the offset c_0 has, with dp_k the polynomials of the changes of coefficients,
+///     d residual = dc_0 - sum dp_k + p_k' dq_k,   d nu_c = sum dp_k' v_k + p_k'' v_k dq_k + p_k' dv_k              (9)
+///     d a_c = sum dp_k' a_k + dp_k'' v_k^2 + (p_k'' a_k + p_k''' v_k^2) dq_k + 2 p_k'' v_k dv_k + p_k' da_k
+/// and its force on coordinate k, p_k' lambda, changes by (dp_k' + p_k'' dq_k) lambda. The rows of a distance, and its force,
+/// change as well as its direction p / L turns, by Eqs. (8) and (9) of closure.h with the displacement D_1 - D_2, and as L changes.
 /// The force f u of a point spring (model.h) changes, with dp_i the displacement of its point and dp'_i the change of the
 /// velocity of that, with r = p_2 - p_1 and u = r / l, by
 ///     dl = u . dr,   du = (dr - u dl) / l,   dl' = du . r' + u . dr'
@@ -52,10 +53,11 @@ struct ShapeVariation {
 struct ModelVariation {
   explicit ModelVariation(const Model& model);
 
-  std::vector<Vector6d> joints;          ///< nb, of Joint::X_PJ
-  std::vector<Vector6d> frames1;         ///< per closure of the model, of Closure::X_B1
-  std::vector<Vector6d> frames2;         ///< and X_B2
-  std::vector<VectorXd> coefficients;    ///< per closure of the model, of its CouplerTerm::coefficient
+  std::vector<Vector6d> joints;   ///< nb, of Joint::X_PJ
+  std::vector<Vector6d> frames1;  ///< per closure of the model, of Closure::X_B1
+  std::vector<Vector6d> frames2;  ///< and X_B2
+  /// Per closure of the model, of the coefficients of its terms (rows) of q, q^2, .. (columns).
+  std::vector<MatrixXd> coefficients;
   std::vector<double> offsets;           ///< and Closure::offset
   std::vector<double> lengths;           ///< and Closure::length
   std::vector<Vector3d> points1;         ///< per point spring of the model, of PointSpring::point1

@@ -58,10 +58,11 @@ class ModelBuilder {
                    std::optional<double> length = {}, double kp = 0, double kd = 0);
   /// One that ties frames, all told: its bodies, placements and dofs are filled here. A NaN stands for the default length.
   void addClosure(const std::string& frame1, const std::string& frame2, Closure closure);
-  /// Couples joints of one coordinate each: the sum of coefficient times coordinate is the offset.
+  /// Couples joints of one coordinate each: the sum of coefficient times coordinate, or of polynomials of it, is the offset.
   /// \param coefficients  by joint; at least two joints
+  /// \param higher  coefficients of the squares, cubes, .. of coordinates, by joint among these
   void addCoupler(const std::string& name, const std::map<std::string, double>& coefficients, double offset = 0,
-                  double kp = 0, double kd = 0);
+                  double kp = 0, double kd = 0, const std::map<std::string, std::vector<double>>& higher = {});
   /// Adds a closure of another model whose links and joints have the same names; its frames get the names
   /// closure/frame1 and closure/frame2.
   void copyClosure(const Model& from, const Closure& closure);

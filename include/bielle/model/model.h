@@ -1,5 +1,6 @@
 #pragma once
 /// \file The immutable model of a robot: a spanning tree of bodies and joints, closed by closures.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -54,17 +55,35 @@ int getLengthRows(ClosureKind kind);
 /// Whether its free motion has an axis: a hinge turns about it, a slider slides along it.
 bool hasAxis(ClosureKind kind);
 
-/// One summand of a coupler: a coefficient times the coordinate of a joint with one.
+/// One summand p(q) = c_1 q + c_2 q^2 + .. of a coupler, q being the coordinate of a joint with one.
 struct CouplerTerm {
-  int joint = 0;           ///< body/joint index
-  double coefficient = 0;  ///< dimensionless, or m/rad, .. between coordinates of different units
-  int idx_q = 0, dof = 0;  ///< indices into q and v
+  int joint = 0;                 ///< body/joint index
+  double coefficient = 0;        ///< c_1: dimensionless, or m/rad, .. between coordinates of different units
+  int idx_q = 0, dof = 0;        ///< indices into q and v
+  std::vector<double> higher{};  ///< c_2, c_3, ..; none of a belt or gear
+
+  bool isLinear() const { return higher.empty(); }
+  /// The n-th derivative of p at q, p itself for n = 0. T: double or a register of lanes.
+  template <typename T>
+  T calcDerivative(int n, const T& q) const;
 };
 
-/// Ties frame 1 on body 1 to frame 2 on body 2, or, as a coupler, coordinates of joints: sum of coefficient times
-/// coordinate = offset, as belts, gears and differentials do. A distance keeps the origins of the frames as far apart as
-/// `length`, as a massless rod with a ball at either end does; a slider lets frame 2 slide along an axis. notation.h defines residual, velocity, acceleration and
-/// force.
+template <typename T>
+T CouplerTerm::calcDerivative(int n, const T& q) const {
+  if (isLinear()) return n == 0 ? T(coefficient * q) : T(n == 1 ? coefficient : 0);
+  T sum = 0;
+  for (int k = static_cast<int>(higher.size()) + 1; k >= std::max(n, 1); --k) {  // Horner
+    double c = k == 1 ? coefficient : higher[static_cast<size_t>(k) - 2];
+    for (int i = 0; i < n; ++i) c *= k - i;
+    sum = sum * q + c;
+  }
+  return n == 0 ? T(sum * q) : sum;
+}
+
+/// Ties frame 1 on body 1 to frame 2 on body 2, or, as a coupler, coordinates of joints: sum of p_i(q_i) = offset. With
+/// p_i = c_i q_i it does as belts, gears and differentials do, with polynomials as cams or fitted linkages. A distance keeps
+/// the origins of the frames as far apart as `length`, as a massless rod with a ball at either end does; a slider lets
+/// frame 2 slide along an axis. notation.h defines residual, velocity, acceleration and force.
 struct Closure {
   std::string name;
   ClosureKind kind = ClosureKind::Weld6D;

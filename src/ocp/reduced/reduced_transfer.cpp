@@ -234,6 +234,7 @@ void ReducedKernel::loadDrift(LaneSource<const ReducedEvaluation> nodes, const G
     gatherLanes(nodes.count, c.next.step.size(), c.next.step.data(), [&](int l) { return get(l).step.data(); });
     gatherLanes(nodes.count, 12 * c.cluster.model.numBodies(), getNumbers(c.own.X_WB.front()),
                 [&](int l) { return getNumbers(get(l).placements.front()); });
+    c.own.q = c.next.basis.q;
     c.own.stage = WorkspaceStage::Placement;
   }
 }
