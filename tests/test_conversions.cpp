@@ -160,6 +160,10 @@ TEST_CASE("random mechanisms come back from MJCF: every joint, closure, base, sp
     checkMjcfRoundTrip(plain.model, plain.q_closed);
     const Mechanism belted = makeBeltedMechanism(rng, kind.joint, kind.closure, kind.base, true);
     checkMjcfRoundTrip(belted.model, belted.q_closed);
+    if (getNv(kind.joint) != 1) {  // couplers of two joints
+      const Mechanism cammed = makeCammedMechanism(rng, kind.joint, kind.closure, kind.base);
+      checkMjcfRoundTrip(cammed.model, cammed.q_closed);
+    }
     const Mechanism sprung = makeSprungMechanism(rng, kind.joint, kind.closure, kind.base);
     const Model back = readMjcfText(formatMjcf(sprung.model, sprung.q_closed).xml);
     REQUIRE(back.jointForces().size() == sprung.model.jointForces().size());
@@ -362,6 +366,55 @@ TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and te
   }
   CHECK_THAT(getError([] { formatUrdf(loadRobot("cleobot").model); }),
              Catch::Contains("URDF does not support such joints"));
+}
+
+TEST_CASE("polynomials of couplers: exact in YAML, refused or told where a format cannot say them") {
+  std::mt19937 rng(9);
+  const Mechanism cam = makeCammedMechanism(rng, JointKind::Spherical, ClosureKind::Coupler, MechanismBase::Fixed);
+  const RobotDirectory directory;
+  const RobotText text = formatRobot(cam.model);
+  const Model back = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
+  REQUIRE(back.closures().size() == 2);
+  for (size_t t = 0; t < 2; ++t) {
+    const CouplerTerm &a = cam.model.closures()[1].terms[t], &b = back.closures()[1].terms[t];
+    CHECK((a.coefficient == b.coefficient && a.higher == b.higher));
+    CHECK(a.isLinear() == (t == 0));
+  }
+  const std::vector<std::string> warnings = formatDrake(cam.model).warnings;
+  CHECK(std::any_of(warnings.begin(), warnings.end(), [](const std::string& w) {
+    return w.find("closure 'belt': it is left out: <mimic> is linear") != std::string::npos;
+  }));
+
+  // Of three joints, or of two polynomials, or of the fifth degree: what the message asks for is taken.
+  const auto make = [](const std::function<void(ModelBuilder&)>& couple) {
+    ModelBuilder builder("arm");
+    for (const char* name : {"a", "b", "c", "between"}) {
+      Joint joint;
+      joint.name = name;
+      joint.kind = JointKind::Revolute;
+      builder.addLink(std::string("link_") + name, "world", joint, {1, Vector3d::Zero(), Matrix3d::Identity()});
+    }
+    couple(builder);
+    return builder.build();
+  };
+  const std::vector<double> square{1};
+  for (const auto& couple : std::vector<std::function<void(ModelBuilder&)>>{
+           [&](ModelBuilder& b) {
+             b.addCoupler("cam", {{"a", 1}, {"b", 1}, {"c", 2}}, 0, 0, 0, {{"c", square}});
+           },
+           [&](ModelBuilder& b) {
+             b.addCoupler("cam", {{"a", 1}, {"b", 1}}, 0, 0, 0, {{"a", square}, {"b", square}});
+           },
+           [&](ModelBuilder& b) {
+             b.addCoupler("cam", {{"a", 1}, {"b", 1}}, 0, 0, 0, {{"b", {0, 0, 0, 1}}});
+           }})
+    CHECK_THAT(getError([&] { formatMjcf(make(couple), VectorXd::Zero(4)); }),
+               Catch::Contains("closure 'cam'") && Catch::Contains("add a light link"));
+  const Model split = make([&](ModelBuilder& b) {
+    b.addCoupler("one", {{"between", 1}, {"b", 1}}, 0, 0, 0, {{"b", square}});
+    b.addCoupler("other", {{"a", 1}, {"between", -1}}, 0, 0, 0, {{"a", square}});
+  });
+  checkMjcfRoundTrip(split, VectorXd::Zero(4));
 }
 
 TEST_CASE("feet of a reference keep their places and yaws in YAML; what is no yaw is refused") {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/formats/robot_writer.h"
@@ -67,7 +68,7 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
   checkWarning(makeSwing("", "\n<tendon><spatial/></tendon>"),
                "<spatial> (line 2): it does not run between two sites, and is left out");
   checkWarning(makeSwing("", "\n<actuator><muscle joint=\"swing\"/></actuator>"),
-               "<muscle> (line 2): the actuator is left out: motors can only drive joints");
+               "<muscle> (line 2): the actuator is left out: motors can only drive joints, and fixed tendons of them");
   checkWarning(makeSwing("", "\n<actuator><position name=\"swing\" joint=\"swing\" forcerange=\"-2 2\"/></actuator>"),
                "<position> (line 2): its servo is left out: it becomes an ideal torque motor");
   checkWarning(makeSwing("", "\n<equality><weld active=\"false\" body1=\"bob\"/></equality>"),
@@ -99,8 +100,6 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
   checkError(makeSwing("\n<body><geom type=\"mesh\" mesh=\"a\"/></body>"), "geom (line 2)",
              "the mass of the body comes from the mesh 'a', which is not there");
   checkError(makeSwing("", "<equality>\n<flex/></equality>"), "flex (line 2)", "such equalities are not supported");
-  checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\" joint2=\"turn\" polycoef=\"0 1 2 0 0\"/></equality>"),
-             "joint (line 2)", "its polycoef is of degree 2 or more");
   checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\"/></equality>"), "joint (line 2)",
              "it constrains a single joint");
   checkError(makeSwing("", "<equality>\n<connect body1=\"none\" anchor=\"0 0 0\"/></equality>"), "connect (line 2)",
@@ -256,6 +255,77 @@ TEST_CASE("line breaks mean nothing: equalities and tendons without names may sh
     REQUIRE(model.pointSprings().size() == 2);
     CHECK(model.pointSprings()[0].name != model.pointSprings()[1].name);
   }
+}
+
+TEST_CASE("what files of others have: limits by default, sites named as bodies, commas, polynomials of joints") {
+  const RobotDirectory directory;
+  const LoadedRobot robot = loadRobot(directory.write("others.xml", R"(<mujoco><compiler angle="radian"/>
+    <default><joint limited="true"/></default><worldbody><body name="trunk" quat="0.6, 0, 0.8, 0"><joint type="free"/>
+      <geom size="0.1"/><site name="foot" pos="0 0 0.1"/>
+      <body name="leg"><joint name="hip" range="-1 2"/><geom size="0.1"/>
+        <body name="foot" pos="0 0 -1"><joint name="ankle" type="ball"/><geom size="0.1"/></body></body>
+      <body name="arm"><joint name="shoulder" range="-2 1" ref="0.5"/><geom size="0.1"/></body></body></worldbody>
+    <equality><joint name="cam" joint1="hip" joint2="shoulder" polycoef="0.1 0 2 0 0.5"/></equality></mujoco>)"));
+  const Model& model = robot.model;
+  CHECK(model.hasFreeFlyer());
+  CHECK(model.bodies()[model.joints()[model.findJoint("ankle")].parent].name == "leg");
+  const int foot = model.findFrame("foot");
+  CHECK(model.frames()[foot].body == model.findJoint("ankle"));
+  CHECK(model.frames()[model.findFrame("foot_2")].body == 1);
+  CHECK_THAT(robot.warnings.at(0), Catch::Contains("the commas between the numbers of its 'quat' are read as spaces"));
+  // hip = 0.1 + 2 (s - 0.5)^2 + 0.5 (s - 0.5)^4
+  Workspace ws(model);
+  VectorXd q = model.makeNeutral();
+  const double s = 0.9, hip = 0.1 + 2 * 0.16 + 0.5 * 0.0256;
+  q[model.joints()[model.findJoint("shoulder")].idx_q] = s;
+  q[model.joints()[model.findJoint("hip")].idx_q] = hip;
+  updatePositions(model, ws, q);
+  CHECK(std::abs(calcClosureResidual(ws, model.closures().at(0))[0]) < 1e-14);
+  CHECK_THAT(getError([&] {
+               readMujoco(
+                   "<mujoco><worldbody><body name=\"a\"><geom size=\"1\"/></body>\n<body name=\"a\"><geom "
+                   "size=\"1\"/></body></worldbody></mujoco>");
+             }),
+             Catch::Contains("body 'a' (line 2)") && Catch::Contains("its name is taken"));
+}
+
+TEST_CASE("two points of the same two bodies make a hinge, whatever their names, where the bodies stand or not") {
+  const auto read = [](const std::string& equality, const std::string& second) {
+    const RobotDirectory directory;
+    return loadRobot(directory.write("bar.xml", R"(<mujoco><compiler angle="radian"/><worldbody>
+      <site name="a1" pos="0.3 -0.1 0.2"/><site name="a2" pos="0.3 0.1 0.2"/>
+      <body name="crank"><joint name="crank" axis="0 1 0"/><geom size="0.1" pos="0 0 0.1"/>
+        <body name="rod" pos="0 0 0.2"><joint name="rod" axis="0 1 0"/><geom size="0.1"/>
+          <body name="end" pos="0.2 0 0.1"><joint name="end" axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/>
+            <site name="b1" pos="0.15 -0.1 0"/><site name="b2" pos="0.15 )" +
+                                                    second + R"( 0" euler="0.3 0 0"/></body></body></body></worldbody>
+      <equality>)" + equality + "</equality></mujoco>"));
+  };
+  const std::string sites =
+      "<connect name=\"p\" site1=\"a1\" site2=\"b1\"/>\n<connect name=\"q\" site1=\"a2\" site2=\"b2\"/>";
+  const LoadedRobot pin = read(sites, "0.1");
+  REQUIRE(pin.model.closures().size() == 1);
+  const Closure& closure = pin.model.closures()[0];
+  CHECK(closure.kind == ClosureKind::Hinge5D);
+  CHECK(closure.name == "p");
+  CHECK((closure.X_B1.R * closure.axis).isApprox(-Vector3d::UnitY(), 1e-12));
+  CHECK((closure.X_B2.R * closure.axis).isApprox(-Vector3d::UnitY(), 1e-12));
+  CHECK((closure.X_B2.p - Vector3d(0.15, 0, 0)).norm() < 1e-15);
+  CHECK(std::any_of(pin.warnings.begin(), pin.warnings.end(), [](const std::string& w) {
+    return w.find("together with 'p' it makes a hinge of their two bodies") != std::string::npos;
+  }));
+  // As it stands open: the same mechanism, closed, as two balls that say one row twice.
+  const VectorXd q = findClosedConfiguration(pin.model).q;
+  Workspace ws(pin.model);
+  updatePositions(pin.model, ws, q);
+  CHECK(calcClosureResidual(ws, closure).norm() < 1e-9);
+  CHECK(calcMobility(pin.model, q).mobility == 1);
+  CHECK(read(sites, "0.12").model.closures().size() == 2);  // not as far apart
+  CHECK(read("<connect body1=\"rod\" body2=\"world\" anchor=\"0 -0.1 0\"/><connect body1=\"rod\" "
+             "body2=\"world\" anchor=\"0 0.1 0\"/>",
+             "0")
+            .model.closures()[0]
+            .kind == ClosureKind::Hinge5D);
 }
 
 TEST_CASE("a robot of MuJoCo becomes one of ours and stays the same") {

@@ -253,7 +253,13 @@ const char* const kHandWritten = R"(<mujoco model="hand">
     <connect name="tie" body1="slider" body2="shin" anchor="0.01 0.02 0.05"/>
     <weld name="glue" body1="plate" body2="rod" relpose="0.1 0.2 0.3 0.8 0.1 0.2 0.3" anchor="0.01 0.03 -0.02"/>
     <joint name="belt" joint1="knee" joint2="pitch" polycoef="0.1 -0.5 0 0 0"/>
+    <joint name="cam" joint1="stretch" joint2="knee" polycoef="0.02 0.3 -0.5 0.2 0.7"/>
+    <tendon name="pull" tendon1="both" tendon2="one" polycoef="0.05 0 0.4 -0.3 0.1"/>
   </equality>
+  <tendon>
+    <fixed name="both"><joint joint="roll" coef="1.5"/><joint joint="rod_x" coef="-0.7"/></fixed>
+    <fixed name="one"><joint joint="stretch" coef="2"/></fixed>
+  </tendon>
   <actuator><motor name="m" joint="knee" gear="5" ctrlrange="-3 3"/></actuator>
 </mujoco>)";
 
@@ -321,11 +327,12 @@ TEST_CASE("MuJoCo and the reader of its files read the same mechanism") {
     };
     gap = std::max(gap, (tie("tie") - Eigen::Map<Vector3d>(data->efc_pos)).norm());
     gap = std::max(gap, (tie("glue") - Eigen::Map<Vector3d>(data->efc_pos + 3)).norm());
-    const Closure& belt = model.closures()[model.findClosure("belt")];
-    double residual = -belt.offset;
-    for (const CouplerTerm& term : belt.terms) residual += term.coefficient * q[term.idx_q];
-    gap = std::max(gap, std::abs(residual - data->efc_pos[9]));
-    CHECK(std::abs(residual) > 1e-3);
+    int row = 9;
+    for (const char* coupler : {"belt", "cam", "pull"}) {
+      const double residual = -calcClosureResidual(ws, model.closures()[model.findClosure(coupler)])[0];
+      gap = std::max(gap, std::abs(residual - data->efc_pos[row++]));
+      CHECK(std::abs(residual) > 1e-3);
+    }
   }
   CHECK(mass < kTolerance);
   CHECK(bias < kTolerance);
@@ -341,5 +348,5 @@ TEST_CASE("MuJoCo and the reader of its files read the same mechanism") {
                        [&](const std::string& w) { return w.find(text) != std::string::npos; });
   };
   CHECK(warns("<light> (line 13): left out"));
-  CHECK(warns("<motor> (line 47): its input becomes the torque or force at its joint"));
+  CHECK(warns("<motor> (line 53): its input becomes the torque or force at its joint"));
 }

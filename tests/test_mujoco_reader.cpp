@@ -1,8 +1,10 @@
 // MuJoCo and the reader of its files agree: masses of meshes, and where free bases made of several joints stand.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <memory>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/robots/robot_loader.h"
 #include "robot_directory.h"
@@ -121,4 +123,101 @@ TEST_CASE("a free base of several joints stands where MuJoCo puts it") {
       CHECK((X.R - Eigen::Map<RowMatrixXd>(data->xmat + 9 * body, 3, 3)).norm() < 1e-12);
     }
   }
+}
+
+namespace {
+
+// A gripper of two fingers and a slide, driven by the sum of their coordinates.
+std::string makeGripper(const std::string& tendon, const std::string& rest) {
+  return R"(<mujoco><compiler angle="radian"/><option gravity="0 0 -3"/>
+    <default><geom density="100000"/></default><worldbody><body name="palm" pos="0 0 1">
+    <joint name="wrist" axis="1 0 0"/><geom size="0.1" pos="0.05 0 0"/>
+    <body name="left" pos="0.1 0 0"><joint name="l" axis="0 1 0" ref="0.3"/><geom size="0.05" pos="0.05 0 0.2"/>
+      <body name="tip" pos="0 0 0.3"><joint name="t" axis="0 1 0.2"/><geom size="0.03" pos="0 0.02 0.1"/></body></body>
+    <body name="right" pos="-0.1 0 0"><joint name="r" axis="0 1 0"/><geom size="0.05" pos="-0.05 0 0.2"/></body>
+    <body name="bolt"><joint name="s" type="slide" axis="0 1 0"/><geom size="0.04"/></body></body></worldbody>
+    <tendon><fixed name="pull" )" +
+         tendon +
+         R"(><joint joint="l" coef="0.5"/><joint joint="t" coef="-1.5"/><joint joint="s" coef="2"/></fixed>
+      <fixed name="alone"><joint joint="r" coef="-0.7"/></fixed></tendon>)" +
+         rest + "</mujoco>";
+}
+
+}  // namespace
+
+TEST_CASE("motors on fixed tendons drive joints as in MuJoCo, with the tendon's springs and limits") {
+  const RobotDirectory directory;
+  const std::string path = directory.write(
+      "gripper.xml",
+      makeGripper(
+          "stiffness=\"4\" damping=\"0.6\" springlength=\"0.2\" limited=\"true\" range=\"-3 4\"",
+          "<actuator><motor name=\"close\" tendon=\"pull\" gear=\"3\" ctrllimited=\"true\" ctrlrange=\"-2 2\"/>"
+          "<motor name=\"one\" tendon=\"alone\" gear=\"5\" ctrllimited=\"true\" ctrlrange=\"-2 2\"/></actuator>"));
+  const LoadedRobot robot = loadRobot(path);
+  const Model& model = robot.model;
+  const MjModel mj = loadMujoco(path);
+  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(mj.get()), mj_deleteData);
+  REQUIRE(model.nv() == mj->nv + 1);
+  REQUIRE(model.nu() == 2);
+  CHECK(model.motors()[0].name == "pull");
+  CHECK(model.motors()[0].effort_limit == 6);
+  CHECK(model.motors()[1].name == "r");
+  CHECK(model.motors()[1].effort_limit == Approx(7).epsilon(1e-15));
+  CHECK(calcMobility(model, model.makeNeutral()).mobility == mj->nv);
+  const int length = model.motors()[0].dof;
+  CHECK(model.lowerLimits()[length] == -3);
+  CHECK(model.upperLimits()[length] == 4);
+  CHECK(model.bodies()[model.joints()[model.motors()[0].joint].parent].name == "palm");
+
+  // At a posture, speeds and inputs: forces of actuators and accelerations. Rotors have next to no inertia.
+  const Closure& coupler = model.closures().at(0);
+  VectorXd q(model.nq()), v(model.nv()), tau = VectorXd::Zero(model.nv());
+  double at = 0.1;
+  for (int j = 0; j < mj->njnt; ++j, at += 0.15) {
+    const Joint& joint = model.joints()[model.findJoint(mj_id2name(mj.get(), mjOBJ_JOINT, j))];
+    data->qpos[j] = q[joint.idx_q] = at;
+    data->qvel[j] = v[joint.idx_v] = 1 - 2 * at;
+  }
+  double sum = 0, rate = 0;
+  for (const CouplerTerm& term : coupler.terms)
+    if (term.dof != length) sum -= term.coefficient * q[term.idx_q], rate -= term.coefficient * v[term.dof];
+  q[model.joints()[model.motors()[0].joint].idx_q] = sum, v[length] = rate;
+  data->ctrl[0] = 1.3, data->ctrl[1] = -0.4;
+  mj_forward(mj.get(), data.get());
+  CHECK(data->ten_length[0] == Approx(sum).epsilon(1e-14));
+  tau[length] = 3 * 1.3;
+  tau[model.motors()[1].dof] = -0.7 * 5 * -0.4;
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), q, v, tau) == NumericalStatus::Ok);
+  REQUIRE(cws.J.rows() == 1);
+  const double multiplier = -tau[length] / cws.J(0, length);  // of a rotor without inertia and springs
+  for (int j = 0; j < mj->njnt; ++j) {
+    const int dof = model.joints()[model.findJoint(mj_id2name(mj.get(), mjOBJ_JOINT, j))].idx_v;
+    CAPTURE(mj_id2name(mj.get(), mjOBJ_JOINT, j));
+    CHECK(tau[dof] + cws.J(0, dof) * multiplier == Approx(data->qfrc_actuator[j]).epsilon(1e-12).margin(1e-12));
+    CHECK(cws.a[dof] == Approx(data->qacc[j]).epsilon(1e-6).margin(1e-6));
+  }
+}
+
+TEST_CASE("a fixed tendon of a narrow range is a coupler with play; a wide one is told") {
+  const RobotDirectory directory;
+  const auto load = [&](const std::string& range) {
+    return loadRobot(directory.write("play.xml", makeGripper("limited=\"true\" range=\"" + range + "\"", "")));
+  };
+  const LoadedRobot narrow = load("0.295 0.305");
+  REQUIRE(narrow.model.closures().size() == 1);
+  const Closure& coupler = narrow.model.closures()[0];
+  CHECK(coupler.name == "pull");
+  CHECK(coupler.offset == Approx(0.3).epsilon(1e-15));
+  REQUIRE(coupler.terms.size() == 3);
+  CHECK(coupler.terms[0].coefficient == 0.5);
+  const auto tells = [](const LoadedRobot& robot, const std::string& text) {
+    return std::any_of(robot.warnings.begin(), robot.warnings.end(),
+                       [&](const std::string& w) { return w.find(text) != std::string::npos; });
+  };
+  CHECK(tells(narrow, "a coupler that keeps its length of 0.3; its play of 0.005 to either side is left out"));
+  const LoadedRobot wide = load("-0.5 0.5");
+  CHECK(wide.model.closures().empty());
+  CHECK(tells(wide, "its range is too wide for a coupler with play"));
 }

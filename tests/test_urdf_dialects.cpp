@@ -262,6 +262,13 @@ TEST_CASE("URDF dialects: balls, a world of another name, ends of loops, and ele
   CHECK(closed.warnings.empty());
   checkMobility(closed.model, 1);
 
+  std::string dependent = writeFourBar();
+  dependent.replace(dependent.find("<joint name=\"pin_b\""), 6, "<joint independent=\"false\"");
+  const std::string told =
+      "joint 'pin_b' is said to depend on others (independent=\"false\"), but no <loop> or <coupling>";
+  CHECK(says(loadUrdf(dependent), told));
+  CHECK_FALSE(says(loadUrdf(dependent, "closures: [{name: c, type: coupler, joints: {crank: 1, pin_b: 1}}]\n"), told));
+
   const LoadedRobot strange =
       loadUrdf(writeFourBar() + "<spring_between/>\n<spring_between/>\n<gazebo/><sensor/><mujoco/>");
   REQUIRE(strange.warnings.size() == 1);

@@ -152,7 +152,11 @@ std::vector<double> MjcfElement::getNumbers(const std::string& attribute, size_t
   std::vector<double> numbers;
   const std::string* text = find(attribute);
   if (!text) return numbers;
-  if (!parseNumbers(*text, numbers) || numbers.size() < least || numbers.size() > most)
+  // MuJoCo refuses commas, programs that write them do not.
+  std::string spaced = *text;
+  for (size_t at = 0; (at = spaced.find(", ", at)) != std::string::npos;) spaced[at] = ' ';
+  if (spaced != *text) note("the commas between the numbers of its '" + attribute + "' are read as spaces");
+  if (!parseNumbers(spaced, numbers) || numbers.size() < least || numbers.size() > most)
     fail("its attribute '" + attribute + "' is not made of " + std::to_string(least) +
              (most > least ? " to " + std::to_string(most) : "") + " finite number(s): " + *text,
          "correct it");

@@ -189,7 +189,7 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   if (own.closures.empty() && files.yaml.closures.empty() && !loops.empty())
     readLoopClosures(loops.string(), files.urdf, files.yaml);
   if (!has_settings) {
-    warnOfClosingFrames(files.urdf, files.yaml);
+    warnOfOpenLoops(files.urdf, files.yaml);
     return files;
   }
   if (!own.models.empty() || own.generator || own.composed)
@@ -200,7 +200,7 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
                      "there is a URDF beside this file, " + path.string(),
                      "remove the key, or move the file to another directory");
   complete(own, files.yaml);
-  warnOfClosingFrames(files.urdf, files.yaml);
+  warnOfOpenLoops(files.urdf, files.yaml);
   return files;
 }
 

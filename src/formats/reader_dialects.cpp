@@ -11,8 +11,6 @@
 namespace bielle {
 namespace {
 
-constexpr double kRotorMass = 1e-9, kRotorInertia = 1e-9;  // kg, kg m^2: nothing without mass has inertia
-
 const std::map<std::string, ClosureKind> kClosureKinds = {
     {"spherical", ClosureKind::Ball3D}, {"ball", ClosureKind::Ball3D},   {"continuous", ClosureKind::Hinge5D},
     {"revolute", ClosureKind::Hinge5D}, {"hinge", ClosureKind::Hinge5D}, {"fixed", ClosureKind::Weld6D},
@@ -69,6 +67,8 @@ class DialectReader {
         leaveOut(*e);
       if (tag == "ros2_control")
         for (const XMLElement* inner : getChildren(*e, "transmission")) readTransmission(*inner);
+      if (tag == "joint" && getAttribute(e, "independent") == "false")
+        tree_.dependent.push_back(getAttribute(e, "name"));
       if (tag == "joint" || tag == "link")
         for (const XMLElement* inner : getChildren(*e))
           if (!(tag == "joint" ? kHarmlessOfJoint : kHarmlessOfLink).count(getTag(*inner)) &&
@@ -335,12 +335,7 @@ class DialectReader {
       rotor.joint.axis = first.joint.axis;
       const auto is_taken = [&](const UrdfJoint& joint) { return joint.joint.name == actuator.name; };
       if (std::any_of(tree_.joints.begin(), tree_.joints.end(), is_taken) ||
-          !tree_.links
-               .emplace(
-                   actuator.name,
-                   UrdfLink{
-                       actuator.name, {kRotorMass, Vector3d::Zero(), kRotorInertia * Matrix3d::Identity()}, {}, {}})
-               .second)
+          !tree_.links.emplace(actuator.name, makeRotor(actuator.name)).second)
         fail(*actuator.element, "there is a link or joint of this name already", "rename it");
       tree_.joints.push_back(rotor);
       ClosureSpec coupler;
@@ -373,11 +368,24 @@ class DialectReader {
 
 }  // namespace
 
+UrdfLink makeRotor(const std::string& name) {
+  constexpr double kMass = 1e-9, kInertia = 1e-9;  // kg, kg m^2
+  return {name, {kMass, Vector3d::Zero(), kInertia * Matrix3d::Identity()}, {}, {}};
+}
+
 void readDialects(const XMLElement& robot, bool for_drake, UrdfFile& tree, YamlFile& settings) {
   DialectReader(for_drake, tree, settings).read(robot);
 }
 
-void warnOfClosingFrames(UrdfFile& tree, const YamlFile& settings) {
+void warnOfOpenLoops(UrdfFile& tree, const YamlFile& settings) {
+  const auto mimics = [](const UrdfJoint& joint) { return !joint.mimicked.empty(); };
+  if (!tree.dependent.empty() && settings.closures.empty() &&
+      std::none_of(tree.joints.begin(), tree.joints.end(), mimics))
+    tree.warnings.push_back(
+        tree.path + ": joint '" + tree.dependent.front() +
+        (tree.dependent.size() > 1 ? "' and " + std::to_string(tree.dependent.size() - 1) + " others are" : "' is") +
+        " said to depend on others (independent=\"false\"), but no <loop> or <coupling> says how, so "
+        "that they move freely here; give `closures` in the robot's YAML file");
   const std::string prefix = "closing_";
   for (const auto& [name, link] : tree.links) {
     if (name.rfind(prefix, 0) != 0 || name.size() < prefix.size() + 3 || name.substr(name.size() - 2) != "_1") continue;

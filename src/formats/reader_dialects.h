@@ -28,7 +28,7 @@ namespace bielle {
 void readDialects(const XMLElement& robot, bool for_drake, UrdfFile& tree, YamlFile& settings);
 
 /// onshape-to-robot marks the ends of loops by frames closing_NAME_1 and closing_NAME_2, and by nothing else: those that no closure
-/// names are told.
-void warnOfClosingFrames(UrdfFile& tree, const YamlFile& settings);
+/// names are told; and so are dependent joints of URDF+ without any closure.
+void warnOfOpenLoops(UrdfFile& tree, const YamlFile& settings);
 
 }  // namespace bielle

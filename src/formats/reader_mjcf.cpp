@@ -32,19 +32,19 @@ RobotFiles MjcfReader::read() {
   forEachSection("default", [this](const XMLElement& e) { readMjcfDefaults(e, "", settings_); });
   forEach("asset", [this](const XMLElement& e) { getTag(e) == "mesh" ? readMesh(e) : noteElement(e); });
   listNamed();
+  forEachSection("worldbody", [this](const XMLElement& e) { reserveNames(e); });
   forEachSection("worldbody", [this](const XMLElement& e) { readContents(e, places_.at("world"), ""); });
   scaleMasses();
   forEach("tendon", [this](const XMLElement& e) { readTendon(e); });
   forEach("equality", [this](const XMLElement& e) { readEquality(e); });
+  forEach("actuator", [this](const XMLElement& e) { readActuator(e); });
+  readTendonRanges();
   joinHinges();
   addClosures();
-  forEach("actuator", [this](const XMLElement& e) { readActuator(e); });
   forEach("custom", [this](const XMLElement& e) { readCustom(e); });
   forEach("keyframe", [this](const XMLElement& e) { readKey(e); });
   addStart();
   for (const XMLElement* e : getChildren(settings_.files.root())) noteSection(*e);
-  for (const auto& [name, tendon] : tendons_)
-    if (!tendon.is_used) noteElement(*tendon.element, "the tendon is left out");
   tree_.warnings = settings_.notes.format();
   GeometryDecimals decimals;
   for (const XMLElement* root : settings_.files.listRoots()) decimals.add(*root, settings_.angle != 1);
@@ -159,13 +159,21 @@ void MjcfReader::readContents(const std::vector<Child>& children, const BodyPlac
   }
 }
 
+// Bodies keep their names where sites have the same.
+void MjcfReader::reserveNames(const XMLElement& element) {
+  for (const XMLElement* e : getChildren(element)) {
+    if (getTag(*e) == "body") taken_.insert(getAttribute(e, "name"));
+    if (getTag(*e) == "body" || getTag(*e) == "frame") reserveNames(*e);
+  }
+}
+
 void MjcfReader::readBody(const Child& child, const BodyPlace& parent) {
   const XMLElement& e = *child.element;
   MjcfElement body(e, "", settings_);
   if (body.getFlag("mocap", false)) body.note("it cannot be moved from outside");
-  std::string file_name = getAttribute(&e, "name");
-  const std::string name = makeName(file_name.empty() ? "body_" + std::to_string(e.GetLineNum()) : file_name);
-  if (!file_name.empty() && name != file_name) body.fail("its name is taken", "rename it");
+  std::string name = getAttribute(&e, "name");
+  if (name.empty()) name = makeName("body_" + std::to_string(e.GetLineNum()));
+  if (places_.count(name)) body.fail("its name is taken", "rename it");
   const SE3 X_PB = child.X_BF * body.getPose();
   std::vector<Child> children;
   flatten(e, {}, body.getText("childclass", child.childclass), children);

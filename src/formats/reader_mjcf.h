@@ -61,6 +61,7 @@ class MjcfReader {
     std::map<std::string, double> coefficients;
     const XMLElement* element = nullptr;
     bool is_used = false;
+    std::string rotor;  // the joint that turns by its length, if there is one
   };
 
   // A spatial tendon; ends only if it runs straight between two sites.
@@ -126,6 +127,7 @@ class MjcfReader {
 
   // bodies: reader_mjcf.cpp
   void flatten(const XMLElement& body, const SE3& X_BF, const std::string& childclass, std::vector<Child>& out);
+  void reserveNames(const XMLElement& element);
   void readContents(const XMLElement& e, const BodyPlace& place, const std::string& childclass);
   void readContents(const std::vector<Child>& children, const BodyPlace& place);
   void readBody(const Child& child, const BodyPlace& parent);
@@ -184,13 +186,21 @@ class MjcfReader {
   void addClosures();
   void addCoupler(const std::string& name, ClosureSpec coupler, const MjcfElement& e);
   const Slot& findSlot(const MjcfElement& e, const std::string& joint) const;
-  std::array<double, 2> readLine(MjcfElement& e);
+  static std::vector<double> readPolynomial(MjcfElement& e);
+  static void subtractPolynomial(const std::vector<double>& p, double c, const std::string& x, double x_ref,
+                                 ClosureSpec& coupler);
   void readJointEquality(MjcfElement& e, const std::string& name);
   void readTendon(const XMLElement& element);
   void readSpatialTendon(const XMLElement& element);
   void readTendonEquality(MjcfElement& e, const std::string& name);
   void readRod(MjcfElement& e, const std::string& name, const SpatialTendon& tendon);
   bool isTied(const std::string& tendon);
+  void addTendonLength(FixedTendon& tendon, double factor, ClosureSpec& coupler, const MjcfElement& e);
+  void readTendonRanges();
+  std::string nameCoupler(const std::string& made) const;
+  std::string findCarrier(const std::map<std::string, double>& joints) const;
+  std::string findDriven(MjcfElement& e, double& gear);
+  void addRotor(FixedTendon& tendon, const std::string& name, MjcfElement& motor);
   void listNamed();
   void readActuator(const XMLElement& element);
   void readCustom(const XMLElement& element);

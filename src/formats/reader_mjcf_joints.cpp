@@ -183,6 +183,11 @@ MjcfReader::Element MjcfReader::readJoint(const Child& child, const std::string&
 }
 
 void MjcfReader::readRange(MjcfElement& e, bool has_one, double unit, Element& out) {
+  // As in MuJoCo, a default of joints does not limit a free joint, nor a ball that has no range.
+  if (out.type == "free" || (!has_one && !e.find("range"))) {
+    for (const char* without_meaning : {"limited", "range"}) e.find(without_meaning);
+    return;
+  }
   if (!e.isLimited("limited", "range")) {
     if (!has_one || !e.find("limited")) e.find("range");
     return;

@@ -81,6 +81,7 @@ void MjcfReader::readTie(MjcfElement& e, const std::string& name) {
     const BodyPlace &one = findSite(e, "site1"), &two = findSite(e, "site2");
     tie.body1 = one.link, tie.body2 = two.link;
     tie.X_L1 = one.X_LB, tie.X_L2 = two.X_LB;
+    if (tie.kind == ClosureKind::Weld6D) e.find("torquescale");
   } else {
     if (!e.find("body1")) e.fail("it has no body1", "name the first body");
     const BodyPlace &one = findBody(e, "body1"), &two = findBody(e, "body2");
@@ -109,24 +110,33 @@ void MjcfReader::readTie(MjcfElement& e, const std::string& name) {
   ties_.push_back(tie);
 }
 
-// Two points NAME.1 and NAME.2 that tie the same bodies make the hinge that the writer wrote.
+// Two points that tie the same bodies, as far apart on one as on the other, make a hinge: 5 rows, of which 6 would say one twice.
+// The writer's NAME.1 and NAME.2 give it their name.
 void MjcfReader::joinHinges() {
-  for (size_t i = 0; i + 1 < ties_.size(); ++i) {
-    Tie &a = ties_[i], &b = ties_[i + 1];
-    if (a.kind != ClosureKind::Ball3D || b.kind != ClosureKind::Ball3D || a.body1 != b.body1 || a.body2 != b.body2 ||
-        a.name.size() < 3)
-      continue;
-    const std::string stem = a.name.substr(0, a.name.size() - 2);
-    const Vector3d along = a.X_L1.p - b.X_L1.p, along2 = a.X_L1.R * a.X_L2.R.transpose() * (a.X_L2.p - b.X_L2.p);
-    if (a.name != stem + ".1" || b.name != stem + ".2" || !(along.norm() > 1e-6) || !along.isApprox(along2, 1e-6))
-      continue;
-    a.kind = ClosureKind::Hinge5D;
-    a.name = stem;
-    a.axis = a.X_L1.R.transpose() * along.normalized();
-    a.X_L1.p = (a.X_L1.p + b.X_L1.p) / 2;
-    a.X_L2.p = (a.X_L2.p + b.X_L2.p) / 2;
-    ties_.erase(ties_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-  }
+  constexpr double kSameLength = 1e-6;  // relative
+  for (size_t i = 0; i < ties_.size(); ++i)
+    for (size_t j = i + 1; j < ties_.size(); ++j) {
+      Tie &a = ties_[i], &b = ties_[j];
+      if (a.kind != ClosureKind::Ball3D || b.kind != ClosureKind::Ball3D || a.body1 != b.body1 || a.body2 != b.body2)
+        continue;
+      const Vector3d along = a.X_L1.p - b.X_L1.p, along2 = a.X_L2.p - b.X_L2.p;
+      if (!(along.norm() > 1e-6) || std::abs(along.norm() - along2.norm()) > kSameLength * along.norm()) continue;
+      const Vector3d turned = a.X_L1.R * a.X_L2.R.transpose() * along2;  // where the bodies stand
+      const std::string stem = a.name.substr(0, a.name.size() - std::min<size_t>(2, a.name.size()));
+      if (a.name == stem + ".1" && b.name == stem + ".2")
+        a.name = stem;
+      else
+        settings_.notes.add(settings_.path, "<connect>", b.line,
+                            "together with '" + a.name + "' it makes a hinge of their two bodies, read as such");
+      a.kind = ClosureKind::Hinge5D;
+      a.axis = a.X_L1.R.transpose() * along.normalized();
+      if (!along.isApprox(turned, kSameLength))  // its frames do not have the axis in common
+        a.X_L2.R = Eigen::Quaterniond::FromTwoVectors(a.axis, along2).toRotationMatrix();
+      a.X_L1.p = (a.X_L1.p + b.X_L1.p) / 2;
+      a.X_L2.p = (a.X_L2.p + b.X_L2.p) / 2;
+      ties_.erase(ties_.begin() + static_cast<std::ptrdiff_t>(j));
+      break;
+    }
 }
 
 void MjcfReader::addClosures() {
@@ -166,35 +176,56 @@ const MjcfReader::Slot& MjcfReader::findSlot(const MjcfElement& e, const std::st
   e.fail("there is no joint '" + joint + "'", "correct the name");
 }
 
-// Coefficients 0 and 1 of a polynomial without others.
-std::array<double, 2> MjcfReader::readLine(MjcfElement& e) {
+std::vector<double> MjcfReader::readPolynomial(MjcfElement& e) {
   std::vector<double> p = e.getNumbers("polycoef", 1, 5);
   if (p.empty()) p = {0, 1};
   p.resize(5);
-  if (p[2] != 0 || p[3] != 0 || p[4] != 0)
-    e.fail("its polycoef is of degree 2 or more", "only y = a + b x is supported: linearise it, or remove it");
-  return {p[0], p[1]};
+  return p;
 }
 
-// y - y_ref = a + b (x - x_ref)
+// Subtracts p_1 s + p_2 s^2 + .. of s = c (x - x_ref) from the sum of a coupler.
+void MjcfReader::subtractPolynomial(const std::vector<double>& p, double c, const std::string& x, double x_ref,
+                                    ClosureSpec& coupler) {
+  CouplerTerm about_ref;
+  double power = c;
+  about_ref.coefficient = power * p[1];
+  for (size_t k = 2; k < p.size(); ++k) about_ref.higher.push_back((power *= c) * p[k]);
+  while (!about_ref.higher.empty() && about_ref.higher.back() == 0) about_ref.higher.pop_back();
+  const int degree = static_cast<int>(about_ref.higher.size()) + 1;
+  coupler.offset += about_ref.calcDerivative(0, -x_ref);
+  std::vector<double> higher;
+  double factorial = 1;
+  for (int k = 1; k <= degree; ++k) {  // Taylor's about 0
+    factorial *= k;
+    const double c_k = about_ref.calcDerivative(k, -x_ref) / factorial;
+    if (k == 1)
+      coupler.coefficients[x] -= c_k;
+    else
+      higher.push_back(-c_k);
+  }
+  if (!higher.empty()) coupler.higher[x] = higher;
+}
+
+// y - y_ref = p(x - x_ref)
 void MjcfReader::readJointEquality(MjcfElement& e, const std::string& name) {
   const std::string y = e.getText("joint1"), x = e.getText("joint2");
-  const auto [a, b] = readLine(e);
+  const std::vector<double> p = readPolynomial(e);
   if (y.empty()) e.fail("it has no joint1", "name one");
   const double y_ref = findSlot(e, y).q_ref[0];
-  if (x.empty() || b == 0) e.fail("it constrains a single joint", "remove the joint to fix the body");
+  if (x.empty() || std::all_of(p.begin() + 1, p.end(), [](double c) { return c == 0; }))
+    e.fail("it constrains a single joint", "remove the joint to fix the body");
   const double x_ref = findSlot(e, x).q_ref[0];
   if (x == y) e.fail("it couples a joint with itself", "name two joints");
   ClosureSpec coupler;
-  coupler.coefficients = {{y, 1}, {x, -b}};
-  coupler.offset = y_ref + a - b * x_ref;
+  coupler.coefficients = {{y, 1}};
+  coupler.offset = y_ref + p[0];
+  subtractPolynomial(p, 1, x, x_ref, coupler);
   addCoupler(name, coupler, e);
 }
 
 void MjcfReader::readTendon(const XMLElement& element) {
   if (getTag(element) == "spatial") return readSpatialTendon(element);
   if (getTag(element) != "fixed") return noteElement(element, "the tendon is left out");
-  MjcfElement e(element, "", settings_, "tendon");
   FixedTendon tendon;
   tendon.element = &element;
   for (const XMLElement* j : getChildren(element, "joint")) {
@@ -202,12 +233,14 @@ void MjcfReader::readTendon(const XMLElement& element) {
     const std::string joint = term.getText("joint");
     findSlot(term, joint);
     if (!term.find("coef")) term.fail("it has no coef", "give one");
-    if (!tendon.coefficients.emplace(joint, term.getNumber("coef", 0)).second)
+    const double coefficient = term.getNumber("coef", 0);
+    if (!tendon.coefficients.emplace(joint, coefficient).second)
       term.fail("the tendon lists this joint twice", "add the coefficients up");
+    if (coefficient == 0) tendon.coefficients.erase(joint);
   }
   const std::string name = getAttribute(&element, "name");
-  if (name.empty()) return noteElement(element, "the tendon is left out");
-  if (!tendons_.emplace(name, tendon).second) e.fail("two tendons have this name", "rename one of them");
+  if (name.empty() || tendon.coefficients.empty()) return noteElement(element, "the tendon is left out");
+  if (!tendons_.emplace(name, tendon).second) refuse(element, "two tendons have this name", "rename one of them");
 }
 
 // Whether an equality holds its length, or ties it to that of another.
@@ -288,28 +321,35 @@ void MjcfReader::readRod(MjcfElement& e, const std::string& name, const SpatialT
   ties_.push_back(tie);
 }
 
-// L1 - L1_ref = a + b (L2 - L2_ref) of sums of coordinates
+// L1 - L1_ref = p(L2 - L2_ref) of sums of coordinates
 void MjcfReader::readTendonEquality(MjcfElement& e, const std::string& name) {
   const std::string first = e.getText("tendon1"), second = e.getText("tendon2");
   for (const std::string& tendon : {first, second})
     if (const auto it = spatial_tendons_.find(tendon); it != spatial_tendons_.end() && !tendon.empty())
       return readRod(e, name, it->second);
-  const auto [a, b] = readLine(e);
+  const std::vector<double> p = readPolynomial(e);
   ClosureSpec coupler;
-  coupler.offset = a;
-  const auto add = [&](const std::string& tendon, double factor) {
+  coupler.offset = p[0];
+  const auto find = [&](const std::string& tendon) -> FixedTendon& {
     const auto it = tendons_.find(tendon);
     if (it == tendons_.end()) e.fail("there is no tendon of joints '" + tendon + "'", "name a <fixed> tendon");
-    it->second.is_used = true;
-    for (const auto& [joint, coefficient] : it->second.coefficients) {
-      coupler.coefficients[joint] += factor * coefficient;
-      coupler.offset += factor * coefficient * findSlot(e, joint).q_ref[0];
-    }
+    return it->second;
   };
-  add(first, 1);
-  if (!second.empty()) add(second, -b);
+  addTendonLength(find(first), 1, coupler, e);
+  const bool is_linear = std::all_of(p.begin() + 2, p.end(), [](double c) { return c == 0; });
+  if (second.empty() || is_linear) {
+    if (!second.empty()) addTendonLength(find(second), -p[1], coupler, e);
+  } else {
+    const std::map<std::string, double>& tendon = find(second).coefficients;
+    find(second).is_used = true;
+    if (tendon.size() != 1)
+      e.fail("its polycoef is of degree 2 or more, of a sum of several joints",
+             "make it linear, or couple tendon1 with a joint that is coupled with that sum");
+    const auto& [x, coefficient] = *tendon.begin();
+    subtractPolynomial(p, coefficient, x, findSlot(e, x).q_ref[0], coupler);
+  }
   for (auto it = coupler.coefficients.begin(); it != coupler.coefficients.end();)
-    it = it->second == 0 ? coupler.coefficients.erase(it) : std::next(it);
+    it = it->second == 0 && !coupler.higher.count(it->first) ? coupler.coefficients.erase(it) : std::next(it);
   addCoupler(name, coupler, e);
 }
 
@@ -326,19 +366,41 @@ void MjcfReader::listNamed() {
   named_.erase("");
 }
 
-void MjcfReader::readActuator(const XMLElement& element) {
+// The joint that an actuator drives, that of a tendon for one on the tendon; empty if it is left out.
+std::string MjcfReader::findDriven(MjcfElement& e, double& gear) {
   static const std::set<std::string> servos = {"position", "velocity", "intvelocity", "damper", "general"};
-  MjcfElement e(element, "", settings_);
-  const std::string joint = e.getText("joint", e.getText("jointinparent"));
-  if (joint.empty() || (e.tag() != "motor" && !servos.count(e.tag())))
-    return e.leaveOut("the actuator is left out: motors can only drive joints");
+  const auto leaveOut = [&](const std::string& problem) {
+    e.leaveOut(problem);
+    return std::string();
+  };
+  const std::vector<double> gears = e.getNumbers("gear", 1, 6);
+  gear = gears.empty() ? 1 : gears[0];
+  std::string joint = e.getText("joint", e.getText("jointinparent"));
+  const auto tendon = tendons_.find(e.getText("tendon"));
+  const bool is_motor = e.tag() == "motor" || servos.count(e.tag());
+  if (joint.empty() && tendon != tendons_.end() && is_motor) {
+    FixedTendon& on = tendon->second;
+    if (on.rotor.empty() && on.coefficients.size() > 1) addRotor(on, tendon->first, e);
+    if (!on.rotor.empty()) return on.rotor;
+    on.is_used = true;
+    joint = on.coefficients.begin()->first;
+    gear *= on.coefficients.begin()->second;
+  }
+  if (joint.empty() || !is_motor)
+    return leaveOut("the actuator is left out: motors can only drive joints, and fixed tendons of them");
   const auto slot = std::find_if(slots_.begin(), slots_.end(), [&](const Slot& s) { return s.joint == joint; });
   if (slot == slots_.end()) e.fail("there is no joint '" + joint + "'", "correct the name");
-  if (slot->q_ref.size() != 1) return e.leaveOut("the actuator is left out: its joint has several coordinates");
+  if (slot->q_ref.size() != 1) return leaveOut("the actuator is left out: its joint has several coordinates");
+  return joint;
+}
+
+void MjcfReader::readActuator(const XMLElement& element) {
+  MjcfElement e(element, "", settings_);
+  double gear = 1;
+  const std::string joint = findDriven(e, gear);
+  if (joint.empty()) return;
   for (const MotorSpec& other : yaml_.motors)
     if (other.joint == joint) return e.leaveOut("a second actuator of a joint is left out");
-  const std::vector<double> gears = e.getNumbers("gear", 1, 6);
-  const double gear = gears.empty() ? 1 : gears[0];
   if (gear == 0) return e.leaveOut("an actuator of gear 0 is left out");
   if (gear != 1) e.note("its input becomes the torque or force at its joint, not that before the gear");
   const bool is_general = e.tag() == "general";

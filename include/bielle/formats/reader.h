@@ -31,7 +31,8 @@
 ///   rad (default 0); a robot that is completed keeps its own
 /// - `closures: [{name, frames: [A, B], type, axis, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge,
 ///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0). A coupler: `{name, type: coupler, joints: {joint:
-///   coefficient, ...}, offset, kp, kd}`, sum of coefficient times coordinate = offset (default 0)
+///   coefficient, ...}, offset, kp, kd}`, sum of coefficient times coordinate = offset (default 0); a list of coefficients makes
+///   the polynomial c_1 q + c_2 q^2 + .. of a coordinate
 /// - `motors: {joint: {armature, effort, velocity, torque_loss}, ...}` instead of `name_mot`; its limits (.inf for none)
 ///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h). Winding and gear, as in MotorDrive (model.h): `ratio`,
 ///   `rotor_inertia`, `torque_constant`, `resistance`, `voltage`, `current`, `continuous_current`, `efficiency`,
@@ -66,8 +67,8 @@
 /// The reader supports <include> (beside the main file, or beside the one that includes it); bodies and <frame>; inertias, or
 /// those of shapes and meshes (STL, OBJ) without <inertial>, and what <compiler> makes of them; joints of all kinds with
 /// range, ref, armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon
-/// (of fixed tendons) with polynomials of degree 1; springs and dampers of spatial tendons between two sites; motors
-/// with gear and limits (servos become motors); classes of defaults; gravity; keyframes as references; sites as frames;
+/// (of fixed tendons) with their polynomials; springs and dampers of spatial tendons between two sites; motors
+/// with gear and limits (servos become motors) on joints and fixed tendons; classes of defaults; gravity; keyframes as references; sites as frames;
 /// geoms as shapes. Ranges hold unless `limited` is false.
 /// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
 ///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the
@@ -75,11 +76,15 @@
 /// - A body on the world that moves by three slides across each other and a ball, or three hinges across each other, has a free joint
 ///   `root_joint`, unless one of them has a spring, damping, friction or an armature of its own, or is named by an actuator, an
 ///   equality or a tendon. Keyframes count as in the file.
-/// - What formats/mjcf.h writes is put together again: connects NAME.1 and NAME.2 to a hinge, the elements of a universal, planar
+/// - A fixed tendon of several joints with a motor is a coordinate of its own, next to without inertia, with the tendon's range,
+///   springs and dampers, coupled with its joints; of one joint, the motor is on the joint. One without a motor or an equality, but
+///   with a range of at most 0.1 rad (0.01 m with slides) to either side, is a coupler, and its play is told.
+/// - Two connects of the same two bodies are a hinge through both points, told unless formats/mjcf.h wrote it (NAME.1 and NAME.2).
+/// - What formats/mjcf.h writes is put together again: the elements of a universal, planar
 ///   or free joint, the spheres of a sole at their site.
 /// - Elements that are left out are listed in `warnings` with their lines. Elements without which the mechanism
 ///   would be another one are errors:
-///   <attach>, <replicate>, <composite> and <flexcomp>, other equalities, polynomials of higher degree, masses of convex hulls and
+///   <attach>, <replicate>, <composite> and <flexcomp>, other equalities, polynomials of a sum of joints, masses of convex hulls and
 ///   of meshes that cannot be read. At most 16 MB and 3000 bodies and sites.
 ///
 /// ## SDF files (.sdf), by libsdformat
@@ -88,7 +93,7 @@
 /// Links that nothing holds are free, those of a static model are not. The frame of a body keeps its directions (on a universal
 /// joint, x and y are its axes) and has its origin on its joint. Frames, ranges, springs, damping and friction of joints, visuals
 /// and collisions are read; motors come from a YAML file with `model`. <drake:linear_bushing_rpy> and <drake:ball_constraint> are
-/// loops.
+/// loops; joints with <drake:parent_frame> and <drake:child_frame> join these frames.
 #include <optional>
 #include <string>
 #include <vector>
