@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/sdf.h"
@@ -303,4 +304,70 @@ TEST_CASE("SDF files that are no robot are errors with a remedy") {
                  "joint 'r2': its child 'd' hangs on another joint too, and it cannot close a loop; cut the loop"));
   CHECK_THAT(getSdfError(makeFourBar("<model name=\"n\"><link name=\"l\"/></model>")),
              Catch::Contains("it contains other models; put"));
+}
+
+TEST_CASE("joints of Drake that name a frame on either link join these frames, wherever their links are drawn") {
+  const auto link = [](const std::string& name, const std::string& pose) {
+    return "<link name=\"" + name + "\"><pose>" + pose +
+           "</pose><inertial><pose>0.1 0.2 0.3 0 0 0</pose><mass>2</mass><inertia><ixx>1</ixx><iyy>0.8</iyy><izz>0.5"
+           "</izz></inertia></inertial></link>\n";
+  };
+  const auto joint = [](const std::string& name, const std::string& links, const std::string& more) {
+    return "<joint name=\"" + name + "\" type=\"revolute\">" + links + more + "</joint>\n";
+  };
+  const auto frame = [](const std::string& name, const std::string& on, const std::string& pose) {
+    return "<frame name=\"" + name + "\" attached_to=\"" + on + "\"><pose>" + pose + "</pose></frame>\n";
+  };
+  const auto wrap = [](const std::string& model) {
+    return "<sdf version=\"1.7\"><model name=\"m\">\n<link "
+           "name=\"ground\"><inertial><mass>0</mass><inertia><ixx>0</ixx>"
+           "<iyy>0</iyy><izz>0</izz></inertia></inertial></link><joint name=\"weld\" "
+           "type=\"fixed\"><parent>world</parent>"
+           "<child>ground</child></joint>\n" +
+           model + "</model></sdf>";
+  };
+  const std::string to_a = "<parent>ground</parent><child>a</child>", to_b = "<parent>a</parent><child>b</child>";
+  const std::string y = "<axis><xyz>0 1 0</xyz></axis>", x = "<axis><xyz>1 0 0</xyz></axis>";
+  const LoadedRobot plain = loadSdf(wrap(link("a", "0 0 1 0 0 0") + link("b", "0.3 0 1.5 0 0 -0.4") +
+                                         joint("one", to_a, y) + joint("two", to_b, "<pose>0 0 0 0 0 0.4</pose>" + x)));
+  const auto makeFrames = [](const std::string& parent, const std::string& child) {
+    return "<drake:parent_frame>" + parent + "</drake:parent_frame><drake:child_frame>" + child +
+           "</drake:child_frame>";
+  };
+  const std::string drawn = link("a", "5 5 5 1 1 1") + link("b", "-3 2 1 0.1 0.2 0.3") +
+                            frame("C", "b", "0 0 0 0 0 0.4") + frame("P", "a", "0.3 0 0.5 0 0 0") +
+                            frame("W", "ground", "0 0 1 0 0 0");
+  const LoadedRobot drake = loadSdf(
+      wrap(drawn + joint("one", to_a, makeFrames("W", "a") + y) + joint("two", to_b, makeFrames("P", "C") + x)));
+  CHECK(drake.warnings.empty());
+  const Difference d = compare(plain.model, drake.model, plain.model.makeNeutral());
+  CHECK(d.missing == "");
+  CHECK(d.mass_matrix < 1e-12);
+  CHECK(d.bias < 1e-12);
+
+  // Not assembled in the file: rods of 1, 4.8 and 2 m on ground of 4 m.
+  const LoadedRobot open = loadSdf(
+      wrap(link("a", "0 0 0 0 0 0") + link("b", "0 0 1 0 0 0") + link("c", "9 0 0 0 0 0") +
+           frame("A0", "ground", "-2 0 0 0 0 0") + frame("D0", "ground", "2 0 0 0 0 0") +
+           frame("A1", "a", "0 0 1 0 0 0") + frame("B1", "b", "-2.4 0 0 0 0 0") + frame("B2", "b", "2.4 0 0 0 0 0") +
+           frame("D1", "c", "0 0 2 0 0 0") + joint("crank", to_a, makeFrames("A0", "a") + y) +
+           joint("rocker", "<parent>ground</parent><child>c</child>", makeFrames("D0", "c") + y) +
+           joint("rod", to_b, makeFrames("A1", "B1") + y) +
+           joint("pin", "<parent>b</parent><child>c</child>", makeFrames("B2", "D1") + y)));
+  const Model& model = open.model;
+  REQUIRE(model.closures().size() == 1);
+  const Closure& pin = model.closures()[0];
+  CHECK((pin.X_B1.p - Vector3d(4.8, 0, 0)).norm() < 1e-12);
+  CHECK((pin.X_B2.p - Vector3d(0, 0, 2)).norm() < 1e-12);
+  CHECK((model.joints()[model.findJoint("rod")].X_PJ.p - Vector3d(0, 0, 1)).norm() < 1e-12);
+  CHECK((model.joints()[model.findJoint("rocker")].X_PJ.p - Vector3d(2, 0, 0)).norm() < 1e-12);
+  const AssemblyResult closed = assembleReference(model, "initial");
+  CHECK(closed.status == NumericalStatus::Ok);
+  CHECK(calcMobility(model, closed.q).mobility == 1);
+
+  CHECK_THAT(
+      getError([&] { loadSdf(wrap(drawn + joint("one", to_a, "<drake:child_frame>a</drake:child_frame>" + y))); }),
+      Catch::Contains("on one of its links alone") && Catch::Contains("give both"));
+  CHECK_THAT(getError([&] { loadSdf(wrap(drawn + joint("one", to_a, makeFrames("P", "a") + y))); }),
+             Catch::Contains("not fixed to link 'ground'"));
 }

@@ -61,6 +61,12 @@ RobotFiles SdfReader::read() {
   for (uint64_t i = 0; i < model_->JointCount(); ++i) names_.insert(model_->JointByIndex(i)->Name());
   for (uint64_t i = 0; i < model_->FrameCount(); ++i) names_.insert(model_->FrameByIndex(i)->Name());
   chooseCarriers();
+  if (element_) readJointFrames(*element_);
+  if (!joint_frames_.empty()) {
+    moveLinks("world");
+    for (uint64_t i = 0; i < model_->LinkCount(); ++i)
+      if (const std::string& link = model_->LinkByIndex(i)->Name(); !carriers_.count(link)) moveLinks(link);
+  }
   for (uint64_t i = 0; i < model_->LinkCount(); ++i) readLink(*model_->LinkByIndex(i));
   addBelow("world");
   for (uint64_t i = 0; i < model_->LinkCount(); ++i)
@@ -163,6 +169,11 @@ SE3 SdfReader::getPlace(const sdf::SemanticPose& semantic) const {
   return X_WM_ * toSE3(pose);
 }
 
+SE3 SdfReader::getPlace(const sdf::SemanticPose& semantic, const std::string& link) const {
+  const auto moved = moves_.find(link);
+  return moved == moves_.end() ? getPlace(semantic) : moved->second * getPlace(semantic);
+}
+
 std::string SdfReader::getParent(const sdf::Joint& joint) const {
   std::string link;
   check(joint.ResolveParentLink(link));
@@ -229,12 +240,15 @@ void SdfReader::addRoot(const std::string& link) {
 SE3 SdfReader::getLinkPlace(const std::string& link) const { return X_WL_.at(link); }
 
 void SdfReader::readLink(const sdf::Link& link) {
-  const SE3 X_WS = getPlace(link.SemanticPose());
+  const SE3 X_WS = getPlace(link.SemanticPose(), link.Name());
   SE3 X_WL = X_WS;
   const auto carrier = carriers_.find(link.Name());
   if (carrier != carriers_.end() && carrier->second->Type() != sdf::JointType::FIXED &&
-      carrier->second->Type() != sdf::JointType::PRISMATIC)
-    X_WL.p = getPlace(carrier->second->SemanticPose()).p;
+      carrier->second->Type() != sdf::JointType::PRISMATIC) {
+    const auto frames = joint_frames_.find(carrier->second->Name());
+    X_WL.p = frames == joint_frames_.end() ? getPlace(carrier->second->SemanticPose(), link.Name()).p
+                                           : (moves_.at(link.Name()) * frames->second.X_WC).p;
+  }
   if (carrier != carriers_.end() && carrier->second->Type() == sdf::JointType::UNIVERSAL)
     if (const auto axes = findUniversalAxes(*carrier->second)) X_WL.R = X_WS.R * *axes;
   X_WL_[link.Name()] = X_WL;
@@ -268,7 +282,7 @@ void SdfReader::readFrame(const sdf::Frame& frame) {
   std::string link;
   check(frame.ResolveAttachedToBody(link));
   if (!X_WL_.count(link)) fail("frame '" + frame.Name() + "'", "it is not attached to a link", "attach it to one");
-  addFrame(frame.Name(), link, getPlace(frame.SemanticPose()));
+  addFrame(frame.Name(), link, getPlace(frame.SemanticPose(), link));
 }
 
 // The bodies of the file stand where its loops are closed.
@@ -296,7 +310,7 @@ void SdfReader::noteElements(const XMLElement& element) {
       {"model", {"link", "joint", "frame", "pose", "static", "include"}},
       {"link", {"pose", "inertial", "visual", "collision"}},
       {"inertial", {"pose", "mass", "inertia"}},
-      {"joint", {"parent", "child", "pose", "axis", "axis2"}},
+      {"joint", {"parent", "child", "pose", "axis", "axis2", "drake:parent_frame", "drake:child_frame"}},
       {"axis", {"xyz", "limit", "dynamics", "mimic", "use_parent_model_frame"}},
       {"axis2", {"xyz", "limit", "dynamics", "use_parent_model_frame"}},
       {"limit", {"lower", "upper", "effort", "velocity"}},

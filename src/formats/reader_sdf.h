@@ -4,7 +4,8 @@
 ///
 /// The bodies of a robot stand in the file where all joints are at zero. A body may be the child of several joints: one carries
 /// it, the others close loops. The frame of a body keeps its directions, unless it hangs on a universal joint, and has its origin on
-/// the joint that carries it.
+/// the joint that carries it. Joints with <drake:parent_frame> and <drake:child_frame> join these frames, wherever the file draws
+/// their links.
 #include <sdf/sdf.hh>
 #include <set>
 
@@ -37,7 +38,9 @@ class SdfReader {
   [[noreturn]] void fail(const std::string& element, const std::string& problem, const std::string& remedy) const;
   void check(const sdf::Errors& errors) const;
   static SE3 toSE3(const ignition::math::Pose3d& pose);
-  SE3 getPlace(const sdf::SemanticPose& pose) const;  // in the world
+  SE3 getPlace(const sdf::SemanticPose& pose) const;  // in the world, as the file draws it
+  SE3 getPlace(const sdf::SemanticPose& pose,
+               const std::string& link) const;  // with all joints at zero, fixed to a link
   std::string getParent(const sdf::Joint& joint) const;
   std::string getChild(const sdf::Joint& joint) const;
   SE3 getLinkPlace(const std::string& link) const;  // of our frame of it, in the world
@@ -63,6 +66,8 @@ class SdfReader {
   const XMLElement& getEntry(const XMLElement& e, const std::string& tag) const;
   Vector3d getVector(const XMLElement& e, const std::string& tag) const;
   std::pair<std::string, SE3> findDrakeFrame(const XMLElement& e, const std::string& tag) const;
+  void readJointFrames(const XMLElement& model);
+  void moveLinks(const std::string& link);
 
   const std::string path_;
   XMLDocument document_;
@@ -80,6 +85,12 @@ class SdfReader {
       carried_;  // by the link that they are on, in the order of the file
   std::vector<const sdf::Joint*> closing_;
   std::set<std::string> names_;
+  // Of joints of Drake that have a frame on either link, and where these frames stand in the file.
+  struct JointFrames {
+    SE3 X_WP, X_WC;
+  };
+  std::map<std::string, JointFrames> joint_frames_;  // by joint
+  std::map<std::string, SE3> moves_;                 // by link: from where the file draws it to all joints at zero
 };
 
 }  // namespace bielle

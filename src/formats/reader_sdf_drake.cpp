@@ -39,15 +39,46 @@ Vector3d SdfReader::getVector(const XMLElement& e, const std::string& tag) const
 std::pair<std::string, SE3> SdfReader::findDrakeFrame(const XMLElement& e, const std::string& tag) const {
   const XMLElement& entry = getEntry(e, tag);
   const std::string name = entry.GetText();
-  if (const sdf::Link* link = model_->LinkByName(name)) return {name, getPlace(link->SemanticPose())};
+  if (const sdf::Link* link = model_->LinkByName(name)) return {name, getPlace(link->SemanticPose(), name)};
   if (name == "world") return {name, {}};
   const sdf::Frame* frame = model_->FrameByName(name);
   if (!frame) fail(describe(entry), "there is no link or frame '" + name + "'", "correct the name");
   std::string link;
   check(frame->ResolveAttachedToBody(link));
-  if (!X_WL_.count(link))
+  if (link != "world" && !model_->LinkByName(link))
     fail(describe(entry), "the frame '" + name + "' is not attached to a link", "attach it to one");
-  return {link, getPlace(frame->SemanticPose())};
+  return {link, getPlace(frame->SemanticPose(), link)};
+}
+
+void SdfReader::readJointFrames(const XMLElement& model) {
+  for (const XMLElement* e : getChildren(model, "joint")) {
+    const sdf::Joint* joint = model_->JointByName(getAttribute(e, "name"));
+    const bool has_parent = e->FirstChildElement("drake:parent_frame"),
+               has_child = e->FirstChildElement("drake:child_frame");
+    if (!joint || (!has_parent && !has_child)) continue;
+    if (has_parent != has_child)
+      fail(describe(*e), "it has a frame of Drake on one of its links alone",
+           "give both <drake:parent_frame> and <drake:child_frame>");
+    const auto find = [&](const std::string& tag, const std::string& link) {
+      const auto [on, X] = findDrakeFrame(*e, tag);
+      if (on != link)
+        fail(describe(getEntry(*e, tag)), "it is not fixed to link '" + link + "'", "name a frame that is");
+      return X;
+    };
+    joint_frames_[joint->Name()] = {find("drake:parent_frame", getParent(*joint)),
+                                    find("drake:child_frame", getChild(*joint))};
+  }
+}
+
+// Puts what hangs on a link where its joints are at zero.
+void SdfReader::moveLinks(const std::string& link) {
+  const SE3& moved = moves_[link];
+  for (const sdf::Joint* joint : carried_[link]) {
+    const auto frames = joint_frames_.find(joint->Name());
+    const std::string child = getChild(*joint);
+    moves_[child] = frames == joint_frames_.end() ? moved : moved * frames->second.X_WP * frames->second.X_WC.inverse();
+    moveLinks(child);
+  }
 }
 
 // Stiff springs between two frames, which stand for the joint that leaves free what has no stiffness.

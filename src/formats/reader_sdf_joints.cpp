@@ -16,9 +16,18 @@ std::string describeSdf(const sdf::Joint& joint) { return "joint '" + joint.Name
 // In the directions of the child as the file gives it.
 Vector3d SdfReader::resolveAxis(const sdf::Joint& joint, int k) const {
   const sdf::JointAxis* axis = joint.Axis(k);
+  const auto frames = joint_frames_.find(joint.Name());
+  const bool in_own_frame = axis && frames != joint_frames_.end() &&
+                            (axis->XyzExpressedIn().empty() || axis->XyzExpressedIn() == joint.Name());
   ignition::math::Vector3d v;
-  if (axis) check(axis->ResolveXyz(v, getChild(joint)));
-  const Vector3d direction(v.X(), v.Y(), v.Z());
+  if (in_own_frame)
+    v = axis->Xyz();
+  else if (axis)
+    check(axis->ResolveXyz(v, getChild(joint)));
+  Vector3d direction(v.X(), v.Y(), v.Z());
+  if (in_own_frame)
+    direction =
+        getPlace(model_->LinkByName(getChild(joint))->SemanticPose()).R.transpose() * frames->second.X_WC.R * direction;
   const double norm = direction.stableNorm();
   if (!axis || !(norm > 1e-12) || !std::isfinite(norm))
     fail(describeSdf(joint), "its axis is not a direction", "give a non-zero vector");
@@ -28,7 +37,7 @@ Vector3d SdfReader::resolveAxis(const sdf::Joint& joint, int k) const {
 // In our frame of the child.
 Vector3d SdfReader::getAxis(const sdf::Joint& joint, int k) const {
   const std::string child = getChild(joint);
-  const Matrix3d R_WS = getPlace(model_->LinkByName(child)->SemanticPose()).R;
+  const Matrix3d R_WS = getPlace(model_->LinkByName(child)->SemanticPose(), child).R;
   return getLinkPlace(child).R.transpose() * R_WS * resolveAxis(joint, k);
 }
 
@@ -134,13 +143,17 @@ void SdfReader::addClosure(const sdf::Joint& joint) {
   const std::string parent = getParent(joint), child = getChild(joint);
   ClosureKind kind = ClosureKind::Weld6D;
   Vector3d axis = Vector3d::UnitZ();
-  const SE3 X_WJ = getPlace(joint.SemanticPose());
+  SE3 X_WP = getPlace(joint.SemanticPose(), parent), X_WC = getPlace(joint.SemanticPose(), child);
+  if (const auto frames = joint_frames_.find(joint.Name()); frames != joint_frames_.end()) {
+    X_WP = moves_.at(parent) * frames->second.X_WP;
+    X_WC = moves_.at(child) * frames->second.X_WC;
+  }
   if (joint.Type() == sdf::JointType::BALL) kind = ClosureKind::Ball3D;
   if (joint.Type() == sdf::JointType::PRISMATIC) kind = ClosureKind::Slider;
   if (joint.Type() == sdf::JointType::REVOLUTE || joint.Type() == sdf::JointType::CONTINUOUS)
     kind = ClosureKind::Hinge5D;
   if (hasAxis(kind)) {
-    axis = X_WJ.R.transpose() * getLinkPlace(child).R * getAxis(joint, 0);
+    axis = X_WC.R.transpose() * getLinkPlace(child).R * getAxis(joint, 0);
     UrdfJoint unused;
     unused.joint.kind = kind == ClosureKind::Slider ? JointKind::Prismatic : JointKind::Revolute;
     const size_t forces = yaml_.joint_forces.size();
@@ -150,7 +163,7 @@ void SdfReader::addClosure(const sdf::Joint& joint) {
                                ": it closes a loop: its range, spring, damping and friction are left out");
     yaml_.joint_forces.resize(forces);
   }
-  addClosure(joint.Name(), kind, axis, parent, X_WJ, child, X_WJ);
+  addClosure(joint.Name(), kind, axis, parent, X_WP, child, X_WC);
 }
 
 }  // namespace bielle
