@@ -19,6 +19,7 @@
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "report/run.h"
+#include "results/number_option.h"
 #include "robots/generator_entry.h"
 
 namespace fs = std::filesystem;
@@ -220,7 +221,7 @@ void addSynthesize(CLI::App& command, Action& action) {
   CLI::Option* ratio = command.add_option("--ratio", a->ratio,
                                           "requested turns of the motor per turn of the joint, over the whole range, "
                                           "in either direction");
-  ratio->check(CLI::PositiveNumber);
+  ratio->check(isPositive());
   CLI::Option* joint =
       command.add_option("--joint", a->joint, "joint of --like, --motion and --parameter, of the same name in all");
   CLI::Option* like = command.add_option("--like", a->like, "robot whose linkage has the requested ratios");
