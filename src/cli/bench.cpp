@@ -141,7 +141,7 @@ void addBench(CLI::App& command, Action& action) {
   arguments->robot.name = "bipetto";
   command
       .add_option("--robot", arguments->robot.name,
-                  "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file of a robot with two feet")
+                  "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file of a robot with two feet")
       ->capture_default_str();
   command.add_option("--threads", arguments->options.threads, "number of threads to compare with one")
       ->check(CLI::Range(1, kMostThreads))

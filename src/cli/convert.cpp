@@ -15,6 +15,7 @@
 #include "formats/process.h"
 #include "formats/sdf.h"
 #include "formats/text_file.h"
+#include "formats/usd.h"
 #include "model/payload.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
@@ -93,6 +94,10 @@ int convert(const ConvertArguments& arguments) {
     const SdfText text = formatSdf(robot.model, findClosedConfiguration(robot.model).q);
     warn(text.warnings);
     writeTextFile(arguments.output, text.xml);
+  } else if (arguments.format == "usd") {
+    const UsdText text = formatUsd(robot.model, findClosedConfiguration(robot.model).q);
+    warn(text.warnings);
+    writeTextFile(arguments.output, text.usda);
   } else {
     MjcfOptions options;
     if (arguments.joints == "hinges") options.rotations = MjcfRotations::Hinges;
@@ -108,7 +113,7 @@ int convert(const ConvertArguments& arguments) {
 
 void addConvert(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ConvertArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
+  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
       ->required();
   command
       .add_option("--to", arguments->format,
@@ -116,8 +121,8 @@ void addConvert(CLI::App& command, Action& action) {
                   "Drake; dxf: plates of the plane links, for a workshop; mjcf: a MuJoCo file; sdf: a Gazebo file with "
                   "loops; sheet: an SVG drawing with distances, and a CSV file of lengths, masses and motors; step: "
                   "solids for CAD "
-                  "(AP214), an assembly of links; urdf: a URDF alone")
-      ->check(CLI::IsMember({"bielle", "drake", "dxf", "mjcf", "sdf", "sheet", "step", "urdf"}))
+                  "(AP214), an assembly of links; urdf: a URDF alone; usd: a USD file with loops for Isaac and Newton")
+      ->check(CLI::IsMember({"bielle", "drake", "dxf", "mjcf", "sdf", "sheet", "step", "urdf", "usd"}))
       ->capture_default_str();
   command
       .add_option(
@@ -153,10 +158,14 @@ void addConvert(CLI::App& command, Action& action) {
       "NOTES.\n"
       "A STEP file (mm) has the boxes, cylinders and spheres of the drawing, each link at its place in the closed "
       "posture.\n"
+      "In USD, loops are joints with excludeFromArticulation, and motors drives without a servo; programs that read it "
+      "keep the\n"
+      "digits of float.\n"
       "A URDF alone is a tree: loops are left out, linear couplers of two joints become <mimic>.\n"
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
       "  bielle convert bipetto --to mjcf --joints hinges -o trained.xml\n"
+      "  bielle convert bipetto --to usd -o bipetto.usda\n"
       "  bielle convert leg_biped --to dxf -o plates.dxf\n"
       "  bielle convert leg_biped --to sheet -o leg.svg\n"
       "  bielle convert leg_biped --to step -o leg.step\n"

@@ -60,7 +60,8 @@ void printInfo(const Json& robot) {
 void addInfo(CLI::App& command, Action& action) {
   const auto robot = std::make_shared<RobotArgument>();
   const auto as_json = std::make_shared<bool>(false);
-  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")->required();
+  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
+      ->required();
   addFixedBase(command, *robot);
   command.add_flag("--json", *as_json, "print JSON");
   command.footer(

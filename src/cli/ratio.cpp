@@ -74,7 +74,7 @@ int run(const RatioArguments& arguments) {
 
 void addRatio(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<RatioArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
+  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
       ->required();
   command
       .add_option("--joint", arguments->joints,

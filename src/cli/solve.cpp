@@ -274,7 +274,7 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
 }
 
 void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
-  sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf, .sdf, .yaml or MuJoCo .xml file")
+  sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
       ->required();
   sub.add_option("-o,--output", arguments->directory,
                  "directory for trajectory.csv, trajectory.npz, summary.json, the robot (mechanism.urdf, .yaml) and "

@@ -32,7 +32,7 @@ std::string takeNumbers(const std::string& text, size_t from, size_t count) {
 
 }  // namespace
 
-void Decimals::add(const std::string& text, double unit) {
+void Decimals::add(const std::string& text, double unit, bool are_floats) {
   std::istringstream stream(text);
   for (std::string word; stream >> word;) {
     const std::optional<double> value = parseNumber(word);
@@ -56,7 +56,7 @@ void Decimals::add(const std::string& text, double unit) {
     if (static_cast<int>(largest_.size()) <= digits) largest_.resize(digits + 1, 0);
     largest_[digits] = std::max(largest_[digits], std::abs(*value) * unit);
     most_digits_ = std::max(most_digits_, digits);
-    if (digits >= kDigitsOfFloat) {
+    if (are_floats || digits >= kDigitsOfFloat) {
       const double off = std::abs(*value - static_cast<double>(static_cast<float>(*value))) * unit;
       all_floats_ = all_floats_ && off <= 0.51 * last;
       float_ = std::max(float_, std::abs(*value) * unit * std::pow(2, -24));

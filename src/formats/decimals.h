@@ -17,7 +17,8 @@ namespace bielle {
 class Decimals {
  public:
   /// \param text  anything; what is no number is passed over   \param unit  of these numbers
-  void add(const std::string& text, double unit = 1);
+  /// \param are_floats  whether they are floats by the format, however few digits they need
+  void add(const std::string& text, double unit = 1, bool are_floats = false);
   int most_digits() const { return most_digits_; }
   /// 0 without numbers.
   double calcHalfUnit() const;

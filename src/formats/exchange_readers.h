@@ -13,4 +13,7 @@ RobotFiles readMjcf(const std::string& path);
 /// not installed
 RobotFiles readSdf(const std::string& path);
 
+/// A file of USD in text form. \throws InputError for what is no usda, refers to other files, or cannot be read as a robot
+RobotFiles readUsd(const std::string& path);
+
 }  // namespace bielle

@@ -62,4 +62,33 @@ std::optional<Inertia> calcMeshInertia(const Eigen::Matrix3Xd& corners, MeshSoli
   return inertia;
 }
 
+std::optional<Inertia> calcPrimitiveInertia(const std::string& type, const Vector3d& half) {
+  const double a = half[0], b = half[1], c = half[2];
+  double volume = 0;
+  Vector3d moments = Vector3d::Zero();  // per mass
+  const auto fromSquares = [](double xx, double yy, double zz) { return Vector3d(yy + zz, xx + zz, xx + yy); };
+  if (type == "sphere" || type == "ellipsoid") {
+    const double y = type == "sphere" ? a : b, z = type == "sphere" ? a : c;
+    volume = 4 * EIGEN_PI / 3 * a * y * z;
+    moments = fromSquares(a * a / 5, y * y / 5, z * z / 5);
+  } else if (type == "box") {
+    volume = 8 * a * b * c;
+    moments = fromSquares(a * a / 3, b * b / 3, c * c / 3);
+  } else if (type == "cylinder") {
+    volume = 2 * EIGEN_PI * a * a * b;
+    moments = fromSquares(a * a / 4, a * a / 4, b * b / 3);
+  } else if (type == "capsule") {
+    // A cylinder and two half balls, whose centres of mass are 3/8 of the radius beyond its ends.
+    const double tube = 2 * EIGEN_PI * a * a * b, ball = 4 * EIGEN_PI / 3 * a * a * a, far = b + 3 * a / 8;
+    volume = tube + ball;
+    if (!(volume > 0)) return Inertia();
+    const double xx = (tube * a * a / 4 + ball * a * a / 5) / volume,
+                 zz = (tube * b * b / 3 + ball * (a * a / 5 - 9 * a * a / 64 + far * far)) / volume;
+    moments = fromSquares(xx, xx, zz);
+  } else {
+    return {};
+  }
+  return Inertia{volume, Vector3d::Zero(), moments.asDiagonal()};
+}
+
 }  // namespace bielle

@@ -1,6 +1,7 @@
 #pragma once
-// Mass and moments of what a mesh encloses.
+// Mass and moments of what a mesh encloses, and of simple solids.
 #include <optional>
+#include <string>
 
 #include "bielle/math/se3.h"
 
@@ -16,5 +17,10 @@ enum class MeshSolid {
 /// \param corners  of the triangles, three columns each
 /// \returns none without a volume or an area
 std::optional<Inertia> calcMeshInertia(const Eigen::Matrix3Xd& corners, MeshSolid solid);
+
+/// Volume, and moments per mass about the centre, of a box, sphere, ellipsoid, or of a cylinder or capsule along z.
+/// \param half  half edges; radius; half axes; radius and half length between the ends, or between the half balls
+/// \returns none for other types
+std::optional<Inertia> calcPrimitiveInertia(const std::string& type, const Vector3d& half);
 
 }  // namespace bielle

@@ -177,7 +177,7 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   const auto& readers = getRobotSources().readers;
   if (const auto reader = readers.find(path.extension().string()); reader != readers.end())
     return reader->second(path.string());
-  if (path.extension() == ".xml" || path.extension() == ".sdf")
+  if (contains(listExchangeExtensions(), path.extension().string()))
     throw MissingPart("the reader of " + path.extension().string() + " files");
   RobotFiles files;
   files.urdf = parseUrdf(readRobotText(path.string()), path.string(), files.yaml);

@@ -29,10 +29,10 @@ bool isDirectory(const fs::path& path) {
 }
 
 bool isTree(const fs::path& path) {
-  return path.extension() == ".urdf" || path.extension() == ".xml" || path.extension() == ".sdf";
+  return path.extension() == ".urdf" || contains(listExchangeExtensions(), path.extension().string());
 }
 
-// robot.urdf, else the one named as the directory, else the only one; without any, the YAML, MJCF or SDF named as the
+// robot.urdf, else the one named as the directory, else the only one; without any, the YAML, MJCF, SDF or USD named as the
 // directory.
 std::string findInDirectory(const fs::path& directory) {
   const fs::path named = fs::absolute(directory).lexically_normal();
@@ -44,7 +44,9 @@ std::string findInDirectory(const fs::path& directory) {
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
     if (it->path().extension() == ".urdf" && isFile(it->path())) found.push_back(it->path().string());
   if (found.size() == 1) return found.front();
-  for (const char* extension : {".yaml", ".xml", ".sdf"})
+  std::vector<std::string> extensions = listExchangeExtensions();
+  extensions.insert(extensions.begin(), ".yaml");
+  for (const std::string& extension : extensions)
     if (found.empty() && isFile(directory / (stem + extension))) return (directory / (stem + extension)).string();
   if (found.empty())
     for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
@@ -57,9 +59,10 @@ std::string findInDirectory(const fs::path& directory) {
 
 // In the directories of robots; empty when there is none.
 std::string findByName(const std::string& name) {
+  std::vector<std::string> files = {name + ".urdf", "robot.urdf", name + ".yaml"};
+  for (const std::string& extension : listExchangeExtensions()) files.push_back(name + extension);
   for (const std::string& directory : getRobotDirectories())
-    for (const std::string& file :
-         {name + ".urdf", std::string("robot.urdf"), name + ".yaml", name + ".xml", name + ".sdf"})
+    for (const std::string& file : files)
       if (const fs::path path = fs::path(directory) / name / file; isFile(path)) return path.string();
   return "";
 }
@@ -80,6 +83,11 @@ bool isRobotByItself(const fs::path& path) {
 }
 
 }  // namespace
+
+const std::vector<std::string>& listExchangeExtensions() {
+  static const std::vector<std::string> extensions = {".xml", ".sdf", ".usda", ".usd", ".usdc", ".usdz"};
+  return extensions;
+}
 
 std::string readRobotText(const std::string& path) {
   std::error_code unknown;
@@ -135,8 +143,10 @@ std::vector<std::string> listRobots() {
     std::error_code error;
     for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
       const std::string name = it->path().filename().string();
-      if (isFile(it->path() / (name + ".urdf")) || isFile(it->path() / (name + ".xml")) ||
-          isFile(it->path() / (name + ".sdf")) || isRobotByItself(it->path() / (name + ".yaml")))
+      const auto has = [&](const std::string& extension) { return isFile(it->path() / (name + extension)); };
+      const std::vector<std::string>& others = listExchangeExtensions();
+      if (has(".urdf") || std::any_of(others.begin(), others.end(), has) ||
+          isRobotByItself(it->path() / (name + ".yaml")))
         names.insert(name);
     }
   }

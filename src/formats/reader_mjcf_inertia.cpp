@@ -174,32 +174,10 @@ Inertia MjcfReader::readSolid(const Child& child) {
 
 // Volume, and moments per mass about its own frame.
 Inertia MjcfReader::calcPrimitive(const MjcfElement& e, const Shape& shape) {
-  const double a = shape.size[0], b = shape.size[1], c = shape.size[2];
-  double volume = 0;
-  Vector3d moments = Vector3d::Zero();  // per mass
-  const auto fromSquares = [](double xx, double yy, double zz) { return Vector3d(yy + zz, xx + zz, xx + yy); };
-  if (shape.type == "sphere" || shape.type == "ellipsoid") {
-    const double y = shape.type == "sphere" ? a : b, z = shape.type == "sphere" ? a : c;
-    volume = 4 * EIGEN_PI / 3 * a * y * z;
-    moments = fromSquares(a * a / 5, y * y / 5, z * z / 5);
-  } else if (shape.type == "box") {
-    volume = 8 * a * b * c;
-    moments = fromSquares(a * a / 3, b * b / 3, c * c / 3);
-  } else if (shape.type == "cylinder") {
-    volume = 2 * EIGEN_PI * a * a * b;
-    moments = fromSquares(a * a / 4, a * a / 4, b * b / 3);
-  } else if (shape.type == "capsule") {
-    // A cylinder and two half balls, whose centres of mass are 3/8 of the radius beyond its ends.
-    const double tube = 2 * EIGEN_PI * a * a * b, ball = 4 * EIGEN_PI / 3 * a * a * a, far = b + 3 * a / 8;
-    volume = tube + ball;
-    if (!(volume > 0)) return {};
-    const double xx = (tube * a * a / 4 + ball * a * a / 5) / volume,
-                 zz = (tube * b * b / 3 + ball * (a * a / 5 - 9 * a * a / 64 + far * far)) / volume;
-    moments = fromSquares(xx, xx, zz);
-  } else {
+  const std::optional<Inertia> solid = calcPrimitiveInertia(shape.type, {shape.size[0], shape.size[1], shape.size[2]});
+  if (!solid)
     e.fail("its type '" + shape.type + "' is unknown", "use sphere, capsule, ellipsoid, cylinder, box, mesh or plane");
-  }
-  return {volume, Vector3d::Zero(), moments.asDiagonal()};
+  return *solid;
 }
 
 }  // namespace bielle

@@ -169,6 +169,9 @@ struct RobotFiles {
   YamlFile yaml;
 };
 
+/// Extensions of files that stand for both files of a robot: those of MuJoCo, SDF and USD.
+const std::vector<std::string>& listExchangeExtensions();
+
 /// The files that formatRobot() wrote the text of. \param path  named in errors, and the place of meshes
 RobotFiles parseRobotText(const RobotText& text, const std::string& path);
 

@@ -17,8 +17,10 @@
 #include "bielle/results/result.h"
 #include "formats/aside_file.h"
 #include "formats/process.h"
+#include "formats/robot_files.h"
 #include "formats/text_file.h"
 #include "model/hash.h"
+#include "model/listing.h"
 #include "model/number_text.h"
 #include "results/json_text.h"
 #include "tasks/case_task.h"
@@ -228,7 +230,7 @@ std::vector<fs::path> listRobotFiles(const fs::path& directory) {
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(directory))
     if (const fs::path type = entry.path().extension();
-        type == ".urdf" || type == ".yaml" || type == ".xml" || type == ".sdf")
+        type == ".urdf" || type == ".yaml" || contains(listExchangeExtensions(), type.string()))
       files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   return files;
