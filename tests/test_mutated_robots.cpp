@@ -11,6 +11,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "formats/mjcf.h"
 #include "formats/sdf.h"
+#include "formats/usd.h"
 #include "robot_directory.h"
 #include "robot_trial.h"
 
@@ -201,31 +202,43 @@ TEST_CASE("Mutated robot files are models or clear errors") {
   CHECK(said.size() > 30);
 }
 
-TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
-  constexpr int kTrials = 2000;
+namespace {
+
+// Mutations of some robots in another format.
+template <typename Format>
+void tryMutatedFiles(int trials, const std::string& file, const Format& format) {
   std::vector<std::string> files;
   for (const char* name : {"fourbar", "fivebar_leg", "spring_leg", "belt_biped"}) {
     const Model model = loadRobot(BIELLE_SOURCE_DIR "/robots/" + std::string(name)).model;
-    files.push_back(formatMjcf(model, findClosedConfiguration(model).q).xml);
+    files.push_back(format(model, findClosedConfiguration(model).q));
   }
   const RobotDirectory directory;
   std::map<Trial, int> count;
   std::map<std::string, int> said;
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < trials; ++i) {
     Random rng(i);
-    const std::string path =
-        directory.write("robot.xml", mutate(files[choose(rng, static_cast<int>(files.size()))], rng));
+    const std::string path = directory.write(file, mutate(files[choose(rng, static_cast<int>(files.size()))], rng));
     const TrialResult result = tryRobot(path);
     ++count[result.trial];
     if (result.trial == Trial::Refused) ++said[result.message.substr(result.message.rfind("; "))];
     CAPTURE(i, result.message);
     CHECK(result.trial != Trial::Wrong);
   }
-  std::cout << kTrials << " mutated files of MuJoCo: " << count[Trial::Valid] << " models, " << count[Trial::Refused]
+  std::cout << trials << " mutations of " << file << ": " << count[Trial::Valid] << " models, " << count[Trial::Refused]
             << " refused with " << said.size() << " different remedies\n";
-  CHECK(count[Trial::Valid] > kTrials / 20);
-  CHECK(count[Trial::Refused] > kTrials / 4);
+  CHECK(count[Trial::Valid] > trials / 20);
+  CHECK(count[Trial::Refused] > trials / 4);
   CHECK(said.size() > 20);
+}
+
+}  // namespace
+
+TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
+  tryMutatedFiles(2000, "robot.xml", [](const Model& model, const VectorXd& q) { return formatMjcf(model, q).xml; });
+}
+
+TEST_CASE("Mutated files of USD are models or clear errors") {
+  tryMutatedFiles(1000, "robot.usda", [](const Model& model, const VectorXd& q) { return formatUsd(model, q).usda; });
 }
 
 TEST_CASE("Mutated robots of parts are models or clear errors") {

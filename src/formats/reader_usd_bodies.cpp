@@ -142,6 +142,7 @@ std::optional<Visual> UsdReader::readGeometry(const UsdPrim& prim, const Vector3
     out.size = {getNumber(prim, "radius", isCapsule(prim) ? 0.5 : 1) * scale[first],
                 getNumber(prim, "height", isCapsule(prim) ? 1 : 2) * scale[along], 0};
   } else {
+    for (const UsdProperty& property : prim.properties) property.is_used = true;
     note(prim.line, std::string(prim.type),
          "it is left out: only cubes, spheres, cylinders and capsules have shapes here");
     return {};

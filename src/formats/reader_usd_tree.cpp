@@ -122,7 +122,8 @@ void UsdReader::addRoot(int body) {
   root.child = owner.name;
   root.joint.kind = owner.is_kinematic ? JointKind::Fixed : JointKind::FreeFlyer;
   if (owner.is_kinematic) root.joint.X_PJ = owner.X_WS;
-  root.joint.name = joint_names_.count("root_joint") ? owner.name + "_root_joint" : "root_joint";
+  const bool is_first = !owner.is_kinematic && !joint_names_.count("root_joint");
+  root.joint.name = is_first ? "root_joint" : owner.name + "_root_joint";
   root.joint.name = makeUnusedName(root.joint.name, [this](const auto& made) { return joint_names_.count(made) > 0; });
   joint_names_.insert(root.joint.name);
   tree_.joints.push_back(root);
@@ -253,6 +254,7 @@ void UsdReader::addStart() {
     const Eigen::Quaterniond turn(X.R);
     std::vector<double>& q = reference.joints[joint.joint.name];
     if (is_free) q = {X.p.x(), X.p.y(), X.p.z()};
+    has_moved = has_moved || !X.R.isIdentity(1e-6) || (is_free && !X.p.isZero(1e-6));
     for (const double x : {turn.x(), turn.y(), turn.z(), turn.w()}) q.push_back(x);
   }
   if (has_moved || !yaml_.closures.empty()) yaml_.references.push_back(reference);

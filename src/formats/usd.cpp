@@ -118,8 +118,9 @@ class UsdWriter {
 
   UsdText write() {
     root_ = makeUsdName(model_.name());
-    const std::string joints = names_.add("joints");
+    joints_ = names_.add("joints");
     findCouplers();
+    nameJoints();
     out_.add("#usda 1.0");
     out_.add("(");
     for (const std::string& entry : {"    defaultPrim = \"" + root_ + "\"", std::string("    kilogramsPerUnit = 1"),
@@ -130,7 +131,7 @@ class UsdWriter {
     out_.open("Xform", root_, model_.name(), {"PhysicsArticulationRootAPI"});
     if (hasGround()) writeBody(0, "ground", SE3());
     for (int i = 1; i < model_.numBodies(); ++i) writeBodyOfJoint(i);
-    out_.open("Scope", joints, joints);
+    out_.open("Scope", joints_, joints_);
     if (!paths_[0].empty()) writeTie({"ground_joint", "PhysicsFixedJoint", "", paths_[0], {}, {}}, {}, {});
     // Motors in their order, which a reader keeps.
     for (const Motor& motor : model_.motors()) writeJoint(motor.joint);
@@ -274,7 +275,8 @@ class UsdWriter {
   }
 
   void writeTie(const UsdTie& tie, std::vector<std::string> schemas, const Properties& properties) {
-    const std::string name = joint_names_.add(tie.name);
+    const auto named = joint_prims_.find(tie.name);
+    const std::string name = tie.closes || named == joint_prims_.end() ? joint_names_.add(tie.name) : named->second;
     out_.open(tie.type, name, tie.name, schemas);
     if (tie.axis) out_.set("uniform token physics:axis", std::string("\"") + tie.axis + "\"");
     if (!tie.path0.empty()) out_.set("rel physics:body0", "<" + tie.path0 + ">");
@@ -368,6 +370,14 @@ class UsdWriter {
          "its damping and friction are Newton's (newton:damping); PhysX does not read them");
   }
 
+  // Beforehand, since one may follow another that comes later.
+  void nameJoints() {
+    joint_prims_["ground_joint"] = joint_names_.add("ground_joint");
+    for (int i = 1; i < model_.numBodies(); ++i)
+      if (const Joint& joint = model_.joints()[i]; joint.nv == 1)
+        joint_prims_[joint.name] = joint_names_.add(joint.name);
+  }
+
   // Which joint follows which: one without a motor, if there is one, that does not follow another.
   void findCouplers() {
     for (const Closure& closure : model_.closures()) {
@@ -393,7 +403,7 @@ class UsdWriter {
     const bool turn = follower.kind != JointKind::Prismatic && leader.kind != JointKind::Prismatic;
     const double ratio = -other.coefficient / own.coefficient,
                  offset = closure.offset / own.coefficient / (follower.kind == JointKind::Prismatic ? 1 : kDegree);
-    const std::string path = "</" + root_ + "/joints/" + makeUsdName(leader.name) + ">";
+    const std::string path = "</" + root_ + "/" + joints_ + "/" + joint_prims_.at(leader.name) + ">";
     schemas.push_back("NewtonMimicAPI");
     properties.push_back({"rel newton:mimicJoint", path});
     properties.push_back({"float newton:mimicCoef0", formatExact(offset)});
@@ -445,7 +455,8 @@ class UsdWriter {
 
   const Model& model_;
   const VectorXd q_ref_;
-  std::string root_;
+  std::string root_, joints_;                       // names of prims
+  std::map<std::string, std::string> joint_prims_;  // by joint
   UsdNames names_, joint_names_;
   std::vector<SE3> places_;                 // of bodies in the world
   std::vector<std::string> paths_;          // of their prims; empty for a world without a ground

@@ -7,14 +7,14 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf sdf loops mesh json npz)
+[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf sdf usd loops mesh json npz)
 build=$root/build-fuzz
 bielle=${BIELLE:-$root/build/bin/bielle}
 mkdir -p "$build/findings" "$build/seeds"
 
 # Seeds: the robots of the source tree, a small robot's YAML with every key, and a result that the command makes.
 if [ ! -e "$build/seeds/done" ]; then
-  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,sdf,loops,mesh,json,npz}
+  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,sdf,usd,loops,mesh,json,npz}
   cp "$root"/robots/*/*.urdf "$build/seeds/urdf"
   cp "$root"/robots/*/*.yaml "$root"/tests/fuzz/toy.yaml "$build/seeds/yaml"
   sed 's/^  ak80-9:/  m:/' "$root/robots/motors.yaml" >"$build/seeds/motors/all.yaml"
@@ -26,6 +26,7 @@ if [ ! -e "$build/seeds/done" ]; then
   for robot in fourbar fivebar_leg spring_leg belt_biped; do
     "$bielle" convert "$root/robots/$robot" --to mjcf -o "$build/seeds/mjcf/$robot.xml" >/dev/null 2>&1
     "$bielle" convert "$root/robots/$robot" --to sdf -o "$build/seeds/sdf/$robot.sdf" >/dev/null 2>&1
+    "$bielle" convert "$root/robots/$robot" --to usd -o "$build/seeds/usd/$robot.usda" >/dev/null 2>&1
     "$bielle" convert "$root/robots/$robot" --to drake -o "$build/seeds/drake/$robot.urdf" >/dev/null 2>&1
   done
   echo 'closures: [{link_a: hand, link_b: rod, point: [0, 0, 1], axis: [0, 1, 0]}]' >"$build/seeds/loops/hinge.yaml"
@@ -47,7 +48,7 @@ for target in "${targets[@]}"; do
   dictionary=()
   case $target in
     urdf | drake | yaml | motors) dictionary=("-dict=$root/tests/fuzz/robot.dict") ;;
-    mjcf | sdf) dictionary=("-dict=$root/tests/fuzz/$target.dict") ;;
+    mjcf | sdf | usd) dictionary=("-dict=$root/tests/fuzz/$target.dict") ;;
   esac
   if nice "$build/tests/fuzz/fuzz_$target" "$build/corpus/$target" "$build/seeds/$target" -max_total_time="$seconds" \
     -timeout=10 -rss_limit_mb=2048 -malloc_limit_mb=1024 -max_len=65536 -print_final_stats=1 \
