@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that URDF cannot
-/// express; or one MuJoCo or SDF file.
+/// express; or one MuJoCo, SDF or USD file.
 ///
 /// ## The URDF
 /// Links and joints of one tree. Bodies are added depth first, the children of a link in the order of their joints in
@@ -94,6 +94,12 @@
 /// joint, x and y are its axes) and has its origin on its joint. Frames, ranges, springs, damping and friction of joints, visuals
 /// and collisions are read; motors come from a YAML file with `model`. <drake:linear_bushing_rpy> and <drake:ball_constraint> are
 /// loops; joints with <drake:parent_frame> and <drake:child_frame> join these frames.
+///
+/// ## USD files (.usda), by the schema UsdPhysics
+/// One layer in text form, which refers to no other file. Joints have their own places, with coordinates in degrees or units of the
+/// file; where the bodies stand is the reference `initial`. Joints with excludeFromArticulation close loops; where loops remain,
+/// first balls, then hinges without a range close them. Bodies that nothing ties to the world are free, kinematic ones stand. The
+/// frame of a body keeps its directions and has its origin on its joint, where that turns. Drives are motors without their servos.
 #include <optional>
 #include <string>
 #include <vector>
