@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
@@ -117,8 +118,7 @@ TEST_CASE("robots come back from USD with their bodies, loops, ranges, motors an
   CHECK(count > 5);
 }
 
-TEST_CASE("random mechanisms come back from USD with their loops, and what it cannot express is refused by name",
-          "[sweep]") {
+TEST_CASE("random mechanisms come back from USD with their loops, and what it cannot express is refused by name") {
   int same = 0, refused = 0;
   const std::vector<MechanismKind> kinds = listMechanismKinds();
   for (size_t i = 0; i < kinds.size(); ++i) {

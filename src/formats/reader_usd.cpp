@@ -83,6 +83,7 @@ bool isHarmless(std::string_view name) {
                                         "newton:maxHullVertices",
                                         "mjc:maxhullvert",
                                         "newton:selfCollisionEnabled",
+                                        "newton:jointsAddMobility",
                                         "newton:timeSteps",
                                         "newton:maxSolver",
                                         "mjc:shellinertia",

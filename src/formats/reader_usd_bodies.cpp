@@ -153,7 +153,11 @@ std::optional<Visual> UsdReader::readGeometry(const UsdPrim& prim, const Vector3
 
 // What a body draws and lets collide; that of the ground is left out.
 void UsdReader::readShape(const UsdPrim& prim, const UsdTransform& M, int index) {
-  if (index == 0 || prim.hasApi("NewtonSiteAPI") || prim.hasApi("MjcSiteAPI")) return;
+  if (index == 0) return;
+  if (prim.hasApi("NewtonSiteAPI") || prim.hasApi("MjcSiteAPI")) {  // how large it is drawn
+    for (const UsdProperty& property : prim.properties) property.is_used = true;
+    return;
+  }
   UsdBody& body = bodies_[static_cast<size_t>(index)];
   const bool collides = prim.hasApi("PhysicsCollisionAPI") && getFlag(prim, "physics:collisionEnabled", true);
   const bool is_drawn = getUsdText(prim, "purpose") != "guide" && getUsdText(prim, "visibility") != "invisible";

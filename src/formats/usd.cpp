@@ -30,10 +30,6 @@ std::string formatQuaternion(const Matrix3d& R) {
   return "(" + formatExact(q.w()) + ", " + formatExact(Vector3d(q.vec()), ", ") + ")";
 }
 
-std::string formatInfinite(double value) {
-  return std::isfinite(value) ? formatExact(value) : value > 0 ? "inf" : "-inf";
-}
-
 std::string listQuoted(const std::vector<std::string>& items) {
   std::vector<std::string> quoted;
   for (const std::string& item : items) quoted.push_back(quoteUsd(item));
@@ -334,13 +330,18 @@ class UsdWriter {
     const double unit = turns ? kDegree : 1;
     const UsdAxis axis = makeUsdAxis(direction);
     std::vector<std::string> schemas;
-    Properties properties = {{"float physics:lowerLimit", formatInfinite(model_.lowerLimits()[dof] / unit)},
-                             {"float physics:upperLimit", formatInfinite(model_.upperLimits()[dof] / unit)}};
+    Properties properties;
+    // Without limits, the schema has infinite ones, a word that some readers do not know.
+    const auto addLimit = [&properties](const std::string& property, double value) {
+      if (std::isfinite(value)) properties.push_back({"float " + property, formatExact(value)});
+    };
+    addLimit("physics:lowerLimit", model_.lowerLimits()[dof] / unit);
+    addLimit("physics:upperLimit", model_.upperLimits()[dof] / unit);
     if (motor >= 0) {
       const std::string drive = turns ? "angular" : "linear", prefix = "drive:" + drive + ":physics:";
       schemas.push_back("PhysicsDriveAPI:" + drive);
       properties.push_back({"uniform token " + prefix + "type", "\"force\""});
-      properties.push_back({"float " + prefix + "maxForce", formatInfinite(model_.motors()[motor].effort_limit)});
+      addLimit(prefix + "maxForce", model_.motors()[motor].effort_limit);
       properties.push_back({"float " + prefix + "stiffness", "0"});
       properties.push_back({"float " + prefix + "damping", "0"});
     }
