@@ -169,6 +169,7 @@ class SimbodyWorld : public World {
   bool step(double duration) override;
   void noteForces() override { changed_ = true; }
   void addRotors();
+  SimTK::State& placeState();
   void finishStep(double duration);
   void readState();
   void realizeForces();
@@ -231,9 +232,10 @@ void SimbodyWorld::addRotors() {
   SimTK::Constraint::Custom constraint(coupling);
 }
 
-void SimbodyWorld::start() {
+// The tree's state at time_, q_ and v_.
+SimTK::State& SimbodyWorld::placeState() {
   SimTK::State& state = tree_.state;
-  state.setTime(0);
+  state.setTime(time_);
   tree_.setCoordinates(q_);
   tree_.updateVelocityMap(q_, v_);
   SimTK::Vector& u = state.updU();
@@ -241,6 +243,11 @@ void SimbodyWorld::start() {
   tree_.scatter(tree_.T * v_, u);
   for (const auto& [rotor, dof] : rotors_) u[int(rotor.getFirstUIndex(state))] = u[tree_.u_index[dof]];
   tree_.system.realize(state, Stage::Velocity);
+  return state;
+}
+
+void SimbodyWorld::start() {
+  SimTK::State& state = placeState();
   const auto place = [&](int body, const Vector3d& point) { return forces_->findPlace(state, body, point); };
   contacts_.reset([&](int body) { return forces_->findPlacement(state, body); });
   contacts_.setStart(place, [&](const JointStop& stop) { return forces_->findCoordinate(state, stop); });
@@ -274,6 +281,7 @@ void SimbodyWorld::realizeForces() {
 
 bool SimbodyWorld::step(double duration) {
   const double start = integrator_->getTime(), end = time_ + duration;
+  const Works work = work_;
   try {
     realizeForces();
     for (double before = integrator_->getTime(); before < end - 1e-12; before = integrator_->getTime()) {
@@ -284,6 +292,10 @@ bool SimbodyWorld::step(double duration) {
   } catch (const std::exception& error) {
     message_ = error.what();
     std::replace(message_.begin(), message_.end(), '\n', ' ');
+    // The engine stopped within a step, whose state is of no stage: back to the last one that was read.
+    integrator_->updAdvancedState() = placeState();
+    tree_.system.realize(integrator_->updAdvancedState(), Stage::Velocity);
+    work_ = work;
     return false;
   }
   const bool is_done = integrator_->getTime() >= end - 1e-12;
