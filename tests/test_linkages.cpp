@@ -2,11 +2,15 @@
 // descriptions answer the same.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/closing.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/ratio.h"
 #include "bielle/model/builder.h"
+#include "dynamics/idle_spins.h"
+#include "dynamics/linkage_ratio.h"
 #include "dynamics/linkage_workspace.h"
 #include "leg_biped.h"
 
@@ -63,7 +67,8 @@ struct GivenBases : LoopBases {
 
 // An ankle of two motors on the shank, cranks and rods to the foot. Rods are carried by universal joints, or by balls: then each
 // can also spin about its own line.
-Model makeAnkle(JointKind rods, Output output) {
+// \param hinges  whether a ball is a universal joint with a hinge across
+Model makeAnkle(JointKind rods, Output output, bool hinges = false) {
   ModelBuilder b("ankle");
   const Vector3d y = Vector3d::UnitY(), x = Vector3d::UnitX();
   for (const int i : {1, 2}) {
@@ -71,7 +76,14 @@ Model makeAnkle(JointKind rods, Output output) {
     const std::string n = std::to_string(i);
     b.addLink("crank" + n, "world", makeJoint("motor" + n, JointKind::Revolute, y, {-0.01, side, length - 0.3 + 0.02}),
               makeBody());
-    b.addLink("rod" + n, "crank" + n, makeJoint("rod" + n, rods, y, {-0.045, 0.1 * side, 0}), makeBody());
+    const Vector3d end(-0.045, 0.1 * side, 0);
+    if (hinges) {
+      b.addLink("yoke" + n, "crank" + n, makeJoint("yoke" + n, JointKind::Universal, y, end), {});
+      b.addLink("rod" + n, "yoke" + n, makeJoint("turn" + n, JointKind::Continuous, Vector3d::UnitZ(), {0, 0, 0}),
+                makeBody());
+    } else {
+      b.addLink("rod" + n, "crank" + n, makeJoint("rod" + n, rods, y, end), makeBody());
+    }
     b.addFrame("end" + n, "rod" + n, at({-0.002, -0.07 * side, -length}));
     b.addMotor("motor" + n, 0.004);
   }
@@ -84,6 +96,67 @@ Model makeAnkle(JointKind rods, Output output) {
   for (const std::string n : {"1", "2"}) b.addClosure("rod" + n, ClosureKind::Ball3D, "end" + n, "heel" + n);
   if (output == Output::Joints)
     for (const char* joint : {"pitch", "roll"}) b.addSerialJoint(joint);
+  return b.build();
+}
+
+Vector3d onCircle(double radius, double degrees, double z) {
+  return {radius * std::cos(degrees * M_PI / 180), radius * std::sin(degrees * M_PI / 180), z};
+}
+
+// A leg of the kind at its lower end, whose motor moves its length, to a ball on the platform.
+void addLeg(ModelBuilder& b, const std::string& name, JointKind kind, const Vector3d& from, const Vector3d& platform,
+            const Vector3d& to) {
+  const Vector3d along = to - from;
+  const Matrix3d R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along).toRotationMatrix();
+  Joint end = makeJoint(name + "_end", kind, Vector3d::UnitY(), from);
+  end.X_PJ.R = R;
+  b.addLink(name + "_cylinder", "world", end, makeBody());
+  b.addLink(name + "_piston", name + "_cylinder",
+            makeJoint(name, JointKind::Prismatic, Vector3d::UnitZ(), {0, 0, 0.4 * along.norm()}), makeBody());
+  b.addFrame(name + "_top", name + "_piston", at({0, 0, 0.6 * along.norm()}));
+  b.addFrame(name + "_place", "platform", at(to - platform));
+  b.addClosure(name + "_ball", ClosureKind::Ball3D, name + "_top", name + "_place");
+  b.addMotor(name, 0.01);
+}
+
+// A platform on six legs. \param carries  whether it has a sole
+Model makeHexapod(JointKind ends, bool carries = true) {
+  ModelBuilder b("hexapod");
+  const Vector3d place(0.02, 0.01, 0.5);
+  b.addLink("platform", "world", makeJoint("platform", JointKind::FreeFlyer, Vector3d::UnitZ(), place), makeBody());
+  b.addFrame("tool", "platform", at({0, 0, 0.1}));
+  if (carries) b.addContact("sole", "tool", ContactKind::Surface6D, 0.1, 0.1);
+  for (int i = 0; i < 6; ++i) {
+    const double middle = 120.0 * (i / 2), side = i % 2 ? 1 : -1;
+    addLeg(b, "leg" + std::to_string(i), ends, onCircle(0.4, middle + 12 * side, 0), place,
+           onCircle(0.25, middle + 48 * side, 0.5));
+  }
+  return b.build();
+}
+
+// A delta: three arms, each with two rods to the tool. \param carries  whether that has a sole
+Model makeDelta(JointKind ends, bool carries = true) {
+  ModelBuilder b("delta");
+  const Vector3d place(0.01, -0.02, -0.4);
+  b.addLink("tool", "world", makeJoint("tool", JointKind::FreeFlyer, Vector3d::UnitZ(), place), makeBody());
+  b.addFrame("tip", "tool", at({0, 0, -0.1}));
+  if (carries) b.addContact("sole", "tip", ContactKind::Surface6D, 0.1, 0.1);
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d x = onCircle(1, 120 * i, 0), y = Vector3d::UnitZ().cross(x);
+    const std::string arm = "arm" + std::to_string(i);
+    b.addLink(arm, "world", makeJoint(arm, JointKind::Revolute, y, 0.2 * x), makeBody());
+    b.addMotor(arm, 0.01);
+    for (const double side : {-1, 1}) {
+      const std::string rod = "rod" + std::to_string(i) + (side < 0 ? "l" : "r");
+      const Vector3d elbow = 0.45 * x + 0.03 * side * y, wrist = place + 0.06 * x + 0.03 * side * y;
+      Joint end = makeJoint(rod, ends, y, elbow - 0.2 * x);
+      end.axis2 = x;
+      b.addLink(rod, arm, end, makeBody());
+      b.addFrame(rod + "_end", rod, at(wrist - elbow));
+      b.addFrame(rod + "_place", "tool", at(wrist - place));
+      b.addClosure(rod, ClosureKind::Ball3D, rod + "_end", rod + "_place");
+    }
+  }
   return b.build();
 }
 
@@ -201,6 +274,137 @@ TEST_CASE("rods on two balls: transmission, its derivative and dead points are t
   }
 }
 
+TEST_CASE("idle spins are those of bodies that turn about a line through two balls, and carry nothing") {
+  const auto count = [](const Model& model) { return countIdleSpins(model, findClosedConfiguration(model).q); };
+  CHECK(count(makeAnkle(JointKind::Universal, Output::Joints)) == 0);
+  CHECK(count(makeAnkle(JointKind::Spherical, Output::Joints)) == 2);
+  CHECK(count(makeAnkle(JointKind::Spherical, Output::Bodies)) == 2);
+  CHECK(count(makeAnkle(JointKind::Spherical, Output::Joints, true)) == 2);
+  CHECK(count(makeDelta(JointKind::Universal)) == 0);
+  CHECK(count(makeDelta(JointKind::Spherical)) == 6);
+  CHECK(count(makeHexapod(JointKind::Universal)) == 0);
+  CHECK(count(makeHexapod(JointKind::Spherical)) == 6);
+  CHECK(count(makeFourBar(Output::Joints)) == 0);
+  ModelParts parts = takeParts(makeFourBar(Output::Bodies));  // it moves, though nothing drives it
+  parts.motors.clear();
+  CHECK(count(ModelBuilder::restore(std::move(parts))) == 0);
+
+  // A rod that carries something, or whose turning is driven or named.
+  const Model ankle = makeAnkle(JointKind::Spherical, Output::Joints),
+              hinges = makeAnkle(JointKind::Spherical, Output::Joints, true);
+  const auto add = [](const Model& model, const std::function<void(ModelParts&)>& change) {
+    ModelParts changed = takeParts(model);
+    change(changed);
+    return ModelBuilder::restore(std::move(changed));
+  };
+  CHECK(count(add(ankle, [&](ModelParts& all) {
+          all.contacts.push_back(all.contacts[0]);
+          all.contacts.back().name = "rod";
+          all.contacts.back().body = ankle.findJoint("rod1");
+        })) == 1);
+  CHECK(count(add(hinges, [&](ModelParts& all) { all.serial_joints.push_back(hinges.findJoint("turn2")); })) == 1);
+  CHECK(count(add(hinges, [&](ModelParts& all) {
+          all.motors.push_back(all.motors[0]);
+          all.motors.back().name = "turn2";
+          all.motors.back().joint = hinges.findJoint("turn2");
+          all.motors.back().dof = hinges.joints()[hinges.findJoint("turn2")].idx_v;
+        })) == 1);
+  const VectorXd q = closeAnkle(hinges, 0, 0);
+  CHECK(makeLinkage(hinges, q, {"pitch", "roll"}).size() == 2);
+  CHECK_THROWS_WITH(makeLinkage(hinges, q, {"turn1", "roll"}),
+                    Catch::Contains("its linkage has mobility 3 and 2 motors (motor1, motor2)"));
+}
+
+TEST_CASE("ratios of rods on balls, their derivatives and dead points are those of rods that cannot spin") {
+  const Model fixed = makeAnkle(JointKind::Universal, Output::Joints);
+  for (const bool hinges : {false, true}) {
+    // A heavy end on one side of the rod: it does not spin evenly, but the ratio is a matter of lengths.
+    ModelParts parts = takeParts(makeAnkle(JointKind::Spherical, Output::Joints, hinges));
+    for (Body& body : parts.bodies)
+      if (body.name == "rod1") body.inertia.com = {0.03, 0.01, -0.1};
+    const Model spinning = ModelBuilder::restore(std::move(parts));
+    const std::vector<std::string> joints = {"pitch", "roll"};
+    const auto prepare = [&](const Model& model, double pitch, double roll) {
+      VectorXd q = closeAnkle(model, pitch, roll);
+      LoopCloser closer(model, q, joints);
+      q[model.joints()[model.findJoint("pitch")].idx_q] = pitch;
+      q[model.joints()[model.findJoint("roll")].idx_q] = roll;
+      REQUIRE(closer.close(q).status == NumericalStatus::Ok);
+      return q;
+    };
+    const auto calcRatio = [&](const Model& model, const VectorXd& q) {
+      const Linkage linkage = makeLinkage(model, q, joints);
+      ClusterPoint point(*linkage.cluster);
+      VectorXd own(linkage.cluster->model.nq());
+      gatherConfiguration(model, *linkage.cluster, q, own);
+      LinkageRatio ratio;
+      REQUIRE(point.update(*linkage.cluster, own));
+      REQUIRE(calcLinkageRatio(linkage, point, ratio));
+      return ratio;
+    };
+    for (const double pitch : {-0.4, 0.0, 0.3})
+      for (const double roll : {0.0, 0.15}) {
+        CAPTURE(hinges, pitch, roll);
+        const VectorXd p = prepare(fixed, pitch, roll);
+        VectorXd q = prepare(spinning, pitch, roll);
+        const LinkageRatio expected = calcRatio(fixed, p), found = calcRatio(spinning, q);
+        CHECK((found.R - expected.R).norm() < 1e-10 * (1 + expected.R.norm()));
+        for (int k = 0; k < 2; ++k) CHECK((found.dR[k] - expected.dR[k]).norm() < 1e-10 * (1 + expected.dR[k].norm()));
+        CHECK(calcBalanceError(spinning, makeLinkage(spinning, q, joints), q, found.R) < 1e-9);
+      }
+    const VectorXd p = prepare(fixed, 0, 0), q = prepare(spinning, 0, 0);
+    for (const int swept : {0, 1}) {
+      const std::vector<RatioSample> expected = sweepRatio(fixed, makeLinkage(fixed, p, joints), p, swept).deadPoints(),
+                                     found =
+                                         sweepRatio(spinning, makeLinkage(spinning, q, joints), q, swept).deadPoints();
+      REQUIRE(found.size() == expected.size());
+      CHECK(!found.empty());
+      for (size_t i = 0; i < found.size(); ++i) {
+        CHECK(found[i].dead == expected[i].dead);
+        CHECK((found[i].joints - expected[i].joints).norm() < 1e-10);
+        CHECK((found[i].motors - expected[i].motors).norm() < 1e-10);
+      }
+    }
+  }
+}
+
+TEST_CASE("deltas and hexapods on balls have the transmission and dead points of those on universal joints") {
+  for (const auto& make : {makeDelta, makeHexapod}) {
+    const Model fixed = make(JointKind::Universal, true), spinning = make(JointKind::Spherical, true);
+    const VectorXd p0 = fixed.makeNeutral(), q0 = spinning.makeNeutral();
+    CAPTURE(fixed.name());
+    const std::vector<Linkage> a = listLinkages(fixed, p0), b = listLinkages(spinning, q0);
+    REQUIRE(a.size() == 1);
+    REQUIRE(b.size() == 1);
+    CHECK(b[0].output == a[0].output);
+    CHECK(b[0].output == (fixed.name() == "delta" ? "tool" : "platform"));
+    CHECK(listLinkagesLeftOut(spinning, q0).empty());
+    const std::vector<Linkage> bare = listLinkages(make(JointKind::Spherical, false), q0);
+    REQUIRE(bare.size() == 1);
+    CHECK(bare[0].output == b[0].output);  // legs have frames too, but they spin
+    const DeadPoint at_start[] = {findDeadPoint(a[0], fixed, p0), findDeadPoint(b[0], spinning, q0)};
+    CHECK(at_start[1].kind == at_start[0].kind);
+    if (at_start[0].kind != DeadPointKind::None)  // the steepest way there depends on the coordinates of legs a little
+      CHECK(at_start[1].distance == Approx(at_start[0].distance).epsilon(0.01));
+    // Motors to positions all of their own.
+    std::vector<std::string> motors;
+    for (const Motor& motor : fixed.motors()) motors.push_back(motor.name);
+    const auto move = [&](const Model& model, VectorXd q, double by) {
+      LoopCloser closer(model, q, motors);
+      for (size_t i = 0; i < motors.size(); ++i)
+        q[model.joints()[model.findJoint(motors[i])].idx_q] += by * (i % 2 ? 0.3 + 0.1 * static_cast<double>(i) : -0.7);
+      REQUIRE(closer.close(q).status == NumericalStatus::Ok);
+      return q;
+    };
+    for (const double by : {0.1, -0.15}) {
+      const double scale = fixed.name() == "delta" ? 1 : 0.3;
+      const double expected = calcTransmission(a[0], fixed, move(fixed, p0, scale * by));
+      CHECK(expected != Approx(1).epsilon(1e-3));
+      CHECK(calcTransmission(b[0], spinning, move(spinning, q0, scale * by)) == Approx(expected).epsilon(1e-9));
+    }
+  }
+}
+
 TEST_CASE("linkages without a transmission are listed with the reason") {
   Model model = makeAnkle(JointKind::Spherical, Output::Joints);
   ModelParts parts = takeParts(model);
@@ -211,7 +415,7 @@ TEST_CASE("linkages without a transmission are listed with the reason") {
   const std::vector<LinkageLeftOut> left_out = listLinkagesLeftOut(model, q);
   REQUIRE(left_out.size() == 1);
   CHECK(left_out[0].name == "pitch, roll");
-  CHECK(left_out[0].why == "1 motor for a mobility of 4");
+  CHECK(left_out[0].why == "1 motor for a mobility of 2");
   CHECK(left_out[0].has_motors);
 }
 

@@ -3,7 +3,9 @@
 #include <filesystem>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/closing.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/ratio.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/robots/robot_loader.h"
 #include "mechanisms.h"
@@ -349,4 +351,67 @@ TEST_CASE("MuJoCo and the reader of its files read the same mechanism") {
   };
   CHECK(warns("<light> (line 13): left out"));
   CHECK(warns("<motor> (line 53): its input becomes the torque or force at its joint"));
+}
+
+TEST_CASE("MuJoCo's constraints give the ratio of an ankle whose rods spin on balls") {
+  const RobotDirectory directory;
+  const std::string path = directory.write("ankle.xml", R"(<mujoco model="ankle">
+  <compiler angle="radian"/>
+  <default><geom type="sphere" size="0.01" density="2000"/></default>
+  <worldbody>
+    <body name="c1" pos="-0.01 0.05 -0.1"><joint name="m1" axis="0 1 0"/><geom/>
+      <body name="r1" pos="-0.05 0.006 0"><joint name="r1" type="ball"/><geom pos="0.01 0.02 -0.1"/></body></body>
+    <body name="c2" pos="-0.01 -0.05 -0.15"><joint name="m2" axis="0 1 0"/><geom/>
+      <body name="r2" pos="-0.05 -0.006 0"><joint name="r2" type="ball"/><geom pos="0 0.01 -0.1"/></body></body>
+    <body name="cross" pos="0 0 -0.32"><joint name="pitch" axis="0 1 0"/><geom/>
+      <body name="foot" pos="0 0 -0.01"><joint name="roll" axis="1 0 0"/><geom/></body></body>
+  </worldbody>
+  <equality>
+    <connect body1="r1" body2="foot" anchor="-0.002 -0.004 -0.2"/>
+    <connect body1="r2" body2="foot" anchor="-0.002 0.004 -0.15"/>
+  </equality>
+  <actuator><motor joint="m1"/><motor joint="m2"/></actuator>
+</mujoco>)");
+  const Model model = loadRobot(path).model;
+  char error[500] = "";
+  const std::unique_ptr<mjModel, void (*)(mjModel*)> mj(mj_loadXML(path.c_str(), nullptr, error, sizeof error),
+                                                        mj_deleteModel);
+  CAPTURE(std::string(error));
+  REQUIRE(mj);
+  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(mj.get()), mj_deleteData);
+  REQUIRE(mj->nv == model.nv());
+  const auto getDof = [&](const char* joint) { return mj->jnt_dofadr[mj_name2id(mj.get(), mjOBJ_JOINT, joint)]; };
+  const auto find = [&](const char* joint) -> const Joint& { return model.joints()[model.findJoint(joint)]; };
+  for (const double pitch : {0.0, 0.25, -0.3})
+    for (const double roll : {0.0, -0.2}) {
+      CAPTURE(pitch, roll);
+      VectorXd q = model.makeNeutral();
+      q[find("pitch").idx_q] = pitch;
+      q[find("roll").idx_q] = roll;
+      const AssemblyResult closed = closeConfiguration(model, q, {"pitch", "roll"});
+      REQUIRE(closed.status == NumericalStatus::Ok);
+      for (int j = 0; j < mj->njnt; ++j) {
+        const Joint& joint = find(mj_id2name(mj.get(), mjOBJ_JOINT, j));
+        VectorXd qpos = closed.q.segment(joint.idx_q, joint.nq);
+        if (joint.nq == 4) qpos << closed.q[joint.idx_q + 3], closed.q.segment<3>(joint.idx_q);
+        Eigen::Map<VectorXd>(data->qpos + mj->jnt_qposadr[j], joint.nq) = qpos;
+      }
+      mj_forward(mj.get(), data.get());
+      REQUIRE(data->ne == 6);
+      REQUIRE_FALSE(mj_isSparse(mj.get()));
+      MatrixXd J = MatrixXd::Zero(8, mj->nv);
+      J.topRows(6) = Eigen::Map<RowMatrixXd>(data->efc_J, data->ne, mj->nv);
+      J(6, getDof("pitch")) = J(7, getDof("roll")) = 1;
+      const MatrixXd T = J.completeOrthogonalDecomposition().pseudoInverse().rightCols(2);
+      const SweepOptions at_start{0.02, 1e-6};
+      const RatioSweep sweep =
+          sweepRatio(model, makeLinkage(model, closed.q, {"pitch", "roll"}), closed.q, 0, at_start);
+      const auto start = std::find_if(sweep.samples.begin(), sweep.samples.end(),
+                                      [](const RatioSample& sample) { return sample.s == 0; });
+      REQUIRE(start != sweep.samples.end());
+      for (int j = 0; j < 2; ++j) {
+        CHECK(start->ratio.R(0, j) == Approx(T(getDof("m1"), j)).epsilon(1e-9).margin(1e-9));
+        CHECK(start->ratio.R(1, j) == Approx(T(getDof("m2"), j)).epsilon(1e-9).margin(1e-9));
+      }
+    }
 }

@@ -16,6 +16,11 @@ void printSection(const Json& robot, const char* key, const char* title, std::ve
   printTable(std::cout, robot[key], columns);
 }
 
+// Of rods on two balls.
+std::string describeSpins(int count) {
+  return count == 0 ? "" : " of which " + std::to_string(count) + (count == 1 ? " idle spin" : " idle spins");
+}
+
 void printInfo(const Json& robot) {
   const auto count = [&robot](const char* key) { return std::to_string(robot[key].get<int>()); };
   const Json& mobility = robot["mobility"];
@@ -28,7 +33,7 @@ void printInfo(const Json& robot) {
                               {"closure rows", count("closure_rows") + ", rank " + mobility["rank"].dump() + " at " +
                                                    mobility["posture"].get<std::string>() +
                                                    (mobility["closed"].get<bool>() ? "" : ", where loops are open")},
-                              {"mobility", mobility["mobility"].dump()}});
+                              {"mobility", mobility["mobility"].dump() + describeSpins(mobility["idle_spins"])}});
   printSection(robot, "joints", "joints", {"name", "kind", "parent", "child", "nq", "nv"});
   printSection(robot, "closures", "closures (gaps in m and rad)",
                {"name", "kind", "frame1", "frame2", "rows", "loop_dofs"});

@@ -30,7 +30,7 @@ PassiveJoints::PassiveJoints(const Model& model, ConstVectorRef q) : model_(mode
       throw InputError(
           model.name(), "closure '" + model.closures()[cluster.closure_indices.front()].name + "'",
           "its linkage has " + std::to_string(linkage.size()) + " motors and mobility " + std::to_string(cluster.size),
-          "an estimator needs as many motors as mobility");
+          "an estimator needs as many motors as mobility, less idle spins");
     followers_.emplace_back(std::move(linkage));
     for (size_t k = 0; k < cluster.dofs.size(); ++k)
       places_[cluster.dofs[k]] = {static_cast<int>(followers_.size()) - 1, static_cast<int>(k)};

@@ -173,7 +173,7 @@ class HeldLinkage {
 std::vector<HeldLinkage> makeHeldLinkages(const Model& model, ConstVectorRef q) {
   const Reduction reduction = makeReduction(model, q);
   std::vector<HeldLinkage> linkages;
-  for (const Linkage& linkage : selectLinkages(model, reduction)) linkages.emplace_back(linkage.cluster);
+  for (const ReducedCluster& cluster : reduction.clusters) linkages.emplace_back(makeUnweighted(cluster));
   return linkages;
 }
 

@@ -1,9 +1,10 @@
 // Bases of clusters and closing of their loops: Eqs. (1) and (2) of reduction.h.
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "bielle/dynamics/kinematics.h"
-#include "dynamics/reduction.h"
+#include "dynamics/idle_spins.h"
 #include "math/small_dense.h"
 #include "model/joint.h"
 
@@ -36,7 +37,7 @@ ClusterBasisOf<T>::ClusterBasisOf(const ReducedCluster& cluster) {
 
 template <typename T>
 ClusterScratchOf<T>::ClusterScratchOf(const ReducedCluster& cluster) : ws(cluster.model) {
-  const int n = cluster.model.nv(), m = cluster.closures.rows, rank = cluster.rank;
+  const int n = cluster.model.nv(), m = cluster.numRows(), rank = cluster.rank;
   residual.setZero(m);
   correction.setZero(rank);
   J_all.setZero(m, n);
@@ -78,6 +79,8 @@ void updateJacobian(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch)
   for (size_t c = 0; c < set.closures.size(); ++c)
     calcClosureJacobian<T>(scratch.ws, set.closures[c],
                            scratch.J_all.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+  if constexpr (std::is_same_v<T, double>)
+    if (cluster.holds_spins) updateSpinRows(cluster, scratch.J_all);
 }
 
 // Returns the largest entry, or NaN.
@@ -219,6 +222,41 @@ typename LogicOf<T>::Mask updateBases(const ReducedCluster& cluster, ClusterScra
 
 }  // namespace
 
+// The null space of J_D is one vector: by elimination in its Gram matrix, with pivots on the diagonal.
+void updateSpinRows(const ReducedCluster& cluster, MatrixXd& J) {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostSpinDofs, kMostSpinDofs> G;
+  const int m = cluster.closures.rows;
+  for (size_t i = 0; i < cluster.spins.size(); ++i) {
+    const std::vector<int>& dofs = cluster.spins[i].dofs;
+    const auto n = static_cast<int>(dofs.size());
+    G.resize(n, n);
+    for (int a = 0; a < n; ++a)
+      for (int b = 0; b < n; ++b) G(a, b) = J.col(dofs[a]).head(m).dot(J.col(dofs[b]).head(m));
+    std::array<bool, kMostSpinDofs> is_done{};
+    const auto choosePivot = [&] {
+      int pivot = -1;
+      for (int a = 0; a < n; ++a)
+        if (!is_done[a] && (pivot < 0 || G(a, a) > (1 + kTie) * G(pivot, pivot))) pivot = a;
+      return pivot;
+    };
+    for (int step = 0; step + 1 < n; ++step) {
+      const int p = choosePivot();
+      is_done[p] = true;
+      if (!(G(p, p) > 0)) continue;
+      G.row(p) /= G(p, p);
+      for (int a = 0; a < n; ++a)
+        if (a != p) G.row(a) -= G(a, p) * G.row(p);
+    }
+    const int last = choosePivot();
+    double sum = 1;
+    for (int a = 0; a < n; ++a)
+      if (a != last) sum += G(a, last) * G(a, last);
+    auto row = J.row(m + static_cast<int>(i));
+    row.setZero();
+    for (int a = 0; a < n; ++a) row[dofs[a]] = (a == last ? 1 : -G(a, last)) / std::sqrt(sum);
+  }
+}
+
 void loadClusterState(const ReducedCluster& cluster, const ClusterState& state, ClusterScratch& scratch) {
   scratch.ws.q = state.basis.q;
   scratch.ws.X_WB = state.placements;
@@ -286,7 +324,8 @@ std::string describeFailure(const ReducedCluster& cluster, const ClusterScratchO
   const ConstraintSet& set = cluster.closures;
   if (getLane(scratch.closed, lane))
     return "closure '" + set.closures.front().name + "': the rank of its loops is no longer " +
-           std::to_string(cluster.rank) + ": a configuration where they gain other motions";
+           std::to_string(cluster.rank - (cluster.numRows() - set.rows)) +
+           ": a configuration where they gain other motions";
   size_t worst = 0;
   double largest = -1;
   for (size_t c = 0; c < set.closures.size(); ++c)

@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "dynamics/idle_spins.h"
 #include "dynamics/linkage_workspace.h"
 #include "model/listing.h"
 
@@ -22,10 +23,8 @@ void addCoordinates(const ReducedCluster& cluster, int i, std::vector<int>& dofs
 
 Linkage selectLinkage(const Model& model, const ReducedCluster& cluster, int index, std::vector<int> joints) {
   Linkage out;
-  const auto unweighted = std::make_shared<ReducedCluster>(cluster);
-  unweighted->metric.setOnes();  // purely geometric: light bodies must not move far per step
-  unweighted->inverse_metric.setOnes();
-  unweighted->inverse_root.setOnes();
+  const std::shared_ptr<ReducedCluster> unweighted = makeUnweighted(cluster);
+  holdSpins(model, joints, *unweighted);
   out.cluster = unweighted;
   out.index = index;
   for (int m = 0; m < model.nu(); ++m) {
@@ -81,19 +80,21 @@ Linkage makeDirectLinkage(const Model& model, int joint) {
 }
 
 // With further serial joints, up to the mobility.
-Linkage makeLoopLinkage(const Model& model, const ReducedCluster& cluster, int index, std::vector<int> joints) {
+Linkage makeLoopLinkage(const Model& model, const ReducedCluster& whole, int index, std::vector<int> joints) {
   const std::string element = "joint '" + model.joints()[joints.front()].name + "'";
+  ReducedCluster cluster = whole;
+  holdSpins(model, joints, cluster);
   for (int i : model.serialJoints())
     if (static_cast<int>(joints.size()) < cluster.size && contains(cluster.joints, i) && !contains(joints, i) &&
         model.joints()[i].nv == 1)
       joints.push_back(i);
-  Linkage linkage = selectLinkage(model, cluster, index, std::move(joints));
+  Linkage linkage = selectLinkage(model, whole, index, std::move(joints));
   const std::string mobility = "its linkage has mobility " + std::to_string(cluster.size),
                     motors = listItems(linkage.motor_names);
   if (linkage.size() != cluster.size)
     throw InputError(model.name(), element,
                      mobility + " and " + std::to_string(linkage.size()) + " motors (" + motors + ")",
-                     "a ratio needs as many motors as mobility");
+                     "a ratio needs as many motors as mobility, less idle spins");
   if (static_cast<int>(linkage.joints.size()) != cluster.size)
     throw InputError(model.name(), element,
                      mobility + ", driven by " + motors + "; " + std::to_string(linkage.joints.size()) +
@@ -105,6 +106,12 @@ Linkage makeLoopLinkage(const Model& model, const ReducedCluster& cluster, int i
 }  // namespace
 
 bool Linkage::isDirect() const { return cluster->joints.empty(); }
+
+std::shared_ptr<ReducedCluster> makeUnweighted(const ReducedCluster& cluster) {
+  const auto out = std::make_shared<ReducedCluster>(cluster);
+  for (VectorXd* x : {&out->metric, &out->inverse_metric, &out->inverse_root}) x->setOnes();
+  return out;
+}
 
 std::vector<Linkage> selectLinkages(const Model& model, const Reduction& reduction) {
   std::vector<Linkage> out;

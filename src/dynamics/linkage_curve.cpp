@@ -135,10 +135,11 @@ double LinkageCurve::findRoot(const CurvePoint& from, double h, double tolerance
 
 MatrixXd LinkageCurve::calcJacobian(const VectorXd& q) {
   const ConstraintSet& set = linkage_.cluster->closures;
-  MatrixXd J = MatrixXd::Zero(set.rows, linkage_.cluster->model.nv());
+  MatrixXd J = MatrixXd::Zero(linkage_.cluster->numRows(), linkage_.cluster->model.nv());
   Workspace ws(linkage_.cluster->model);
   updatePositions(linkage_.cluster->model, ws, q);
   for (size_t c = 0; c < set.closures.size(); ++c)
+  if (linkage_.cluster->holds_spins) updateSpinRows(*linkage_.cluster, J);
     calcClosureJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
   return J;
 }

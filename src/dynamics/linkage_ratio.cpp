@@ -12,7 +12,7 @@ constexpr double kSingular = 1e-12;  // singular values of N_J, whose rows are a
 // a of Eq. (2) at the velocity v = T w of the cluster (n).
 VectorXd calcDriftAcceleration(const Linkage& linkage, ClusterPoint& point, const MatrixXd& T, const VectorXd& v) {
   const ReducedCluster& cluster = *linkage.cluster;
-  MatrixXd drift(cluster.closures.rows, v.size()), gamma(cluster.rank, 1);
+  MatrixXd drift(cluster.numRows(), v.size()), gamma(cluster.rank, 1);
   updateDrift(cluster, point.workspace(), v, drift);
   point.selectIndependent(drift * v, gamma);
   point.solveGram(gamma);

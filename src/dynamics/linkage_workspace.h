@@ -13,7 +13,11 @@ namespace bielle {
 
 inline constexpr int kMostLinkageMobility = 6;  // of transmissions and dead points
 
-// Of all clusters, with all their motors and serial joints, which may be more or fewer than their mobility.
+// The cluster with a metric of ones: purely geometric, as light bodies must not move far per step.
+std::shared_ptr<ReducedCluster> makeUnweighted(const ReducedCluster& cluster);
+
+// Of all clusters, with all their motors and serial joints, which may be more or fewer than their mobility; idle spins
+// (reduction.h) are left aside.
 std::vector<Linkage> selectLinkages(const Model& model, const Reduction& reduction);
 // makeLinkage() for several linkages of one model.
 Linkage makeLinkage(const Model& model, const Reduction& reduction, const std::vector<std::string>& joints);
@@ -83,8 +87,8 @@ void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory,
 bool hasReference(const Linkage& linkage);
 // O at the positions of the workspace; no rows where the output is joints.
 void updateOutput(const Linkage& linkage, const Workspace& ws, MatrixXd& O);
-// The columns of a basis of all closed motions (n x cluster size), less what is idle: N of linkage.h. Needs s.O; the result lives
-// until the next call.
+// A basis of closed motions less what is idle: N of linkage.h. Needs s.O; the result lives until the next call.
+// \param basis  of the cluster, or of that of the robot, where nothing is left aside (n x its size)
 const MatrixXd& selectMoving(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& basis);
 // The drift of the closures, and that of O.
 void updateDrift(const Linkage& linkage, LinkageWorkspace& s, ConstVectorRef v);

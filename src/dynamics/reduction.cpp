@@ -8,6 +8,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/builder.h"
+#include "dynamics/idle_spins.h"
 #include "dynamics/point_spring.h"
 
 namespace bielle {
@@ -126,6 +127,7 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
       if (!(calcClosureResidual(ws, closure).cwiseAbs().maxCoeff() < 1e-8))
         throw InputError(model.name(), "closure '" + closure.name + "'", "it is open at the given configuration",
                          "close the configuration first (assemble, closeConfiguration)");
+    cluster.spins = findIdleSpins(model, cluster, q_cluster);
     out.clusters.push_back(std::move(cluster));
   }
   for (const PointSpring& spring : model.pointSprings())

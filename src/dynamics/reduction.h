@@ -15,6 +15,13 @@
 ///     q = q_0 (+) (d - W^{-1} J(q_0)^T zeta)    with zeta such that q is closed                                    (2)
 /// so that (W N)(q_0)^T (q (-) q_0) = (W N)(q_0)^T d: (2) inverts the difference in reduced coordinates exactly.
 ///
+/// **Idle spins.** A rod on two balls turns about its own line, and nothing else moves. Of a cluster, the joints behind one joint (dofs
+/// D) have such a spin s if it is the only motion with
+///     J_D s = 0,   v_p(s) = 0,   s = 0 on motors and serial joints                                                 (3)
+/// at a closed configuration and beside it, where v_p are the velocities of all their bodies at the centre p of that joint: with
+/// ends that are held by closures, they turn about a line; and bodies that carry other joints or soles are at rest. In a
+/// linkage (linkage.h) the rows s^T v = 0 are added to J, without residual or drift: s(q) changes neither motors nor output.
+///
 /// W is the inertia that each dof moves at the configuration of the reduction: corrections move light rods rather than
 /// legs, as constraint impulses do. It also sets the scale between metres and radians.
 #include <string>
@@ -36,6 +43,12 @@ struct DofGroup {
 /// dependent.
 constexpr double kRankTolerance = 1e-6;
 
+/// A motion of Eq. (3).
+struct IdleSpin {
+  std::vector<int> dofs;    ///< of the cluster's joints that have a part in it
+  std::vector<int> bodies;  ///< of its model that turn
+};
+
 /// One loop cluster as a separate mechanism.
 struct ReducedCluster {
   Model model;                       ///< joints and closures of the cluster, massless, over their common root
@@ -51,8 +64,12 @@ struct ReducedCluster {
   VectorXd metric;                   ///< n, diagonal of W
   VectorXd inverse_metric;           ///< n, diagonal of W^{-1}
   VectorXd inverse_root;             ///< n, diagonal of W^{-1/2}
-  int rank = 0;                      ///< of the closure Jacobian
+  std::vector<IdleSpin> spins;       ///< those found by Eq. (3)
+  bool holds_spins = false;          ///< whether they are left aside, by a row each after those of the closures
+  int rank = 0;                      ///< of J
   int offset = 0, size = 0;          ///< reduced coordinates [offset, offset + size), size = n - rank
+
+  int numRows() const { return closures.rows + (holds_spins ? static_cast<int>(spins.size()) : 0); }
 };
 
 /// A free joint or a cluster: a node of the reduced tree. Parents come first.
@@ -143,6 +160,8 @@ template <typename T>
 typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
                                        const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
                                        const VectorX<T>& zeta_guess, ClusterStateOf<T>& out);
+/// Writes the rows of J that hold spins, after those of the closures. \param J  numRows() x n. No allocation.
+void updateSpinRows(const ReducedCluster& cluster, MatrixXd& J);
 /// Loads placements and columns of a state into the scratch.
 void loadClusterState(const ReducedCluster& cluster, const ClusterState& state, ClusterScratch& scratch);
 /// Why the last of these functions returned false, naming a closure; needs the scratch as that function left it.

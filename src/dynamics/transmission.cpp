@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "dynamics/idle_spins.h"
 #include "dynamics/linkage_workspace.h"
 #include "model/listing.h"
 
@@ -12,18 +13,18 @@ namespace {
 
 constexpr double kIdle = 1e-7;  // of motors and output in a unit motion: what is left of gaps
 
-// Bodies of the cluster that carry other joints or soles; if there are none of these, frames.
+// Bodies of the cluster that carry other joints or soles; if there are none of these, frames, but on what spins.
 std::vector<int> findCarriers(const Model& model, const ReducedCluster& cluster) {
-  std::vector<int> carriers;
-  const auto add = [&](int body) {
-    if (contains(cluster.joints, body) && !contains(carriers, body)) carriers.push_back(body);
-  };
-  for (int i = 1; i < model.numBodies(); ++i)
-    if (!contains(cluster.joints, i)) add(model.joints()[i].parent);
-  for (const ContactFrame& contact : model.contacts()) add(contact.body);
-  if (carriers.empty())
+  std::vector<int> carriers = listCarriers(model, cluster.joints);
+  if (carriers.empty()) {
+    std::vector<int> spinning;
+    for (const IdleSpin& spin : cluster.spins)
+      for (const int b : spin.bodies) spinning.push_back(cluster.joints[b - 1]);
     for (const Frame& frame : model.frames())
-      if (model.findMotor(model.joints()[frame.body].name) < 0) add(frame.body);
+      if (contains(cluster.joints, frame.body) && !contains(carriers, frame.body) && !contains(spinning, frame.body) &&
+          model.findMotor(model.joints()[frame.body].name) < 0)
+        carriers.push_back(frame.body);
+  }
   std::sort(carriers.begin(), carriers.end());
   return carriers;
 }
@@ -178,6 +179,7 @@ void updateDerivative(const Linkage& linkage, LinkageWorkspace& s, const Reduced
 
 // s.both: how the columns of a basis move motors and output.
 void updateRows(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& basis) {
+  s.both.resize(s.both.rows(), basis.cols());
   takeRows(basis, linkage.motor_dofs, s.both);
   auto output = s.both.bottomRows(s.Q.rows());
   if (linkage.joints.empty()) {
@@ -189,7 +191,7 @@ void updateRows(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& bas
 
 // Whether no more than as many closed motions as there are motors move motors or output, at the reference.
 bool isDetermined(const Model& model, ConstVectorRef q_reference, const Linkage& linkage) {
-  if (linkage.idle == 0) return true;
+  if (linkage.cluster->size == linkage.size()) return true;
   LinkageWorkspace s(linkage);
   gatherConfiguration(model, *linkage.cluster, q_reference, s.q);
   if (!updateBasis(linkage, s, nullptr, nullptr)) return false;
@@ -212,10 +214,11 @@ void setReference(const Model& model, ConstVectorRef q_reference, Linkage& linka
 // Gives a linkage its output and its reference. Returns why it has no transmission; "" if it has one.
 std::string complete(const Model& model, ConstVectorRef q_reference, Linkage& linkage) {
   const int motors = linkage.size(), mobility = linkage.cluster->size;
+  const int spins = static_cast<int>(linkage.cluster->spins.size());
   const std::string counts =
       std::to_string(motors) + (motors == 1 ? " motor" : " motors") + " for a mobility of " + std::to_string(mobility);
-  linkage.idle = mobility - motors;
-  if (motors == 0 || linkage.idle < 0) return counts;
+  linkage.idle = mobility + spins - motors;
+  if (motors == 0 || mobility < motors) return counts;
   if (motors > kMostLinkageMobility) return counts + ", over " + std::to_string(kMostLinkageMobility);
   const bool moves_bodies = static_cast<int>(linkage.joint_dofs.size()) != motors;
   if (moves_bodies) {
@@ -274,12 +277,12 @@ LinkageWorkspace::LinkageWorkspace(const Linkage& linkage)
       T(linkage.cluster->dofs.size(), linkage.size()),
       z(T),
       y(linkage.cluster->rank, linkage.size()),
-      drift(linkage.cluster->closures.rows, linkage.cluster->dofs.size()),
+      drift(linkage.cluster->numRows(), linkage.cluster->dofs.size()),
       O(MatrixXd::Zero(6 * static_cast<Eigen::Index>(linkage.bodies.size()), T.rows())),
       turn(O),
       Q(linkage.bodies.empty() ? T.cols() : O.rows(), T.cols()),
       Q_inverse(Q.cols(), Q.rows()),
-      both(T.cols() + Q.rows(), linkage.cluster->size),
+      both(T.cols() + Q.rows(), linkage.size() + linkage.idle),
       N(T),
       derivative(T.rows()),
       N_M(T.cols(), T.cols()),
@@ -339,7 +342,7 @@ void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory,
 }
 
 const MatrixXd& selectMoving(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& basis) {
-  if (linkage.idle == 0) return basis;
+  if (basis.cols() == linkage.size()) return basis;
   updateRows(linkage, s, basis);
   s.svd.compute(s.both);  // what is idle is its null space
   s.N.noalias() = basis * s.svd.matrixV().leftCols(linkage.size());

@@ -30,11 +30,12 @@ std::vector<Linkage> listLinkages(const Model& closed, const Reduction& reductio
         joints.push_back(closed.joints()[i].name);
         coordinates += closed.joints()[i].nv;
       }
-    if (joints.empty() || coordinates != cluster.size)
+    const int mobility = cluster.size - static_cast<int>(cluster.spins.size());
+    if (joints.empty() || coordinates != mobility)
       throw InputError(closed.name(), "closures " + listItems(closures),
-                       "there is no equivalent serial chain: their linkage has mobility " +
-                           std::to_string(cluster.size) + ", but its serial joints (" + listItems(joints) + ") have " +
-                           std::to_string(coordinates) + " coordinates",
+                       "there is no equivalent serial chain: their linkage has mobility " + std::to_string(mobility) +
+                           ", but its serial joints (" + listItems(joints) + ") have " + std::to_string(coordinates) +
+                           " coordinates",
                        joints.empty() ? "use the closed model; or if one-axis joints determine the linkage, such as a "
                                         "knee or an ankle, list them as serial_joints"
                                       : "list serial joints that determine the linkage, or use the closed model");

@@ -26,7 +26,7 @@ std::optional<Linkage> findLinkage(const Model& model, const std::vector<int>& m
 }
 
 bool hasRatios(const Linkage& linkage) {
-  return !linkage.joints.empty() && linkage.idle == 0 && linkage.size() <= kMostRatioMotors;
+  return !linkage.joints.empty() && linkage.cluster->size == linkage.size() && linkage.size() <= kMostRatioMotors;
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "bielle/dynamics/linkage.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
+#include "dynamics/idle_spins.h"
 #include "dynamics/point_spring.h"
 #include "dynamics/regular_mobility.h"
 #include "model/frame_name.h"
@@ -170,8 +171,13 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
   const Mobility mobility = calcMobility(model, q), regular = closed ? calcRegularMobility(model, q) : mobility;
   if (regular.rank > mobility.rank)
     place += " (singular: rank " + std::to_string(mobility.rank) + " there, this beside it)";
-  return {{"posture", place},     {"closed", closed},     {"singular", regular.rank > mobility.rank},
-          {"rows", regular.rows}, {"rank", regular.rank}, {"mobility", regular.mobility}};
+  return {{"posture", place},
+          {"closed", closed},
+          {"singular", regular.rank > mobility.rank},
+          {"rows", regular.rows},
+          {"rank", regular.rank},
+          {"mobility", regular.mobility},
+          {"idle_spins", closed && regular.mobility > 0 ? countIdleSpins(model, q) : 0}};
 }
 
 // Of every linkage.
