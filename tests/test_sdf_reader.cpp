@@ -7,6 +7,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "formats/sdf.h"
 #include "get_error.h"
+#include "model/number_text.h"
 #include "robot_difference.h"
 #include "robot_directory.h"
 
@@ -175,6 +176,41 @@ TEST_CASE("joints of SDF: frames that poses are relative to, ranges, springs, an
   CHECK(getSdfJoint(model, "socket").kind == JointKind::Spherical);
   CHECK(getSdfJoint(model, "ja").kind == JointKind::Continuous);
   CHECK(warnsOf(robot, "<model> <plugin> (line "));
+}
+
+TEST_CASE("loops of SDF are cut at their balls, wherever these are in the file, and other joints keep their ranges") {
+  // Two levers on a frame, and a rod between them.
+  const auto link = [](const std::string& name, double x, double y) {
+    return "<link name='" + name + "'><pose>" + formatNumber(x) + " " + formatNumber(y) +
+           " 0.3 0 0 "
+           "0</pose><inertial><mass>2</mass><inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></"
+           "inertial></link>";
+  };
+  const auto lever = [](const std::string& name) {
+    return "<joint name='pin_" + name + "' type='revolute'><parent>frame</parent><child>" + name +
+           "</child><axis><xyz>0 0 1</xyz><limit><lower>-0.6</lower><upper>0.5</upper></limit>"
+           "<dynamics><damping>0.2</damping></dynamics></axis></joint>";
+  };
+  const std::string ball =
+      "<joint name='ball' type='ball'><pose>0 0.2 0 0 0 0</pose><parent>rod</parent><child>b</child></joint>";
+  const std::string rest =
+      link("frame", 0, 0) + link("a", 0, 0) + link("b", 0.8, 0) + link("rod", 0, 0.2) + lever("a") +
+      "<joint name='fork' type='universal'><parent>a</parent><child>rod</child><axis><xyz>0 0 1</xyz></axis>"
+      "<axis2><xyz>0 1 0</xyz></axis2></joint>";
+  for (const std::string& joints : {ball + lever("b"), lever("b") + ball}) {
+    const LoadedRobot robot = loadSdf("<sdf version='1.7'><model name='levers'>" + joints + rest + "</model></sdf>");
+    const Model& model = robot.model;
+    REQUIRE(model.closures().size() == 1);
+    CHECK(model.closures()[0].name == "ball");
+    CHECK(model.closures()[0].kind == ClosureKind::Ball3D);
+    const Joint& pin = getSdfJoint(model, "pin_b");
+    CHECK(pin.kind == JointKind::Revolute);
+    CHECK(model.lowerLimits()[pin.idx_v] == -0.6);
+    CHECK(model.upperLimits()[pin.idx_v] == 0.5);
+    CHECK(model.jointForces().size() == 2);
+    CHECK_FALSE(warnsOf(robot, "it closes a loop"));
+    CHECK(calcMobility(model, findClosedConfiguration(model).q).mobility == 7);
+  }
 }
 
 TEST_CASE("a model of SDF that nothing holds has a free base, one that is static has none") {

@@ -186,14 +186,22 @@ std::string SdfReader::getChild(const sdf::Joint& joint) const {
   return link;
 }
 
-// Which joint carries a link: the first that leads to it, but one that cannot close a loop before any other, and one that slides,
-// whose coordinate and motor a loop would lose, before one that turns.
+// Which joint carries a link: the first that leads to it, but one that cannot close a loop before any other, then one that slides,
+// whose coordinate and motor a loop would lose, and a ball after all others if there is a hinge that would lose something as a closure.
 void SdfReader::chooseCarriers() {
-  const auto rank = [](sdf::JointType type) { return !canClose(type) ? 0 : type == sdf::JointType::PRISMATIC ? 1 : 2; };
-  for (const int now : {0, 1, 2})
+  std::set<std::string> hinged;
+  for (uint64_t i = 0; i < model_->JointCount(); ++i)
+    if (const sdf::Joint& joint = *model_->JointByIndex(i); canClose(joint.Type()) && losesByCut(joint))
+      hinged.insert(getChild(joint));
+  const auto rank = [&](const sdf::Joint& joint) {
+    if (!canClose(joint.Type())) return 0;
+    if (joint.Type() == sdf::JointType::PRISMATIC) return 1;
+    return joint.Type() == sdf::JointType::BALL && hinged.count(getChild(joint)) ? 3 : 2;
+  };
+  for (const int now : {0, 1, 2, 3})
     for (uint64_t i = 0; i < model_->JointCount(); ++i) {
       const sdf::Joint& joint = *model_->JointByIndex(i);
-      if (rank(joint.Type()) != now) continue;
+      if (rank(joint) != now) continue;
       const std::string parent = getParent(joint), child = getChild(joint);
       bool is_free = !carriers_.count(child);
       for (std::string above = parent; is_free && parents_.count(above); above = parents_[above])

@@ -3,9 +3,9 @@
 /// reader_no_sdf.cpp stands for it.
 ///
 /// The bodies of a robot stand in the file where all joints are at zero. A body may be the child of several joints: one carries
-/// it, the others close loops. The frame of a body keeps its directions, unless it hangs on a universal joint, and has its origin on
-/// the joint that carries it. Joints with <drake:parent_frame> and <drake:child_frame> join these frames, wherever the file draws
-/// their links.
+/// it, a hinge with a range, a force or an effort rather than a ball, and the others close loops. The frame of a body keeps its
+/// directions, unless it hangs on a universal joint, and has its origin on the joint that carries it. Joints with
+/// <drake:parent_frame> and <drake:child_frame> join these frames, wherever the file draws their links.
 #include <sdf/sdf.hh>
 #include <set>
 
@@ -50,6 +50,7 @@ class SdfReader {
   Vector3d resolveAxis(const sdf::Joint& joint, int k) const;
   Vector3d getAxis(const sdf::Joint& joint, int k) const;
   std::optional<Matrix3d> findUniversalAxes(const sdf::Joint& joint) const;
+  static bool losesByCut(const sdf::Joint& joint);
   void readAxis(const sdf::Joint& joint, int k, UrdfJoint& out);
   void addClosure(const sdf::Joint& joint);
   void addClosure(const std::string& name, ClosureKind kind, const Vector3d& axis, const std::string& link1,

@@ -51,6 +51,16 @@ std::optional<Matrix3d> SdfReader::findUniversalAxes(const sdf::Joint& joint) co
   return R;
 }
 
+// Whether a hinge has what a closure cannot have: a range, a force, or what its motor can do.
+bool SdfReader::losesByCut(const sdf::Joint& joint) {
+  const sdf::JointAxis* axis = joint.Axis(0);
+  if (!axis || (joint.Type() != sdf::JointType::REVOLUTE && joint.Type() != sdf::JointType::CONTINUOUS)) return false;
+  const bool has_range =
+      joint.Type() == sdf::JointType::REVOLUTE && (axis->Lower() > -kNoLimit || axis->Upper() < kNoLimit);
+  return has_range || axis->Damping() != 0 || axis->Friction() != 0 || axis->SpringStiffness() != 0 ||
+         (axis->Effort() > 0 && axis->Effort() < kNoLimit);
+}
+
 // Limits, forces and speed of a coordinate.
 void SdfReader::readAxis(const sdf::Joint& joint, int k, UrdfJoint& out) {
   const sdf::JointAxis& axis = *joint.Axis(k);
