@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/ratio.h"
 #include "bielle/model/builder.h"
@@ -426,4 +427,141 @@ TEST_CASE("a posture at a dead point has the distance 0, and is no reference of 
     const VectorXd q = carryLinkage(chain.model, linkage, sample, chain.q_closed);
     CHECK(findDeadPoint(linkage, chain.model, q).distance < 1e-6);
   }
+}
+
+namespace {
+
+// A mechanism in the xz plane, whose angles turn from x to z.
+class PlaneBuilder {
+ public:
+  explicit PlaneBuilder(const std::string& name) : builder(name) {}
+  void addHinge(const std::string& name, const std::string& parent, double x, double z) {
+    add(name, parent, JointKind::Continuous, -Vector3d::UnitY(), {x, 0, z});
+  }
+  void add(const std::string& name, const std::string& parent, JointKind kind, const Vector3d& axis,
+           const Vector3d& p) {
+    Joint joint;
+    joint.name = name;
+    joint.kind = kind;
+    joint.axis = axis;
+    joint.X_PJ.p = p;
+    Inertia inertia;
+    inertia.mass = 0.3;
+    inertia.I_com = 1e-3 * Matrix3d::Identity();
+    builder.addLink(name, parent, joint, inertia);
+  }
+  // Points along x of two bodies.
+  void pin(const std::string& a, double x_a, const std::string& b, double x_b) {
+    const std::string name = a + "_" + b;
+    builder.addFrame(name + "1", a, {Matrix3d::Identity(), {x_a, 0, 0}});
+    builder.addFrame(name + "2", b, {Matrix3d::Identity(), {x_b, 0, 0}});
+    builder.addClosure(name, ClosureKind::Ball3D, name + "1", name + "2");
+  }
+  ModelBuilder builder;
+};
+
+constexpr double kBar = 0.5;
+
+// Three stages of crossed bars on a foot that slides; a0 is the angle of the bars, the foot is at kBar cos(a0).
+Model makeScissor() {
+  PlaneBuilder b("scissor");
+  for (const int i : {0, 1, 2}) {
+    const std::string n = std::to_string(i);
+    b.addHinge("a" + n, i == 0 ? "world" : "b" + std::to_string(i - 1), i == 0 ? 0 : -kBar / 2, 0);
+    b.addHinge("b" + n, "a" + n, kBar / 2, 0);
+    if (i > 0) b.pin("a" + std::to_string(i - 1), kBar, "b" + n, kBar / 2);
+  }
+  b.add("foot", "world", JointKind::Prismatic, Vector3d::UnitX(), Vector3d::Zero());
+  b.pin("b0", kBar / 2, "foot", 0);
+  b.builder.addMotor("foot", 0.01);
+  return b.builder.build();
+}
+
+}  // namespace
+
+TEST_CASE("a sweep stops where two rows of the loops are lost at once, and distances fall to zero there") {
+  const Model model = makeScissor();
+  const double start = 0.4;
+  VectorXd q(model.nq());
+  const std::vector<std::pair<std::string, double>> angles = {{"a0", start},
+                                                              {"b0", -2 * start},
+                                                              {"a1", 2 * start},
+                                                              {"b1", -2 * start},
+                                                              {"a2", 2 * start},
+                                                              {"b2", -2 * start},
+                                                              {"foot", kBar * std::cos(start)}};
+  for (const auto& [name, angle] : angles) q[model.joints()[model.findJoint(name)].idx_q] = angle;
+  VectorXd flat = VectorXd::Zero(model.nq());
+  flat[model.joints()[model.findJoint("foot")].idx_q] = kBar;
+  REQUIRE(calcMobility(model, q).rank == 6);
+  REQUIRE(calcMobility(model, flat).rank == 4);
+  const Linkage linkage = makeLinkage(model, q, {"a0"});
+  RatioSweep sweep = sweepRatio(model, linkage, q);
+  addDistances(model, linkage, q, sweep);
+  CHECK_FALSE(sweep.full_turn);
+  CHECK_THAT(sweep.begin, Catch::Contains("its loops lose rank"));
+  CHECK_THAT(sweep.end, Catch::Contains("its loops lose rank"));
+  CHECK(sweep.samples.front().joints[0] > 0);
+  CHECK(sweep.samples.front().joints[0] < 1e-3);
+  CHECK(sweep.samples.back().joints[0] == Approx(kPi / 2).margin(1e-3));  // all bars on one another
+  int near = 0;
+  for (const RatioSample& sample : sweep.samples) {
+    const double a = sample.joints[0];
+    CAPTURE(a);
+    CHECK(sample.ratio.R(0, 0) == Approx(-kBar * std::sin(a)).margin(1e-9));
+    if (a > 0.48) continue;
+    ++near;
+    REQUIRE(sample.nearest);
+    CHECK(sample.nearest->kind == DeadPointKind::Motors);
+    CHECK(sample.nearest->distance == Approx(a).margin(1e-6));
+  }
+  CHECK(near > 10);
+}
+
+TEST_CASE("a sweep of Peaucellier's inversor stops where its rhombus folds") {
+  // Arms from O to A and C, and sides of the rhombus A B C D; B is on a crank about Q, and circles through O.
+  const double arm = 0.4, side = 0.15, radius = 0.3;
+  PlaneBuilder b("inversor");
+  b.addHinge("crank", "world", radius, 0);
+  b.addHinge("ba", "crank", radius, 0);
+  b.addHinge("bc", "crank", radius, 0);
+  b.addHinge("oa", "world", 0, 0);
+  b.addHinge("ad", "oa", arm, 0);
+  b.addHinge("oc", "world", 0, 0);
+  b.addHinge("cd", "oc", arm, 0);
+  b.pin("ba", side, "oa", arm);
+  b.pin("bc", side, "oc", arm);
+  b.pin("ad", side, "cd", side);
+  b.builder.addMotor("crank", 0.01);
+  const Model model = b.builder.build();
+  const auto get = [&](const char* name) { return model.joints()[model.findJoint(name)].idx_q; };
+  const double turn = 1.2, reach = 2 * radius * std::cos(turn / 2);  // O B, at half the angle of the crank
+  const double at_o = std::acos((arm * arm + reach * reach - side * side) / (2 * arm * reach));
+  const double at_b = std::acos((side * side + reach * reach - arm * arm) / (2 * side * reach));
+  const double middle = turn / 2;
+  VectorXd q(model.nq());
+  q[get("crank")] = turn;
+  q[get("oa")] = middle + at_o;
+  q[get("oc")] = middle - at_o;
+  q[get("ba")] = middle + kPi - at_b - turn;
+  q[get("bc")] = middle + kPi + at_b - turn;
+  const Eigen::Vector2d A(arm * std::cos(middle + at_o), arm * std::sin(middle + at_o));
+  const Eigen::Vector2d B(reach * std::cos(middle), reach * std::sin(middle)),
+      C(arm * std::cos(middle - at_o), arm * std::sin(middle - at_o));
+  const Eigen::Vector2d D = A + C - B;
+  q[get("ad")] = std::atan2(D.y() - A.y(), D.x() - A.x()) - (middle + at_o);
+  q[get("cd")] = std::atan2(D.y() - C.y(), D.x() - C.x()) - (middle - at_o);
+  REQUIRE(closeConfiguration(model, q).status == NumericalStatus::Ok);
+  REQUIRE((closeConfiguration(model, q).q - q).norm() < 1e-9);
+  const Linkage linkage = makeLinkage(model, q, {"oa"});
+  const RatioSweep sweep = sweepRatio(model, linkage, q);
+  std::vector<double> reached;
+  for (const auto& [end, sample] :
+       {std::pair(sweep.begin, sweep.samples.front()), std::pair(sweep.end, sweep.samples.back())}) {
+    CHECK_THAT(end, Catch::Contains("its loops lose rank"));
+    reached.push_back(2 * radius * std::abs(std::cos(sample.motors[0] / 2)));
+  }
+  std::sort(reached.begin(), reached.end());
+  CHECK(reached[0] == Approx(std::sqrt(arm * arm - side * side)).margin(1e-3));  // D is on B, between A and C
+  CHECK(reached[1] == Approx(arm + side).margin(1e-3));                          // A is on C
 }

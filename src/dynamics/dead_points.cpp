@@ -68,6 +68,7 @@ double calcWay(const Linkage& linkage, const VectorXd& from, const VectorXd& to)
 // The way from a configuration to where a volume vanishes; infinite if that is not within kFarthestDeadPoint.
 double follow(const Linkage& linkage, const VectorXd& start, DeadPointKind kind, int side) {
   constexpr double kLongestStep = 0.1, kDead = 1e-9;  // in all coordinates of the cluster; of a volume
+  constexpr double kShort = 1e-3, kShare = 0.9;       // of a step that does not close: to be left out, or taken
   constexpr int kMostSteps = 100;
   const ReducedCluster& cluster = *linkage.cluster;
   LinkageWorkspace here(linkage), there(linkage);
@@ -92,7 +93,12 @@ double follow(const Linkage& linkage, const VectorXd& start, DeadPointKind kind,
     const double rate = (N.transpose() * way).dot(gradient);
     const double root = rate < 0 ? volume / -rate : kNone;
     if (root < kLongestStep) near = true;
-    if (!there.point.close(cluster, here.point.basis(), std::min(root, kLongestStep) * way, VectorXd())) return kNone;
+    const VectorXd move = std::min(root, kLongestStep) * way;
+    if (!there.point.close(cluster, here.point.basis(), move, VectorXd())) {
+      // Where the volume vanishes loops may lose rank, so that there is no basis: short of it, then.
+      if (root < kShort) return calcWay(linkage, start, cluster.model.integrate(here.point.basis().q, move));
+      if (!there.point.close(cluster, here.point.basis(), kShare * move, VectorXd())) return kNone;
+    }
     before = way;
     std::swap(here.point, there.point);
     if (!(calcWay(linkage, start, here.point.basis().q) < kFarthestDeadPoint + kLongestStep)) return kNone;

@@ -11,7 +11,6 @@ namespace {
 constexpr double kHeldTolerance = 1e-13;  // rad
 constexpr double kLongest = 1.2;          // largest displacement of a step over its length
 constexpr double kRankPlace = 1e-9;       // of a loss of rank, along the curve
-constexpr double kLostRank = 1e-4;        // singular values of the closures, relative
 constexpr double kHeldRank = 1e-6;        // singular values of the rates of held joints, relative
 
 }  // namespace
@@ -139,17 +138,44 @@ MatrixXd LinkageCurve::calcJacobian(const VectorXd& q) {
   Workspace ws(linkage_.cluster->model);
   updatePositions(linkage_.cluster->model, ws, q);
   for (size_t c = 0; c < set.closures.size(); ++c)
-  if (linkage_.cluster->holds_spins) updateSpinRows(*linkage_.cluster, J);
     calcClosureJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+  if (linkage_.cluster->holds_spins) updateSpinRows(*linkage_.cluster, J);
   return J;
 }
 
-bool LinkageCurve::hasRank(const VectorXd& q) {
+double LinkageCurve::calcRankMargin(const VectorXd& q) {
   const VectorXd sigma = Eigen::JacobiSVD<MatrixXd>(calcJacobian(q)).singularValues();
-  return sigma[linkage_.cluster->rank - 1] > kLostRank * sigma[0];
+  return sigma[linkage_.cluster->rank - 1] / sigma[0];
 }
 
-// The determinant of J on the independent rows of the start, completed by the tangent space there, changes its sign.
+// Where rank is lost, the margin of rank falls to zero and rises again, about as fast as the linkage moves.
+bool LinkageCurve::findRankMinimum(const CurvePoint& from, const CurvePoint& to, double& h) {
+  constexpr double kRate = 10;  // of the margin, per length of the curve
+  const double before = calcRankMargin(from.q), after = calcRankMargin(to.q), most = kRate * std::abs(h);
+  if (before < kLostRank || before > most || after > most) return false;
+  const auto calc = [&](double step) {
+    CurvePoint at;
+    return advance(from, step, at) ? calcRankMargin(at.q) : 0.0;
+  };
+  constexpr double kGolden = 0.6180339887498949, kEnd = 0.01;
+  if (calc(kEnd * h) >= before || calc((1 - kEnd) * h) >= after) return false;  // it is least at an end
+  double low = 0, high = h, a = h - kGolden * h, b = kGolden * h, f_a = calc(a), f_b = calc(b);
+  while (std::abs(high - low) > kRankPlace && std::min(f_a, f_b) > 0) {
+    if (f_a < f_b) {
+      high = b, b = a, f_b = f_a;
+      f_a = calc(a = high - kGolden * (high - low));
+    } else {
+      low = a, a = b, f_a = f_b;
+      f_b = calc(b = low + kGolden * (high - low));
+    }
+  }
+  if (std::min(f_a, f_b) > kLostRank) return false;
+  h = f_a < f_b ? a : b;
+  return true;
+}
+
+// The determinant of J on the independent rows of the start, completed by the tangent space there, changes its sign, where
+// one rank is lost; the margin finds where two are lost at once.
 bool LinkageCurve::findRankLoss(const CurvePoint& from, const CurvePoint& to, double& h) {
   if (!from_.update(*linkage_.cluster, from.q)) return false;
   const std::vector<int> rows = from_.basis().rows;
@@ -160,10 +186,14 @@ bool LinkageCurve::findRankLoss(const CurvePoint& from, const CurvePoint& to, do
     for (size_t i = 0; i < rows.size(); ++i) completed.row(i) = J.row(rows[i]);
     return completed.determinant();
   };
-  if (calcDeterminant(from) * calcDeterminant(to) > 0) return false;
-  const double root = findRoot(from, h, kRankPlace, calcDeterminant);
-  CurvePoint at;
-  if (advance(from, root, at) && hasRank(at.q)) return false;  // other rows keep the rank
+  double root = h;
+  if (calcDeterminant(from) * calcDeterminant(to) > 0) {
+    if (!findRankMinimum(from, to, root)) return false;
+  } else {
+    root = findRoot(from, h, kRankPlace, calcDeterminant);
+    CurvePoint at;
+    if (advance(from, root, at) && hasRank(at.q)) return false;  // other rows keep the rank
+  }
   why_ = "closure '" + linkage_.cluster->closures.closures.front().name +
          "': its loops lose rank and can continue in several ways";
   h = root;

@@ -37,10 +37,13 @@ class LinkageCurve {
   const ReducedCluster& cluster() const { return *linkage_.cluster; }
 
  private:
+  static constexpr double kLostRank = 1e-4;  // of calcRankMargin()
   bool finishPoint(const VectorXd& direction, CurvePoint& point);
   MatrixXd heldRows() const;
   MatrixXd calcJacobian(const VectorXd& q);
-  bool hasRank(const VectorXd& q);
+  double calcRankMargin(const VectorXd& q);  // the least singular value of J, over the largest
+  bool hasRank(const VectorXd& q) { return calcRankMargin(q) > kLostRank; }
+  bool findRankMinimum(const CurvePoint& from, const CurvePoint& to, double& h);
 
   const Linkage& linkage_;
   int joint_;
