@@ -193,6 +193,48 @@ TEST_CASE("an adopted robot bends its knees the way that their ranges allow") {
   }
 }
 
+TEST_CASE("a frame that is named like a foot is no sole where its shapes reach below it") {
+  // Legs of six joints; the frames of the last bodies are at the ankles.
+  const auto makeLeg = [](const std::string& last, const std::string& side, const std::string& y) {
+    const auto body = [&side](const std::string& name, const std::string& place, const std::string& joints,
+                              double mass) {
+      std::string text = "<body name='" + name + "_" + side + "' pos='" + place + "'><inertial pos='0 0 -.1' mass='" +
+                         formatNumber(mass) + "' diaginertia='.01 .01 .01'/>";
+      for (size_t at = 0; at + 1 < joints.size(); at += 2)
+        text += "<joint name='" + name + joints.substr(at, 2) + "_" + side + "' axis='" +
+                (joints[at + 1] == 'x'   ? "1 0 0"
+                 : joints[at + 1] == 'y' ? "0 1 0"
+                                         : "0 0 1") +
+                "'/>";
+      return text;
+    };
+    return body("thigh", "0 " + y + " 0", "_z_x_y", 3) + body("shank", "0 0 -.4", "_y", 2) +
+           body(last, "0 0 -.4", "_y_x", 1) +
+           "<geom type='box' pos='.03 0 -.045' size='.09 .035 .01'/></body></body></body>";
+  };
+  for (const std::string last : {"foot", "ankle_roll_link"}) {
+    const RobotDirectory directory;
+    const std::string path = directory.write(
+        "biped.xml",
+        "<mujoco><compiler angle='radian'/><worldbody><body name='trunk' pos='0 0 .9'><freejoint/><inertial "
+        "pos='0 0 .2' mass='20' diaginertia='.5 .5 .5'/>" +
+            makeLeg(last, "left", ".1") + makeLeg(last, "right", "-.1") + "</body></worldbody></mujoco>");
+    const Adoption adoption = adoptRobot(loadRobot(path), "../biped.xml");
+    CAPTURE(last, adoption.yaml);
+    const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+    REQUIRE(model.contacts().size() == 2);
+    for (const ContactFrame& contact : model.contacts()) {
+      CHECK((contact.X_BF.p - Vector3d(0.03, 0, -0.055)).norm() < 1e-6);
+      CHECK(contact.half_length == Approx(0.09));
+      CHECK(contact.half_width == Approx(0.035));
+    }
+    Workspace ws(model);
+    updatePositions(model, ws, assembleReference(model, "half_sitting").q);
+    for (const ContactFrame& contact : model.contacts())
+      CHECK(std::abs(getPlacement(ws, contact.body, contact.X_BF).p.z()) < 1e-6);
+  }
+}
+
 TEST_CASE("an adopted robot says where the dead points of its linkages are") {
   // A four-bar at the knee whose crank turns wholly (robots/parts/knee/four_bar.yaml): the knee turns back where crank and rod are in
   // line, l +- c from the motor to the end of the arm, which is at the angle psi from the thigh, cos psi = sin(knee - middle).

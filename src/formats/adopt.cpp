@@ -336,9 +336,8 @@ class Adopter {
           lines.push_back(linkage.output + ": one of the " + getName(nearest.kind) + ", " + formatDistance(nearest) +
                           " (rad or m) away");
         for (size_t j = 0; j < linkage.joints.size(); ++j)
-          for (const RatioSample& sample : sweepRatio(model, linkage, posture_, static_cast<int>(j)).samples)
-            if (sample.dead != DeadPointKind::None || sample.loses_rank)
-              lines.push_back(describe(linkage, j, sample, posture_[model.joints()[linkage.joints[j]].idx_q]));
+          for (const RatioSample& sample : listDeadPoints(sweepRatio(model, linkage, posture_, static_cast<int>(j))))
+            lines.push_back(describe(linkage, j, sample, posture_[model.joints()[linkage.joints[j]].idx_q]));
       }
     } catch (const InputError& error) {  // the posture is one itself
       lines.push_back(error.element() + ": " + error.problem());
@@ -349,6 +348,19 @@ class Adopter {
       guesses_.push_back("  " + line);
       out_ << YAML::Newline << YAML::Comment(line);
     }
+  }
+
+  // Those of a kind at one angle, as a linkage passes them on several ways, are one.
+  static std::vector<RatioSample> listDeadPoints(const RatioSweep& sweep) {
+    constexpr double kSame = 1e-3;  // rad or m
+    std::vector<RatioSample> out;
+    for (const RatioSample& sample : sweep.samples) {
+      const bool is_known = std::any_of(out.begin(), out.end(), [&](const RatioSample& other) {
+        return other.dead == sample.dead && std::abs(other.joints[sweep.joint] - sample.joints[sweep.joint]) < kSame;
+      });
+      if ((sample.dead != DeadPointKind::None || sample.loses_rank) && !is_known) out.push_back(sample);
+    }
+    return out;
   }
 
   static std::string describe(const Linkage& linkage, size_t joint, const RatioSample& dead, double posture) {

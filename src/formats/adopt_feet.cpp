@@ -13,6 +13,7 @@ constexpr double kUpright = 0.9;                      // least cosine between th
 constexpr double kMirror = 0.06, kSameHeight = 0.02;  // of a pair of feet, m: published models are not quite symmetric
 constexpr double kTouching = 0.005;  // m; shapes of a foot that reach as low as this over its lowest point are its sole
 constexpr double kRound = 1.05;      // extent of a round shape across, over its radius
+constexpr double kBelow = 0.01;      // m; a foot that reaches lower under a frame does not stand on it
 constexpr double kBlade = 0.03;      // m, the width of a foot that stands on an edge is less
 
 bool isNamedFoot(std::string name) {
@@ -20,18 +21,30 @@ bool isNamedFoot(std::string name) {
   return name.find("foot") != std::string::npos || name.find("sole") != std::string::npos;
 }
 
+double getExtent(const SE3& X_WS, const Shape& shape, const Vector3d& direction) {
+  return (X_WS.R.transpose() * direction).cwiseAbs().dot(shape.half) + shape.radius;
+}
+
+// Whether shapes of its body, or of those that this one carries, reach below a frame, as those of a foot below the ankle.
+bool isAboveShapes(const Model& model, const Workspace& ws, const Frame& frame) {
+  const SE3 X_WF = getPlacement(ws, frame.body, frame.X_BF);
+  return std::any_of(model.shapes().begin(), model.shapes().end(), [&](const Shape& shape) {
+    if (!model.isAncestorOrSelf(frame.body, shape.body)) return false;
+    const SE3 X_FS = X_WF.inverseTimes(getPlacement(ws, shape.body, shape.X_BS));
+    return X_FS.p.z() - getExtent(X_FS, shape, Vector3d::UnitZ()) < -kBelow;
+  });
+}
+
+// Those with z up that are soles by their name, unless by their shapes they are not, and all others.
 std::vector<FoundFoot> listUprightFrames(const Model& model, const Workspace& ws) {
   std::vector<FoundFoot> feet;
   for (const Frame& frame : model.frames()) {
     const SE3 X = getPlacement(ws, frame.body, frame.X_BF);
     if (frame.body > 1 && X.R(2, 2) > kUpright)
-      feet.push_back({frame.name, frame.body, frame.X_BF, X, isNamedFoot(frame.name)});
+      feet.push_back(
+          {frame.name, frame.body, frame.X_BF, X, isNamedFoot(frame.name) && !isAboveShapes(model, ws, frame)});
   }
   return feet;
-}
-
-double getExtent(const SE3& X_WS, const Shape& shape, const Vector3d& direction) {
-  return (X_WS.R.transpose() * direction).cwiseAbs().dot(shape.half) + shape.radius;
 }
 
 // z is up along the flat side of a shape, or across it if it is long; x forward, or along the shape if that is nearly forward.

@@ -16,7 +16,8 @@ struct FoundFoot {
 };
 
 /// One foot, or the left and the right one, which are mirror images of each other, in the posture of the workspace:
-/// - frames with z up that are named foot or sole, the lowest ones;
+/// - frames with z up that are named foot or sole, the lowest ones, unless shapes of their bodies reach below them: then they are
+///   ankles;
 /// - otherwise new frames on the bodies whose shapes reach lowest, below the middle of what touches the ground there: z along
 ///   their flat side, x forward, along them if they are long;
 /// - of a robot without shapes the lowest frames with z up. Empty if there are none.
