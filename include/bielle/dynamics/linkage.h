@@ -6,8 +6,8 @@
 /// motors nor output, as the spin of a rod on two balls. N (n x m) is an orthonormal basis of its other closed motions, N_M its
 /// rows of the motors, and O N the motion of what the linkage is there for, its output: its
 /// serial joints, where there are m of them; else the bodies that carry other joints, soles or (if there are none of
-/// these) frames, by their twists relative to the body that carries the linkage, with lengths over the size of the
-/// linkage. Of the volumes
+/// these) frames and do not spin idly, by their twists relative to the body that carries the linkage, with lengths over the
+/// size of the linkage. Of the volumes
 ///     s_M = |det N_M|,    s_O = sqrt(det (O N)^T (O N))                                                            (1)
 /// the first vanishes at dead points of the motors, where the linkage moves though its motors stand, and the second at
 /// dead points of the output, which stands still while motors move. With T = N N_M^{-1} and Q = O T, the transmission
@@ -32,7 +32,7 @@ struct ReducedCluster;
 /// A loop cluster with its motors and its output. It does not change, copies share the cluster, and functions may be called
 /// from several threads at once.
 struct Linkage {
-  std::shared_ptr<const ReducedCluster> cluster;  ///< with a metric of ones; without joints if isDirect()
+  std::shared_ptr<const ReducedCluster> cluster;  ///< metric of ones, no idle spins; without joints if isDirect()
   int index = 0;                                  ///< of the cluster among those of the robot
   std::vector<int> motors;                        ///< indices into Model::motors()
   std::vector<int> joints;                        ///< indices in the whole model; none where the output is bodies
