@@ -1,12 +1,13 @@
 #pragma once
 /// \file FDDP for a receding horizon: a few iterations per step, each about as long as the last, on a window that moves.
 ///
-/// Iterations are those of fddp.h, with four differences. Each tries only a few step lengths, 1, 1/4, ...; if none is
-/// acceptable, the trajectory and its multipliers stay as they are, and the next iteration, in this step() or after
-/// advance(), is regularized more. None closes the gaps for its own sake: steps of all lengths are rolled out in segments,
-/// which run at the same time, and what they leave open is left to the next step. Multipliers are new, fddp.h Eq. (12),
-/// before every linearization, which is made once; those of a search in vain are taken back, or the same violations would
-/// count once more with every search. And since Eq. (10) is not at its minimum there, rows with y_k != 0 are then held at
+/// Iterations are those of fddp.h, with four differences. Each tries only a few step lengths, 1, 1/4, 1/16 and 1/64: where the
+/// gaps that a push leaves are large, only short ones succeed, and more regularization does not shorten the others. If none is
+/// acceptable, the trajectory and its multipliers stay as they are, and the next iteration, in this step() or after advance(),
+/// is regularized more. None closes the gaps for its own sake: steps of all lengths are rolled out in segments, which run at
+/// the same time, and what they leave open is left to the next step. Multipliers are new, fddp.h Eq. (12), before every
+/// linearization, which is made once; those of a search in vain are taken back, or the same violations would count once more
+/// with every search. And since Eq. (10) is not at its minimum there, rows with y_k != 0 are then held at
 /// their bounds, like equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal on Optimization 13,
 /// 2002): in Eq. (10) they have
 ///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (14)
@@ -24,7 +25,7 @@ struct FddpMemory;
 struct RecedingOptions : IterationOptions {
   int iterations = 1;  ///< per step, at most 1000000, those without an acceptable step included; fewer if it converges
 
-  RecedingOptions() { num_step_lengths = 2; }  // 1 and 1/4
+  RecedingOptions() { num_step_lengths = 4; }  // 1 to 1/64
 };
 
 /// What a node of a window that has moved takes over from a node of the last window.
