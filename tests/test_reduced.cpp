@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/robots/robot_loader.h"
@@ -33,6 +34,7 @@ std::vector<StageSpec> makeStages(const Model& model, const std::vector<ContactT
       stage.dt = 0;
     }
     if (k == 0) stage.constraints = makeConstraintSet(model, contacts);
+    if (!model.jointForces().empty()) stage.armature = randomVector(rng, model.nv()).cwiseAbs();
     stage.state = {0.7, q_ref, randomVector(rng, model.nv()), randomVector(rng, 2 * model.nv()).cwiseAbs()};
     stage.control = {0.3, randomVector(rng, model.nu()), VectorXd::Ones(model.nu())};
     stage.costs.push_back({"com", 2, Activation::makeQuadratic(Vector3d(1, 2, 3)), makeComPosition(Vector3d(1, 0, 2))});
@@ -168,6 +170,46 @@ TEST_CASE("reduced step: springs, dampers and friction on joints in and outside 
       const State node = makeClosedState(model, mechanism.q_closed, 0.05, 1, rng);
       checkLinearization(model, {{1, {}, 0, 10}}, state, node.x(), rng, StageKind::Dynamics, Formulation::Reduced,
                          rule);
+    }
+}
+
+TEST_CASE("steps: with an armature of h^2 k / 4 a step of any length takes a spring implicitly, in both formulations") {
+  constexpr double kMass = 2, kStiffness = 800, kLength = 0.3;  // h omega = 6
+  ModelBuilder builder("oscillator");
+  Joint slide;
+  slide.name = "slide";
+  slide.kind = JointKind::Prismatic;
+  slide.axis = Vector3d::UnitX();
+  builder.addLink("mass", "world", slide, {kMass, Vector3d::Zero(), Matrix3d::Identity()});
+  builder.addMotor("slide");
+  JointForce spring;
+  spring.stiffness = kStiffness;
+  builder.addJointForce("slide", spring);
+  const Model model = builder.build();
+  const auto calcEnergy = [&](const VectorXd& x) { return 0.5 * (kStiffness * x[0] * x[0] + kMass * x[1] * x[1]); };
+  for (Formulation formulation : {Formulation::Full, Formulation::Reduced})
+    for (bool implicit : {true, false}) {
+      CAPTURE(getName(formulation), implicit);
+      std::vector<StageSpec> stages(2);
+      stages[0].step = StepRule::Midpoint;
+      stages[0].dt = kLength;
+      if (implicit) stages[0].armature = VectorXd::Constant(1, kLength * kLength * kStiffness / 4);
+      const RobotProblem whole(model, VectorXd::Zero(1), VectorXd::Zero(1), std::move(stages), formulation);
+      ProblemProbe problem(whole);
+      VectorXd x = Eigen::Vector2d(0.1, -0.4), next(2);
+      const double energy = calcEnergy(x);
+      for (int i = 0; i < 5; ++i) {
+        double cost = 0;
+        REQUIRE(problem.step(0, x, VectorXd::Zero(1), next, cost) == NumericalStatus::Ok);
+        const double force = -kStiffness * (x[0] + next[0]) / 2;
+        if (implicit) CHECK(next[1] == Approx(x[1] + kLength * force / kMass).margin(1e-12));
+        CHECK(next[0] == Approx(x[0] + kLength * (x[1] + next[1]) / 2).margin(1e-12));
+        x = next;
+      }
+      if (implicit)
+        CHECK(calcEnergy(x) == Approx(energy).epsilon(1e-12));
+      else
+        CHECK(calcEnergy(x) > 1e6 * energy);
     }
 }
 

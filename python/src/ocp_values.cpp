@@ -112,6 +112,7 @@ void bindStages(py::module_& module) {
       .field("costs", &StageSpec::costs, "Costs")
       .field("path_constraints", &StageSpec::path_constraints, "PathConstraints")
       .field("effort_limits", &StageSpec::effort_limits, "bounds of |u| (nu,); empty: those of the motors")
+      .field("armature", &StageSpec::armature, "of a step, added to the model's (nv,), kg m^2 or kg; empty: none")
       .field("feet", &StageSpec::feet, "FootTasks of the feet that move, for predictive control");
 }
 

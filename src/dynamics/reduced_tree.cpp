@@ -111,7 +111,7 @@ void ReducedTreeOf<T>::addMassWithin(const WorkspaceOf<T>& ws, const ClusterLift
     const int first = link.dofs.front();
     link.YJ = ws.YJ.middleCols(first, n);
     M.block(o, o, n, n).noalias() = ws.J.middleCols(first, n).transpose().lazyProduct(link.YJ);
-    M.block(o, o, n, n).diagonal() += model_.armature().segment(first, n);
+    M.block(o, o, n, n).diagonal() += ws.armature.segment(first, n);
     return;
   }
   const ClusterMotionOf<T>& motion = *lift->motion;
@@ -127,7 +127,7 @@ void ReducedTreeOf<T>::addMassWithin(const WorkspaceOf<T>& ws, const ClusterLift
       for (int k = group.begin; k < group.end; ++k) {
         const int dof = link.dofs[k];
         const T row = ws.YJ.col(dof).dot(motion.J.col(n * c + k)) + ws.J.col(dof).dot(after_y_.col(g)) +
-                      model_.armature()[dof] * N(k, c);
+                      ws.armature[dof] * N(k, c);
         for (int d = 0; d < place.size; ++d) M(o + d, o + c) += N(k, d) * row;
         sum += N(k, c) * ws.YJ.col(dof);
       }
@@ -203,7 +203,7 @@ void ReducedTreeOf<T>::addClusterWithin(const WorkspaceOf<T>& ws, const ClusterL
       Vector6<T> sum_y = after_y, sum_v = after_v;
       for (int k = group.begin; k < group.end; ++k) {
         const int dof = link.dofs[k], at = n * c + k;
-        const double armature = model_.armature()[dof];
+        const T armature = ws.armature[dof];
         const T row_y = ws.YJ.col(dof).dot(motion.dA.col(at)) + ws.BtJ.col(dof).dot(motion.dV.col(at)) +
                         ws.J.col(dof).dot(after_y) + armature * dy(k, c) - (*lift.KN)(k, c) +
                         ws.stiffness[dof] * N(k, c) + ws.resistance[dof] * Z(k, c);

@@ -82,7 +82,7 @@ void updateMassMatrix(const Model& model, Workspace& ws) {
       ws.M(j, k) = m;
       ws.M(k, j) = m;
     }
-  ws.M.diagonal() += model.armature();
+  ws.M.diagonal() += ws.armature;
 }
 
 template <typename T>
@@ -116,7 +116,7 @@ void updateInverseDynamics(const Model& model, WorkspaceOf<T>& ws, typename Argu
   }
   ws.a = a;
   sumForces(model, ws, ws.b);
-  ws.b += model.armature().cwiseProduct(a);
+  ws.b += ws.armature.cwiseProduct(a);
   ws.stage = WorkspaceStage::Velocity;
 }
 
@@ -126,7 +126,7 @@ VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q
   updateAccelerations(model, ws, a);
   VectorXd tau(model.nv());
   sumForces(model, ws, tau);
-  return tau + model.armature().cwiseProduct(a);
+  return tau + ws.armature.cwiseProduct(a);
 }
 
 template <typename T>

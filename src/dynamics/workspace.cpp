@@ -9,6 +9,7 @@ namespace bielle {
 template <typename T>
 WorkspaceOf<T>::WorkspaceOf(const Model& model) {
   const int nb = model.numBodies(), nv = model.nv();
+  armature = model.armature().cast<T>();
   q.setZero(model.nq());
   X_WB.resize(nb);
   Y.assign(nb, Matrix6<T>::Zero());

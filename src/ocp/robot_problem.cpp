@@ -49,6 +49,8 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
   if (spec.control.weight != 0)
     require(spec.control.reference.size() == model.nu() && spec.control.weights.size() == model.nu(),
             "the control cost has the wrong size", "reference and weights: nu");
+  require(spec.armature.size() == 0 || (spec.armature.size() == model.nv() && areWeights(spec.armature)),
+          "its armature has the wrong size, or is negative or not finite", "armature: nv, or empty");
   require(spec.effort_limits.size() == 0 || spec.effort_limits.size() == model.nu(),
           "its effort limits have the wrong size", "effort_limits: nu, or empty");
   const auto requireForces = [&](const Residual& residual, const char* kind, const std::string& name) {

@@ -20,6 +20,8 @@ struct WorkspaceOf {
 
   WorkspaceStage stage = WorkspaceStage::Empty;
 
+  VectorX<T> armature;  ///< nv, that of the model unless the caller changes it
+
   // Writer: updatePositions
   VectorX<T> q;                ///< nq
   std::vector<SE3Of<T>> X_WB;  ///< nb, placements of the bodies

@@ -41,6 +41,11 @@
 ///
 /// The speeds of the motors belong to the velocity that a is taken at: v, or v + h/2 a of a midpoint step.
 ///
+/// A step too long for a spring of stiffness k makes it grow: with the mass m, if h^2 k > 4 m. With the armature h^2 k / 4
+/// added,
+///     (m + h^2 k / 4) a = f - k q_mid    is    m a = f - k (q + q+) / 2,                                             (7)
+/// the implicit midpoint step of that spring, which is of second order and stable for any h.
+///
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and likewise for
 /// v and u.
 #include <memory>
@@ -96,6 +101,8 @@ struct StageSpec {
   std::vector<Cost> costs;
   std::vector<PathConstraint> path_constraints;
   VectorXd effort_limits;  ///< bounds of |u|, nu; empty: those of the motors
+  /// Of a step, kg m^2 or kg, added to that of the model, nv; empty: none. Springs of stiffness k with h^2 k / 4 have Eq. (7).
+  VectorXd armature;
 };
 
 /// Value of one cost at one node, for reports.

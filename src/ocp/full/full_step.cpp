@@ -15,12 +15,18 @@ FullStepScratch::FullStepScratch(const Model& model, int most_constraint_rows)
       by_velocity(MatrixXd::Zero(std::max(model.nv(), most_constraint_rows), model.nv())) {}
 
 void updateNode(const Model& model, const VectorXd& x, Workspace& ws) {
+  ws.armature = model.armature();
   updatePositions(model, ws, x.head(model.nq()));
   updateVelocities(model, ws, x.segment(model.nq(), model.nv()));
   updateMassMatrix(model, ws);
 }
 
 namespace {
+
+void setArmature(const Model& model, const StageSpec& spec, Workspace& ws) {
+  ws.armature = model.armature();
+  if (spec.armature.size() > 0) ws.armature += spec.armature;
+}
 
 bool isMidpoint(const StageSpec& spec) { return spec.step == StepRule::Midpoint; }
 
@@ -32,6 +38,7 @@ auto getVelocity(const Model& model, const VectorXd& x) { return x.segment(model
 // a and lambda of the step, after the drifts that come before.
 NumericalStatus updateEulerAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
                                         FullEvaluation& at) {
+  setArmature(model, spec, at.ws);
   return updateConstrainedDynamics(model, at.ws, at.cws, spec.constraints, at.x.head(model.nq()),
                                    getVelocity(model, at.x), scratch.tau);
 }
@@ -43,6 +50,7 @@ NumericalStatus updateMidpointAcceleration(const Model& model, const StageSpec& 
   const auto q = at.x.head(model.nq());
   const auto v = getVelocity(model, at.x);
   updateNode(model, at.x, at.ws);
+  setArmature(model, spec, mid.ws);
   scratch.displacement = at.dt / 2 * v;
   model.integrate(q, scratch.displacement, at.q_mid);
   if (!updateConstrainedSystem(model, mid.ws, at.cws, spec.constraints, at.q_mid)) return NumericalStatus::Singular;

@@ -54,7 +54,7 @@ void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<
   const Batch batch(items, count);
   for (int l = 0; l < kLane; ++l) {
     const LinearizeItem& item = items[l < count ? l : 0];
-    loadLengths(*item.spec, item.at->dt, l);
+    loadSteps(*item.spec, item.at->dt, l);
   }
   if (getPoint(*items->spec) == Point::Midpoint) {
     linearizeStates(items, count, views);

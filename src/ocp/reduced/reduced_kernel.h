@@ -173,7 +173,7 @@ class ReducedKernel {
   void loadMidpointBases(LaneSource<const ReducedEvaluation> nodes);
   void loadPoints(const StepItem* items, int count);
   void loadControls(const StepItem* items, int count);
-  void loadLengths(const StageSpec& spec, double h, int lane);
+  void loadSteps(const StageSpec& spec, double h, int lane);
   enum class ContactUse { Step, Stabilization, Derivatives };
   void loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, Point point, ContactUse use);
   void loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node, int closure_rows,

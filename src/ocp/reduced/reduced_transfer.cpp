@@ -119,16 +119,18 @@ void ReducedKernel::storePoints(const StepItem* items, int count) {
 }
 
 // k and h of Eq. (g); of a midpoint step those of the second drift.
-void ReducedKernel::loadLengths(const StageSpec& spec, double h, int lane) {
+void ReducedKernel::loadSteps(const StageSpec& spec, double h, int lane) {
   kick_.set(lane, h);
   drift_.set(lane, spec.step == StepRule::Midpoint ? 0.5 * h : h);
+  for (int k = 0; k < model_.nv(); ++k)
+    ws_.armature[k].set(lane, model_.armature()[k] + (spec.armature.size() > 0 ? spec.armature[k] : 0));
 }
 
-// Time steps and motor forces.
+// Time steps, armature and motor forces.
 void ReducedKernel::loadControls(const StepItem* items, int count) {
   for (int l = 0; l < kLane; ++l) {
     const StepItem& item = items[l < count ? l : 0];
-    loadLengths(*item.spec, item.at->dt, l);
+    loadSteps(*item.spec, item.at->dt, l);
   }
   gatherLanes(count, u_.size(), u_.data(), [&](int l) { return items[l].at->u.data(); });
   tau_.setZero();
