@@ -5,6 +5,7 @@
 
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
+#include "bielle/robots/robot_loader.h"
 #include "control/window_grid.h"
 #include "own_robots.h"
 
@@ -40,7 +41,7 @@ struct Walk {
     const std::vector<Node>& nodes = grid->nodes();
     REQUIRE(static_cast<int>(nodes.size()) == options.nodes);
     REQUIRE(grid->begin() == first);
-    CHECK(grid->end() - first <= countMostStages(options));
+    CHECK(grid->end() - first <= countMostStages(options, planned[0].spec.dt));
     for (size_t k = 0; k < nodes.size(); ++k) {
       const Node& node = nodes[k];
       const int distance = node.begin - first;
@@ -103,6 +104,66 @@ TEST_CASE("window grid: far nodes stand for several stages, and are cut in two a
   CHECK(same > 40 * moves);  // of 48
 }
 
+namespace {
+
+// The first window over a squat of stages that short; `moves` is called while it moves on.
+void walkThrough(const Model& model, double time_step,
+                 const std::function<void(const WindowGrid&, RobotProblem&)>& look) {
+  SquatOptions squat;
+  squat.time_step = time_step;
+  const PredictiveOptions options;
+  const Motion motion = makePredictiveMotion(model, planSquat(model, squat, makeStandingRobot(model)), {}, options);
+  const int stages = motion.problem->numStages() - countMostStages(options, time_step);
+  ShootingTrajectory solved = motion.guess;
+  solved.xs.resize(stages + 1);
+  solved.us.resize(stages);
+  const auto horizon = makeMotionHorizon(motion, solved, options);
+  WindowGrid grid(*horizon, options);
+  for (int first = 0; first <= stages; ++first) {
+    grid.move(first);
+    look(grid, horizon->getProblem());
+  }
+}
+
+}  // namespace
+
+TEST_CASE("window grid: windows are not much shorter where stages are, and change little as they move on") {
+  for (const double time_step : {0.015, 0.0075, 0.005}) {
+    CAPTURE(time_step);
+    std::optional<int> last;
+    int most_cut = 0;
+    walkThrough(getBipetto(), time_step, [&](const WindowGrid& grid, RobotProblem&) {
+      const double duration = (grid.end() - grid.begin()) * time_step;
+      CHECK(duration > 0.6);
+      CHECK(duration < 1.1);
+      CHECK(grid.nodes()[29].end() == grid.begin() + 30);
+      int cut = 0;
+      for (const Node& node : grid.nodes()) cut += node.origin == Origin::Cut;
+      if (last) most_cut = std::max(most_cut, cut);
+      last = grid.end();
+    });
+    CHECK(most_cut <= 4);
+  }
+}
+
+TEST_CASE("window grid: nodes of several stages take springs implicitly, those of one as they are") {
+  const Model model = loadRobot(BIELLE_SOURCE_DIR "/robots/spring_biped").model;
+  int longest = 0;
+  walkThrough(model, 0.005, [&](const WindowGrid& grid, RobotProblem& problem) {
+    for (size_t k = 0; k < grid.nodes().size(); ++k) {
+      const StageSpec& spec = problem.spec(grid.stages()[k]);
+      const int length = grid.nodes()[k].length;
+      longest = std::max(longest, length);
+      REQUIRE(spec.dt == Approx(0.005 * length));
+      REQUIRE(spec.armature.size() == (length > 1 ? model.nv() : 0));
+      if (length == 1) continue;
+      for (const JointForce& force : model.jointForces())
+        REQUIRE(spec.armature[force.dof] == Approx(spec.dt * spec.dt * force.stiffness / 4));
+    }
+  });
+  CHECK(longest == 8);
+}
+
 TEST_CASE("window grid: a window may leap ahead, through the middle of nodes, and move back") {
   Walk walk(12);
   int first = 0;
@@ -155,7 +216,7 @@ std::vector<Node> listNodes(const std::function<void(int, StageSpec&)>& change) 
   PredictiveOptions options;
   options.fine_nodes = 10;
   const Motion motion = makePredictiveMotion(model, planSquat(model, {}, makeStandingRobot(model)), {}, options);
-  const int stages = motion.problem->numStages() - countMostStages(options);
+  const int stages = motion.problem->numStages() - countMostStages(options, motion.problem->spec(0).dt);
   for (int k = 0; k < stages; ++k) {
     StageSpec spec = motion.problem->spec(k);
     change(k, spec);
@@ -223,7 +284,7 @@ TEST_CASE("window grid: a squat's bottom and a jump's impact are nodes of their 
   const StandingRobot standing = makeStandingRobot(model);
   for (MotionPlan plan : {planSquat(model, {}, standing), planJump(model, {}, standing)}) {
     const Motion motion = makePredictiveMotion(model, std::move(plan), {}, options);
-    const int stages = motion.problem->numStages() - countMostStages(options);
+    const int stages = motion.problem->numStages() - countMostStages(options, motion.problem->spec(0).dt);
     ShootingTrajectory solved = motion.guess;
     solved.xs.resize(stages + 1);
     solved.us.resize(stages);

@@ -1,6 +1,7 @@
 #include "control/horizon.h"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "bielle/model/error.h"
@@ -36,16 +37,30 @@ StateCost makeEndCost(const Model& model, const VectorXd& q, const VectorXd& joi
   return {1, q, VectorXd::Zero(nv), weights};
 }
 
+std::vector<StageSpec> listStages(const RobotProblem& problem) {
+  std::vector<StageSpec> stages;
+  for (int k = 0; k <= problem.numStages(); ++k) stages.push_back(problem.spec(k));
+  return stages;
+}
+
+double calcTime(const Model& model, ConstVectorRef q) { return calcRobotSize(model, makeStandingRobot(model, q)).time; }
+
 // A problem of its own, whose stages are replaced as windows move on: copies of a motion share theirs.
 std::unique_ptr<RobotProblem> copyProblem(const RobotProblem& problem) {
   if (problem.formulation() != Formulation::Reduced || problem.hasFreeTimings())
     throw std::invalid_argument("PredictiveController: the problem is not reduced, or its durations are free");
-  std::vector<StageSpec> specs;
-  for (int k = 0; k <= problem.numStages(); ++k) specs.push_back(problem.spec(k));
   const Model& model = problem.model();
   const VectorXd& x0 = problem.initialState();
-  return std::make_unique<RobotProblem>(model, x0.head(model.nq()), x0.tail(model.nv()), std::move(specs),
+  return std::make_unique<RobotProblem>(model, x0.head(model.nq()), x0.tail(model.nv()), listStages(problem),
                                         Formulation::Reduced);
+}
+
+// Of a motion whose last node is the terminal one, s.
+double findShortestStep(const std::vector<StageSpec>& stages) {
+  double shortest = std::numeric_limits<double>::infinity();
+  for (size_t k = 0; k + 1 < stages.size(); ++k)
+    if (stages[k].kind == StageKind::Dynamics) shortest = std::min(shortest, stages[k].dt);
+  return shortest;
 }
 
 class MotionHorizon : public Horizon {
@@ -53,10 +68,12 @@ class MotionHorizon : public Horizon {
   MotionHorizon(const Motion& motion, const ShootingTrajectory& plan, const PredictiveOptions& options)
       : own_(copyProblem(*motion.problem)),
         problem_(*own_),
-        last_(problem_.numStages() - countMostStages(options)),
-        last_dt_(problem_.spec(last_).dt),
+        last_(static_cast<int>(plan.us.size())),
+        last_dt_(problem_.spec(std::min(last_, problem_.numStages())).dt),
         plan_(plan) {
-    if (static_cast<int>(plan.us.size()) != last_ || plan.xs.size() != plan.us.size() + 1)
+    if (plan.xs.size() != plan.us.size() + 1 || last_ >= problem_.numStages() ||
+        last_ + countMostStages(options, findShortestStep(listStages(problem_)) / calcTimeScale(problem_)) !=
+            problem_.numStages())
       throw std::invalid_argument("PredictiveController: the plan does not belong to the motion");
     double time = 0;
     for (int k = 0; k < problem_.numStages(); ++k) {
@@ -107,12 +124,12 @@ class MotionHorizon : public Horizon {
 // foot that lands early began to swing.
 class WalkHorizon : public Horizon {
  public:
-  WalkHorizon(CommandedWalk walk, const PredictiveOptions& options)
-      : stages_(countMostStages(options)), walk_(std::move(walk)) {
+  WalkHorizon(CommandedWalk walk, const PredictiveOptions& options) : walk_(std::move(walk)) {
     checkNodes(options);
     const Model& model = walk_.model();
-    std::vector<StageSpec> specs;
-    for (int s = 0; s <= stages_; ++s) specs.push_back(keep(walk_.makeNext()));
+    std::vector<StageSpec> specs = {keep(walk_.makeNext())};
+    stages_ = countMostStages(options, walk_.timeStep() / calcTime(model, states_[0].head(model.nq())));
+    for (int s = 1; s <= stages_; ++s) specs.push_back(keep(walk_.makeNext()));
     for (StageSpec& spec : walk_.makeExamples()) specs.push_back(std::move(spec));
     size_ = static_cast<int>(specs.size());
     states_.resize(size_);
@@ -170,8 +187,8 @@ class WalkHorizon : public Horizon {
     return std::move(stage.spec);
   }
 
-  const int stages_;  // of the longest window
   CommandedWalk walk_;
+  int stages_ = 0;                           // of the longest window
   int size_ = 0;                             // of the ring
   int made_ = 0;                             // stages
   std::vector<VectorXd> states_, controls_;  // by node
@@ -181,21 +198,26 @@ class WalkHorizon : public Horizon {
 
 }  // namespace
 
+double calcTimeScale(const RobotProblem& problem) {
+  const Model& model = problem.model();
+  return calcTime(model, problem.initialState().head(model.nq()));
+}
+
 Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
                             const PredictiveOptions& options) {
   checkNodes(options);
   if (plan.stages.size() < 2 || plan.schedule.phases.empty() || plan.guess.us.empty() || plan.guess.xs.empty())
     throw InputError(model.name(), "motion '" + plan.name + "'", "its plan has no stage, phase or guess",
                      "fill them in, e.g. by planSquat()");
-  const size_t copies = static_cast<size_t>(countMostStages(options));
+  const int copies = countMostStages(options, findShortestStep(plan.stages) / calcTime(model, plan.q_start));
   const StageSpec last = *(plan.stages.end() - 2);
   if (last.kind != StageKind::Dynamics)
     throw InputError(model.name(), "motion '" + plan.name + "'", "it ends with an impact",
                      "let it end with the robot standing");
-  plan.stages.insert(plan.stages.end() - 1, copies, last);
-  plan.schedule.phases.back().nodes += countMostStages(options);
-  plan.guess.xs.insert(plan.guess.xs.end(), copies, VectorXd(plan.guess.xs.back()));
-  plan.guess.us.insert(plan.guess.us.end(), copies, VectorXd(plan.guess.us.back()));
+  plan.stages.insert(plan.stages.end() - 1, static_cast<size_t>(copies), last);
+  plan.schedule.phases.back().nodes += copies;
+  plan.guess.xs.insert(plan.guess.xs.end(), static_cast<size_t>(copies), VectorXd(plan.guess.xs.back()));
+  plan.guess.us.insert(plan.guess.us.end(), static_cast<size_t>(copies), VectorXd(plan.guess.us.back()));
   plan.stages.back() = StageSpec();
   plan.stages.back().state = makeEndCost(model, plan.q_end, selectMainJoints(model), options);
   plan.goals.clear();

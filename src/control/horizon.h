@@ -31,6 +31,9 @@ class Horizon {
   virtual bool isSolved() const = 0;
 };
 
+// By which the times of the robot are larger than those of the reference robot.
+double calcTimeScale(const RobotProblem& problem);
+
 // A solved motion, then copies of its last stage. The problem is a copy of the motion's.
 std::unique_ptr<Horizon> makeMotionHorizon(const Motion& motion, const ShootingTrajectory& plan,
                                            const PredictiveOptions& options);

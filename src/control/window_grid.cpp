@@ -8,8 +8,24 @@
 namespace bielle {
 namespace {
 
+constexpr double kUsualStage = 0.015;  // s
+constexpr int kMostRatio = 16, kRamp = 8;
+
+// R of Eq. (1) for stages of h s.
+int calcRatio(double h) {
+  int ratio = 1;
+  while (ratio < kMostRatio && std::sqrt(2) * ratio * h < kUsualStage) ratio *= 2;
+  return ratio;
+}
+
 // Eq. (1).
-int getMostStages(int distance, int fine) { return distance < fine ? 1 : distance < 3 * fine ? 2 : 4; }
+int getMostStages(int distance, int fine, int ratio) {
+  if (distance < fine) return 1;
+  const int most = (distance < (1 + 2 * ratio) * fine ? 2 : 4) * ratio;
+  for (int length = 2, end = fine + kRamp; length < most; length *= 2, end += kRamp)
+    if (distance < end) return length;
+  return most;
+}
 
 bool areSame(ConstVectorRef a, ConstVectorRef b) { return a.size() == b.size() && a == b; }
 
@@ -45,9 +61,18 @@ bool areAlike(const Model& model, const StateCost& a, const StateCost& b) {
          areSame(a.v_ref.head<5>(), b.v_ref.head<5>()) && areSame(a.v_ref.tail(others), b.v_ref.tail(others));
 }
 
-StageSpec stretch(const StageSpec& first, int length) {
+// Eq. (7) of robot_problem.h: the steps of stages follow the springs of joints, longer ones need not.
+VectorXd makeSpringArmature(const Model& model, double h) {
+  VectorXd armature = VectorXd::Zero(model.nv());
+  for (const JointForce& force : model.jointForces())
+    armature[force.dof] += 0.25 * h * h * std::max(0.0, force.stiffness);
+  return armature;
+}
+
+StageSpec stretch(const Model& model, const StageSpec& first, int length) {
   StageSpec spec = first;
   spec.dt *= length;
+  if (!model.jointForces().empty()) spec.armature = makeSpringArmature(model, spec.dt);
   limitGains(spec.step, spec.dt, spec.constraints);
   // Costs grow with the length, and penalties, which are of squares, likewise.
   for (PathConstraint& constraint : spec.path_constraints) constraint.scale /= std::sqrt(length);
@@ -56,11 +81,14 @@ StageSpec stretch(const StageSpec& first, int length) {
 
 }  // namespace
 
-int countMostStages(const PredictiveOptions& options) {
+int countMostStages(const PredictiveOptions& options, double h) {
   int stages = 0;
-  for (int k = 0; k < options.nodes; ++k) stages += getMostStages(stages, options.fine_nodes);
+  for (int k = 0; k < options.nodes; ++k) stages += getMostStages(stages, options.fine_nodes, calcRatio(h));
   return stages;
 }
+
+WindowGrid::WindowGrid(Horizon& horizon, const PredictiveOptions& options)
+    : horizon_(horizon), options_(options), time_(calcTimeScale(horizon.getProblem())) {}
 
 void WindowGrid::clear() {
   for (const Node& node : nodes_) restore(node);
@@ -121,13 +149,18 @@ bool WindowGrid::areAlike(int stage, int next) const {
          bielle::areAlike(a.path_constraints, b.path_constraints);
 }
 
+int WindowGrid::getMost(const Node& node) const {
+  const double h = node.first ? node.first->dt : horizon_.getProblem().spec(getStage(node.begin)).dt;
+  return getMostStages(node.begin - first_, options_.fine_nodes, h > 0 ? calcRatio(h / time_) : 1);
+}
+
 void WindowGrid::restore(const Node& node) {
   if (node.first) horizon_.getProblem().replaceStage(getStage(node.begin), *node.first);
 }
 
 // Adds a node, in parts if it is too long; the problem has its stage as it was.
 void WindowGrid::add(Node node) {
-  const int most = getMostStages(node.begin - first_, options_.fine_nodes);
+  const int most = getMost(node);
   if (node.length > most) {
     const int half = (node.length + 1) / 2;
     restore(node);
@@ -142,7 +175,7 @@ void WindowGrid::add(Node node) {
     RobotProblem& problem = horizon_.getProblem();
     const int stage = getStage(node.begin);
     node.first = std::make_shared<StageSpec>(problem.spec(stage));
-    problem.replaceStage(stage, stretch(*node.first, node.length));
+    problem.replaceStage(stage, stretch(problem.model(), *node.first, node.length));
   }
   nodes_.push_back(std::move(node));
 }
@@ -151,7 +184,7 @@ void WindowGrid::append() {
   Node node;
   node.begin = nodes_.empty() ? first_ : end();
   node.source = std::max(0, static_cast<int>(before_.size()) - 1);
-  const int most = getMostStages(node.begin - first_, options_.fine_nodes);
+  const int most = getMost(node);
   while (node.length < most && areAlike(node.begin, node.begin + node.length)) ++node.length;
   add(std::move(node));
 }

@@ -12,8 +12,11 @@ namespace bielle {
 // a step as long as all of them. It joins stages that are alike: of one phase, with the same contacts, limits of torques and
 // weights of state and control, the same references of both but for the heading, and costs and constraints of the same names,
 // whose references may differ; those without a name must be the same.
-// Nodes keep their place in time while the window moves, and are cut in two when they are too near. Their length is at most
-//     1 stage within the first `fine` stages of the window, 2 within the next 2 fine, 4 beyond.                           (1)
+// Nodes keep their place in time while the window moves, and are cut in two when they are too near. With R the power of two
+// next to 15 ms (of the reference robot, motion/robot_size.h) over the length of a stage, between 1 and 16, they are at most
+//     1 stage long within the first `fine` stages of the window, 2 R within the next 2 R fine, 4 R beyond,                (1)
+// where they double every 8 stages until then: so a window is not much shorter in time where stages are, and at most one node of
+// each length is cut when it moves on. Springs take longer steps implicitly (robot_problem.h Eq. 7).
 class WindowGrid {
  public:
   // What a node was in the window before.
@@ -31,7 +34,7 @@ class WindowGrid {
     int end() const { return begin + length; }
   };
 
-  WindowGrid(Horizon& horizon, const PredictiveOptions& options) : horizon_(horizon), options_(options) {}
+  WindowGrid(Horizon& horizon, const PredictiveOptions& options);
 
   // Gives all stages their own place again.
   void clear();
@@ -53,6 +56,7 @@ class WindowGrid {
 
  private:
   int getStage(int stage) const;
+  int getMost(const Node& node) const;
   bool areAlike(int stage, int next) const;
   void restore(const Node& node);
   void add(Node node);
@@ -60,6 +64,7 @@ class WindowGrid {
 
   Horizon& horizon_;
   const PredictiveOptions& options_;
+  const double time_;  // of the robot's size
   std::vector<Node> nodes_, before_;
   int first_ = 0;
   std::vector<int> stages_;
@@ -67,7 +72,7 @@ class WindowGrid {
   std::optional<Node> next_;
 };
 
-// The most stages that a window may stand for.
-int countMostStages(const PredictiveOptions& options);
+// The most stages of h s of the reference robot that a window may stand for.
+int countMostStages(const PredictiveOptions& options, double h);
 
 }  // namespace bielle

@@ -70,8 +70,7 @@ WindowPlanner::Solution WindowPlanner::makeEmpty() const {
 }
 
 WindowPlanner::Solution WindowPlanner::makeFirst() {
-  // Not for robots with springs: standing under predictive control they drift, and fall sooner on their planned footholds.
-  if (horizon_->isSolved() && !hasSprings(model_)) aimFootholds();
+  if (horizon_->isSolved()) aimFootholds();
   startFromGuess(0);
   if (!horizon_->isSolved()) solveFromRest();
   Receding first = makeSolver(kFirstIterations);
