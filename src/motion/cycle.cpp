@@ -8,7 +8,7 @@
 namespace bielle {
 namespace {
 
-constexpr int kSteps = 2, kUnderWay = 2;  // of the cycle; that begin within it at most and end after it
+constexpr int kSteps = 2, kUnderWay = 2;  // of a cycle; that begin within the last one at most and end after it
 
 // A stance phase, which begins with a landing, is cut in its middle.
 struct Cut {
@@ -53,8 +53,8 @@ void move(const SE3& X, GaitNode& node) {
 }  // namespace
 
 SE3 cutCycle(const SE3& middle, LocomotionTask& task, Gait& gait) {
-  const int lead = task.lead;
-  const Cut from = findCut(gait, lead), to = findCut(gait, lead + kSteps);
+  const int lead = task.lead, steps = kSteps * task.cycles;
+  const Cut from = findCut(gait, lead), to = findCut(gait, lead + steps);
   const int begin = from.node + from.before, end = to.node + to.before;
 
   Gait cycle;
@@ -76,8 +76,8 @@ SE3 cutCycle(const SE3& middle, LocomotionTask& task, Gait& gait) {
     if (node.landed >= 0) node.landed -= lead;
   }
   cycle.nodes.back().landed = -1;
-  const auto keep = [lead](const auto& all) {
-    return std::decay_t<decltype(all)>(all.begin() + lead, all.begin() + lead + kSteps + kUnderWay);
+  const auto keep = [lead, steps](const auto& all) {
+    return std::decay_t<decltype(all)>(all.begin() + lead, all.begin() + lead + steps + kUnderWay);
   };
   cycle.swings = keep(gait.swings);
   for (SwingSpan& span : cycle.swings) span = {span.begin - begin, span.end - begin};
@@ -87,7 +87,7 @@ SE3 cutCycle(const SE3& middle, LocomotionTask& task, Gait& gait) {
   move(X, task.plan);
   for (GaitNode& node : cycle.nodes) move(X, node);
   gait = std::move(cycle);
-  return calcDisplacement(calcMiddle(task.plan.start), calcMiddle(task.plan.getStance(kSteps)));
+  return calcDisplacement(calcMiddle(task.plan.start), calcMiddle(task.plan.getStance(steps)));
 }
 
 }  // namespace bielle

@@ -58,6 +58,7 @@ namespace {
 constexpr const char* kPeriodic =
     "one cycle of two steady steps, whose end is its beginning, moved; steps, start_support and end_support do not "
     "count";
+constexpr const char* kCycles = "with periodic: number of such cycles";
 
 }  // namespace
 
@@ -65,6 +66,7 @@ void describe(OptionFields& f, WalkOptions& o) {
   f.number("speed", o.speed, "m/s", {}, "speed of the steady steps; negative: backward");
   f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
   f.flag("periodic", o.periodic, kPeriodic);
+  f.integer("cycles", o.cycles, {1, 1000}, kCycles);
   describe(f, o.gait);
 }
 
@@ -72,6 +74,7 @@ void describe(OptionFields& f, SideWalkOptions& o) {
   f.number("speed", o.speed, "m/s", {}, "speed of the steady steps to the left; negative: to the right");
   f.integer("steps", o.steps, {2, 200}, "number of steps: one opens the stance, the next one closes it");
   f.flag("periodic", o.periodic, kPeriodic);
+  f.integer("cycles", o.cycles, {1, 1000}, kCycles);
   describe(f, o.gait);
 }
 
@@ -80,6 +83,7 @@ void describe(OptionFields& f, TurnOptions& o) {
   f.number("radius", o.radius, "m", kNotNegative, "radius of the arc to walk along; 0: turn on the spot");
   f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
   f.flag("periodic", o.periodic, kPeriodic);
+  f.integer("cycles", o.cycles, {1, 1000}, kCycles);
   describe(f, o.gait);
 }
 
@@ -196,6 +200,7 @@ void describe(OptionFields& f, RunOptions& o) {
   f.number("speed", o.speed, "m/s", {}, "speed of the steady steps; negative: backward");
   f.integer("steps", o.steps, {2, 200}, "number of steps; the last one brings the feet together");
   f.flag("periodic", o.periodic, kPeriodic);
+  f.integer("cycles", o.cycles, {1, 1000}, kCycles);
   f.number("flight", o.flight, "s", kPositive, "time in the air between two steps");
   f.number("stance", o.stance, "s", kNotNegative, "time with one foot on the ground");
   describeGait(f, o.gait);

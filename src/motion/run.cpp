@@ -50,7 +50,7 @@ Goal makeFlightGoal(const ContactSchedule& schedule, int flights, double flight)
 
 MotionPlan planRun(const Model& model, const RunOptions& o, const StandingRobot& standing) {
   listOptions(o).check();
-  const int steps = o.periodic ? kCycleSteps : o.steps;
+  const int steps = o.periodic ? countCycleSteps(o.cycles) : o.steps;
   const Stance stance = makeStance(model, o.gait, standing);
   requireLevel(model, listSoles(stance), "run");
   const double length = o.speed * (o.stance + o.flight);
@@ -64,6 +64,7 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const StandingRobot&
   task.support = Side::Left;
   task.speed = o.speed;
   task.lead = o.periodic ? kCycleLead : 0;
+  task.cycles = o.cycles;
   MotionPlan plan = planFlights(model, stance, task, o);
   const Vector3d forward = stance.middle.R.col(0);
   std::vector<Goal> goals;
@@ -71,7 +72,7 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const StandingRobot&
     goals = {makeCycleSpeedGoal(plan.schedule, o.speed, forward)};
   else if (steps >= kSteadySteps)
     goals = makeSpeedGoals(plan.schedule, o.speed, forward);
-  goals.push_back(makeFlightGoal(plan.schedule, o.periodic ? 2 : steps - 1, o.flight));
+  goals.push_back(makeFlightGoal(plan.schedule, o.periodic ? 2 * o.cycles : steps - 1, o.flight));
   plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
   return plan;
 }

@@ -37,8 +37,9 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
   task.name = name;
   if (options.periodic) requireLevel(model, listSoles(stance), std::string(name) + " that repeats");
   task.lead = options.periodic ? kCycleLead : 0;
-  task.plan =
-      planFootsteps(stance.feet[0], stance.feet[1], command, options.periodic ? kCycleSteps : options.steps, first);
+  task.cycles = options.cycles;
+  const int steps = options.periodic ? countCycleSteps(options.cycles) : options.steps;
+  task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, steps, first);
   task.ground = makeGroundUnder(model, listSoles(stance));
   if (!task.ground.steps.empty())  // down from what one foot stands on
     for (Footstep& step : task.plan.steps) {
@@ -88,7 +89,7 @@ MotionPlan planTurn(const Model& model, const TurnOptions& o, const StandingRobo
   StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(), 0,
                              yaw > 0 ? Side::Left : Side::Right, o, standing);
   const int nodes = plan.motion.schedule.numStages();
-  const double angle = o.periodic ? 2 * yaw : o.angle;
+  const double angle = o.periodic ? 2 * o.cycles * yaw : o.angle;
   addGoals({{GoalKind::Turn, "angle", angle, calcTolerance(angle, 0.02), 0, nodes}}, plan.motion);
   return std::move(plan.motion);
 }

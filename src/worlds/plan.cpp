@@ -93,8 +93,9 @@ void repeat(const Motion& motion, double duration, Plan& plan) {
   plan.end = duration > 0 ? duration : kCycles * period;
   std::vector<Policy::Stage> stages;
   plan.schedule.phases.clear();
+  plan.cycles = static_cast<int>(std::ceil((*plan.end + kMostExtension) / period));
   SE3 X;
-  for (int i = 0; i * period < *plan.end + kMostExtension; ++i, X = *motion.cycle * X) {
+  for (int i = 0; i < plan.cycles; ++i, X = *motion.cycle * X) {
     for (Policy::Stage stage : cycle) {
       stage.q = carryPosture(model, stage.q, X);
       stage.start += i * period;
@@ -133,7 +134,7 @@ Plan finishPlan(const LoadedRobot& robot, MotionSummary summary, Belief belief, 
   if (!is_known) solution = solveForGains(summary.file, solution.motion, solution.trajectory, iterations);
   Plan plan{control == PlanControl::Gains ? makePolicy(solution) : makePolicy(solution.motion, solution.trajectory)};
   plan.schedule = solution.motion.schedule;
-  if (solution.motion.cycle && control != PlanControl::Predictive) repeat(solution.motion, options.duration, plan);
+  if (solution.motion.cycle) repeat(solution.motion, options.duration, plan);
   plan.policy.setLookAhead(options.predictive.look_ahead);
   plan.ground = solution.motion.ground;
   plan.goals = solution.motion.goals;

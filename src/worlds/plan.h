@@ -41,9 +41,10 @@ struct Plan {
   std::optional<Solution> solution{};    ///< of the policy; none for a walk by command
   std::optional<CommandedWalk> walk{};   ///< by command: of the robot cut at its balls, before its first stage
   std::vector<TimedCommand> commands{};  ///< of that walk
-  /// Of a motion that repeats, and is carried out without predictive control: when it ends unless told otherwise, s. The policy
-  /// goes on for as long as it takes to see whether the robot stands.
+  /// Of a motion that repeats: when it ends unless told otherwise, s. The policy has as many cycles as it takes to see whether the
+  /// robot stands.
   std::optional<double> end{};
+  int cycles = 1;
   int iterations = 0;  ///< that the solver took for the gains; 0: the motion in the files was its solution
 
   /// Of the model that is believed in.

@@ -19,9 +19,26 @@ ShootingTrajectory restrictTrajectory(const Model& from, const Model& model, Sho
   return trajectory;
 }
 
-// Along a solution, with the model cut at its balls.
-std::unique_ptr<PredictiveController> predict(const Model& model, const Model& cut, const Solution& solution,
-                                              PredictiveOptions options) {
+// Of a motion that repeats, so many times. The last state of each is the first of the next.
+ShootingTrajectory repeatTrajectory(const Solution& solution, int cycles) {
+  const Motion& motion = solution.motion;
+  const ShootingTrajectory& cycle = solution.trajectory;
+  ShootingTrajectory out = cycle;
+  SE3 X;
+  for (int i = 1; i < cycles; ++i) {
+    X = *motion.cycle * X;
+    for (size_t k = 0; k < cycle.us.size(); ++k) {
+      out.xs.push_back(carryState(motion.problem->model(), cycle.xs[k + 1], X));
+      out.us.push_back(cycle.us[k]);
+    }
+  }
+  return out;
+}
+
+// Along a plan, with the model cut at its balls.
+std::unique_ptr<PredictiveController> predict(const Plan& plan, const Model& cut, PredictiveOptions options) {
+  const Model& model = plan.model();
+  const Solution& solution = *plan.solution;
   const Motion& motion = solution.motion;
   const ProblemOptions& problem = motion.problem_options;
   // A plan may be closer to a dead point than motors would let it come, or start from one: without a margin there is no stop.
@@ -30,8 +47,10 @@ std::unique_ptr<PredictiveController> predict(const Model& model, const Model& c
   MotionRequest freed = *motion.request;
   const StandingRobot standing = makeStandingRobot(cut, q0);
   freeFeet(cut, standing, motion.ground, freed.options);
+  if (plan.cycles > 1) freed.options.set("cycles", plan.cycles * freed.options.get<int>("cycles"));
   return std::make_unique<PredictiveController>(makePredictiveMotion(cut, freed.plan(cut, standing), problem, options),
-                                                restrictTrajectory(model, cut, solution.trajectory), options);
+                                                restrictTrajectory(model, cut, repeatTrajectory(solution, plan.cycles)),
+                                                options);
 }
 
 }  // namespace
@@ -42,7 +61,7 @@ PlanController makeController(const Plan& plan, const ControlOptions& options) {
   if (options.control == PlanControl::Predictive) {
     const Model cut = plan.walk ? plan.walk->model() : plan.serial ? model : cutAtBalls(model);
     auto prediction = plan.walk ? std::make_unique<PredictiveController>(*plan.walk, options.predictive)
-                                : predict(model, cut, *plan.solution, options.predictive);
+                                : predict(plan, cut, options.predictive);
     out.prediction = prediction.get();
     out.law = std::move(prediction);
     if (!cut.isCopyOf(model)) out.law = std::make_unique<RestrictedController>(model, cut, std::move(out.law));

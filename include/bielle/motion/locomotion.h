@@ -104,15 +104,16 @@ struct LocomotionTask {
   Side support = Side::Left;              ///< foot that stands before the first flight, if there are flights
   Vector3d direction = Vector3d::Zero();  ///< unit vector of the walking direction, or zero if there is none
   double speed = 0;                       ///< of the CoM along it, at steady steps, m/s
-  /// Of a cycle of two steps: the number of steps planned before it. These and the steps after it, at least two more, only make the
-  /// cycle steady and are left out of the motion. 0: the whole motion.
+  /// Of cycles of two steps: the number of steps planned before them. These and the steps after them, at least two more, only make
+  /// the cycles steady and are left out of the motion. 0: the whole motion.
   int lead = 0;
+  int cycles = 1;
 };
 /// Steps after which a gait no longer depends on how it began: each step of duration T leaves e^{-T / tau} of a deviation of its
 /// pendulum.
 inline constexpr int kCycleLead = 12;
-/// Steps to plan for a cycle.
-inline constexpr int kCycleSteps = 2 * kCycleLead + 2;
+/// Steps to plan for so many cycles.
+constexpr int countCycleSteps(int cycles) { return 2 * (kCycleLead + cycles); }
 
 /// Mean speed of the centre of mass over the steady steps: from the second landing to the last but two (in short
 /// motions from the first to the last but one), over a whole number of cycles of `steps_per_cycle` steps. Motions start

@@ -21,7 +21,8 @@ struct RunOptions {
   int steps = 8;          ///< the last one brings the feet together
   double flight = 0.08;   ///< time in the air of every step but the last, rounded to time steps, s
   double stance = 0.24;   ///< time on the ground of each foot, s
-  bool periodic = false;  ///< one cycle of two of the steady steps alone
+  bool periodic = false;  ///< cycles of two of the steady steps alone
+  int cycles = 1;         ///< their number
   LocomotionOptions gait = makeGaitDefaults();
 
   static LocomotionOptions makeGaitDefaults();

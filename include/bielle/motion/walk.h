@@ -10,14 +10,16 @@ namespace bielle {
 struct WalkOptions {
   double speed = 0.5;     ///< forward, of the steady steps; negative: backward, m/s
   int steps = 6;          ///< the last one brings the feet together
-  bool periodic = false;  ///< one cycle of two of the steady steps alone
+  bool periodic = false;  ///< cycles of two of the steady steps alone
+  int cycles = 1;         ///< their number
   LocomotionOptions gait;
 };
 
 struct SideWalkOptions {
   double speed = 0.2;     ///< to the left, of the steady steps; negative: to the right, m/s
   int steps = 6;          ///< every other one opens the stance, the next one closes it
-  bool periodic = false;  ///< one cycle of two of the steady steps alone
+  bool periodic = false;  ///< cycles of two of the steady steps alone
+  int cycles = 1;         ///< their number
   LocomotionOptions gait;
 };
 
@@ -25,7 +27,8 @@ struct TurnOptions {
   double angle = 1.57;    ///< to the left; negative: to the right, rad
   double radius = 0;      ///< of the arc that the middle of the feet follows; 0: on the spot, m
   int steps = 8;          ///< the last one brings the feet together
-  bool periodic = false;  ///< one cycle of two of the steady steps alone
+  bool periodic = false;  ///< cycles of two of the steady steps alone
+  int cycles = 1;         ///< their number
   LocomotionOptions gait;
 };
 
