@@ -9,7 +9,7 @@ namespace bielle::testing {
 /// A number that divides none of the numbers of kinds gives every kind its turns.
 class Selection {
  public:
-  explicit Selection(int several = 3) : several_(several) {}
+  explicit Selection(int several = 5) : several_(several) {}
 
   bool isLeftOut() { return !tries_all_ && count_++ % several_ != 0; }
 

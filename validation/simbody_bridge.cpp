@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "math/decompositions.h"
+#include "math/so3.h"
 #include "simbody_system.h"
 
 namespace bielle::validation {

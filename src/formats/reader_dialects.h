@@ -5,7 +5,8 @@
 /// urdfdom in 2026) tie two links, named by <link1> and <link2> or <parent> and <child>, at frames that are theirs (xyz and rpy of
 /// these elements, or <parent_origin> and <child_origin>); `<loop name type>` (URDF+ of Chignoli and others, "Recursive rigid-body
 /// dynamics algorithms for systems with kinematic loops", 2023) ties <predecessor link> and <successor link> at the <origin> of each.
-/// Types are `spherical` or `ball`, `continuous`, `revolute` or `hinge`, and `fixed`; a hinge turns about <axis xyz> (default x) of
+/// Types are `spherical` or `ball`, `continuous`, `revolute` or `hinge`, `prismatic`, and `fixed`; a hinge turns about, and a slider
+/// slides along, <axis xyz> (default x) of
 /// the first frame, or about <parent_axis> and <child_axis>. A `<joint>` inside `<gazebo>` is one of SDF: its links, at its
 /// <pose> in the child, are tied as they stand with all joints at zero.
 ///
