@@ -29,10 +29,11 @@
 /// - `base: free | fixed`
 /// - `frames: {name: {link, place: [x, y, z], rpy: [roll, pitch, yaw]}, ...}` further frames, placed in a link of the tree, m and
 ///   rad (default 0); a robot that is completed keeps its own
-/// - `closures: [{name, frames: [A, B], type, axis, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge,
-///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0). A coupler: `{name, type: coupler, joints: {joint:
-///   coefficient, ...}, offset, kp, kd}`, sum of coefficient times coordinate = offset (default 0); a list of coefficients makes
-///   the polynomial c_1 q + c_2 q^2 + .. of a coordinate
+/// - `closures: [{name, frames: [A, B], type, axis, length, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge or
+///   a slider, in frame 1 (default z); `length` of a distance, m (default: where all coordinates are neutral); kp in 1/s^2, kd
+///   in 1/s (default 0). A coupler: `{name, type: coupler, joints: {joint: coefficient, ...}, offset, kp, kd}`, sum of
+///   coefficient times coordinate = offset (default 0); a list of coefficients makes the polynomial c_1 q + c_2 q^2 + .. of a
+///   coordinate
 /// - `motors: {joint: {armature, effort, velocity, torque_loss}, ...}` instead of `name_mot`; its limits (.inf for none)
 ///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h). Winding and gear, as in MotorDrive (model.h): `ratio`,
 ///   `rotor_inertia`, `torque_constant`, `resistance`, `voltage`, `current`, `continuous_current`, `efficiency`,
@@ -67,8 +68,9 @@
 /// The reader supports <include> (beside the main file, or beside the one that includes it); bodies and <frame>; inertias, or
 /// those of shapes and meshes (STL, OBJ) without <inertial>, and what <compiler> makes of them; joints of all kinds with
 /// range, ref, armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon
-/// (of fixed tendons) with their polynomials; springs and dampers of spatial tendons between two sites; motors
-/// with gear and limits (servos become motors) on joints and fixed tendons; classes of defaults; gravity; keyframes as references; sites as frames;
+/// (of fixed tendons) with their polynomials, or of the length of a spatial tendon between two sites; springs and dampers of such
+/// tendons; motors with gear and limits (servos become motors) on joints and fixed tendons; classes of defaults; gravity;
+/// keyframes as references; sites as frames;
 /// geoms as shapes. Ranges hold unless `limited` is false.
 /// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
 ///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the
@@ -89,7 +91,7 @@
 ///
 /// ## SDF files (.sdf), by libsdformat
 /// One model, whose bodies stand where all joints are at zero. Of several joints onto a link, the first carries it (one that cannot
-/// close a loop before any other); revolute, ball and fixed ones close loops at this posture, which is the reference `initial`.
+/// close a loop before any other); revolute, prismatic, ball and fixed ones close loops at this posture, which is the reference `initial`.
 /// Links that nothing holds are free, those of a static model are not. The frame of a body keeps its directions (on a universal
 /// joint, x and y are its axes) and has its origin on its joint. Frames, ranges, springs, damping and friction of joints, visuals
 /// and collisions are read; motors come from a YAML file with `model`. <drake:linear_bushing_rpy> and <drake:ball_constraint> are
