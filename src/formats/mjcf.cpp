@@ -183,13 +183,13 @@ class MjcfWriter {
     if (linear == closure.terms.end()) refusePolynomial(closure);
     const CouplerTerm &y = *linear, &x = closure.terms[&y == &closure.terms[0] ? 1 : 0];
     if (x.higher.size() + 1 > kMjcfDegree) refusePolynomial(closure);
+    std::vector<double> powers{0, x.coefficient};
+    powers.insert(powers.end(), x.higher.begin(), x.higher.end());
+    powers = shiftPolynomial(std::move(powers), q_ref_[x.idx_q]);
+    powers.resize(kMjcfDegree + 1);
     std::string polynomial = formatMjcf(rest / y.coefficient);
-    double factorial = 1;
-    for (int k = 1; k <= kMjcfDegree; ++k) {  // Taylor's about q_ref
-      factorial *= k;
-      const double slope = x.calcDerivative(k, q_ref_[x.idx_q]) / factorial;
-      polynomial += " " + (slope == 0 ? "0" : formatMjcf(-slope / y.coefficient));
-    }
+    for (int k = 1; k <= kMjcfDegree; ++k)
+      polynomial += " " + (powers[k] == 0 ? "0" : formatMjcf(-powers[k] / y.coefficient));
     addElement(section, "joint",
                {{"name", closure.name},
                 {"joint1", model_.joints()[y.joint].name},
@@ -279,6 +279,12 @@ class MjcfWriter {
 };
 
 }  // namespace
+
+std::vector<double> shiftPolynomial(std::vector<double> c, double x) {
+  for (size_t i = 0; i + 1 < c.size(); ++i)
+    for (size_t k = c.size() - 1; k-- > i;) c[k] += x * c[k + 1];
+  return c;
+}
 
 MjcfText formatMjcf(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options) {
   return MjcfWriter(model, q_ref, options).write();

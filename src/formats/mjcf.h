@@ -42,6 +42,9 @@ struct MjcfText {
   std::vector<std::string> warnings;
 };
 
+/// The coefficients in s of the polynomial c_0 + c_1 q + .. at q = x + s, exact for x = 0.
+std::vector<double> shiftPolynomial(std::vector<double> c, double x);
+
 /// \param q_ref  closed configuration (nq), as of findClosedConfiguration
 MjcfText formatMjcf(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options = {});
 

@@ -186,24 +186,14 @@ std::vector<double> MjcfReader::readPolynomial(MjcfElement& e) {
 // Subtracts p_1 s + p_2 s^2 + .. of s = c (x - x_ref) from the sum of a coupler.
 void MjcfReader::subtractPolynomial(const std::vector<double>& p, double c, const std::string& x, double x_ref,
                                     ClosureSpec& coupler) {
-  CouplerTerm about_ref;
-  double power = c;
-  about_ref.coefficient = power * p[1];
-  for (size_t k = 2; k < p.size(); ++k) about_ref.higher.push_back((power *= c) * p[k]);
-  while (!about_ref.higher.empty() && about_ref.higher.back() == 0) about_ref.higher.pop_back();
-  const int degree = static_cast<int>(about_ref.higher.size()) + 1;
-  coupler.offset += about_ref.calcDerivative(0, -x_ref);
-  std::vector<double> higher;
-  double factorial = 1;
-  for (int k = 1; k <= degree; ++k) {  // Taylor's about 0
-    factorial *= k;
-    const double c_k = about_ref.calcDerivative(k, -x_ref) / factorial;
-    if (k == 1)
-      coupler.coefficients[x] -= c_k;
-    else
-      higher.push_back(-c_k);
-  }
-  if (!higher.empty()) coupler.higher[x] = higher;
+  std::vector<double> powers(p.size());
+  double power = 1;
+  for (size_t k = 1; k < p.size(); ++k) powers[k] = (power *= c) * p[k];
+  while (powers.size() > 2 && powers.back() == 0) powers.pop_back();
+  powers = shiftPolynomial(std::move(powers), -x_ref);
+  coupler.offset += powers[0];
+  coupler.coefficients[x] -= powers[1];
+  for (size_t k = 2; k < powers.size(); ++k) coupler.higher[x].push_back(-powers[k]);
 }
 
 // y - y_ref = p(x - x_ref)
