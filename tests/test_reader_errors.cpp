@@ -112,7 +112,7 @@ const std::vector<Mistake> kYamlMistakes = {
     {kType, kType + "\nclosures: [{frames: [arm, rod], type: 6d, kp: -1}]", "closure 'arm--rod'", "gain", "kp and kd"},
     {kType, kType + "\nclosures: [{frames: [arm, rod]}]", "key 'closures'[0]", "no 'type'", "add it"},
     {kType, kType + "\nclosures: [{frames: [arm, rod], type: 6d, stiffness: 1}]", "key 'closures'[0]: key 'stiffness'",
-     "unknown", "name, frames, type, axis, joints, offset, kp, kd"},
+     "unknown", "name, frames, type, axis, length, joints, offset, kp, kd"},
     {kType, kType + "\nclosures: [{name: belt, type: coupler}]", "key 'closures'[0]", "no 'joints'", "add it"},
     {kType, kType + "\nclosures: [{type: coupler, joints: {}}]", "key 'closures'[0]", "no 'name'", "add it"},
     {kType, kType + "\nclosures: [{name: belt, type: coupler, frames: [arm, rod]}]", "key 'closures'[0]: key 'frames'",

@@ -230,7 +230,7 @@ def test_a_cam_from_nothing():
     builder.add_coupler("cam", {"a": 0, "b": -1}, higher={"a": [1, -0.5]})
     builder.add_joint_force("b", bielle.JointForce(preload=3))
     model = builder.build()
-    assert model.closures[0].terms[0].higher == [1, -0.5]
+    assert list(model.closures[0].terms[0].higher) == [1, -0.5]
     x = 0.6
     q, slope = [x, x**2 - 0.5 * x**3], 2 * x - 1.5 * x**2
     assert model.closure_residual(q) == pytest.approx([0])

@@ -54,6 +54,7 @@ struct UsdJoint {
   double effort = kNone, velocity = kNone;
   JointForce force;
   double armature = 0;
+  double length = 0;  // of a rod between the places, m; 0: it is none
 };
 
 class UsdReader {

@@ -72,9 +72,16 @@ bool UsdReader::readKind(UsdJoint& joint) {
   }
   if (type == "PhysicsFixedJoint") return true;
   if (type == "PhysicsJoint") return readSix(joint);
-  if (type == "PhysicsDistanceJoint")
-    failUsd(path_, prim, "it is a PhysicsDistanceJoint, which is not supported",
-            "put a rod with a ball at each end (PhysicsSphericalJoint) in its place");
+  if (type == "PhysicsDistanceJoint") {
+    const double least = getNumber(prim, "physics:minDistance", -1, true),
+                 most = getNumber(prim, "physics:maxDistance", -1, true);
+    if (!(least == most && least > 0))
+      failUsd(path_, prim, "it is a rope: its physics:minDistance is not its physics:maxDistance, or not positive",
+              "give both the length of a rod");
+    joint.length = least * meter_;
+    joint.is_excluded = true;  // no tree hangs on a rod without a body
+    return true;
+  }
   failUsd(path_, prim, "it is a " + std::string(type) + ", which is not supported",
           type.find("Gear") != std::string_view::npos || type.find("Rack") != std::string_view::npos
               ? "couple the two joints by NewtonMimicAPI or PhysxMimicJointAPI in its place"

@@ -13,15 +13,15 @@
 namespace bielle {
 namespace {
 
-// Of the joints, those of low rank carry bodies before others: first what can close no loop (slides and drives), then what the file
-// leaves in its tree, balls last, since a loop cut there takes the fewest rows.
+// Of the joints, those of low rank carry bodies before others: first drives, which can close no loop, then what the file leaves in its
+// tree, slides first, since turns are usual where loops are cut, and balls last, since a loop cut there takes the fewest rows.
 int getRank(const UsdJoint& joint) {
   const int excluded = joint.is_excluded ? 1 : 0;
   const bool has_range = std::isfinite(joint.lower) || std::isfinite(joint.upper);
-  if (joint.kind == JointKind::Prismatic) return excluded;
-  if (joint.is_driven) return 2 + excluded;
-  const int kind = joint.kind == JointKind::Fixed ? 0 : joint.kind == JointKind::Spherical ? 3 : has_range ? 1 : 2;
-  return 4 + 4 * excluded + kind;
+  if (joint.is_driven) return excluded;
+  const bool is_stiff = joint.kind == JointKind::Prismatic || joint.kind == JointKind::Fixed;
+  const int kind = is_stiff ? 0 : joint.kind == JointKind::Spherical ? 3 : has_range ? 1 : 2;
+  return 2 + 4 * excluded + kind;
 }
 
 // Sets of bodies that are tied to each other.
@@ -54,14 +54,12 @@ void UsdReader::chooseCarriers() {
   std::vector<UsdJoint*> order;
   for (UsdJoint& joint : joints_) order.push_back(&joint);
   std::stable_sort(order.begin(), order.end(), [](auto* a, auto* b) { return getRank(*a) < getRank(*b); });
-  for (UsdJoint* joint : order) joint->is_carrying = islands.join(joint->body[0], joint->body[1]);
+  for (UsdJoint* joint : order) joint->is_carrying = joint->length == 0 && islands.join(joint->body[0], joint->body[1]);
   std::vector<std::string> chosen;
   for (const UsdJoint& joint : joints_) {
     if (joint.is_carrying) continue;
-    if (joint.kind == JointKind::Prismatic || joint.is_driven)
-      failUsd(path_, *joint.prim,
-              joint.is_driven ? "all joints of its loop have drives" : "all joints of its loop slide or have drives",
-              "remove the drive of one revolute joint of the loop");
+    if (joint.is_driven)
+      failUsd(path_, *joint.prim, "all joints of its loop have drives", "remove the drive of one joint of the loop");
     if (!joint.is_excluded) chosen.push_back(joint.name);
   }
   if (!chosen.empty())
@@ -178,19 +176,28 @@ void UsdReader::addMotors() {
   }
 }
 
+namespace {
+
+bool hasDirections(ClosureKind kind) { return kind != ClosureKind::Ball3D && kind != ClosureKind::Distance; }
+
+}  // namespace
+
 void UsdReader::addClosure(const UsdJoint& joint) {
   ClosureSpec closure;
   closure.name = joint.name;
-  closure.kind = joint.kind == JointKind::Spherical  ? ClosureKind::Ball3D
-                 : joint.kind == JointKind::Revolute ? ClosureKind::Hinge5D
-                                                     : ClosureKind::Weld6D;
+  closure.kind = joint.length > 0                     ? ClosureKind::Distance
+                 : joint.kind == JointKind::Spherical ? ClosureKind::Ball3D
+                 : joint.kind == JointKind::Revolute  ? ClosureKind::Hinge5D
+                 : joint.kind == JointKind::Prismatic ? ClosureKind::Slider
+                                                      : ClosureKind::Weld6D;
+  if (joint.length > 0) closure.length = joint.length;
   closure.axis = joint.axis;
   for (const int end : {0, 1}) {
     const UsdBody& body = bodies_[static_cast<size_t>(joint.body[end])];
     const SE3 X_LF = body.X_SL.inverse() * joint.X_SJ[end];
     std::string& frame = end == 0 ? closure.frame1 : closure.frame2;
     frame = body.name;
-    if (X_LF.p.isZero(0) && (closure.kind == ClosureKind::Ball3D || X_LF.R.isIdentity(0))) continue;
+    if (X_LF.p.isZero(0) && (!hasDirections(closure.kind) || X_LF.R.isIdentity(0))) continue;
     frame = makeUnusedName(joint.name + "_frame" + std::to_string(end + 1),
                            [this](const std::string& made) { return link_names_.count(made) > 0; });
     link_names_.insert(frame);

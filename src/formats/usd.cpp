@@ -1,5 +1,6 @@
 #include "formats/usd.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -99,6 +100,23 @@ class UsdLines {
 };
 
 // What ties two bodies in the file, by their paths; none is the world.
+const char* getTieType(ClosureKind kind) {
+  switch (kind) {
+    case ClosureKind::Ball3D:
+      return "PhysicsSphericalJoint";
+    case ClosureKind::Hinge5D:
+      return "PhysicsRevoluteJoint";
+    case ClosureKind::Slider:
+      return "PhysicsPrismaticJoint";
+    case ClosureKind::Distance:
+      return "PhysicsDistanceJoint";
+    case ClosureKind::Weld6D:
+    case ClosureKind::Coupler:
+      break;
+  }
+  return "PhysicsFixedJoint";
+}
+
 struct UsdTie {
   std::string name, type;
   std::string path0, path1;
@@ -389,8 +407,10 @@ class UsdWriter {
         if (!couplers_.count(term.dof) && (!follower || !is_driven)) follower = &term;
         if (follower == &term && !is_driven) break;
       }
-      if (closure.terms.size() != 2 || !follower) {
-        warn("closure '" + closure.name + "'", "it is left out: in USD, a joint follows one other joint");
+      const bool is_linear = std::all_of(closure.terms.begin(), closure.terms.end(),
+                                         [](const CouplerTerm& term) { return term.isLinear(); });
+      if (closure.terms.size() != 2 || !follower || !is_linear) {
+        warn("closure '" + closure.name + "'", "it is left out: in USD, a joint follows one other joint, by a factor");
         continue;
       }
       couplers_[follower->dof] = &closure;
@@ -424,19 +444,23 @@ class UsdWriter {
     if (closure.kp != 0 || closure.kd != 0) warn(element, "its gains kp and kd are left out");
     if (closure.kind == ClosureKind::Coupler) return;
     UsdTie tie = {closure.name,
-                  closure.kind == ClosureKind::Ball3D ? "PhysicsSphericalJoint" : "PhysicsFixedJoint",
+                  getTieType(closure.kind),
                   paths_[static_cast<size_t>(closure.body1)],
                   paths_[static_cast<size_t>(closure.body2)],
                   closure.X_B1,
                   closure.X_B2};
     tie.closes = true;
-    if (closure.kind == ClosureKind::Hinge5D) {
+    if (hasAxis(closure.kind)) {
       const UsdAxis axis = makeUsdAxis(closure.axis);
       const SE3 turn(axis.R, Vector3d::Zero());
-      tie.type = "PhysicsRevoluteJoint", tie.axis = axis.token;
+      tie.axis = axis.token;
       tie.X_0J = tie.X_0J * turn, tie.X_1J = tie.X_1J * turn;
     }
-    writeTie(tie, {}, {});
+    Properties properties;
+    if (closure.kind == ClosureKind::Distance)
+      for (const char* bound : {"float physics:minDistance", "float physics:maxDistance"})
+        properties.push_back({bound, formatExact(closure.length)});
+    writeTie(tie, {}, properties);
   }
 
   void listOmissions() {
