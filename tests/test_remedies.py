@@ -36,7 +36,8 @@ FOLLOWED = [  # command, what it refuses, the remedy, and what follows it: {} is
     (SIMULATE.format("walk"), "--payload 1 --payload-at trunk", r"e\.g\. (--payload-at \S+)", "--payload 1 {}"),
 ]
 # Options of other programs in texts of ours.
-FOREIGN = {"--check", "--print", "--expand-auto-inertials", "--dropdtd", "--noent", "--build", "--parallel", "--target"}
+FOREIGN = {"--check", "--print", "--expand-auto-inertials", "--dropdtd", "--noent", "--build", "--parallel", "--target",
+           "--flatten"}
 
 
 def run(arguments):
