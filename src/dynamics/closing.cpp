@@ -47,7 +47,7 @@ class HeldLinkage {
         state_(*cluster_),
         next_(*cluster_),
         A_(MatrixXd::Zero(cluster_->size, cluster_->size)),
-        ldlt_(cluster_->size),
+        ldlt_(MatrixXd::Identity(cluster_->size, cluster_->size)),  // copies read what only a factorization writes
         z_(VectorXd::Zero(cluster_->size)),
         d_(VectorXd::Zero(cluster_->model.nv())) {}
 
