@@ -345,15 +345,15 @@ void addClosureForceDerivative(const Model& model, const Workspace& ws, const Cl
                                MatrixRef dID_dq) {
   for (const CouplerTerm& term : c.terms)
     dID_dq(term.dof, term.dof) -= term.calcDerivative(2, ws.q[term.idx_q]) * lambda[0];  // Eq. (7)
-  if (c.kind == ClosureKind::Coupler) return;
+  const bool turns = c.kind == ClosureKind::Distance;
+  if (c.kind == ClosureKind::Coupler || (c.body2 == 0 && !turns)) return;  // no effect on the world
   const Vector6d wrench = calcClosureWrench<double>(ws, c, lambda);
   const ClosureRows<double> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const Vector6d moved = c.signs[i] * crossForce(ws.J.col(k), wrench);
-    if (c.body2 != 0)                                                                   // no effect on the world
-      for (int j : model.supportDofs(c.body2)) dID_dq(j, k) += ws.J.col(j).dot(moved);  // Eq. (5)
-    if (c.kind != ClosureKind::Distance) continue;
+    for (int j : model.supportDofs(c.body2)) dID_dq(j, k) += ws.J.col(j).dot(moved);  // Eq. (5); none of the world
+    if (!turns) continue;
     const Vector6d turned = c.signs[i] * rows.calcTurned(wrench, ws.J.col(k));
     for (size_t l = 0; l < c.dofs.size(); ++l) dID_dq(c.dofs[l], k) -= c.signs[l] * ws.J.col(c.dofs[l]).dot(turned);
   }

@@ -159,7 +159,8 @@ void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<
     const ClosureRows<T> rows(view.ws, placed);
     const int dof1 = cluster.body_dof[own.body1];
     for (int c = 0; c < cluster.size; ++c) {
-      const Vector6<T> turned = rows.calcTurned(W, calcDifference(motion, motion.J, own, c));
+      Vector6<T> turned = Vector6<T>::Zero();
+      if (own.kind == ClosureKind::Distance) turned = rows.calcTurned(W, calcDifference(motion, motion.J, own, c));
       Vector6<T> twist1 = Vector6<T>::Zero();
       if (dof1 >= 0) twist1 = motion.J.col(n * c + dof1);
       for (size_t d = 0; d < own.dofs.size(); ++d) {

@@ -77,7 +77,7 @@ bool UsdReader::readKind(UsdJoint& joint) {
                  most = getNumber(prim, "physics:maxDistance", -1, true);
     if (!(least == most && least > 0))
       failUsd(path_, prim, "it is a rope: its physics:minDistance is not its physics:maxDistance, or not positive",
-              "give both the length of a rod");
+              "give both the same length");
     joint.length = least * meter_;
     joint.is_excluded = true;  // no tree hangs on a rod without a body
     return true;
