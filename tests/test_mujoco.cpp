@@ -8,6 +8,7 @@
 #include "bielle/dynamics/ratio.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/robots/robot_loader.h"
+#include "load_mujoco.h"
 #include "mechanisms.h"
 #include "published_robots.h"
 #include "robot_directory.h"
@@ -272,12 +273,8 @@ TEST_CASE("MuJoCo and the reader of its files read the same mechanism") {
   const std::string path = directory.write("hand.xml", kHandWritten);
   const LoadedRobot robot = loadRobot(path);
   const Model& model = robot.model;
-  char error[500] = "";
-  const std::unique_ptr<mjModel, void (*)(mjModel*)> mj(mj_loadXML(path.c_str(), nullptr, error, sizeof error),
-                                                        mj_deleteModel);
-  CAPTURE(std::string(error));
-  REQUIRE(mj);
-  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(mj.get()), mj_deleteData);
+  const MjModel mj = loadMujoco(path);
+  const MjData data(mj_makeData(mj.get()), mj_deleteData);
   REQUIRE(mj->nv == model.nv());
   REQUIRE(mj->nq == model.nq());
   REQUIRE(mj->njnt == model.numBodies() - 1);
@@ -373,12 +370,8 @@ TEST_CASE("MuJoCo's constraints give the ratio of an ankle whose rods spin on ba
   <actuator><motor joint="m1"/><motor joint="m2"/></actuator>
 </mujoco>)");
   const Model model = loadRobot(path).model;
-  char error[500] = "";
-  const std::unique_ptr<mjModel, void (*)(mjModel*)> mj(mj_loadXML(path.c_str(), nullptr, error, sizeof error),
-                                                        mj_deleteModel);
-  CAPTURE(std::string(error));
-  REQUIRE(mj);
-  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(mj.get()), mj_deleteData);
+  const MjModel mj = loadMujoco(path);
+  const MjData data(mj_makeData(mj.get()), mj_deleteData);
   REQUIRE(mj->nv == model.nv());
   const auto getDof = [&](const char* joint) { return mj->jnt_dofadr[mj_name2id(mj.get(), mjOBJ_JOINT, joint)]; };
   const auto find = [&](const char* joint) -> const Joint& { return model.joints()[model.findJoint(joint)]; };

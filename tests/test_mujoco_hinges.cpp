@@ -1,11 +1,10 @@
 // A robot whose balls are written as hinges is the same robot in MuJoCo: bodies, velocities, mass matrix and loops.
 #include <catch2/catch.hpp>
-#include <memory>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/robots/robot_loader.h"
+#include "load_mujoco.h"
 #include "mechanisms.h"
-#include "robot_directory.h"
 #include "worlds/mujoco_model.h"
 
 using namespace bielle;
@@ -14,21 +13,6 @@ using namespace bielle::testing;
 namespace {
 
 constexpr double kHingeTolerance = 1e-10;
-
-using HingeModel = std::unique_ptr<mjModel, void (*)(mjModel*)>;
-using HingeData = std::unique_ptr<mjData, void (*)(mjData*)>;
-
-HingeModel loadHinges(const Model& model, ConstVectorRef q_ref) {
-  MjcfOptions options;
-  options.rotations = MjcfRotations::Hinges;
-  const RobotDirectory directory;
-  const std::string path = directory.write("robot.xml", formatMjcf(model, q_ref, options).xml);
-  char error[500] = "";
-  HingeModel mj(mj_loadXML(path.c_str(), nullptr, error, sizeof error), mj_deleteModel);
-  CAPTURE(std::string(error));
-  REQUIRE(mj);
-  return mj;
-}
 
 void setHinges(const Model& model, ConstVectorRef q_ref, ConstVectorRef q, ConstVectorRef v, const mjModel& mj,
                mjData& data) {
@@ -67,8 +51,8 @@ double calcHingeGap(const mjData& data) {
 void compareHinges(const Model& model, ConstVectorRef q_ref, unsigned seed) {
   std::mt19937 rng(seed);
   const MujocoModel balls(model, q_ref);
-  const HingeModel hinges = loadHinges(model, q_ref);
-  const HingeData data(mj_makeData(hinges.get()), mj_deleteData);
+  const MjModel hinges = loadHinges(model, q_ref);
+  const MjData data(mj_makeData(hinges.get()), mj_deleteData);
   const auto expected = balls.makeData();
   for (int i = 0; i < hinges->njnt; ++i) CHECK(hinges->jnt_type[i] != mjJNT_BALL);
   for (int trial = 0; trial < 3; ++trial) {
@@ -127,7 +111,7 @@ TEST_CASE("Joints of the file have the names and the order that are told; keyfra
     CAPTURE(name);
     const Model model = loadRobot(name).model;
     const VectorXd q_ref = findClosedConfiguration(model).q;
-    const HingeModel hinges = loadHinges(model, q_ref);
+    const MjModel hinges = loadHinges(model, q_ref);
     const std::vector<std::string> names = listMjcfJoints(model, MjcfRotations::Hinges);
     REQUIRE(static_cast<int>(names.size()) == hinges->njnt);
     for (int i = 0; i < hinges->njnt; ++i) CHECK(names[i] == mj_id2name(hinges.get(), mjOBJ_JOINT, i));
@@ -139,7 +123,7 @@ TEST_CASE("Joints of the file have the names and the order that are told; keyfra
     const std::vector<std::string> with_balls = listMjcfJoints(model, MjcfRotations::Balls);
     REQUIRE(static_cast<int>(with_balls.size()) == balls.get()->njnt);
     for (int i = 0; i < balls.get()->njnt; ++i) CHECK(with_balls[i] == mj_id2name(balls.get(), mjOBJ_JOINT, i));
-    const HingeData data(mj_makeData(hinges.get()), mj_deleteData);
+    const MjData data(mj_makeData(hinges.get()), mj_deleteData);
     const auto expected = balls.makeData();
     REQUIRE(hinges->nkey == balls.get()->nkey);
     for (int k = 0; k < hinges->nkey; ++k) {

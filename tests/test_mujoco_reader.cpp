@@ -1,12 +1,12 @@
 // MuJoCo and the reader of its files agree: masses of meshes, and where free bases made of several joints stand.
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <memory>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/robots/robot_loader.h"
+#include "load_mujoco.h"
 #include "robot_directory.h"
 #include "worlds/mujoco_model.h"
 
@@ -14,16 +14,6 @@ using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-using MjModel = std::unique_ptr<mjModel, void (*)(mjModel*)>;
-
-MjModel loadMujoco(const std::string& path) {
-  char error[500] = "";
-  MjModel model(mj_loadXML(path.c_str(), nullptr, error, sizeof error), mj_deleteModel);
-  CAPTURE(std::string(error));
-  REQUIRE(model);
-  return model;
-}
 
 // A plate of the shape of an L, not convex, and thick; seen from outside.
 const char* const kAngle = R"(v 0 0 0
@@ -112,7 +102,7 @@ TEST_CASE("a free base of several joints stands where MuJoCo puts it") {
     Workspace ws(model);
     updatePositions(model, ws, assembleReference(model, "k").q);
     const MjModel mj = loadMujoco(path);
-    const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(mj.get()), mj_deleteData);
+    const MjData data(mj_makeData(mj.get()), mj_deleteData);
     mj_resetDataKeyframe(mj.get(), data.get(), 0);
     mj_kinematics(mj.get(), data.get());
     for (const char* name : {"trunk", "leg"}) {
@@ -156,7 +146,7 @@ TEST_CASE("motors on fixed tendons drive joints as in MuJoCo, with the tendon's 
   const LoadedRobot robot = loadRobot(path);
   const Model& model = robot.model;
   const MjModel mj = loadMujoco(path);
-  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(mj.get()), mj_deleteData);
+  const MjData data(mj_makeData(mj.get()), mj_deleteData);
   REQUIRE(model.nv() == mj->nv + 1);
   REQUIRE(model.nu() == 2);
   CHECK(model.motors()[0].name == "pull");

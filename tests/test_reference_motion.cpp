@@ -1,10 +1,10 @@
 // References for learning: MuJoCo, set to each frame, has the bodies, velocities and closed loops that the file has.
 #include <catch2/catch.hpp>
-#include <memory>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/names.h"
 #include "bielle/robots/robot_loader.h"
+#include "load_mujoco.h"
 #include "mechanisms.h"
 #include "results/npz.h"
 #include "results/reference_motion.h"
@@ -17,9 +17,6 @@ using namespace bielle::testing;
 namespace {
 
 constexpr double kFrameTolerance = 1e-9;
-
-using FrameModel = std::unique_ptr<mjModel, void (*)(mjModel*)>;
-using FrameData = std::unique_ptr<mjData, void (*)(mjData*)>;
 
 // Closed states of a robot that swings about a posture, at uneven times, with an impact in the middle.
 MotionRecord makeSwing(const Model& model, ConstVectorRef q_ref, int nodes) {
@@ -47,19 +44,6 @@ MotionRecord makeSwing(const Model& model, ConstVectorRef q_ref, int nodes) {
     if (k != nodes / 2) time += k % 2 == 0 ? 0.011 : 0.017;
   }
   return record;
-}
-
-FrameModel loadFrames(const Model& model, ConstVectorRef q_ref) {
-  MjcfOptions options;
-  options.rotations = MjcfRotations::Hinges;
-  const RobotDirectory directory;
-  char error[500] = "";
-  FrameModel mj(mj_loadXML(directory.write("robot.xml", formatMjcf(model, q_ref, options).xml).c_str(), nullptr, error,
-                           sizeof error),
-                mj_deleteModel);
-  CAPTURE(std::string(error));
-  REQUIRE(mj);
-  return mj;
 }
 
 // As trainers do: the first body from its place and twist in the world, the other coordinates from the joints.
@@ -113,8 +97,8 @@ TEST_CASE("MuJoCo has the bodies of a reference where the file has them, and its
     const VectorXd q_ref = findClosedConfiguration(model).q;
     const MotionRecord record = makeSwing(model, q_ref, 13);
     ReferenceMotion motion = makeReferenceMotion(model, q_ref, record, 60);
-    const FrameModel mj = loadFrames(model, q_ref);
-    const FrameData data(mj_makeData(mj.get()), mj_deleteData);
+    const MjModel mj = loadHinges(model, q_ref);
+    const MjData data(mj_makeData(mj.get()), mj_deleteData);
     const bool is_free = model.hasFreeFlyer();
     REQUIRE(motion.joint_names.size() + is_free == static_cast<size_t>(mj->njnt));
     for (int i = is_free; i < mj->njnt; ++i)

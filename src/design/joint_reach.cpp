@@ -48,7 +48,7 @@ std::vector<JointReach> listReaches(const Model& model) {
   std::vector<JointReach> reaches;
   const VectorXd q = findClosedConfiguration(model).q;
   for (const Linkage& linkage : listLinkages(model, q))
-    for (size_t j = 0; j < linkage.joints.size() && linkage.idle == 0; ++j) {
+    for (size_t j = 0; j < linkage.joints.size(); ++j) {
       try {
         const RatioSweep sweep = sweepRatio(model, linkage, q, static_cast<int>(j));
         const auto start = std::min_element(sweep.samples.begin(), sweep.samples.end(),

@@ -43,42 +43,15 @@ Stance putDown(const Stance& stance) {
   return down;
 }
 
-// Rejects requests that no motor torques can satisfy.
-void check(const Scene& scene) {
+[[noreturn]] void refuseStep(const Scene& scene, int step, const std::string& problem, const std::string& remedy) {
+  throw InputError(scene.model.name(), "step " + std::to_string(step) + " of the " + scene.task.name, problem, remedy);
+}
+
+// Legs as struts from the middle of the hips' plane, half way between two consecutive footholds at touchdown.
+// \param strut, height  of the centre of mass over the feet, at the start
+void checkReach(const Scene& scene, double strut, double height) {
   constexpr double kStretch = 1.15, kCrouch = 0.6;  // of the legs, over their length in the standing posture
-  constexpr double kLowest = 0.4, kHighest = 1.5;   // of the centre of mass over the feet, over its height at the start
-  const Model& model = scene.model;
-  const ContactFrame& left = model.contacts()[scene.stance.contacts[0]];
-  const ContactFrame& right = model.contacts()[scene.stance.contacts[1]];
-  const auto refuse = [&](int step, const std::string& problem, const std::string& remedy) {
-    throw InputError(model.name(), "step " + std::to_string(step) + " of the " + scene.task.name, problem, remedy);
-  };
-  for (const GaitNode& node : scene.gait.nodes) {
-    const std::array<SE3, 2> feet = getFeet(scene, node);
-    if (calcSoleDistance(left, feet[0], right, feet[1]) <= 0)
-      refuse(scene.gait.phases[node.phase].steps_done + 1,
-             "the feet would collide: the stance is too narrow for the soles on this path",
-             "turn or step less at a time, with more steps");
-  }
-  // Legs as struts from the middle of the hips' plane, half way between two consecutive footholds at touchdown.
-  const Vector3d strut_of_stance = scene.stance.com - getLowerFoot(scene.stance).p;
-  const double strut = strut_of_stance.norm(), height = strut_of_stance.z();
-  requireOption(scene.options.swing.height < strut, "swing_height",
-                formatNumber(scene.options.swing.height) + " m is more than the legs are long, " +
-                    formatNumber(strut, "%.3g") + " m",
-                "give metres, e.g. " + formatNumber(0.1 * strut, "%.1g"));
-  if (scene.options.timing.flight > 0)
-    for (const GaitNode& node : scene.gait.nodes) {
-      const GaitPhase& phase = scene.gait.phases[node.phase];
-      const std::array<SE3, 2> feet = scene.task.plan.getStance(phase.steps_done);
-      const double over = node.com.z() - std::min(feet[0].p.z(), feet[1].p.z());
-      if (!phase.flies() && !(over > kLowest * height && over < kHighest * height))
-        refuse(phase.steps_done + 1,
-               "the centre of mass would have to move to " + formatNumber(over, "%.3g") + " m over the feet, from " +
-                   formatNumber(height, "%.3g") + " m at the start, to take off and land",
-               "request a shorter flight, or a longer stance");
-    }
-  int refused = 0;  // the first step, the way to which is too far
+  int refused = 0;                                  // the first step, the way to which is too far
   double widest = 0, across = 0, up = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     if (phase.isDoubleSupport() || phase.flies()) continue;
@@ -92,13 +65,47 @@ void check(const Scene& scene) {
   if (refused == 0) return;
   const double bridged = 2 * std::sqrt(std::pow(kStretch * strut, 2) - std::pow(kCrouch * height, 2));
   const double speed = up > 1e-3 ? 0 : 0.8 * bridged / widest * scene.task.speed;  // that of stairs changes no step
-  refuse(refused,
-         "its foothold is out of reach: the feet would be " + formatNumber(across, "%.3g") + " m apart" +
-             (up > 1e-3 ? ", and " + formatNumber(up, "%.3g") + " m in height" : "") + "; these legs bridge " +
-             formatNumber(bridged, "%.2g") + " m on the level, or climb " +
-             formatNumber(2 * (kStretch * strut - kCrouch * height), "%.2g") + " m",
-         "give lengths in metres; request shorter or lower steps" +
-             (speed != 0 ? ", by a speed of e.g. " + formatNumber(speed, "%.2g") + " m/s" : ""));
+  refuseStep(scene, refused,
+             "its foothold is out of reach: the feet would be " + formatNumber(across, "%.3g") + " m apart" +
+                 (up > 1e-3 ? ", and " + formatNumber(up, "%.3g") + " m in height" : "") + "; these legs bridge " +
+                 formatNumber(bridged, "%.2g") + " m on the level, or climb " +
+                 formatNumber(2 * (kStretch * strut - kCrouch * height), "%.2g") + " m",
+             "give lengths in metres; request shorter or lower steps" +
+                 (speed != 0 ? ", by a speed of e.g. " + formatNumber(speed, "%.2g") + " m/s" : ""));
+}
+
+// Rejects requests that no motor torques can satisfy.
+void check(const Scene& scene) {
+  constexpr double kLowest = 0.4, kHighest = 1.5;  // of the centre of mass over the feet, over its height at the start
+  const Model& model = scene.model;
+  const ContactFrame& left = model.contacts()[scene.stance.contacts[0]];
+  const ContactFrame& right = model.contacts()[scene.stance.contacts[1]];
+  for (const GaitNode& node : scene.gait.nodes) {
+    const std::array<SE3, 2> feet = getFeet(scene, node);
+    if (calcSoleDistance(left, feet[0], right, feet[1]) <= 0)
+      refuseStep(scene, scene.gait.phases[node.phase].steps_done + 1,
+                 "the feet would collide: the stance is too narrow for the soles on this path",
+                 "turn or step less at a time, with more steps");
+  }
+  const Vector3d strut_of_stance = scene.stance.com - getLowerFoot(scene.stance).p;
+  const double strut = strut_of_stance.norm(), height = strut_of_stance.z();
+  requireOption(scene.options.swing.height < strut, "swing_height",
+                formatNumber(scene.options.swing.height) + " m is more than the legs are long, " +
+                    formatNumber(strut, "%.3g") + " m",
+                "give metres, e.g. " + formatNumber(0.1 * strut, "%.1g"));
+  if (scene.options.timing.flight > 0)
+    for (const GaitNode& node : scene.gait.nodes) {
+      const GaitPhase& phase = scene.gait.phases[node.phase];
+      const std::array<SE3, 2> feet = scene.task.plan.getStance(phase.steps_done);
+      const double over = node.com.z() - std::min(feet[0].p.z(), feet[1].p.z());
+      if (!phase.flies() && !(over > kLowest * height && over < kHighest * height))
+        refuseStep(scene, phase.steps_done + 1,
+                   "the centre of mass would have to move to " + formatNumber(over, "%.3g") +
+                       " m over the feet, from " + formatNumber(height, "%.3g") +
+                       " m at the start, to take off and land",
+                   "request a shorter flight, or a longer stance");
+    }
+  checkReach(scene, strut, height);
 }
 
 std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& schedule) {

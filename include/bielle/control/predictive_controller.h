@@ -3,7 +3,8 @@
 ///
 /// The problem is the motion's, through a window of N nodes. The first nodes are stages of the motion. Later ones stand for up
 /// to two, then four stages that are alike, more where stages are short, with the costs and constraints of the first of them and
-/// a step as long as all of them (src/control/window_grid.h). Let stage k begin at t_k. From what is measured at t_k and the torques of that instant
+/// a step as long as all of them (src/control/window_grid.h). Let stage k begin at t_k. From what is
+/// measured at t_k and the torques of that instant
 /// the model predicts the state at the next stage,
 ///
 ///     x_{k+1} = f_k(x(t_k) projected on the closures, u(t_k))                                                       (1)
