@@ -24,6 +24,9 @@ bielle_step_packages=(libocct-data-exchange-dev libocct-modeling-algorithms-dev 
 bielle_mesh_packages=(libassimp-dev)
 # ezdxf, which writes DXF files (bielle convert) when it is there. Without it everything else works.
 bielle_dxf_packages=(python3-ezdxf)
+# DART and ODE, which `bielle-loops` compares with where they are installed; not by the tests: with what DART needs they are
+# 120 packages.
+bielle_engine_packages=(libdart-dev libode-dev)
 # Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, a locale with a decimal
 # comma, what tests the Python package.
 bielle_test_packages=(catch2 python3 locales chromium pkg-config python3-pytest

@@ -46,6 +46,8 @@ OTHERS = {
     "Simbody": ["src/worlds/", "validation/"],
     "SimTK": ["src/worlds/", "validation/"],
     "simbody/": ["src/worlds/", "validation/"],
+    "dart/": ["validation/loops/engine_dart.cpp"],
+    "ode/": ["validation/loops/engine_ode.cpp"],
     "mujoco/": ["src/worlds/", "validation/"],
     "pybind11/": ["python/"],
 }

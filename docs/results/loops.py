@@ -5,7 +5,8 @@
     docs/results/loops.py --measure             measures everything first (a quarter of an hour)
     docs/results/loops.py --measure bricard     measures these problems, `long` or `cost`
 
-`--limit` is the processor time after which a trial ends. `--quick` measures a second of two problems and prints the page.
+`--engines` measures only these, one after the other, and leaves the rows of the others as they are. DART and ODE are measured
+where they are installed, MuJoCo 3 where $BIELLE_NODE_MODULES has @mujoco/mujoco. `--limit` is the processor time after which a trial ends. `--quick` measures a second of two problems and prints the page.
 """
 import csv
 import json
@@ -27,7 +28,8 @@ COLUMNS = ["engine", "setting", "cpu", "gap", "drift", "until", "end", "errors"]
 PATIENCE = 90  # with a trial and the making of its world, s
 GOALS = (1e-3, 1e-6, 1e-9)
 COLORS = {"manifold": "#d62728", "bielle": "#ff7f0e", "simbody": "#1f77b4", "simbody3": "#17becf",
-          "mujoco": "#2ca02c", "mujoco_euler": "#98df8a"}
+          "mujoco": "#98df8a", "mujoco_euler": "#c5b0d5", "mujoco3": "#2ca02c", "mujoco3_discrete": "#bcbd22",
+          "dart": "#9467bd", "ode": "#8c564b"}
 
 PROBLEMS = {
     "fourbars_2": """Two parallelograms side by side, three vertical and two horizontal thin rods of 1 kg and 1 m, thrown over
@@ -51,22 +53,24 @@ are explicit in every engine: fixed steps of more than 0.1 to 0.2 ms diverge. Wh
 }
 
 
-# Tables are files of comma-separated values below a comment that says where they are from.
+# Tables are files of comma-separated values below comments that say where they are from: a line for each run, after the first one
+# with the engines that it measured again.
 
 def write_data(name, run, columns, rows):
     with open(DATA / f"loops_{name}.csv", "w", encoding="utf-8", newline="") as file:
-        file.write(f"# {run}\n")
+        file.writelines(f"# {line}\n" for line in run.split("\n"))
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)
 
 
 def read_data(name):
-    """(comment, rows as dictionaries); (None, []) without measurements."""
+    """(comments, rows as dictionaries); (None, []) without measurements."""
     try:
         with open(DATA / f"loops_{name}.csv", encoding="utf-8", newline="") as file:
-            comment = file.readline()[1:].strip()
-            return comment, list(csv.DictReader(file))
+            lines = file.read().splitlines()
+        comments = [line[1:].strip() for line in lines if line.startswith("#")]
+        return "\n".join(comments), list(csv.DictReader(lines[len(comments):]))
     except FileNotFoundError:
         return None, []
 
@@ -138,7 +142,28 @@ def measure_long(loops):
     return ["engine", "setting", "count", "cpu", "until", "end", "errors"], rows
 
 
+def merge(name, run, engines, columns, rows, listed):
+    """Rows of other engines stay, with where they are from."""
+    comment, old = read_data(name)
+    if not engines or not comment:
+        return run, columns, rows
+    kept = [[row[column] for column in columns] for row in old if row["engine"] not in engines]
+    rows = sorted(kept + rows, key=lambda row: listed.index(row[0]))  # stable
+    return comment.split("\n")[0] + f"\n{', '.join(engines)}: {run}", columns, rows
+
+
 # The page
+
+def tell_run(comment, engines):
+    """Where a table is from."""
+    first, *others = comment.split("\n")
+    told = [f"*{first}.*"]
+    for line in others:
+        names, run = line.split(": ", 1)
+        told.append(f"*{', '.join(engines.get(name, name) for name in names.split(', '))}: {run}, one after the other on a "
+                    "loaded machine.*")
+    return " ".join(told)
+
 
 def read_errors(row):
     return {float(time): float(error) for time, error in (pair.split(":") for pair in row["errors"].split())}
@@ -215,7 +240,7 @@ def add_problem(page, problem, engines, comment, rows, figures):
     page.add(PROBLEMS[problem["name"]])
     page.add(f"""{problem['bodies']} bodies, {problem['velocities']} velocities, {problem['rows']} closure rows;
 {problem['duration']:g} s. The error is the largest of {', '.join(problem['judged'])} at {', '.join(f'{t:g}' for t in problem['times'])}
-s. *{comment}.*""")
+s. {tell_run(comment, engines)}""")
     if figures:
         draw(problem["name"], problem, engines, rows)
         page.lines += ["", f"![error over processor time](../images/loops_{problem['name']}.svg)"]
@@ -239,7 +264,7 @@ def add_cost(page, engines):
     page.heading("The cost of many loops")
     page.add(f"""Processor time of the first 0.5 s of N four-bars [s]: 2 N + 1 bodies, N loops that share rods, one freedom. Fixed
 steps are of 1 ms, others have an accuracy of 1e-6. A dash: the case before took more than 10 s, or this one 90 s
-with the making of its world. *{comment}.*""")
+with the making of its world. {tell_run(comment, engines)}""")
     counts = list(dict.fromkeys(row["count"] for row in rows))
     lines = []
     for engine, title in engines.items():
@@ -255,7 +280,7 @@ def add_long(page, engines):
     if not rows:
         return
     page.heading("N four-bars, in full")
-    page.add(f"""Errors of B0 [m] after 1, 5 and 10 s and processor time; a trial that ended early has no later errors. *{comment}.*""")
+    page.add(f"""Errors of B0 [m] after 1, 5 and 10 s and processor time; a trial that ended early has no later errors. {tell_run(comment, engines)}""")
     lines = []
     for row in rows:
         errors = [tell_error(row, time) for time in (1, 5, 10)]
@@ -314,7 +339,11 @@ its energy gives the time as an integral over its coordinate, to 1e-12 and bette
 true motion comes from their equations, extrapolated to the same accuracy. Neither uses Bielle's dynamics. Axes are as published, because gravity is part of a model.
 `bielle-loops robot PROBLEM` writes a mechanism as a robot for `bielle`.""")
     page.add("""Simbody is version 3.7, MuJoCo version 2.2.2. Simbody's accuracy is the relative error of a step, a tenth of which is the tolerance of its constraints in metres. MuJoCo's closures are
-soft; their time constant is twice the step, the least that it takes. *Opening*: the largest distance of points that a closure
+soft; their time constant is twice the step, the least that it takes. MuJoCo 3 is 3.14, as npm has it: WebAssembly in node, which is
+said to take 1.1 to 1.6 times as long as its native library; the steps of its `discrete` integrator are implicit in springs and
+dampers. DART is version 6.12 with the least force mixing that it takes (1e-9), ODE version 0.16 as it comes; both have steps of
+first order, and DART, ODE and MuJoCo 3 run in programs of their own, which time themselves.
+*Opening*: the largest distance of points that a closure
 ties. *Drift*: the largest change of the energy, less the work of motors, over the largest kinetic energy.""")
     page.add("Every engine is stopped twenty times a motion and at the times compared, to be looked at.")
     problems = [problem for problem in listed["problems"] if data(problem["name"])[1]]
@@ -333,6 +362,7 @@ ties. *Drift*: the largest change of the energy, less the work of motors, over t
 def main():
     parser = common.make_parser(__doc__)
     parser.add_argument("--measure", nargs="*", metavar="PROBLEM", help="what to measure first; all without a name")
+    parser.add_argument("--engines", nargs="+", default=[], metavar="ENGINE", help="measure only these")
     parser.add_argument("--limit", type=float, default=20, help="processor time of a trial, s")
     arguments = parser.parse_args()
     loops = Loops(arguments.bielle)
@@ -354,7 +384,10 @@ def main():
         elif name == LONG:
             write_data(name, run, *measure_long(loops))
         else:
-            write_data(name, run, *measure_problem(loops, name, ["--limit", arguments.limit]))
+            only = [option for engine in arguments.engines for option in ("--engine", engine)]
+            columns, rows = measure_problem(loops, name, ["--limit", arguments.limit, *only])
+            write_data(name, *merge(name, run, arguments.engines, columns, rows,
+                                    [engine["name"] for engine in loops.list()["engines"]]))
     make_page(loops, read_data, run).write(False)
 
 

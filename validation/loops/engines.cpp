@@ -4,6 +4,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/worlds/bielle_world.h"
+#include "loops/process_world.h"
 #ifdef BIELLE_WITH_MUJOCO
 #include "worlds/mujoco_world.h"
 #endif
@@ -33,6 +34,11 @@ std::unique_ptr<World> makeMujoco(const Model& model, double step, bool runge_ku
   return makeMujocoWorld(model, options);
 }
 #endif
+
+template <Mujoco3Integrator integrator>
+std::unique_ptr<World> makeMujoco3(const Model& model, double step) {
+  return makeMujoco3World(model, step, integrator);
+}
 
 std::vector<Engine> listEngines() {
   const std::vector<double> steps = {4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6};
@@ -64,7 +70,21 @@ std::vector<Engine> listEngines() {
       {"mujoco_euler", "MuJoCo, Euler", "time step [s]", steps, true,
        [](const Model& model, double step) { return makeMujoco(model, step, false); }},
 #endif
+#ifdef BIELLE_LOOPS_DART
+      {"dart", "DART", "time step [s]", steps, true,
+       [](const Model& model, double step) -> std::unique_ptr<World> { return makeDartWorld(model, step); }},
+#endif
+#ifdef BIELLE_LOOPS_ODE
+      {"ode", "ODE", "time step [s]", steps, true,
+       [](const Model& model, double step) -> std::unique_ptr<World> { return makeOdeWorld(model, step); }},
+#endif
   };
+  if (hasMujoco3()) {
+    engines.push_back({"mujoco3", "MuJoCo 3 (WebAssembly), RK4", "time step [s]", steps, true,
+                       makeMujoco3<Mujoco3Integrator::RungeKutta>});
+    engines.push_back({"mujoco3_discrete", "MuJoCo 3 (WebAssembly), discrete", "time step [s]", steps, true,
+                       makeMujoco3<Mujoco3Integrator::Discrete>});
+  }
   return engines;
 }
 

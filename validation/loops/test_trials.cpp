@@ -37,6 +37,13 @@ TEST_CASE("all engines move Bricard's mechanism, the more exactly the finer") {
   check("mujoco", 2e-3, 1e-3, 2e-5, 3.5);  // of second order, by its closures
   check("mujoco_euler", 2e-3, 1e-3, 2e-3, 1.8);
 #endif
+  for (const Engine& engine : getEngines()) {
+    const std::string name = engine.name;
+    if (name == "dart") check("dart", 1e-4, 2e-5, 3e-5, 4);
+    if (name == "ode") check("ode", 1e-4, 1e-5, 2e-5, 8);
+    if (name == "mujoco3") check("mujoco3", 2e-3, 1e-3, 2e-6, 3.5);
+    if (name == "mujoco3_discrete") check("mujoco3_discrete", 2e-3, 1e-3, 2e-3, 1.8);
+  }
 }
 
 TEST_CASE("a trial notices a mechanism that is not that of its true motion") {
@@ -66,6 +73,29 @@ TEST_CASE("a trial that takes too long ends, and finer ones are not begun") {
   CHECK(trial.end == "the time was up");
   CHECK(trial.until < problem.duration);
   CHECK(runTrials(problem, getEngine("bielle"), {1e-6, 0}).size() == 1);
+}
+
+TEST_CASE("engines in programs of their own carry out all kinds of parts, and tell when they break off") {
+  for (const Engine& engine : getEngines()) {
+    const std::string name = engine.name;
+    if (name != "dart" && name != "ode" && name != "mujoco3") continue;
+    CAPTURE(name);
+    // A spring, a motor and balls; universal joints; slides; dampers.
+    CHECK(findError(makeSqueezer(), name, 2e-4, 0.01) < 1e-3);
+    CHECK(findError(makeSpatialFourbar(), name, 1e-4, 0.5) < 1e-3);
+    CHECK(findError(makeSliderCrank(), name, 1e-4, 0.5) < 1e-2);
+    CHECK(findError(makeGovernor(), name, 5e-5, 1) < 1e-4);
+    const Trial trial = runTrial(makeGovernor(), engine, 1e-3);
+    CAPTURE(trial.end);
+    CHECK(!trial.end.empty());
+    CHECK(trial.errors.empty());
+    Problem problem = makeSpatialFourbar();
+    ModelParts parts = takeParts(problem.model);
+    parts.closures[0].kind = ClosureKind::Distance;
+    parts.closures[0].length = 0.1;
+    problem.model = ModelBuilder::restore(parts);
+    CHECK_THAT(runTrial(problem, engine, 1e-3).end, Catch::Contains("distance"));
+  }
 }
 
 TEST_CASE("unknown problems and engines are named with those that there are") {

@@ -5,6 +5,8 @@
 #include <ctime>
 #include <set>
 
+#include "loops/process_world.h"
+
 namespace bielle::loops {
 namespace {
 
@@ -45,11 +47,12 @@ void run(const Problem& problem, const Engine& engine, const TrialOptions& optio
   const auto world = engine.make(problem.model, trial.setting);
   world->reset(problem.start.q, problem.start.v);
   if (problem.torques.size() > 0) world->setTorques(problem.torques);
+  const auto* apart = dynamic_cast<const ProcessWorld*>(world.get());
   const double at_start = problem.calcInvariant(problem.start.q, problem.start.v);
   for (const double time : listLooks(problem, duration)) {
     const double before = readClock();
     const bool is_good = world->advance(time - world->time());
-    trial.cpu += readClock() - before;
+    trial.cpu = apart ? apart->cpu() : trial.cpu + readClock() - before;
     trial.until = world->time();
     if (!is_good) {
       trial.end = world->message();
