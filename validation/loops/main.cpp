@@ -4,8 +4,10 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "bielle/formats/reader.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
+#include "loops/dynamics_time.h"
 #include "loops/trial.h"
 #include "results/number_option.h"
 
@@ -18,6 +20,8 @@ struct Arguments {
   std::vector<std::string> problems, engines;
   TrialOptions trial;
   std::vector<double> settings, times;
+  std::vector<std::string> robots;
+  double run = 0.02;
   std::string directory;
 };
 
@@ -94,6 +98,27 @@ int writeRobots(const Arguments& arguments) {
   return 0;
 }
 
+// What the dynamics of robots cost.
+int printTimes(const Arguments& arguments) {
+  bielle::LoadOptions options;
+  options.base = bielle::BaseKind::Fixed;
+  for (const std::string& path : arguments.robots) {
+    const bielle::Model model = bielle::loadRobot(path, options).model;
+    const DynamicsTimes times = measureDynamics(model, arguments.run);
+    std::cout << ordered_json{{"robot", model.name()},
+                              {"bodies", model.numBodies() - 1},
+                              {"velocities", model.nv()},
+                              {"rows", model.numClosureRows()},
+                              {"mobility", times.mobility},
+                              {"accelerations", times.accelerations},
+                              {"derivatives", times.derivatives},
+                              {"step", times.step},
+                              {"linearization", times.linearization}}
+              << std::endl;
+  }
+  return 0;
+}
+
 void checkNames(const Arguments& arguments) {
   for (const std::string& name : arguments.engines) getEngine(name);
 }
@@ -121,6 +146,11 @@ int run(int argc, char** argv) {
   CLI::App& robot = *app.add_subcommand("robot", "The mechanisms as robots for `bielle`: directories of their names");
   robot.add_option("PROBLEM", arguments.problems, known)->required();
   robot.add_option("-o,--output", arguments.directory, "where they go");
+  CLI::App& dynamics = *app.add_subcommand("dynamics", "What the dynamics of robots on a fixed base cost, s");
+  dynamics.add_option("ROBOT", arguments.robots, "name, directory or file")->required();
+  dynamics.add_option("--run", arguments.run, "processor time of one of ten runs, the least of which is told, s")
+      ->check(bielle::isPositive())
+      ->capture_default_str();
   bielle::requireFiniteNumbers(app);
   try {
     app.parse(argc, argv);
@@ -128,6 +158,7 @@ int run(int argc, char** argv) {
     if (list.parsed()) return listAll();
     if (trials.parsed()) return printTrials(arguments);
     if (motion.parsed()) return printMotion(arguments);
+    if (dynamics.parsed()) return printTimes(arguments);
     return writeRobots(arguments);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);

@@ -9,12 +9,13 @@
 //     -> {"q": [..], "v": [..], "cpu": s}        cpu: processor time of the steps, or {"error": why}
 // These programs see nothing of Bielle: its headers set the alignment of Eigen's numbers otherwise than DART was compiled.
 #include <Eigen/Dense>
-#include <ctime>
 #include <exception>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
+
+#include "processor_clock.h"
 
 namespace bielle::outside {
 
@@ -120,11 +121,6 @@ inline Mechanism readMechanism(const json& j) {
 // Of the steps of an engine with: Engine(mechanism), start(q, v), setForces(tau), step(h), q(), v().
 template <typename Engine>
 int serve() {
-  const auto read_clock = [] {
-    timespec time;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-  };
   std::ostream out(std::cout.rdbuf());
   std::cout.rdbuf(std::cerr.rdbuf());  // for what engines say
   try {
@@ -140,9 +136,9 @@ int serve() {
       } else if (request.contains("forces")) {
         engine.setForces(readVector(request["forces"]));
       } else {
-        const double h = request["step"], before = read_clock();
+        const double h = request["step"], before = loops::readProcessorClock();
         for (double count = request["count"]; count > 0; --count) engine.step(h);
-        cpu += read_clock() - before;
+        cpu += loops::readProcessorClock() - before;
       }
       const VectorXd q = engine.q(), v = engine.v();
       if (q.allFinite() && v.allFinite())

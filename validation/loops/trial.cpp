@@ -2,22 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <set>
 
 #include "loops/process_world.h"
+#include "loops/processor_clock.h"
 
 namespace bielle::loops {
 namespace {
 
 constexpr int kLooks = 20;         // at the state, besides the times of the problem
 constexpr double kRefining = 2.5;  // about what the next finer setting costs
-
-double readClock() {
-  timespec time;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 // In increasing order, with the end.
 std::set<double> listLooks(const Problem& problem, double duration) {
@@ -50,9 +44,9 @@ void run(const Problem& problem, const Engine& engine, const TrialOptions& optio
   const auto* apart = dynamic_cast<const ProcessWorld*>(world.get());
   const double at_start = problem.calcInvariant(problem.start.q, problem.start.v);
   for (const double time : listLooks(problem, duration)) {
-    const double before = readClock();
+    const double before = readProcessorClock();
     const bool is_good = world->advance(time - world->time());
-    trial.cpu = apart ? apart->cpu() : trial.cpu + readClock() - before;
+    trial.cpu = apart ? apart->cpu() : trial.cpu + readProcessorClock() - before;
     trial.until = world->time();
     if (!is_good) {
       trial.end = world->message();
