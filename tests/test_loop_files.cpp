@@ -146,3 +146,58 @@ actuated_joints: [turn]
   CHECK(robot.model.nu() == 1);
   CHECK(tells(robot, "key 'ball_limit_deg'"));
 }
+
+TEST_CASE("a file robot_data.yaml beside a URDF closes loops by joints in their parents") {
+  const RobotDirectory directory;
+  const std::string urdf = replaceOnce(makeSquare(), "<mimic joint=\"turn\" multiplier=\"-1\"/>", "");
+  const std::string data = R"(metadata: {exporter_version: '3.0.0'}
+joints:
+  turn: {type: continuous, passive: false}
+  swing: {type: continuous, passive: true}
+  mount: {type: fixed, passive: false}
+closing_joints:
+  - name: jaw
+    source: user_tag
+    type: prismatic
+    parent: top
+    child: right
+    origin_xyz_m: [0.0, 0.0, 1.0]
+    origin_rpy_rad: [0.0, -1.5707963267948966, 0.0]
+    axis: [1.0, 0.0, 0.0]
+    limits: {lower: -0.05, upper: 0.05}
+)";
+  const std::string path = directory.write("robot_data.yaml", data);
+  const LoadedRobot robot = loadIn(directory, urdf);
+  const Model& model = robot.model;
+  REQUIRE(model.closures().size() == 1);
+  const Closure& jaw = model.closures()[0];
+  CHECK(jaw.kind == ClosureKind::Slider);
+  CHECK(jaw.axis == Vector3d::UnitX());
+  CHECK(jaw.X_B1.p == Vector3d::UnitZ());
+  // Closed with all joints at zero, at the corner of the square, and parallel to the ground.
+  CHECK((jaw.X_B2.p - Vector3d::UnitZ()).norm() < 1e-15);
+  CHECK(jaw.X_B2.R.isIdentity(1e-15));
+  REQUIRE(model.nu() == 1);
+  CHECK(model.motors()[0].name == "turn");
+  CHECK(tells(robot, "its loops are those of " + path));
+  CHECK(tells(robot, "limits'"));
+  for (const auto& [type, kind] :
+       {std::pair("revolute", ClosureKind::Hinge5D), {"fixed", ClosureKind::Weld6D}, {"ball", ClosureKind::Ball3D}}) {
+    directory.write("robot_data.yaml", replaceOnce(data, "type: prismatic", std::string("type: ") + type));
+    CHECK(loadIn(directory, urdf).model.closures()[0].kind == kind);
+  }
+  const auto getDataError = [&](const std::string& from, const std::string& to) {
+    directory.write("robot_data.yaml", replaceOnce(data, from, to));
+    return getError([&] { loadIn(directory, urdf); });
+  };
+  CHECK_THAT(getDataError("prismatic", "screw"), Catch::Contains("robot_data.yaml: ") && Catch::Contains("(line 9)") &&
+                                                     Catch::Contains("a joint 'screw' cannot close a loop; use prism"));
+  CHECK_THAT(getDataError("child: right", "child: none"), Catch::Contains("there is no link 'none'; correct the name"));
+  CHECK_THAT(getDataError("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]"), Catch::Contains("it is not a direction"));
+  // Without loops, or with those of another file, it has no effect.
+  directory.write("robot_data.yaml", "joints: {turn: {passive: false}}");
+  CHECK(loadIn(directory, urdf).model.nu() == 0);
+  directory.write("robot_data.yaml", data);
+  directory.write("loop_closures.yaml", "closures: [{link_a: top, link_b: right, point: [1, 0, 1], axis: [0, 1, 0]}]");
+  CHECK(loadIn(directory, urdf).model.closures()[0].kind == ClosureKind::Hinge5D);
+}

@@ -296,6 +296,29 @@ TEST_CASE("virtual work balances where the motor stands still too, and another r
   CHECK(dead == 2);
 }
 
+TEST_CASE("a polynomial does not repeat after a turn, though all angles and their rates nearly do") {
+  const auto sweep = [](double square) {
+    ModelBuilder builder("cam");
+    for (const char* name : {"wheel", "follower"}) {
+      Joint joint;
+      joint.name = name;
+      joint.kind = JointKind::Continuous;
+      Inertia inertia;
+      inertia.mass = 1;
+      inertia.I_com = Matrix3d::Identity();
+      builder.addLink(name + std::string("_link"), "world", joint, inertia);
+    }
+    // The follower is at x + square x (x - 2 pi): at 0 and at 2 pi it is where the wheel is.
+    builder.addCoupler("cam", {{"follower", -1}, {"wheel", 1 - 2 * kPi * square}}, 0, 0, 0, {{"wheel", {square}}});
+    builder.addMotor("wheel");
+    const Model model = builder.build();
+    const VectorXd q = model.makeNeutral();
+    return sweepRatio(model, makeLinkage(model, q, {"follower"}), q);
+  };
+  CHECK_FALSE(sweep(0.05).full_turn);
+  CHECK(sweep(0.05).end == "length of the curve");
+}
+
 TEST_CASE("belts: a sweep is one turn of the joint, whatever the ratio") {
   const Model belt = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/belt_biped").model;
   for (const double ratio : {2.0, 1.58, 3.3}) {

@@ -12,12 +12,25 @@ namespace {
 constexpr double kSmallestStep = 1e-7;    // of the default step
 constexpr double kBeforeRankLoss = 0.99;  // of the step that leads to it
 
+// A turn later, a cam is another one: its polynomial does not repeat.
+bool followsPolynomial(const Model& model, int joint) {
+  for (const Closure& closure : model.closures()) {
+    const auto& terms = closure.terms;
+    if (std::any_of(terms.begin(), terms.end(), [&](const CouplerTerm& t) { return t.joint == joint; }) &&
+        std::any_of(terms.begin(), terms.end(), [](const CouplerTerm& t) { return !t.isLinear(); }))
+      return true;
+  }
+  return false;
+}
+
 // q (-) q0 with angles up to whole turns.
 VectorXd calcWrappedDifference(const Model& model, const VectorXd& q0, const VectorXd& q) {
   VectorXd d = model.difference(q0, q);
   for (int k = 0; k < model.nv(); ++k) {
-    const JointKind kind = model.joints()[model.dofs()[k].joint].kind;
-    if (kind == JointKind::Revolute || kind == JointKind::Continuous || kind == JointKind::Universal)
+    const int joint = model.dofs()[k].joint;
+    const JointKind kind = model.joints()[joint].kind;
+    if ((kind == JointKind::Revolute || kind == JointKind::Continuous || kind == JointKind::Universal) &&
+        !followsPolynomial(model, joint))
       d[k] = std::remainder(d[k], 2 * kPi);
   }
   return d;

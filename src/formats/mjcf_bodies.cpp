@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "formats/robot_text.h"
 #include "math/decompositions.h"
 #include "math/so3.h"
 #include "model/joint.h"
@@ -194,8 +195,8 @@ class BodyWriter {
   }
 
   void writeShapes(int body, XMLElement& e) {
-    for (const Visual& visual : model_.visuals()) {
-      if (visual.body != body) continue;
+    for (const Visual* part : visuals_[body]) {
+      const Visual& visual = *part;
       if (visual.shape == Visual::Shape::Mesh) {
         meshes_.insert(visual.mesh);
         continue;
@@ -211,12 +212,12 @@ class BodyWriter {
                      {"size", is_box ? formatMjcf(size / 2) : formatMjcf(Vector3d(size[0], size[1] / 2, 0))}});
       setAttributes(geom, {{"rgba", formatMjcf(visual.rgba)}});
     }
-    for (const Shape& shape : model_.shapes())
-      if (shape.body == body && !shape.fitted) writeShape(shape, e);
+    for (const Shape* shape : shapes_[body])
+      if (!shape->fitted) writeShape(*shape, e);
     for (const ContactFrame& contact : model_.contacts())
       if (contact.body == body) writeSole(contact, e);
-    for (const Frame& frame : model_.frames())
-      if (frame.body == body && frame.name != model_.bodies()[body].name) writeFrame(frame, e);
+    for (const Frame* frame : frames_[body])
+      if (frame->name != model_.bodies()[body].name) writeFrame(*frame, e);
     writeTendonSites(body, e);
   }
 
@@ -289,6 +290,9 @@ class BodyWriter {
   void warn(const std::string& element, const std::string& problem) { warnings_.add(element, problem); }
 
   const Model& model_;
+  const std::vector<std::vector<const Visual*>> visuals_ = sortByBody(model_, model_.visuals());
+  const std::vector<std::vector<const Shape*>> shapes_ = sortByBody(model_, model_.shapes());
+  const std::vector<std::vector<const Frame*>> frames_ = sortByBody(model_, model_.frames());
   const ConstVectorRef q_ref_;
   const MjcfOptions& options_;
   FormatWarnings& warnings_;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "math/direction.h"
 #include "model/listing.h"
 
 namespace fs = std::filesystem;
@@ -17,12 +18,18 @@ UrdfJoint* findTreeJoint(UrdfFile& tree, const std::string& name) {
   return it == tree.joints.end() ? nullptr : &*it;
 }
 
+constexpr const char* kRobotData = "robot_data.yaml";
+
 const YamlKeys kLoopFileKeys("loop_closures.yaml of others", "",
                              {"closures", "ball_loops", "pin_loops", "dependent", "independent", "actuated_joints",
                               "ball_upgrades"});
 const YamlKeys kHingeKeys("loop_closures.yaml of others", "closures[]", {"link_a", "link_b", "point", "axis"});
 const YamlKeys kTiedKeys("loop_closures.yaml of others", "ball_loops[], pin_loops[]",
                          {"name", "parent", "child", "parent_xyz", "child_xyz", "axis"});
+const YamlKeys kRobotDataKeys("robot_data.yaml of others", "", {"closing_joints", "joints"});
+const YamlKeys kClosingKeys("robot_data.yaml of others", "closing_joints[]",
+                            {"name", "type", "parent", "child", "origin_xyz_m", "origin_rpy_rad", "axis"});
+const YamlKeys kDrivenKeys("robot_data.yaml of others", "joints.JOINT", {"passive"});
 
 class LoopClosuresReader {
  public:
@@ -33,12 +40,15 @@ class LoopClosuresReader {
   }
 
   void read(const YamlEntry& root) {
+    const bool has_joints = find(getPresent(root, kRobotDataKeys), "closing_joints");
+    if (fs::path(path_).filename() == kRobotData && !has_joints) return;
     if (!isOfThisRobot(root)) {
       tree_.warnings.push_back(path_ + ": it is left out: it names no link of " + tree_.path);
       return;
     }
     tree_.warnings.push_back(tree_.path + ": its loops are those of " + path_);
     settings_.path = path_;
+    if (has_joints) return readRobotData(root);
     for (const auto& [key, entry] : getKnown(root, kLoopFileKeys)) {
       if (key == "closures")
         forEach(entry, [this](const YamlEntry& e) { readHinge(e); });
@@ -112,6 +122,14 @@ class LoopClosuresReader {
     return {pairs.begin(), pairs.end()};
   }
 
+  // The same without a word.
+  static YamlFields getPresent(const YamlEntry& entry, const std::vector<std::string>& known) {
+    YamlFields fields;
+    for (const auto& [key, value] : entry.getMap())
+      if (contains(known, key)) fields.emplace(key, value);
+    return fields;
+  }
+
   void add(const std::string& name, ClosureKind kind, const Vector3d& axis, const std::string& link1, const SE3& X_L1,
            const std::string& link2, const SE3& X_L2) {
     ClosureSpec closure;
@@ -143,6 +161,46 @@ class LoopClosuresReader {
         {is_pin ? R_ba : Matrix3d::Identity(), require(fields, "child_xyz", entry).getVector3()});
   }
 
+  // Besides the loops the file repeats what the URDF has, and says which joints nothing drives.
+  void readRobotData(const YamlEntry& root) {
+    for (const auto& [key, entry] : getPresent(root, kRobotDataKeys)) {
+      if (key == "closing_joints") {
+        forEach(entry, [this](const YamlEntry& e) { readClosingJoint(e); });
+        continue;
+      }
+      for (const auto& [name, joint] : entry.getMap()) {
+        if (!joint.isMap()) continue;
+        const YamlFields fields = getPresent(joint, kDrivenKeys);
+        const YamlEntry* passive = find(fields, "passive");
+        const UrdfJoint* driven = findTreeJoint(tree_, name);
+        if (passive && passive->isWord("false") && driven && getNv(driven->joint.kind) == 1) addMotor(name);
+      }
+    }
+  }
+
+  // A joint where the links stand with all joints at zero.
+  void readClosingJoint(const YamlEntry& entry) {
+    static const std::map<std::string, ClosureKind> kinds = {
+        {"prismatic", ClosureKind::Slider}, {"revolute", ClosureKind::Hinge5D}, {"continuous", ClosureKind::Hinge5D},
+        {"spherical", ClosureKind::Ball3D}, {"ball", ClosureKind::Ball3D},      {"fixed", ClosureKind::Weld6D}};
+    const YamlFields fields = getPresent(entry, kClosingKeys);
+    const std::string a = findLink(require(fields, "parent", entry)), b = findLink(require(fields, "child", entry)),
+                      name = require(fields, "name", entry).getText();
+    const YamlEntry &type = require(fields, "type", entry), *turn = find(fields, "origin_rpy_rad");
+    const auto kind = kinds.find(type.getText());
+    if (kind == kinds.end())
+      type.fail("a joint '" + type.getText() + "' cannot close a loop",
+                "use prismatic, revolute, continuous, spherical or fixed");
+    const bool has_axis = hasAxis(kind->second);
+    const SE3 X_aJ(turn ? makeRotation(turn->getVector3()) : Matrix3d::Identity(),
+                   require(fields, "origin_xyz_m", entry).getVector3());
+    add(name, kind->second, has_axis ? getDirection(require(fields, "axis", entry)) : Vector3d::UnitZ(), a, X_aJ, b,
+        X_WL_.at(b).inverse() * X_WL_.at(a) * X_aJ);
+    for (const auto& [key, value] : entry.getMap())
+      if (key == "limits")
+        tree_.warnings.push_back(path_ + ": " + value.element() + ": a closure has no range, so it is left out");
+  }
+
   // It follows others by its loop; the line of <mimic> is only near to that.
   void removeMimic(const YamlEntry& entry) {
     UrdfJoint& joint = findJoint(entry);
@@ -157,10 +215,13 @@ class LoopClosuresReader {
     if (getNv(joint.joint.kind) != 1)
       entry.fail("joint '" + joint.joint.name + "' does not have exactly one coordinate",
                  "name a revolute or prismatic joint");
+    addMotor(joint.joint.name);
+  }
+  void addMotor(const std::string& joint) {
     for (const MotorSpec& other : settings_.motors)
-      if (other.joint == joint.joint.name) return;
+      if (other.joint == joint) return;
     MotorSpec motor;
-    motor.joint = joint.joint.name;
+    motor.joint = joint;
     settings_.motors.push_back(motor);
   }
 
@@ -189,11 +250,12 @@ std::string addUrdfFrame(UrdfFile& tree, std::string name, const std::string& li
 
 fs::path findLoopClosures(const fs::path& urdf) {
   const fs::path directory = urdf.has_parent_path() ? urdf.parent_path() : ".";
-  for (const fs::path& place : {directory, directory / "..", directory / "../config"}) {
-    std::error_code error;
-    const fs::path file = (place / "loop_closures.yaml").lexically_normal();
-    if (fs::is_regular_file(file, error)) return file;
-  }
+  for (const char* name : {"loop_closures.yaml", kRobotData})
+    for (const fs::path& place : {directory, directory / "..", directory / "../config"}) {
+      std::error_code error;
+      const fs::path file = (place / name).lexically_normal();
+      if (fs::is_regular_file(file, error)) return file;
+    }
   return {};
 }
 

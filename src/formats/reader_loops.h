@@ -8,6 +8,11 @@
 ///   motor (sw2robot);
 /// - `ball_loops` and `pin_loops: [{name, parent, child, parent_xyz, child_xyz, axis}, ...]`: balls and hinges, the axis in the
 ///   parent; `ball_upgrades: [...]`, joints that are balls; `actuated_joints: [...]`, those with a motor (robonex-description).
+///
+/// Without one, a file robot_data.yaml with `closing_joints: [{name, type, parent, child, origin_xyz_m, origin_rpy_rad, axis}, ...]`
+/// in one of these places (fusion2URDF): joints in their parent links, which close loops with all joints at zero; their ranges are
+/// left out. Joints with `passive: false` in its `joints` have motors; the rest of the file repeats the URDF and is not read. (The
+/// keys, not the name of the file, tell which of the two it is.)
 #include <filesystem>
 
 #include "formats/robot_files.h"

@@ -1,6 +1,7 @@
 #pragma once
 /// \file Numbers, and names for what has none, in the files that a robot is written as.
 #include <string>
+#include <vector>
 
 #include "bielle/model/model.h"
 #include "model/number_text.h"
@@ -15,6 +16,14 @@ bool hasImpliedFreeFlyer(const Model& model);
 
 /// A frame of the model at this place; if there is none, `made`.
 std::string findFrameName(const Model& model, int body, const SE3& X_BF, const std::string& made);
+
+/// Frames, visuals or shapes of a model by their bodies, in their order.
+template <typename Part>
+std::vector<std::vector<const Part*>> sortByBody(const Model& model, const std::vector<Part>& parts) {
+  std::vector<std::vector<const Part*>> sorted(static_cast<size_t>(model.numBodies()));
+  for (const Part& part : parts) sorted[static_cast<size_t>(part.body)].push_back(&part);
+  return sorted;
+}
 
 /// \throws InputError
 [[noreturn]] void refuseToWrite(const Model& model, const std::string& element, const std::string& problem);

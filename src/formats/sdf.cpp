@@ -77,11 +77,10 @@ class SdfWriter {
     if (!(inertia.mass > 0))
       warn("link '" + model_.bodies()[i].name + "'", "it has no mass, which SDF requires to be positive");
     int count = 0;
-    for (const Visual& visual : model_.visuals())
-      if (visual.body == i) writeVisual(visual, ++count, link);
+    for (const Visual* visual : visuals_[i]) writeVisual(*visual, ++count, link);
     count = 0;
-    for (const Shape& shape : model_.shapes())
-      if (shape.body == i && !shape.fitted) writeShape(shape, ++count, link);
+    for (const Shape* shape : shapes_[i])
+      if (!shape->fitted) writeShape(*shape, ++count, link);
   }
 
   // A box with rounded edges is written as the box around it.
@@ -249,6 +248,8 @@ class SdfWriter {
   }
 
   const Model& model_;
+  const std::vector<std::vector<const Visual*>> visuals_ = sortByBody(model_, model_.visuals());
+  const std::vector<std::vector<const Shape*>> shapes_ = sortByBody(model_, model_.shapes());
   const VectorXd q_ref_;
   std::set<std::string> taken_;  // names of joints
   std::string shifted_;          // joints with their coordinates at q_ref

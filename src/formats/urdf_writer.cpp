@@ -64,8 +64,8 @@ class UrdfWriter {
     for (int i = free_root_ ? 1 : 0; i < model_.numBodies(); ++i) {
       writeLink(i);
       if (i > (free_root_ ? 1 : 0)) writeJoint(i);
-      for (const Frame& frame : model_.frames())
-        if (frame.body == i && !bodies_.count(frame.name)) writeFrame(frame.name, i, frame.X_BF);
+      for (const Frame* frame : frames_[i])
+        if (!bodies_.count(frame->name)) writeFrame(frame->name, i, frame->X_BF);
       writeMadeFrames(i);
     }
     for (auto color = colors_.rbegin(); color != colors_.rend(); ++color) {
@@ -107,10 +107,9 @@ class UrdfWriter {
                   {"ixz", formatExact(I(0, 2))},
                   {"iyz", formatExact(I(1, 2))}});
     }
-    for (const Visual& visual : model_.visuals())
-      if (visual.body == i) writeVisual(visual, addElement(link, "visual"));
-    for (const Shape& shape : model_.shapes())
-      if (shape.body == i && !shape.fitted) writeShape(shape, addElement(link, "collision"));
+    for (const Visual* visual : visuals_[i]) writeVisual(*visual, addElement(link, "visual"));
+    for (const Shape* shape : shapes_[i])
+      if (!shape->fitted) writeShape(*shape, addElement(link, "collision"));
   }
 
   void writeVisual(const Visual& visual, XMLElement& e) {
@@ -253,6 +252,9 @@ class UrdfWriter {
   }
 
   const Model& model_;
+  const std::vector<std::vector<const Visual*>> visuals_ = sortByBody(model_, model_.visuals());
+  const std::vector<std::vector<const Shape*>> shapes_ = sortByBody(model_, model_.shapes());
+  const std::vector<std::vector<const Frame*>> frames_ = sortByBody(model_, model_.frames());
   const bool free_root_;
   XMLDocument& document_;
   XMLElement* robot_ = nullptr;

@@ -218,16 +218,15 @@ class UsdWriter {
     writeInertia(i == 0 && !(inertia.mass > 0) ? makeGroundInertia() : inertia);
     out_.place(X_WB);
     UsdNames own;
-    for (const Frame& frame : model_.frames())
-      if (frame.body == i && frame.name != shown && frame.name != "world") {
-        out_.open("Xform", own.add(frame.name), frame.name, {"NewtonSiteAPI"});
-        out_.place(frame.X_BF);
+    for (const Frame* frame : frames_[i])
+      if (frame->name != shown && frame->name != "world") {
+        out_.open("Xform", own.add(frame->name), frame->name, {"NewtonSiteAPI"});
+        out_.place(frame->X_BF);
         out_.close();
       }
-    for (const Visual& visual : model_.visuals())
-      if (visual.body == i) writeVisual(visual, own.add("visual"));
-    for (const Shape& shape : model_.shapes())
-      if (shape.body == i && !shape.fitted) writeShape(shape, own.add("collision"));
+    for (const Visual* visual : visuals_[i]) writeVisual(*visual, own.add("visual"));
+    for (const Shape* shape : shapes_[i])
+      if (!shape->fitted) writeShape(*shape, own.add("collision"));
     out_.close();
   }
 
@@ -479,6 +478,9 @@ class UsdWriter {
   }
 
   const Model& model_;
+  const std::vector<std::vector<const Visual*>> visuals_ = sortByBody(model_, model_.visuals());
+  const std::vector<std::vector<const Shape*>> shapes_ = sortByBody(model_, model_.shapes());
+  const std::vector<std::vector<const Frame*>> frames_ = sortByBody(model_, model_.frames());
   const VectorXd q_ref_;
   std::string root_, joints_;                       // names of prims
   std::map<std::string, std::string> joint_prims_;  // by joint

@@ -30,6 +30,7 @@ if [ ! -e "$build/seeds/done" ]; then
     "$bielle" convert "$root/robots/$robot" --to drake -o "$build/seeds/drake/$robot.urdf" >/dev/null 2>&1
   done
   echo 'closures: [{link_a: hand, link_b: rod, point: [0, 0, 1], axis: [0, 1, 0]}]' >"$build/seeds/loops/hinge.yaml"
+  printf 'joints: {shoulder: {passive: false}}\nclosing_joints: [{name: s, type: prismatic, parent: hand, child: rod, origin_xyz_m: [0, 0, 1], origin_rpy_rad: [0, 1, 0], axis: [0, 1, 0]}]\n' >"$build/seeds/loops/slide.yaml"
   printf 'pin_loops: [{name: p, parent: hand, child: rod, parent_xyz: [0, 0, 1], child_xyz: [0, 0, 0], axis: [0, 1, 0]}]\nindependent: [shoulder]\nball_upgrades: [rod_joint]\n' >"$build/seeds/loops/pin.yaml"
   "$bielle" convert "$root/validation/elements/point_spring.yaml" --to mjcf -o "$build/seeds/mjcf/springs.xml" >/dev/null 2>&1
   "$bielle" convert "$root/validation/elements/point_spring.yaml" --to drake -o "$build/seeds/drake/springs.urdf" >/dev/null 2>&1
