@@ -29,9 +29,11 @@ if(BIELLE_BUILD_VALIDATION)
     set_tests_properties(results_${page} PROPERTIES LABELS system)
   endforeach()
   if(TARGET bielle-loops)
-    add_test(NAME results_loops COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/loops.py --quick
-      --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
-    set_tests_properties(results_loops PROPERTIES LABELS system)
+    foreach(page loops scaling)
+      add_test(NAME results_${page} COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/${page}.py --quick
+        --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
+      set_tests_properties(results_${page} PROPERTIES LABELS system)
+    endforeach()
   endif()
   # The figure of the jump with and without springs, by coarser stages and without the second solve of each.
   add_test(NAME springs_figure COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/examples/springs/jump.py
