@@ -52,23 +52,13 @@ class Constrained : public Base {
   }
   void linearize(LinearizeTask& task, ProblemScratch* scratch) const override {
     Base::linearize(task, scratch);
-    if (!task.weights) return;
+    if (!task.rows) return;
     const int nx = Base::kX, nu = task.node < this->numStages() ? Base::kU : 0;
-    StageModel& out = *task.out;
     visit(task.node, [&](const Row& row, int i) {
-      Eigen::Matrix<double, Base::kX, 1> by_x;
-      Eigen::Matrix<double, Base::kU, 1> by_u;
-      for (int j = 0; j < nx; ++j) by_x[j] = calc(row, task.node, *task.at, j).imag() / kStep;
-      for (int j = 0; j < nu; ++j) by_u[j] = calc(row, task.node, *task.at, nx + j).imag() / kStep;
-      const double g = task.weights->gradient[i], h = task.weights->hessian[i];
-      for (int j = 0; j < nx; ++j) {
-        out.lx[j] += g * by_x[j];
-        for (int k = 0; k < nx; ++k) out.lxx()(j, k) += h * by_x[j] * by_x[k];
-      }
-      for (int j = 0; j < nu; ++j) {
-        out.lu[j] += g * by_u[j];
-        for (int k = 0; k < nx; ++k) out.lux()(j, k) += h * by_u[j] * by_x[k];
-        for (int k = 0; k < nu; ++k) out.luu()(j, k) += h * by_u[j] * by_u[k];
+      auto column = task.out->Ct().col(i);  // poisoned where it is not wanted
+      for (int j = 0; j < nu + nx; ++j) {
+        const int seed = j < nu ? nx + j : j - nu;
+        column[j] = (*task.rows)[i] ? calc(row, task.node, *task.at, seed).imag() / kStep : NAN;
       }
     });
   }

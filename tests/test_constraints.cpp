@@ -116,6 +116,17 @@ TEST_CASE("constraints: a cart catches its pole within bounds, and the condition
   CHECK(calcConditions(problem, t, multipliers).gradient > 3e-4);
 }
 
+TEST_CASE("constraints: new multipliers, penalties, regularizations and held rows sweep over the same models") {
+  const auto problem = makeBoundedCartPole();
+  const FddpSummary summary = solve(problem, makeGuess(problem)).summary;
+  REQUIRE(summary.termination == FddpTermination::Converged);
+  const int iterates = static_cast<int>(summary.log.size());
+  CAPTURE(iterates, summary.sweeps, summary.multiplier_updates);
+  CHECK(summary.sweeps >= iterates + 3);
+  CHECK(summary.linearizations >= iterates * (problem.stages + 1));
+  CHECK(summary.linearizations <= (iterates + 1) * (problem.stages + 1));  // again where rows are held that had no weight
+}
+
 TEST_CASE("constraints: a penalty alone violates them by the multipliers over it, to first order") {
   auto problem = makeBoundedCartPole();
   FddpOptions options;

@@ -9,6 +9,7 @@
 #include "check_derivative.h"
 #include "mechanisms.h"
 #include "motion/applied_options.h"
+#include "weighted_model.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -79,10 +80,12 @@ void checkEnergyStage(const RobotProblem& problem, int k, const VectorXd& x, con
   EvaluateTask evaluate{k, &x, &u, nullptr, at.get()};
   problem.evaluate(&evaluate, 1, scratch.get());
   StageModel stage;
-  stage.resize(ndx, nu, problem.tangentSize(k + 1));
-  LinearizeTask task{k, at.get(), &node.evaluation(), &weights, &stage, NumericalStatus::Failed, {}};
+  stage.resize(ndx, nu, problem.tangentSize(k + 1), rows);
+  const std::vector<char> all = listRows(problem, k);
+  LinearizeTask task{k, at.get(), &node.evaluation(), &all, &stage, NumericalStatus::Failed, {}};
   problem.linearize(&task, 1, scratch.get());
   REQUIRE(task.status == NumericalStatus::Ok);
+  addWeights(weights, stage);
   // Cost, weighted constraints and powers as functions of (du, dx).
   const auto step = [&](const VectorXd& d) {
     const VectorXd x1 = d.tail(ndx).isZero(0) ? x : evaluator.integrate(d.tail(ndx));
@@ -189,10 +192,12 @@ TEST_CASE("energy: derivatives of voltages, and of powers behind lossy gears, in
     EvaluateTask evaluate{0, &x, &u, nullptr, at.get()};
     problem.evaluate(&evaluate, 1, scratch.get());
     StageModel out;
-    out.resize(problem.tangentSize(0), problem.controlSize(0), problem.tangentSize(1));
-    LinearizeTask task{0, at.get(), &next.evaluation(), &weights, &out, NumericalStatus::Failed, {}};
+    out.resize(problem.tangentSize(0), problem.controlSize(0), problem.tangentSize(1), nu);
+    const std::vector<char> all = listRows(problem, 0);
+    LinearizeTask task{0, at.get(), &next.evaluation(), &all, &out, NumericalStatus::Failed, {}};
     problem.linearize(&task, 1, scratch.get());
     REQUIRE(task.status == NumericalStatus::Ok);
+    addWeights(weights, out);
     const Eigen::Index nx = out.lx.size();
     const MatrixXd J = differentiate(VectorXd::Zero(u.size() + nx), 1e-4, [&](const VectorXd& d) {
       const VectorXd x1 = d.tail(nx).isZero(0) ? x : evaluator.integrate(d.tail(nx));

@@ -333,7 +333,9 @@ TEST_CASE(
   CHECK(std::min(
             {summary.evaluate_seconds, summary.linearize_seconds, summary.sweep_seconds, summary.rollout_seconds}) > 0);
   CHECK(parts <= summary.seconds);
-  CHECK(summary.linearizations >= static_cast<int>(summary.log.size()));
+  const int iterates = static_cast<int>(summary.log.size());
+  CHECK(summary.linearizations == iterates * (problem.stages + 1));
+  CHECK(summary.sweeps >= iterates);
   CHECK(summary.rollouts + summary.searches >= summary.iterations);
   CHECK((summary.search_seconds > 0) == (summary.searches > 0));
   CHECK(summary.search_seconds <= summary.rollout_seconds);

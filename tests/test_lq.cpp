@@ -7,6 +7,7 @@
 #include <random>
 
 #include "solve/lq_sweep.h"
+#include "weighted_model.h"
 
 using namespace bielle;
 
@@ -141,6 +142,42 @@ TEST_CASE("the sweep solves the dense program, whatever the sizes, gaps and regu
     CHECK(slope == Approx(dense.g.dot(z)).epsilon(1e-11));
     for (const LqSweep::Node& node : sweep.nodes()) CHECK(node.Vxx == node.Vxx.transpose());
   }
+}
+
+TEST_CASE("weights of constraints are the same as terms of the cost") {
+  auto models = makeModels(kTangents, kControls);
+  std::vector<ConstraintWeights> weights;
+  std::vector<StageModel> folded;
+  for (size_t k = 0; k < models.size(); ++k) {
+    const int rows = static_cast<int>(k) % 4;
+    models[k].setRows(rows);
+    models[k].Ct() = random(static_cast<int>(models[k].Ct().rows()), rows);
+    weights.push_back({random(rows, 1), random(rows, 1).cwiseAbs()});
+    if (rows > 1) weights[k].gradient[0] = weights[k].hessian[1] = 0;
+    if (rows > 2) weights[k].hessian[2] = weights[k].gradient[2] = 0, models[k].Ct().col(2).setConstant(NAN);
+    folded.push_back(models[k]);
+    if (rows > 2) folded[k].Ct().col(2).setZero();
+    testing::addWeights(weights[k], folded[k]);
+  }
+  LqSweep sweep, expected;
+  std::vector<VectorXd> dx, du, dx1, du1;
+  const auto calcError = [&] {
+    const LqResult result = sweep.update(models, {0.1, 0.2}, {}, weights);
+    REQUIRE(result.status == NumericalStatus::Ok);
+    double error = std::abs(result.expected_change - expected.result().expected_change);
+    error = std::max(error, std::abs(sweep.calcStep(models, dx, du) - expected.calcStep(folded, dx1, du1)));
+    for (size_t k = 0; k < dx.size(); ++k) {
+      error = std::max(error, (dx[k] - dx1[k]).norm());
+      error = std::max(error, (sweep.nodes()[k].Vxx - expected.nodes()[k].Vxx).norm());
+      if (k < du.size()) error = std::max(error, (du[k] - du1[k]).norm());
+    }
+    return error;
+  };
+  REQUIRE(expected.update(folded, {0.1, 0.2}).status == NumericalStatus::Ok);
+  CHECK(calcError() < 1e-10);
+  CHECK(calcError() < 1e-10);  // the models are as they were
+  models[3].Ct()(1, 0) += 1e-4;
+  CHECK(calcError() > 1e-7);
 }
 
 TEST_CASE("the sweep solves the dense program of larger sizes, with every number of lanes and columns left over") {

@@ -6,6 +6,7 @@
 #include "check_derivative.h"
 #include "fddp_oracle.h"
 #include "solve/periodic_problem.h"
+#include "weighted_model.h"
 
 using namespace bielle;
 using namespace bielle::test;
@@ -161,9 +162,10 @@ TEST_CASE("periodic: derivatives at the beginning and the end, on a manifold") {
     return VectorXd(moved.evaluate(N, at.integrate(d)).constraints);
   });
   ConstraintWeights weights{VectorXd::Random(6), VectorXd::Random(6).cwiseAbs()};
+  const std::vector<char> rows = testing::listRows(problem, N);
   StageModel plain, with;
   for (StageModel* model : {&plain, &with}) {
-    model->resize(12, 0, 0);
+    model->resize(12, 0, 0, 6);
     LinearizeTask task;
     task.node = N;
     auto evaluation = problem.makeEvaluation();
@@ -171,11 +173,12 @@ TEST_CASE("periodic: derivatives at the beginning and the end, on a manifold") {
     EvaluateTask evaluate{N, &x, nullptr, nullptr, evaluation.get()};
     problem.evaluate(&evaluate, 1, scratch.get());
     task.at = evaluation.get();
-    task.weights = model == &with ? &weights : nullptr;
+    task.rows = &rows;
     task.out = model;
     problem.linearize(&task, 1, scratch.get());
     REQUIRE(task.status == NumericalStatus::Ok);
   }
+  testing::addWeights(weights, with);
   checkDerivative((with.lx - plain.lx).transpose(), weights.gradient.transpose() * C, "gradient of the end");
   const MatrixXd hessian =
       MatrixXd(with.lxx().selfadjointView<Eigen::Lower>()) - MatrixXd(plain.lxx().selfadjointView<Eigen::Lower>());

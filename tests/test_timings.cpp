@@ -14,6 +14,7 @@
 #include "discretizations.h"
 #include "mechanisms.h"
 #include "solve_in_place.h"
+#include "weighted_model.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -101,10 +102,12 @@ void checkTimedStage(const RobotProblem& problem, int k, const VectorXd& x, cons
   EvaluateTask evaluate{k, &x, &u, nullptr, at.get()};
   problem.evaluate(&evaluate, 1, scratch.get());
   StageModel model;
-  model.resize(ndx, nu, next);
-  LinearizeTask task{k, at.get(), &node.evaluation(), &weights, &model, NumericalStatus::Failed, {}};
+  model.resize(ndx, nu, next, problem.constraintSize(k));
+  const std::vector<char> all = listRows(problem, k);
+  LinearizeTask task{k, at.get(), &node.evaluation(), &all, &model, NumericalStatus::Failed, {}};
   problem.linearize(&task, 1, scratch.get());
   REQUIRE(task.status == NumericalStatus::Ok);
+  addWeights(weights, model);
   // Next state, weighted cost and roots as functions of (du, dx).
   const auto step = [&](const VectorXd& d) {
     const VectorXd x1 = d.tail(ndx).isZero(0) ? x : evaluator.integrate(d.tail(ndx));
@@ -306,24 +309,19 @@ TEST_CASE("free timings: steps and linearizations allocate nothing after the fir
   std::vector<std::unique_ptr<NodeEvaluation>> nodes;
   std::vector<EvaluateTask> evaluations;
   std::vector<StageModel> models(5);
-  std::vector<ConstraintWeights> weights(5);
+  std::vector<std::vector<char>> rows(5);
   std::vector<LinearizeTask> linearizations;
   const VectorXd &x0 = problem.initialState(), u0 = VectorXd::Ones(model.nu() + 1), u = VectorXd::Ones(model.nu());
   for (int k = 0; k < 5; ++k) {
     nodes.push_back(problem.makeEvaluation());
     evaluations.push_back({k, &x0, k == 0 ? &u0 : &u, nullptr, nodes[k].get()});
-    models[k].resize(problem.tangentSize(k), k < 4 ? problem.controlSize(k) : 0,
-                     k < 4 ? problem.tangentSize(k + 1) : 0);
-    weights[k] = {VectorXd::Ones(problem.constraintSize(k)), VectorXd::Ones(problem.constraintSize(k))};
+    models[k].resize(problem.tangentSize(k), k < 4 ? problem.controlSize(k) : 0, k < 4 ? problem.tangentSize(k + 1) : 0,
+                     problem.constraintSize(k));
+    rows[k] = listRows(problem, k);
   }
   for (int k = 0; k < 5; ++k)
-    linearizations.push_back({k,
-                              nodes[k].get(),
-                              k < 4 ? nodes[k + 1].get() : nullptr,
-                              &weights[k],
-                              &models[k],
-                              NumericalStatus::Failed,
-                              {}});
+    linearizations.push_back(
+        {k, nodes[k].get(), k < 4 ? nodes[k + 1].get() : nullptr, &rows[k], &models[k], NumericalStatus::Failed, {}});
   const auto scratch = problem.makeScratch();
   const auto run = [&] {
     problem.evaluate(evaluations.data(), 5, scratch.get());

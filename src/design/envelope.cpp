@@ -42,10 +42,10 @@ void Envelope::Data::updateCostates(double penalty) {
     weights.push_back(makeActiveWeights(problem, k, y[k], at[k]->constraints, penalty));
     weights[k].gradient = y[k];
   }
-  const std::vector<StageModel> models = linearizeNodes(problem, at, weights, scratch.get());
+  const std::vector<StageModel> models = linearizeNodes(problem, at, scratch.get());
   LqSweep sweep;
   std::vector<VectorXd> dx, du;
-  if (sweepNodes(problem, models, optimum.us, sweep, dx, du) != NumericalStatus::Ok)
+  if (sweepNodes(problem, models, weights, optimum.us, sweep, dx, du) != NumericalStatus::Ok)
     throw std::invalid_argument("Envelope: the optimum is not a minimum to second order");
   for (size_t k = 0; k < models.size(); ++k) costates.push_back(sweep.nodes()[k].Vx + sweep.nodes()[k].Vxx * dx[k]);
 }

@@ -30,8 +30,8 @@ class Follower {
     std::vector<ConstraintWeights> weights;
     for (int k = 0; k <= N_; ++k)
       weights.push_back(makeActiveWeights(problem_, k, y_[k], at_[k]->constraints, penalty_));
-    const std::vector<StageModel> models = linearizeNodes(problem_, at_, weights, scratch_.get());
-    if (sweepNodes(problem_, models, z_.us, sweep_, dx_, du_) != NumericalStatus::Ok) return false;
+    const std::vector<StageModel> models = linearizeNodes(problem_, at_, scratch_.get());
+    if (sweepNodes(problem_, models, weights, z_.us, sweep_, dx_, du_) != NumericalStatus::Ok) return false;
     std::vector<IntegrateTask> tasks;
     std::vector<VectorXd> xs(z_.xs);
     for (int k = 0; k <= N_; ++k) {

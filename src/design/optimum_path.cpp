@@ -86,18 +86,20 @@ ConstraintWeights makeActiveWeights(const ShootingProblem& problem, int node, co
 }
 
 std::vector<StageModel> linearizeNodes(const ShootingProblem& problem, const EvaluationList& at,
-                                       const std::vector<ConstraintWeights>& weights, ProblemScratch* scratch) {
+                                       ProblemScratch* scratch) {
   const int N = problem.numStages(), size = std::max(1, problem.batchSize());
   std::vector<StageModel> models(N + 1);
+  std::vector<std::vector<char>> rows(N + 1);
   std::vector<LinearizeTask> tasks(N + 1);
   for (int k = 0; k <= N; ++k) {
     const bool running = k < N;
     models[k].resize(problem.tangentSize(k), running ? problem.controlSize(k) : 0,
-                     running ? problem.tangentSize(k + 1) : 0);
+                     running ? problem.tangentSize(k + 1) : 0, problem.constraintSize(k));
+    rows[k].assign(problem.constraintSize(k), true);
     tasks[k].node = k;
     tasks[k].at = at[k].get();
     tasks[k].next = running ? at[k + 1].get() : nullptr;
-    tasks[k].weights = weights[k].gradient.size() > 0 ? &weights[k] : nullptr;
+    tasks[k].rows = &rows[k];
     tasks[k].out = &models[k];
   }
   for (int first = 0; first <= N; first += size)
@@ -110,15 +112,15 @@ std::vector<StageModel> linearizeNodes(const ShootingProblem& problem, const Eva
 }
 
 NumericalStatus sweepNodes(const ShootingProblem& problem, const std::vector<StageModel>& models,
-                           const std::vector<VectorXd>& us, LqSweep& sweep, std::vector<VectorXd>& dx,
-                           std::vector<VectorXd>& du) {
+                           const std::vector<ConstraintWeights>& weights, const std::vector<VectorXd>& us,
+                           LqSweep& sweep, std::vector<VectorXd>& dx, std::vector<VectorXd>& du) {
   std::vector<ControlBox> boxes;
   for (size_t k = 0; k < us.size(); ++k) {
     const ControlBox bounds = getControlBounds(problem, static_cast<int>(k));
     boxes.push_back({(bounds.lower - us[k]).cwiseMin(0), (bounds.upper - us[k]).cwiseMax(0)});
   }
   const double regularization = FddpOptions().min_regularization;
-  const NumericalStatus status = sweep.update(models, {regularization, regularization}, boxes).status;
+  const NumericalStatus status = sweep.update(models, {regularization, regularization}, boxes, weights).status;
   if (status == NumericalStatus::Ok) sweep.calcStep(models, dx, du);
   return status;
 }

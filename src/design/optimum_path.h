@@ -27,11 +27,11 @@ inline double getActiveBound(double y, double lower, double upper) { return y > 
 
 // Quadratic models of all nodes about evaluations. \throws std::invalid_argument when a node has none
 std::vector<StageModel> linearizeNodes(const ShootingProblem& problem, const EvaluationList& at,
-                                       const std::vector<ConstraintWeights>& weights, ProblemScratch* scratch);
+                                       ProblemScratch* scratch);
 
 // A sweep over all nodes within the bounds of the controls us, and its step. Not Ok: no step.
 NumericalStatus sweepNodes(const ShootingProblem& problem, const std::vector<StageModel>& models,
-                           const std::vector<VectorXd>& us, LqSweep& sweep, std::vector<VectorXd>& dx,
-                           std::vector<VectorXd>& du);
+                           const std::vector<ConstraintWeights>& weights, const std::vector<VectorXd>& us,
+                           LqSweep& sweep, std::vector<VectorXd>& dx, std::vector<VectorXd>& du);
 
 }  // namespace bielle

@@ -56,8 +56,8 @@ Solution attempt(const Motion& motion, const FddpOptions& solver, const FddpObse
 
 // What the solve before this one took.
 void addWork(const FddpSummary& before, FddpSummary& summary) {
-  for (const auto count :
-       {&FddpSummary::iterations, &FddpSummary::linearizations, &FddpSummary::rollouts, &FddpSummary::searches})
+  for (const auto count : {&FddpSummary::iterations, &FddpSummary::linearizations, &FddpSummary::sweeps,
+                           &FddpSummary::rollouts, &FddpSummary::searches})
     summary.*count += before.*count;
   for (const auto seconds : {&FddpSummary::seconds, &FddpSummary::evaluate_seconds, &FddpSummary::linearize_seconds,
                              &FddpSummary::sweep_seconds, &FddpSummary::rollout_seconds, &FddpSummary::search_seconds})

@@ -1,5 +1,6 @@
 #include "ocp/node_costs.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace bielle {
@@ -79,25 +80,32 @@ std::vector<CostValue> NodeCosts::getValues(const RobotEvaluation& at) const {
   return values;
 }
 
-void NodeCosts::selectRows(const RobotEvaluation& at, const ConstraintWeights* constraints, CountedRows& rows) const {
+void NodeCosts::selectRows(const RobotEvaluation& at, const std::vector<char>* wanted, CountedRows& rows) const {
   const double scale = getScale(at);
   rows.blocks.clear();
   rows.rows = rows.motion_rows = 0;
   for (const Block& block : blocks_) {
     const int n = block.residual->size();
     auto gradient = rows.gradient.segment(rows.rows, n), hessian = rows.hessian.segment(rows.rows, n);
+    const auto numbers = rows.constraints.begin() + rows.rows;
     if (block.cost) {
+      std::fill_n(numbers, n, -1);
       block.cost->activation.calcDerivatives(at.residuals.segment(block.row, n), gradient, hessian);
       gradient *= scale * block.cost->weight;
       hessian *= scale * block.cost->weight;
+      if (gradient.isZero(0) && hessian.isZero(0)) continue;
     } else {
-      if (!constraints) continue;
-      const VectorXd& unit = block.constraint->scale;
-      gradient = constraints->gradient.segment(block.constraint_row, n).cwiseQuotient(unit);
-      hessian = constraints->hessian.segment(block.constraint_row, n).cwiseQuotient(unit.cwiseAbs2());
+      int found = 0;
+      for (int i = 0, row = block.constraint_row; wanted && i < n; ++i, ++row) {
+        found += (*wanted)[row];
+        numbers[i] = (*wanted)[row] ? row : -1;
+      }
+      if (found == 0) continue;
+      gradient.setZero();
+      hessian.setZero();
+      rows.unit.segment(rows.rows, n) = block.constraint->scale;
     }
-    if (gradient.isZero(0) && hessian.isZero(0)) continue;
-    rows.blocks.push_back({block.residual, rows.rows, n, block.cost && block.cost->activation.isSquare()});
+    rows.blocks.push_back({block.residual, rows.rows, n, !block.cost || block.cost->activation.isSquare()});
     rows.rows += n;
     if (block.residual->needsMotion()) rows.motion_rows = rows.rows;
   }

@@ -5,23 +5,32 @@
 
 namespace bielle {
 
-// Rows of a node that count: those of a residual whose weights do not all vanish, one after the other, first those that
-// depend on q or v. Bounds that are kept leave no rows.
+// Rows of a node that count: those of costs whose weights do not all vanish and of constraints that are wanted, residual by
+// residual, first those that depend on q or v.
 struct CountedRows {
   struct Block {
     const Residual* residual;
     int row, size;
-    bool square;  // of a cost that is a sum of squares
+    bool square;  // a constraint, or a cost that is a sum of squares
   };
   std::vector<Block> blocks;
-  VectorXd gradient, hessian;  // weights
+  VectorXd gradient, hessian;    // weights of costs
+  std::vector<int> constraints;  // by row: its number, or -1
+  VectorXd unit;                 // of constraints
   int rows = 0, motion_rows = 0;
 
   void reserve(int num_blocks, int num_rows) {
     blocks.reserve(num_blocks);
-    for (VectorXd* v : {&gradient, &hessian}) v->setZero(num_rows);
+    for (VectorXd* v : {&gradient, &hessian, &unit}) v->setZero(num_rows);
+    constraints.resize(num_rows);
   }
-  bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0; }
+  bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0 || constraints[row] >= 0; }
+  // Calls work(row, unit, column of C^T) for each constraint.
+  template <typename Work>
+  void visitConstraints(StageModel& out, const Work& work) const {
+    for (int i = 0; i < rows; ++i)
+      if (constraints[i] >= 0) work(i, unit[i], out.Ct().col(constraints[i]));
+  }
 };
 
 // Partial derivatives of stacked residuals, rows x nv, nv, constraint rows, nu, nu, 1; they may be larger than one node
@@ -50,8 +59,8 @@ class NodeCosts {
   void calc(const NodeView& node, RobotEvaluation& at) const;
   // What calc() has made not finite, by name: "constraint 'knee' is not a number"; "" if all is finite.
   std::string describeNotFinite(const RobotEvaluation& at) const;
-  // Computes scaled weights, and with them which rows count. `constraints` may be null.
-  void selectRows(const RobotEvaluation& at, const ConstraintWeights* constraints, CountedRows& rows) const;
+  // Computes scaled weights, and with them which rows count. \param wanted  constraints, may be null
+  void selectRows(const RobotEvaluation& at, const std::vector<char>* wanted, CountedRows& rows) const;
   // Computes the Jacobians of the counted rows, which must be zero before.
   void differentiate(const NodeView& node, const CountedRows& rows, ResidualJacobians& jacobians) const;
   // Adds the derivatives of the control cost.

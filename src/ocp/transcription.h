@@ -82,8 +82,7 @@ void setNextTimeScale(const TimeScalePlace& place, const RobotEvaluation& at, co
                       StageModel& out);
 
 // Adds the derivatives of the running cost by its factor s, robot_problem.h Eq. (6), to those at fixed s.
-// \param no_squares  by (u, s, dq, dv), the part of the gradient that is not due to squares: that of constraints, which s
-// does not multiply, and of energies
+// \param no_squares  by (u, s, dq, dv), the part of the gradient that is not due to squares: that of energies
 void addTimeScaleCost(int leading, const RobotEvaluation& at, ConstVectorRef no_squares, StageModel& out);
 
 // False if an entry of a model that the solver reads is not finite.

@@ -117,6 +117,7 @@ Json makeConstraints(const FddpSummary& solver) {
 // What the iterations did, and how long, summed over the threads.
 Json makeWork(const FddpSummary& solver) {
   return {{"linearizations", solver.linearizations},
+          {"sweeps", solver.sweeps},
           {"rollouts", solver.rollouts},
           {"searches", solver.searches},
           {"seconds",

@@ -56,6 +56,16 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
   kept_ = restoring_ = holds_ = ahead_ = false;
 }
 
+bool AugmentedLagrangian::addWeighted(int node, std::vector<char>& rows) const {
+  const ConstraintWeights& weights = nodes_[node].weights;
+  bool added = false;
+  for (Eigen::Index i = 0; i < weights.gradient.size(); ++i) {
+    if (rows[i] || (weights.gradient[i] == 0 && weights.hessian[i] == 0)) continue;
+    added = rows[i] = true;
+  }
+  return added;
+}
+
 double AugmentedLagrangian::calcDistance(const Node& node, Eigen::Index row, double c) const {
   const double y = node.multipliers[row], z = c + y / penalty_;
   if (isHeld(node, row)) return z - (y > 0 ? node.upper : node.lower)[row];

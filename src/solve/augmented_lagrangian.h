@@ -1,6 +1,7 @@
 #pragma once
 // The constraints of a shooting problem, by an augmented Lagrangian (docs/solver.md, Eqs. 10 to 14).
 #include "bielle/solve/fddp.h"
+#include "solve/lq_sweep.h"
 #include "solve/node_evaluations.h"
 
 namespace bielle {
@@ -17,6 +18,8 @@ class AugmentedLagrangian {
   double calc(int node, const VectorXd& c) const;
   /// Computes the weights of Eq. (11) and the measures below at the current iterate.
   void evaluate(const EvaluationList& iterate);
+  /// Marks the rows of a node that have weights. Returns whether one was not marked before.
+  bool addWeighted(int node, std::vector<char>& rows) const;
   /// Null if the node has no constraints.
   const ConstraintWeights* getWeights(int node) const { return rows_ > 0 ? nodes_[node].getWeights() : nullptr; }
 

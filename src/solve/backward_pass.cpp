@@ -11,15 +11,17 @@ namespace bielle {
 void BackwardPass::resize(const ShootingProblem& problem) {
   const int N = problem.numStages();
   models_.resize(N + 1);
-  tasks_.resize(N + 1);
+  tasks_.reserve(N + 1);
+  rows_.resize(N + 1);
   failures_.resize(N + 1);
   if (linearized_.size() != models_.size()) linearized_ = std::vector<std::atomic<bool>>(N + 1);
   for (int k = 0; k <= N; ++k) {
     const int ndx = problem.tangentSize(k), nu = k < N ? problem.controlSize(k) : 0;
     const int ndx_next = k < N ? problem.tangentSize(k + 1) : 0;
     if (!models_[k].hasSizes(ndx, nu, ndx_next)) models_[k].resize(ndx, nu, ndx_next);
+    models_[k].setRows(problem.constraintSize(k));
   }
-  hessians_.resize(models_);
+  num_linearized_ = 0;
   linearize_seconds_ = sweep_seconds_ = 0;
 }
 
@@ -34,28 +36,54 @@ void BackwardPass::prepare(const BackwardInput& input) {
   updateNodes(input, 1, input.problem.numStages() + 1);
 }
 
+int BackwardPass::sweepAgain(const BackwardInput& input) {
+  tasks_.clear();
+  for (int k = 0; k <= input.problem.numStages(); ++k) {
+    if (input.lagrangian.addWeighted(k, rows_[k])) addTask(input, k);
+  }
+  startSweep(input);
+  updateNodes(input, 0, static_cast<int>(tasks_.size()));
+  return findFailure(input.problem);
+}
+
 int BackwardPass::finish(const BackwardInput& input) {
+  findRows(input, 0);
   updateNodes(input, 0, 1);
   return findFailure(input.problem);
 }
 
 void BackwardPass::start(const BackwardInput& input) {
-  const int N = input.problem.numStages();
-  const EvaluationList& nodes = input.evaluations.getIterate();
-  for (int k = 0; k <= N; ++k) {
-    hessians_.takeBack(models_[k]);  // if the last sweep stopped halfway
-    tasks_[k].node = k;
-    tasks_[k].at = nodes[k].get();
-    tasks_[k].next = k < N ? nodes[k + 1].get() : nullptr;
-    tasks_[k].weights = input.lagrangian.getWeights(k);
-    tasks_[k].out = &models_[k];
-    linearized_[k].store(false, std::memory_order_relaxed);
+  tasks_.clear();
+  for (int k = 0; k <= input.problem.numStages(); ++k) {
+    findRows(input, k);
+    addTask(input, k);
   }
-  sweep_.start(models_, input.regularization);
-  sweep_node_ = N;
+  startSweep(input);
 }
 
-// In batches, independent of the threads, from the last on.
+void BackwardPass::findRows(const BackwardInput& input, int k) {
+  rows_[k].assign(input.problem.constraintSize(k), false);
+  input.lagrangian.addWeighted(k, rows_[k]);
+}
+
+void BackwardPass::addTask(const BackwardInput& input, int k) {
+  const EvaluationList& nodes = input.evaluations.getIterate();
+  tasks_.emplace_back();
+  LinearizeTask& task = tasks_.back();
+  task.node = k;
+  task.at = nodes[k].get();
+  task.next = k < input.problem.numStages() ? nodes[k + 1].get() : nullptr;
+  task.rows = &rows_[k];
+  task.out = &models_[k];
+  linearized_[k].store(false, std::memory_order_relaxed);
+}
+
+void BackwardPass::startSweep(const BackwardInput& input) {
+  sweep_.start(models_, input.regularization);
+  sweep_node_ = input.problem.numStages();
+}
+
+// Tasks in batches, independent of the threads, from the last on.
 void BackwardPass::updateNodes(const BackwardInput& input, int begin, int end) {
   const int size = input.problem.batchSize(), num_batches = (end - begin + size - 1) / size;
   std::atomic<int> next{num_batches - 1};
@@ -76,6 +104,7 @@ void BackwardPass::updateNodes(const BackwardInput& input, int begin, int end) {
     }
   });
   errors.rethrow();
+  num_linearized_ += end - begin;
   const Clock::time_point start_rest = Clock::now();
   sweepReadyNodes(input);
   linearize_seconds_ = linearize_seconds;
@@ -93,36 +122,29 @@ void BackwardPass::sweepReadyNodes(const BackwardInput& input) {
   const int N = input.problem.numStages();
   while (sweep_node_ >= 0 && sweep_.result().status == NumericalStatus::Ok &&
          linearized_[sweep_node_].load(std::memory_order_acquire)) {
-    StageModel& model = models_[sweep_node_];
-    sweep_.updateNode(sweep_node_, model,
-                      sweep_node_ < N && !input.boxes.empty() ? &input.boxes[sweep_node_] : nullptr);
-    hessians_.takeBack(model);
+    const ControlBox* box = sweep_node_ < N && !input.boxes.empty() ? &input.boxes[sweep_node_] : nullptr;
+    sweep_.updateNode(sweep_node_, models_[sweep_node_], box, input.lagrangian.getWeights(sweep_node_));
     --sweep_node_;
   }
 }
 
 // Runs in parallel: writes only to entries of its own nodes.
 void BackwardPass::linearize(const BackwardInput& input, int thread, int begin, int end) {
-  for (int k = begin; k < end; ++k) {
-    hessians_.lend(models_[k]);
-    tasks_[k].status = NumericalStatus::Failed;
-    tasks_[k].failure.clear();
-  }
+  for (int i = begin; i < end; ++i) tasks_[i].status = NumericalStatus::Failed;
   input.problem.linearize(&tasks_[begin], end - begin, input.evaluations.getScratch(thread));
-  for (int k = begin; k < end; ++k) {
-    failures_[k] = checkModel(input.problem, k);
+  for (int i = begin; i < end; ++i) {
+    const int k = tasks_[i].node;
+    failures_[k] = checkModel(input.problem, tasks_[i]);
     if (failures_[k].empty()) linearized_[k].store(true, std::memory_order_release);
   }
 }
 
 // Describes what is wrong with the model of a node; empty if nothing is.
-std::string BackwardPass::checkModel(const ShootingProblem& problem, int k) const {
-  const StageModel& model = models_[k];
-  if (tasks_[k].status != NumericalStatus::Ok) {
-    const std::string& reason = tasks_[k].failure;
-    return "the problem could not be linearized" + (reason.empty() ? "" : ": " + reason);
-  }
-  const int N = problem.numStages(), nu = k < N ? problem.controlSize(k) : 0;
+std::string BackwardPass::checkModel(const ShootingProblem& problem, const LinearizeTask& task) const {
+  const StageModel& model = *task.out;
+  if (task.status != NumericalStatus::Ok)
+    return "the problem could not be linearized" + (task.failure.empty() ? "" : ": " + task.failure);
+  const int k = task.node, N = problem.numStages(), nu = k < N ? problem.controlSize(k) : 0;
   if (!model.hasSizes(problem.tangentSize(k), nu, k < N ? problem.tangentSize(k + 1) : 0))
     return "the sizes of the quadratic model differ from those of the problem";
   if (!std::isfinite(model.cost) || !model.gap.allFinite()) return "the cost or the gap is not finite";

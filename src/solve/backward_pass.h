@@ -4,7 +4,6 @@
 #include <string>
 
 #include "solve/augmented_lagrangian.h"
-#include "solve/hessian_pool.h"
 #include "solve/lq_sweep.h"
 
 namespace bielle {
@@ -28,34 +27,43 @@ class BackwardPass {
 
   /// Returns the first node that could not be linearized, or -1; in either case the sweep may have stopped.
   int update(const BackwardInput& input);
+  /// Sweeps over the same models with another regularization or other weights. Only nodes where rows have weights that had none
+  /// before are linearized again. Returns as update() does.
+  int sweepAgain(const BackwardInput& input);
   /// The same in two parts: all nodes but the first, then that one. The input must be the same but for the first node.
   void prepare(const BackwardInput& input);
   int finish(const BackwardInput& input);
   /// Why a node could not be linearized, empty if it could.
   const std::string& getFailure(int node) const { return failures_[node]; }
 
-  /// N + 1, without their second derivatives, which the sweep overwrites.
+  /// N + 1, of costs and dynamics alone, and of constraints with weights.
   const std::vector<StageModel>& models() const { return models_; }
   const LqSweep& sweep() const { return sweep_; }
   /// Times of all updates since resize(), summed over the threads.
   double linearizeSeconds() const { return linearize_seconds_; }
   double sweepSeconds() const { return sweep_seconds_; }
+  /// Nodes linearized since resize().
+  int numLinearized() const { return num_linearized_; }
 
  private:
   void start(const BackwardInput& input);
+  void findRows(const BackwardInput& input, int k);
+  void addTask(const BackwardInput& input, int k);
+  void startSweep(const BackwardInput& input);
   void updateNodes(const BackwardInput& input, int begin, int end);
   int findFailure(const ShootingProblem& problem) const;
   void linearize(const BackwardInput& input, int thread, int begin, int end);
-  std::string checkModel(const ShootingProblem& problem, int k) const;
+  std::string checkModel(const ShootingProblem& problem, const LinearizeTask& task) const;
   void sweepReadyNodes(const BackwardInput& input);
 
-  std::vector<StageModel> models_;             // N + 1; those awaiting the sweep have a Hessian from the pool
-  std::vector<LinearizeTask> tasks_;           // N + 1
+  std::vector<StageModel> models_;             // N + 1
+  std::vector<LinearizeTask> tasks_;           // at most N + 1, with increasing nodes
+  std::vector<std::vector<char>> rows_;        // N + 1: the constraints that the model has
   std::vector<std::string> failures_;          // N + 1
   std::vector<std::atomic<bool>> linearized_;  // N + 1: the model is ready for the sweep
-  HessianPool hessians_;
   LqSweep sweep_;
   int sweep_node_ = -1;  // the next one
+  int num_linearized_ = 0;
   double linearize_seconds_ = 0, sweep_seconds_ = 0;
 };
 

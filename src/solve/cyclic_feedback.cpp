@@ -11,7 +11,7 @@ namespace {
 class CycleModels {
  public:
   CycleModels(const ShootingProblem& problem, const ShootingTrajectory& solution, const Multipliers& multipliers)
-      : problem_(problem), N_(problem.numStages()), scratch_(problem.makeScratch()), models_(N_ + 1) {
+      : problem_(problem), N_(problem.numStages()), scratch_(problem.makeScratch()), models_(N_ + 1), weights_(N_ + 1) {
     for (int k = 0; k <= N_; ++k) {
       nodes_.push_back(problem.makeEvaluation());
       EvaluateTask task{k, &solution.xs[k], k < N_ ? &solution.us[k] : nullptr, nullptr, nodes_.back().get()};
@@ -26,6 +26,7 @@ class CycleModels {
 
   bool ok() const { return ok_; }
   std::vector<StageModel>& models() { return models_; }
+  const std::vector<ConstraintWeights>& weights() const { return weights_; }
 
   // Derivative of S^{-1} at the end, from that of S at the beginning, by central differences of fourth order.
   MatrixXd calcReturn(const StateMap& map) const {
@@ -51,17 +52,19 @@ class CycleModels {
  private:
   bool linearize(int k, const Multipliers& multipliers) {
     const int rows = problem_.constraintSize(k);
-    ConstraintWeights weights{VectorXd::Zero(rows), VectorXd::Zero(rows)};
+    ConstraintWeights& weights = weights_[k];
+    weights = {VectorXd::Zero(rows), VectorXd::Zero(rows)};
     if (static_cast<int>(multipliers.values.size()) > k && multipliers.values[k].size() >= rows) {
       weights.gradient = multipliers.values[k].head(rows);
       weights.hessian = (weights.gradient.array() != 0).select(VectorXd::Constant(rows, multipliers.penalty), 0.0);
     }
-    models_[k].resize(problem_.tangentSize(k), problem_.controlSize(k), problem_.tangentSize(k + 1));
+    models_[k].resize(problem_.tangentSize(k), problem_.controlSize(k), problem_.tangentSize(k + 1), rows);
+    const std::vector<char> all(rows, true);
     LinearizeTask task;
     task.node = k;
     task.at = nodes_[k].get();
     task.next = nodes_[k + 1].get();
-    task.weights = rows > 0 ? &weights : nullptr;
+    task.rows = &all;
     task.out = &models_[k];
     problem_.linearize(&task, 1, scratch_.get());
     return task.status == NumericalStatus::Ok;
@@ -71,6 +74,7 @@ class CycleModels {
   const int N_;
   std::unique_ptr<ProblemScratch> scratch_;
   std::vector<StageModel> models_;
+  std::vector<ConstraintWeights> weights_;  // none of the last node
   std::vector<std::unique_ptr<NodeEvaluation>> nodes_;
   bool ok_ = false;
 };
@@ -107,7 +111,7 @@ CyclicFeedback calcCyclicFeedback(const ShootingProblem& inner, const StateMap& 
   MatrixXd value = MatrixXd::Zero(n, n);
   for (int i = 0; i < kMostCycles; ++i) {
     models.back().lxx() = E.transpose() * value * E;
-    const LqResult result = sweep.update(models, {}, boxes);
+    const LqResult result = sweep.update(models, {}, boxes, cycle.weights());
     if (result.status != NumericalStatus::Ok) {
       out.status = result.status;
       return out;

@@ -56,7 +56,7 @@ FddpSolve::End FddpSolve::linearize() {
   if (settling_ > 0) {
     settle();
   } else if (hasSettledMerit()) {
-    updateMultipliers();  // now, so that this iterate is linearized once
+    updateMultipliers();  // now, so that one sweep is enough
   }
   return updateModels();
 }
@@ -132,7 +132,7 @@ bool FddpSolve::mustUpdateMultipliers() const {
   return !updated_ && first_sweep && last_step_ >= kGoodStep && lagrangian.isDue(calcForeseen());
 }
 
-// Eq. (12). The next sweep makes new models about the same evaluations.
+// Eq. (12), about the same models.
 FddpSolve::End FddpSolve::updateMultipliers() {
   updated_ = true;
   if (!memory_.lagrangian.updateMultipliers(getIterate(), line_.cost)) {
@@ -225,7 +225,7 @@ FddpSolve::End FddpSolve::tryHolding(int segments) {
   return renewed_ ? updateMultipliers() : sweepAgain();
 }
 
-// About the same evaluations, with new weights of constraints.
+// Over the same models, with new weights of constraints.
 FddpSolve::End FddpSolve::sweepAgain() {
   swept_ = false;
   return updateStep();

@@ -101,7 +101,7 @@ void FddpIterations::updateBoxes() {
 }
 
 FddpIterations::End FddpIterations::updateModels() {
-  if (const End end = linearizeAndSweep()) return end;
+  if (const End end = linearize()) return end;
   updateGaps();
   line_.violation = memory_.lagrangian.violation();
   summary_.cost = line_.cost;
@@ -119,14 +119,17 @@ BackwardInput FddpIterations::getBackwardInput() const {
           threads_};
 }
 
-FddpIterations::End FddpIterations::linearizeAndSweep() {
+FddpIterations::End FddpIterations::linearize() {
   BackwardPass& backward = memory_.backward;
-  const int failed =
-      std::exchange(prepared_, false) ? backward.finish(getBackwardInput()) : backward.update(getBackwardInput());
+  return checkModels(std::exchange(prepared_, false) ? backward.finish(getBackwardInput())
+                                                     : backward.update(getBackwardInput()));
+}
+
+FddpIterations::End FddpIterations::checkModels(int failed) {
   swept_ = true;
-  ++summary_.linearizations;
+  ++summary_.sweeps;
   if (failed < 0) return {};
-  summary_.message = "node " + std::to_string(failed) + ": " + backward.getFailure(failed);
+  summary_.message = "node " + std::to_string(failed) + ": " + memory_.backward.getFailure(failed);
   return FddpTermination::Failed;
 }
 
@@ -142,14 +145,13 @@ void FddpIterations::updateGaps() {
   }
 }
 
-// The sweep, at the smallest regularization from the current one on for which it succeeds. A second sweep needs new
-// models, because a sweep overwrites their Hessians; the evaluations are kept.
+// The sweep, at the smallest regularization from the current one on for which it succeeds. Models are kept.
 FddpIterations::End FddpIterations::updateStep() {
   if (isInterrupted()) return FddpTermination::Interrupted;
   failure_.clear();
   while (true) {
     if (!swept_)
-      if (const End end = linearizeAndSweep()) return end;
+      if (const End end = checkModels(memory_.backward.sweepAgain(getBackwardInput()))) return end;
     swept_ = false;
     const Clock::time_point start = Clock::now();
     const LqSweep& sweep = memory_.backward.sweep();
@@ -304,6 +306,7 @@ FddpSummary FddpIterations::finish(FddpTermination termination) {
   }
   summary_.seconds = calcSecondsSince(start_);
   summary_.evaluate_seconds = memory_.evaluations.getSeconds();
+  summary_.linearizations = memory_.backward.numLinearized();
   summary_.linearize_seconds = memory_.backward.linearizeSeconds();
   summary_.sweep_seconds += memory_.backward.sweepSeconds();
   summary_.rollout_seconds = memory_.rollout.getSeconds();

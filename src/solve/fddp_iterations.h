@@ -121,7 +121,8 @@ class FddpIterations {
   void begin();
   void updateBoxes();
   BackwardInput getBackwardInput() const;
-  End linearizeAndSweep();
+  End linearize();
+  End checkModels(int failed);
   void updateGaps();
   double calcGradient() const;
   void chooseFirstStep();

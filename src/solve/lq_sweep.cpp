@@ -24,16 +24,11 @@ bool isFinite(const LqSweep::Node& node) { return node.Vx.allFinite() && node.Vx
 }  // namespace
 
 LqResult LqSweep::update(const std::vector<StageModel>& models, const LqRegularization& regularization,
-                         const std::vector<ControlBox>& boxes) {
+                         const std::vector<ControlBox>& boxes, const std::vector<ConstraintWeights>& weights) {
   start(models, regularization);
   const int N = static_cast<int>(models.size()) - 1;
-  for (int k = N; k >= 0; --k) {
-    const ControlBox* box = k < N && !boxes.empty() ? &boxes[k] : nullptr;
-    const ConstMatrixMap hessian = models[k].hessian();
-    std::copy_n(hessian.data(), hessian.outerStride() * hessian.cols(), hessian_.data());
-    if (updateNode(k, models[k], shapePadded(hessian_, hessian.rows(), hessian.cols()), box) != NumericalStatus::Ok)
-      break;
-  }
+  for (int k = N; k >= 0 && result_.status == NumericalStatus::Ok; --k)
+    updateNode(k, models[k], k < N && !boxes.empty() ? &boxes[k] : nullptr, weights.empty() ? nullptr : &weights[k]);
   return result_;
 }
 
@@ -43,14 +38,14 @@ void LqSweep::start(const std::vector<StageModel>& models, const LqRegularizatio
   result_ = LqResult();
 }
 
-NumericalStatus LqSweep::updateNode(int k, StageModel& model, const ControlBox* box) {
-  return updateNode(k, model, model.hessian(), box);
-}
-
-NumericalStatus LqSweep::updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box) {
+NumericalStatus LqSweep::updateNode(int k, const StageModel& model, const ControlBox* box,
+                                    const ConstraintWeights* weights) {
   Node& node = nodes_[k];
+  MatrixMap Q = copyHessian(model);
+  node.gradient << model.lu, model.lx;
+  if (weights) addConstraints(model, *weights, Q, node.gradient);
   if (k + 1 == static_cast<int>(nodes_.size())) {
-    node.Vx = model.lx;
+    node.Vx = node.gradient;
     node.Vxx = Q;
     node.Vxx.diagonal().array() += regularization_.state;
     copyLowerToUpper(node.Vxx);
@@ -59,6 +54,28 @@ NumericalStatus LqSweep::updateNode(int k, const StageModel& model, MatrixMap Q,
   const NumericalStatus status = updateStage(model, nodes_[k + 1], box, Q, node);
   if (status != NumericalStatus::Ok) result_ = {status, k, 0};
   return status;
+}
+
+MatrixMap LqSweep::copyHessian(const StageModel& model) {
+  const ConstMatrixMap from = model.hessian();
+  std::copy_n(from.data(), from.outerStride() * from.cols(), hessian_.data());
+  return {hessian_.data(), from.rows(), from.cols(), Eigen::OuterStride<>(from.outerStride())};
+}
+
+// Columns in full lanes: their padding is zero.
+void LqSweep::addConstraints(const StageModel& model, const ConstraintWeights& weights, MatrixMap Q,
+                             VectorXd& gradient) {
+  const ConstMatrixMap Ct = model.Ct();
+  const Index stride = Ct.outerStride();
+  int num = 0;
+  for (Index i = 0; i < weights.gradient.size(); ++i) {
+    if (weights.gradient[i] != 0) gradient += weights.gradient[i] * Ct.col(i);
+    if (weights.hessian[i] == 0) continue;
+    const Eigen::Map<const VectorXd> row(Ct.data() + i * stride, stride);
+    Ct_.segment(num * stride, stride) = row;
+    Ct_scaled_.segment(num++ * stride, stride) = weights.hessian[i] * row;
+  }
+  addLowerProduct(0, num, 1, {Ct_scaled_.data(), stride}, {Ct_.data(), stride}, Q);
 }
 
 NumericalStatus LqSweep::updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q,
@@ -78,7 +95,7 @@ void LqSweep::updateQuadratic(const StageModel& model, const Node& next, MatrixM
   auto p = p_.head(n_next), Vxx_gap = Vxx_gap_.head(n_next), gradient = gradient_.head(nu + n);
   Vxx_gap.noalias() = next.Vxx * model.gap;
   p = next.Vx + Vxx_gap;
-  gradient << model.lu, model.lx;
+  gradient = node.gradient;
   gradient.noalias() += Ft * p;
   node.Qu = gradient.head(nu);
   node.Vx = gradient.tail(n);
@@ -155,17 +172,18 @@ double LqSweep::calcStep(const std::vector<StageModel>& models, std::vector<Vect
   for (int k = 0; k < N; ++k) {
     du[k] = nodes_[k].k;
     du[k].noalias() += nodes_[k].K * dx[k];
-    slope += models[k].lx.dot(dx[k]) + models[k].lu.dot(du[k]);
+    const VectorXd& gradient = nodes_[k].gradient;
+    slope += gradient.tail(dx[k].size()).dot(dx[k]) + gradient.head(du[k].size()).dot(du[k]);
     dx[k + 1] = models[k].gap;
     dx[k + 1].noalias() += models[k].Fx() * dx[k];
     dx[k + 1].noalias() += models[k].Fu() * du[k];
   }
-  return slope + models[N].lx.dot(dx[N]);
+  return slope + nodes_[N].gradient.dot(dx[N]);
 }
 
 void LqSweep::resize(const std::vector<StageModel>& models) {
   nodes_.resize(models.size());
-  Eigen::Index max_n = 0, max_nu = 0;
+  Eigen::Index max_n = 0, max_nu = 0, max_rows = 0;
   for (size_t k = 0; k < models.size(); ++k) {
     const Eigen::Index n = models[k].lx.size(), nu = k + 1 < models.size() ? models[k].lu.size() : 0;
     nodes_[k].Vx.resize(n);
@@ -173,8 +191,10 @@ void LqSweep::resize(const std::vector<StageModel>& models) {
     nodes_[k].Qu.resize(nu);
     nodes_[k].k.resize(nu);
     nodes_[k].K.resize(nu, n);
+    nodes_[k].gradient.resize(nu + n);
     max_n = std::max(max_n, n);
     max_nu = std::max(max_nu, nu);
+    max_rows = std::max(max_rows, models[k].Ct().cols());
   }
   const Index rows = roundUpToLane(max_n + max_nu);
   p_.resize(max_n);
@@ -182,6 +202,7 @@ void LqSweep::resize(const std::vector<StageModel>& models) {
   gradient_.resize(max_n + max_nu);
   Ft_Vxx_.resize(rows * max_n);
   hessian_.setZero(rows * (max_n + max_nu));
+  for (VectorXd* m : {&Ct_, &Ct_scaled_}) m->resize(rows * max_rows);
   Kt_.resize(roundUpToLane(max_n) * max_nu);
 }
 

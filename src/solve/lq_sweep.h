@@ -1,7 +1,8 @@
 #pragma once
 /// \file The linear-quadratic (Riccati) sweep over a shooting problem's quadratic models. It knows no robot.
 ///
-/// With the models of StageModel and regularizations mu_x, mu_u >= 0, find the step (dx, du), dx_0 = 0, that minimizes
+/// With the models of StageModel, to whose cost weights of constraints add gradient . dc + 1/2 dc . diag(hessian) . dc,
+/// dc = Cx dx + Cu du, and regularizations mu_x, mu_u >= 0, find the step (dx, du), dx_0 = 0, that minimizes
 ///     sum_k [ lx.dx + lu.du + 1/2 dx.(lxx + mu_x I).dx + du.lux.dx + 1/2 du.(luu + mu_u I).du ]_k
 ///           + [ lx.dx + 1/2 dx.(lxx + mu_x I).dx ]_N      s.t.  dx_{k+1} = Fx dx_k + Fu du_k + gap_k.            (1)
 /// The cost to go from node k is V_k(dx) = v_k + Vx.dx + 1/2 dx.Vxx.dx, with V_N = the terminal term. Backwards, with
@@ -35,6 +36,11 @@ struct LqRegularization {
   double state = 0;    ///< mu_x, added to the diagonal of every Vxx
 };
 
+/// What is added to the cost of a node for its constraints, to second order about c without second derivatives of c.
+struct ConstraintWeights {
+  VectorXd gradient, hessian;  ///< constraintSize, or none; both are zero in rows that do not matter at present
+};
+
 /// Bounds of du at one stage (nu each), infinite if there are none; lower <= 0 <= upper.
 struct ControlBox {
   VectorXd lower, upper;
@@ -51,20 +57,21 @@ class LqSweep {
  public:
   /// Results of the sweep at node k: k and K of Eq. (5), and the value function; at the terminal node Vx and Vxx only.
   struct Node : Gains {
-    VectorXd Vx;   ///< ndx_k
-    MatrixXd Vxx;  ///< ndx_k x ndx_k, symmetric, both triangles
-    VectorXd Qu;   ///< nu_k
+    VectorXd Vx;        ///< ndx_k
+    MatrixXd Vxx;       ///< ndx_k x ndx_k, symmetric, both triangles
+    VectorXd Qu;        ///< nu_k
+    VectorXd gradient;  ///< of the cost, with weights: (lu, lx)
   };
 
-  /// Solves (1) for N + 1 models, the last one terminal. boxes: N of them, or none.
+  /// Solves (1) for N + 1 models, the last one terminal. boxes: N of them, or none; weights: N + 1, or none.
   LqResult update(const std::vector<StageModel>& models, const LqRegularization& regularization,
-                  const std::vector<ControlBox>& boxes = {});
+                  const std::vector<ControlBox>& boxes = {}, const std::vector<ConstraintWeights>& weights = {});
 
   /// The same node by node, for models that become available one by one: start(), then updateNode(k) for
-  /// k = N .. 0 as long as the status is Ok. start() reads only the sizes of the models. updateNode() overwrites the
-  /// Hessian of the model.
+  /// k = N .. 0 as long as the status is Ok. start() reads only the sizes of the models.
   void start(const std::vector<StageModel>& models, const LqRegularization& regularization);
-  NumericalStatus updateNode(int k, StageModel& model, const ControlBox* box = nullptr);
+  NumericalStatus updateNode(int k, const StageModel& model, const ControlBox* box = nullptr,
+                             const ConstraintWeights* weights = nullptr);
   /// Result of the nodes updated so far.
   const LqResult& result() const { return result_; }
 
@@ -76,8 +83,9 @@ class LqSweep {
 
  private:
   void resize(const std::vector<StageModel>& models);
-  // Q: the Hessian of the model, which becomes [Quu . ; Qxu Qxx]; then its first columns become L over Y^T.
-  NumericalStatus updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box);
+  MatrixMap copyHessian(const StageModel& model);
+  void addConstraints(const StageModel& model, const ConstraintWeights& weights, MatrixMap Q, VectorXd& gradient);
+  // Q: the Hessian, which becomes [Quu . ; Qxu Qxx]; then its first columns become L over Y^T.
   NumericalStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q,
                               Node& node);
   void updateQuadratic(const StageModel& model, const Node& next, MatrixMap Q, Node& node);
@@ -90,8 +98,8 @@ class LqSweep {
   LqResult result_;
   BoxQp box_qp_;
   // Buffers of one node, sized for the largest; columns of matrices are padded like those of a StageModel. With
-  // F = [Fu Fx]: [Qu Qx], F^T Vxx', a copy of the Hessian for models that keep theirs, and K^T.
-  VectorXd p_, Vxx_gap_, gradient_, Ft_Vxx_, hessian_, Kt_;
+  // F = [Fu Fx]: [Qu Qx], F^T Vxx', Q, C^T of rows that have a Hessian, also times that, and K^T.
+  VectorXd p_, Vxx_gap_, gradient_, Ft_Vxx_, hessian_, Ct_, Ct_scaled_, Kt_;
 };
 
 }  // namespace bielle

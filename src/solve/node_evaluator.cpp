@@ -20,11 +20,15 @@ NumericalStatus NodeEvaluator::linearize(const NodeEvaluation* next, StageModel&
   const bool running = node_ < problem_.numStages();
   const int ndx = problem_.tangentSize(node_), nu = running ? problem_.controlSize(node_) : 0;
   const int ndx_next = running ? problem_.tangentSize(node_ + 1) : 0;
+  const int rows = problem_.constraintSize(node_);
   if (!out.hasSizes(ndx, nu, ndx_next)) out.resize(ndx, nu, ndx_next);
+  out.setRows(rows);
+  rows_.assign(rows, true);
   LinearizeTask task;
   task.node = node_;
   task.at = at_.get();
   task.next = next;
+  task.rows = &rows_;
   task.out = &out;
   problem_.linearize(&task, 1, scratch_.get());
   return task.status;

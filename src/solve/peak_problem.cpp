@@ -48,7 +48,7 @@ std::unique_ptr<ProblemScratch> PeakProblem::makeScratch() const {
     out->models.takeBack();
     out->vectors.takeBack();
     for (int i = 0; i < size; ++i) {
-      out->takeModel(ndx, nu, running ? inner_.tangentSize(k + 1) : 0);
+      out->takeModel(ndx, nu, running ? inner_.tangentSize(k + 1) : 0, inner_.constraintSize(k));
       out->takeVector(ndx);
       out->takeVector(inner_.stateSize());
     }
@@ -104,8 +104,8 @@ void PeakProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* mem
     inner[i].node = node;
     inner[i].at = getInner(tasks[i].at);
     inner[i].next = getInner(tasks[i].next);
-    inner[i].weights = tasks[i].weights;
-    inner[i].out = &scratch.takeModel(ndx, nu, ndx_next);
+    inner[i].rows = tasks[i].rows;
+    inner[i].out = &scratch.takeModel(ndx, nu, ndx_next, inner_.constraintSize(node));
     inner[i].status = NumericalStatus::Failed;
     inner[i].failure.clear();
   }
@@ -119,7 +119,7 @@ void PeakProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* mem
 }
 
 // In the order of (2): controls, with s after them at the first stage, and tangents, with s after them at other nodes.
-void PeakProblem::setModel(int node, const NodeEvaluation& at, const NodeEvaluation* next, StageModel& inner,
+void PeakProblem::setModel(int node, const NodeEvaluation& at, const NodeEvaluation* next, const StageModel& inner,
                            StageModel& out) const {
   const Eigen::Index nu = inner.lu.size(), ndx = inner.lx.size(), n = inner.gap.size();
   const Eigen::Index first_x = node > 0 ? nu : nu + 1, s = node > 0 ? nu + ndx : nu;
@@ -134,16 +134,20 @@ void PeakProblem::setModel(int node, const NodeEvaluation& at, const NodeEvaluat
     if (counts(i)) slope += limits_[i] * at.u[i] * inner.lu[i];
   }
   setHessian(node, at, inner, out);
+  const auto transform = [&](ConstMatrixMap from, auto&& to) {
+    to.middleRows(first_x, ndx) = from.bottomRows(ndx);
+    to.row(s).setZero();
+    for (Eigen::Index i = 0; i < nu; ++i) {
+      to.row(i) = getFactor(i, share) * from.row(i);
+      if (counts(i)) to.row(s) += limits_[i] * at.u[i] * from.row(i);
+    }
+  };
+  transform(inner.Ct(), out.Ct());
   if (!running) return;
-  MatrixMap from = inner.Ft(), to = out.Ft();
-  to.middleRows(first_x, ndx).leftCols(n) = from.bottomRows(ndx);
-  to.row(s).setZero();
-  to.col(n).setZero();
-  for (Eigen::Index i = 0; i < nu; ++i) {
-    to.row(i).head(n) = getFactor(i, share) * from.row(i);
-    if (counts(i)) to.row(s).head(n) += limits_[i] * at.u[i] * from.row(i);
-  }
-  to(s, n) = 1;
+  MatrixMap Ft = out.Ft();
+  transform(inner.Ft(), Ft.leftCols(n));
+  Ft.col(n).setZero();
+  Ft(s, n) = 1;
   out.gap.head(n) = inner.gap;
   out.gap[n] = share - next->x[next->x.size() - 1];
 }

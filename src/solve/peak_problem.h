@@ -60,7 +60,7 @@ class PeakProblem : public ShootingProblem {
   }
   bool counts(Eigen::Index control) const { return control < limits_.size() && std::isfinite(limits_[control]); }
   double getFactor(Eigen::Index control, double share) const { return counts(control) ? share * limits_[control] : 1; }
-  void setModel(int node, const NodeEvaluation& at, const NodeEvaluation* next, StageModel& inner,
+  void setModel(int node, const NodeEvaluation& at, const NodeEvaluation* next, const StageModel& inner,
                 StageModel& out) const;
   void setHessian(int node, const NodeEvaluation& at, const StageModel& inner, StageModel& out) const;
 

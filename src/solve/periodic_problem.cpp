@@ -14,12 +14,7 @@ namespace {
 // cycles take half as many iterations more, with 10 to 100 about the same number.
 constexpr double kClosingScale = 100;
 
-struct PeriodicScratch : WrappedScratch {
-  using WrappedScratch::WrappedScratch;
-  ConstraintWeights weights;  // of the last node
-};
-
-PeriodicScratch& getScratch(ProblemScratch* memory) { return static_cast<PeriodicScratch&>(*memory); }
+WrappedScratch& getScratch(ProblemScratch* memory) { return static_cast<WrappedScratch&>(*memory); }
 
 }  // namespace
 
@@ -65,7 +60,7 @@ std::string PeriodicProblem::getConstraintName(int node, int row) const {
 std::unique_ptr<NodeEvaluation> PeriodicProblem::makeEvaluation() const { return wrapEvaluation(inner_); }
 
 std::unique_ptr<ProblemScratch> PeriodicProblem::makeScratch() const {
-  return std::make_unique<PeriodicScratch>(inner_);
+  return std::make_unique<WrappedScratch>(inner_);
 }
 
 // Eq. (2)
@@ -87,7 +82,7 @@ VectorXd PeriodicProblem::calcError(const VectorXd& theta, const NodeEvaluation&
 }
 
 void PeriodicProblem::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memory) const {
-  PeriodicScratch& scratch = getScratch(memory);
+  WrappedScratch& scratch = getScratch(memory);
   std::vector<EvaluateTask>& inner = scratch.evaluations;
   inner.clear();
   for (int i = 0; i < count; ++i) {
@@ -152,7 +147,7 @@ MatrixXd PeriodicProblem::differentiate(const VectorXd& theta, bool maps, const 
 }
 
 void PeriodicProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* memory) const {
-  PeriodicScratch& scratch = getScratch(memory);
+  WrappedScratch& scratch = getScratch(memory);
   std::vector<LinearizeTask>& inner = scratch.linearizations;
   inner.clear();
   scratch.models.takeBack();
@@ -164,14 +159,9 @@ void PeriodicProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch*
     task.node = node;
     task.at = getInner(tasks[i].at);
     task.next = getInner(tasks[i].next);
-    task.weights = tasks[i].weights;
-    if (task.weights && !running) {
-      const int rows = inner_.constraintSize(node);
-      scratch.weights = {task.weights->gradient.head(rows), task.weights->hessian.head(rows)};
-      task.weights = &scratch.weights;
-    }
+    task.rows = tasks[i].rows;
     task.out = &scratch.takeModel(inner_.tangentSize(node), running ? inner_.controlSize(node) : 0,
-                                  running ? inner_.tangentSize(node + 1) : 0);
+                                  running ? inner_.tangentSize(node + 1) : 0, inner_.constraintSize(node));
     inner.push_back(task);
   }
   inner_.linearize(inner.data(), static_cast<int>(inner.size()), scratch.inner.get());
@@ -185,7 +175,7 @@ void PeriodicProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch*
     tasks[i].failure = done->failure;
     if (done->status == NumericalStatus::Ok) {
       setModel(tasks[i], *done->out);
-      if (tasks[i].node == numStages()) addClosing(tasks[i], scratch.inner.get());
+      if (tasks[i].node == numStages() && tasks[i].rows) setClosing(tasks[i], scratch.inner.get());
     }
     ++done;
   }
@@ -216,6 +206,8 @@ void PeriodicProblem::setModel(const LinearizeTask& task, const StageModel& inne
   out.lx << inner.lx, VectorXd::Zero(n_);
   out.hessian().setZero();
   out.hessian().topLeftCorner(size, size) = inner.hessian();
+  out.Ct().topLeftCorner(size, inner.Ct().cols()) = inner.Ct();
+  out.Ct().bottomRows(n_).setZero();
   if (n == 0) return;
   out.gap << inner.gap, task.at->x.tail(n_) - task.next->x.tail(n_);
   out.Ft().setZero();
@@ -223,24 +215,15 @@ void PeriodicProblem::setModel(const LinearizeTask& task, const StageModel& inne
   out.Ft().bottomRightCorner(n_, n_).setIdentity();
 }
 
-// What the solver adds for Eq. (3).
-void PeriodicProblem::addClosing(const LinearizeTask& task, ProblemScratch* inner) const {
-  if (!task.weights) return;
-  StageModel& out = *task.out;
-  const NodeEvaluation& last = *getInner(task.at);
-  const VectorXd gradient = kClosingScale * task.weights->gradient.tail(n_),
-                 hessian = kClosingScale * kClosingScale * task.weights->hessian.tail(n_);
-  const MatrixXd by_theta = differentiate(task.at->x.tail(n_), true, last, inner);
-  const MatrixXd weighted = hessian.asDiagonal() * by_theta;
-  out.lx.head(n_) -= gradient;
-  out.lx.tail(n_) += by_theta.transpose() * gradient;
-  out.lxx().topLeftCorner(n_, n_).diagonal() += hessian;
-  out.lxx().bottomLeftCorner(n_, n_) -= weighted.transpose();
-  out.lxx().bottomRightCorner(n_, n_) += by_theta.transpose() * weighted;
+// Derivatives of Eq. (3).
+void PeriodicProblem::setClosing(const LinearizeTask& task, ProblemScratch* inner) const {
+  auto Ct = task.out->Ct().rightCols(n_);
+  Ct.topRows(n_) = -kClosingScale * MatrixXd::Identity(n_, n_);
+  Ct.bottomRows(n_) = kClosingScale * differentiate(task.at->x.tail(n_), true, *getInner(task.at), inner).transpose();
 }
 
 void PeriodicProblem::integrate(const IntegrateTask* tasks, int count, ProblemScratch* memory) const {
-  PeriodicScratch& scratch = getScratch(memory);
+  WrappedScratch& scratch = getScratch(memory);
   std::vector<IntegrateTask>& inner = scratch.integrations;
   inner.clear();
   scratch.vectors.takeBack();
@@ -261,7 +244,7 @@ void PeriodicProblem::integrate(const IntegrateTask* tasks, int count, ProblemSc
 }
 
 void PeriodicProblem::difference(const DifferenceTask* tasks, int count, ProblemScratch* memory) const {
-  PeriodicScratch& scratch = getScratch(memory);
+  WrappedScratch& scratch = getScratch(memory);
   std::vector<DifferenceTask>& inner = scratch.differences;
   inner.clear();
   scratch.vectors.takeBack();

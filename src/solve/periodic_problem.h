@@ -64,7 +64,7 @@ class PeriodicProblem : public ShootingProblem {
   MatrixXd differentiate(const VectorXd& theta, bool maps, const NodeEvaluation& at, ProblemScratch* inner) const;
   void linearizeStart(LinearizeTask& task, ProblemScratch* inner) const;
   void setModel(const LinearizeTask& task, const StageModel& inner) const;
-  void addClosing(const LinearizeTask& task, ProblemScratch* inner) const;
+  void setClosing(const LinearizeTask& task, ProblemScratch* inner) const;
 
   const ShootingProblem& inner_;
   StateMap map_;

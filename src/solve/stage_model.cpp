@@ -3,7 +3,7 @@
 
 namespace bielle {
 
-void StageModel::resize(int ndx, int nu, int ndx_next) {
+void StageModel::resize(int ndx, int nu, int ndx_next, int rows) {
   ndx_ = ndx;
   nu_ = nu;
   ndx_next_ = ndx_next;
@@ -14,6 +14,13 @@ void StageModel::resize(int ndx, int nu, int ndx_next) {
   lu.setZero(nu);
   Ft_.setZero(stride_ * ndx_next_);
   hessian_.setZero(stride_ * (nu_ + ndx_));
+  Ct_.setZero(stride_ * rows);
+  rows_ = rows;
+}
+
+void StageModel::setRows(int rows) {
+  if (Ct_.size() < stride_ * rows) Ct_.setZero(stride_ * rows);
+  rows_ = rows;
 }
 
 bool StageModel::hasSizes(int ndx, int nu, int ndx_next) const {

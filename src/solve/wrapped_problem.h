@@ -60,9 +60,11 @@ struct WrappedScratch : ProblemScratch {
     return vectors.take([size](const VectorXd& v) { return v.size() == size; },
                         [size](VectorXd& v) { v.resize(size); });
   }
-  StageModel& takeModel(int ndx, int nu, int ndx_next) {
-    return models.take([=](const StageModel& model) { return model.hasSizes(ndx, nu, ndx_next); },
-                       [=](StageModel& model) { model.resize(ndx, nu, ndx_next); });
+  StageModel& takeModel(int ndx, int nu, int ndx_next, int rows) {
+    StageModel& out = models.take([=](const StageModel& model) { return model.hasSizes(ndx, nu, ndx_next); },
+                                  [=](StageModel& model) { model.resize(ndx, nu, ndx_next); });
+    out.setRows(rows);
+    return out;
   }
 };
 

@@ -131,9 +131,9 @@ struct FddpSummary {
   double multiplier = 0;       ///< largest |y_i|
   double penalty = 0;          ///< rho; 0 if there are no constraints
   int multiplier_updates = 0;  ///< Eq. (12)
-  // What was done for that: linearizations of all nodes, each with a sweep; rollouts of a step in segments; searches, each of
-  // steps of several lengths in one piece.
-  int linearizations = 0, rollouts = 0, searches = 0;
+  // What was done for that: linearizations of single nodes, one an iterate, and another where constraints get weights that had
+  // none; sweeps; rollouts of a step in segments; searches, each of steps of several lengths in one piece.
+  int linearizations = 0, sweeps = 0, rollouts = 0, searches = 0;
   double seconds = 0;
   // Time by part, s, summed over the threads: with one thread they add up to almost `seconds`. Searches are rollouts, too.
   double evaluate_seconds = 0, linearize_seconds = 0, sweep_seconds = 0, rollout_seconds = 0, search_seconds = 0;

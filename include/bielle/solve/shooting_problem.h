@@ -30,10 +30,11 @@ using ConstRowMatrixMap = Eigen::Map<const RowMatrixXd, 0, Eigen::OuterStride<>>
 /// Quadratic model of one stage about (x_k, u_k), in tangent coordinates at x_k and at the node state x_{k+1}:
 ///     dx_{k+1} = Fx dx_k + Fu du_k + gap
 ///     l = cost + lx.dx + lu.du + 1/2 (dx.lxx.dx + 2 du.lux.dx + du.luu.du)
-/// The terminal node has only cost, lx and lxx: its other sizes are zero.
+///     c = c_k + Cx dx_k + Cu du_k      (constraints, in the rows that were wanted)
+/// The terminal node has only cost, lx, lxx and Cx: its other sizes are zero.
 ///
-/// The matrices are views of two that are stored as the sweep needs them: F^T = [Fu Fx]^T, and the lower triangle of
-/// the Hessian [luu . ; lux^T lxx], both with columns aligned to the processor's vector registers.
+/// The matrices are views of three that are stored as the sweep needs them: F^T = [Fu Fx]^T, C^T = [Cu Cx]^T, and the lower
+/// triangle of the Hessian [luu . ; lux^T lxx], all with columns aligned to the processor's vector registers.
 class StageModel {
  public:
   VectorXd gap;  ///< ndx_{k+1}: difference(x_{k+1}, f_k(x_k, u_k))
@@ -42,10 +43,10 @@ class StageModel {
   VectorXd lu;  ///< nu_k
 
   /// Sets the sizes, and all entries to zero.
-  void resize(int ndx, int nu, int ndx_next);
-  /// Exchanges the memory of the Hessian, with its content, for another piece of at least its size; while it has none,
-  /// the Hessian must not be used.
-  void swapHessian(VectorXd& memory) { hessian_.swap(memory); }
+  /// \param rows  of the constraints
+  void resize(int ndx, int nu, int ndx_next, int rows = 0);
+  /// Changes the number of constraints alone, without allocation if it has been as large before.
+  void setRows(int rows);
   bool hasSizes(int ndx, int nu, int ndx_next) const;
 
   RowMatrixMap Fx() { return {Ft_.data() + nu_, ndx_next_, ndx_, stride()}; }  ///< ndx_{k+1} x ndx_k
@@ -61,18 +62,20 @@ class StageModel {
   ConstRowMatrixMap lux() const { return {hessian_.data() + nu_, nu_, ndx_, stride()}; }
   ConstMatrixMap luu() const { return {hessian_.data(), nu_, nu_, stride()}; }
 
-  /// (nu_k + ndx_k) x ndx_{k+1} and (nu_k + ndx_k) square
+  /// (nu_k + ndx_k) x ndx_{k+1}, x constraintSize and square
   MatrixMap Ft() { return {Ft_.data(), nu_ + ndx_, ndx_next_, stride()}; }
+  MatrixMap Ct() { return {Ct_.data(), nu_ + ndx_, rows_, stride()}; }
   MatrixMap hessian() { return {hessian_.data(), nu_ + ndx_, nu_ + ndx_, stride()}; }
   ConstMatrixMap Ft() const { return {Ft_.data(), nu_ + ndx_, ndx_next_, stride()}; }
+  ConstMatrixMap Ct() const { return {Ct_.data(), nu_ + ndx_, rows_, stride()}; }
   ConstMatrixMap hessian() const { return {hessian_.data(), nu_ + ndx_, nu_ + ndx_, stride()}; }
 
  private:
   Eigen::OuterStride<> stride() const { return Eigen::OuterStride<>(stride_); }
 
-  Eigen::Index ndx_ = 0, nu_ = 0, ndx_next_ = 0;
+  Eigen::Index ndx_ = 0, nu_ = 0, ndx_next_ = 0, rows_ = 0;
   Eigen::Index stride_ = 0;  // nu + ndx, rounded up to full registers; the padding is finite
-  VectorXd Ft_, hessian_;
+  VectorXd Ft_, Ct_, hessian_;
 };
 
 /// A numerical failure is a status, never an exception or a NaN passed on.
@@ -99,20 +102,14 @@ struct EvaluateTask {
   NodeEvaluation* out = nullptr;  ///< from makeEvaluation() of this problem; its content is overwritten
 };
 
-/// The terms that a solver adds to the cost of a node for its constraints: to second order about the evaluated c,
-///     gradient . dc + 1/2 dc . diag(hessian) . dc.
-struct ConstraintWeights {
-  VectorXd gradient, hessian;  ///< constraintSize; both are zero in rows that do not matter at present
-};
-
 struct LinearizeTask {
   int node = 0;                  ///< in [0, N]
   NodeEvaluation* at = nullptr;  ///< its status is Ok; derivatives may be kept there
   /// The evaluation of node + 1, whose x is the node state to which the gap leads; null at the terminal node.
   const NodeEvaluation* next = nullptr;
-  /// To be added to the derivatives of the cost, by the chain rule, the Hessian without second derivatives of c; its cost stays
-  /// l_k. Null: nothing.
-  const ConstraintWeights* weights = nullptr;
+  /// Non-zero for the constraints whose derivatives are wanted (constraintSize); other columns of C^T are not read and may be left
+  /// as they are. Null: none.
+  const std::vector<char>* rows = nullptr;
   StageModel* out = nullptr;  ///< of the right sizes; its content is overwritten
   NumericalStatus status = NumericalStatus::Failed;
   std::string failure;  ///< why the status is not Ok, for messages; may be empty
@@ -215,7 +212,7 @@ class NodeEvaluator {
 
   /// Dynamics and cost of a node at (x, u), kept until the next call; u is not read at the terminal node.
   const NodeEvaluation& evaluate(int node, const VectorXd& x, const VectorXd& u = VectorXd());
-  /// Quadratic model about the last evaluation, which must be Ok.
+  /// Quadratic model about the last evaluation, which must be Ok, with all constraints.
   /// \param next  evaluation of the next node; null at the terminal node
   NumericalStatus linearize(const NodeEvaluation* next, StageModel& out);
   /// x (+) dx and x1 (-) x about the state x of the last evaluation.
@@ -228,6 +225,7 @@ class NodeEvaluator {
   const ShootingProblem& problem_;
   std::unique_ptr<NodeEvaluation> at_;
   std::unique_ptr<ProblemScratch> scratch_;
+  std::vector<char> rows_;
   int node_ = 0;
 };
 

@@ -75,7 +75,7 @@ class FullTranscription : public Transcription {
 
   void linearize(LinearizeTask& task, FullScratch& scratch) const;
   void setImpact(const FullEvaluation& at, StageModel& out) const;
-  void setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints, FullScratch& scratch,
+  void setResiduals(int node, const FullEvaluation& at, const std::vector<char>* wanted, FullScratch& scratch,
                     StageModel& out) const;
   void addSpeedResiduals(int node, const FullEvaluation& at, FullScratch& scratch) const;
   void setControlResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
@@ -160,7 +160,7 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
     setNextTimeScale(place, at, task.next->x, out);
   }
   out.cost = at.cost;
-  setResiduals(node, at, task.weights, scratch, out);
+  setResiduals(node, at, task.rows, scratch, out);
   addStateCost(node, at, scratch.difference, out);
   if (isRunning(node)) costs_[node].addControlCost(at, out);
   if (place.isFree()) addTimeScaleCost(countLeading(model_, place), at, scratch.no_squares, out);
@@ -183,10 +183,10 @@ void FullTranscription::setImpact(const FullEvaluation& at, StageModel& out) con
 }
 
 // Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part.
-void FullTranscription::setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints,
+void FullTranscription::setResiduals(int node, const FullEvaluation& at, const std::vector<char>* wanted,
                                      FullScratch& scratch, StageModel& out) const {
   const int nv = model_.nv();
-  costs_[node].selectRows(at, constraints, scratch.counted);
+  costs_[node].selectRows(at, wanted, scratch.counted);
   const int rows = scratch.counted.rows;
   out.lx.setZero();
   out.lu.setZero();
@@ -214,6 +214,10 @@ void FullTranscription::setResiduals(int node, const FullEvaluation& at, const C
     Rx.leftCols(nv).noalias() += by_forces * at.cws.dlambda_dq;
     Rx.rightCols(nv).noalias() += by_forces * at.cws.dlambda_dv;
   }
+  scratch.counted.visitConstraints(out, [&](int row, double unit, auto column) {
+    column.setZero();
+    column.tail(2 * nv) = Rx.row(row).transpose() / unit;
+  });
   scaled = hessian.asDiagonal() * Rx;
   out.lx.tail(2 * nv).noalias() = Rx.transpose() * gradient;
   out.lxx().bottomRightCorner(2 * nv, 2 * nv).noalias() = Rx.transpose() * scaled;
@@ -249,6 +253,8 @@ void FullTranscription::setControlResiduals(int node, const FullEvaluation& at, 
   Ru = scratch.jacobians.u.topRows(rows);
   if (!isImpact(node))  // motors have no say in an impact
     Ru.noalias() += scratch.jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows) * at.cws.dlambda_du;
+  scratch.counted.visitConstraints(
+      out, [&](int row, double unit, auto column) { column.head(nu) = Ru.row(row).transpose() / unit; });
   out.lu.head(nu).noalias() = Ru.transpose() * gradient;
   out.lux().topRightCorner(nu, 2 * nv).noalias() = Ru.transpose() * scaled;
   scaled_Ru = hessian.asDiagonal() * Ru;
@@ -264,6 +270,7 @@ void FullTranscription::setScaleResiduals(int node, const FullEvaluation& at, Fu
   Rs = scratch.jacobians.s.head(rows);
   const auto by_forces = scratch.jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows);
   if (specs_[node].step == StepRule::Midpoint) Rs.noalias() += by_forces * at.midpoint->lambda_s;
+  scratch.counted.visitConstraints(out, [&](int row, double unit, auto column) { column[nu] = Rs[row] / unit; });
   const auto Rx = scratch.Rx.topRows(rows);
   const auto Ru = scratch.Ru.topRows(rows);
   for (const CountedRows::Block& block : scratch.counted.blocks) {

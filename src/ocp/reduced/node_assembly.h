@@ -19,9 +19,9 @@ class NodeAssembly {
   // Sets the derivatives of the impulses of an impact with respect to q and v (rows x nv).
   void setImpulseDerivatives(ConstMatrixRef by_q, ConstMatrixRef by_v, const ReducedEvaluation& at,
                              const LaneView& view);
-  // Sets the Gauss-Newton terms of the residuals, overwriting `out`.
+  // Sets the Gauss-Newton terms of the residuals, overwriting `out`, and the constraints that are wanted.
   void setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
-                    const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
+                    const std::vector<char>* wanted, const ReducedEvaluation& at, const LaneView& view,
                     StageModel& out);
   // The part of the gradient of the last setResiduals() that is not due to squares, by (u, s, dy, dy_v); zero where s is not
   // free.

@@ -42,11 +42,11 @@ void NodeAssembly::addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef o
 
 // With Rt = (dr/d(u, dy, dy_v))^T, one column per residual, Rt diag(hessian) Rt^T is the whole Hessian.
 void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
-                                const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
+                                const std::vector<char>* wanted, const ReducedEvaluation& at, const LaneView& view,
                                 StageModel& out) {
   const int nr = reduction_.size, leading = at.leading, columns = leading + 2 * nr;
   no_squares_.setZero();
-  costs.selectRows(at, constraints, counted_);
+  costs.selectRows(at, wanted, counted_);
   const int rows = counted_.rows;
   if (rows == 0) {
     for (VectorXd* gradient : {&out.lx, &out.lu}) gradient->setZero();
@@ -74,11 +74,12 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
     for (const CountedRows::Block& block : counted_.blocks)
       for (int i = block.row; !block.square && i < block.row + block.size; ++i)
         no_squares_.head(columns) += counted_.gradient[i] * Rt.col(i);
+  counted_.visitConstraints(out, [&](int row, double unit, auto column) { column = Rt.col(row) / unit; });
   auto gradient = gradient_.head(columns);
   gradient.setZero();
-  int counting = 0;  // rows so far with a non-zero weight
+  int counting = 0;  // rows of costs so far with a non-zero weight
   for (int i = 0; i < rows; ++i) {
-    if (!counted_.counts(i)) continue;
+    if (!counted_.counts(i) || counted_.constraints[i] >= 0) continue;
     gradient += counted_.gradient[i] * Rt.col(i);
     if (counting < i) Rt.col(counting) = Rt.col(i);
     scaled.col(counting++) = counted_.hessian[i] * Rt.col(i);

@@ -179,7 +179,7 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
     }
   }
   out.cost = at.cost;
-  assembly.setResiduals(costs_[node], specs_[node], layout_.contacts[node], task.weights, at, view, out);
+  assembly.setResiduals(costs_[node], specs_[node], layout_.contacts[node], task.rows, at, view, out);
   if (specs_[node].state.weight != 0)
     addStateCostModel(model_, reduction_, view.state_cost, costs_[node].getScale(at), out);
   if (isRunning(node)) costs_[node].addControlCost(at, out);
