@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/firmware/firmware.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
@@ -16,6 +17,7 @@
 #include "formats/sdf.h"
 #include "formats/text_file.h"
 #include "formats/usd.h"
+#include "model/number_text.h"
 #include "model/payload.h"
 #include "results/number_option.h"
 #include "results/output_place.h"
@@ -30,6 +32,9 @@ struct ConvertArguments {
   std::string format = "bielle", joints, output;
   double payload = 0, hole = 8;
   std::vector<double> payload_at;
+  std::string precision = "double";
+  int postures = FirmwareOptions().postures;
+  std::vector<std::string> ranges;  // joint, low, high, ..
 };
 
 void warn(const std::vector<std::string>& warnings) {
@@ -54,7 +59,33 @@ int writeBy(const std::string& name, const std::string& json, const std::string&
   return status;
 }
 
+bool isFirmware(const std::string& format) { return format == "c" || format == "cpp" || format == "numpy"; }
+
+void writeFirmware(const LoadedRobot& robot, const ConvertArguments& arguments) {
+  FirmwareOptions options;
+  options.language = arguments.format == "c"     ? FirmwareLanguage::C
+                     : arguments.format == "cpp" ? FirmwareLanguage::Cpp
+                                                 : FirmwareLanguage::NumPy;
+  options.is_single = arguments.precision == "float";
+  options.postures = arguments.postures;
+  for (size_t i = 0; i + 2 < arguments.ranges.size(); i += 3) {
+    const std::string& joint = arguments.ranges[i];
+    const std::optional<double> low = parseNumber(arguments.ranges[i + 1]), high = parseNumber(arguments.ranges[i + 2]);
+    if (!low || !high || !(*low < *high))
+      throw InputError("", "--range " + joint,
+                       "'" + arguments.ranges[i + 1] + " " + arguments.ranges[i + 2] + "' is no range",
+                       "give two numbers, the lower one first, as --range " + joint + " -0.3 0.5");
+    options.ranges[joint] = {*low, *high};
+  }
+  const FirmwareText text = formatFirmware(robot.model, findClosedConfiguration(robot.model).q, options);
+  warn(text.warnings);
+  writeTextDirectory(arguments.output, text.files);
+}
+
 int convert(const ConvertArguments& arguments) {
+  if (!isFirmware(arguments.format) && (!arguments.ranges.empty() || arguments.precision != "double"))
+    throw InputError("", arguments.ranges.empty() ? "--precision" : "--range",
+                     "it says how maps of linkages are computed", "add --to c, or leave it out");
   if (!arguments.joints.empty() && arguments.format != "mjcf")
     throw InputError("", "--joints", "it says how a file of MuJoCo is written", "add --to mjcf, or leave it out");
   LoadedRobot robot = arguments.robot.load();
@@ -65,6 +96,8 @@ int convert(const ConvertArguments& arguments) {
   if (arguments.format == "bielle") {
     writeRobot(robot.model, arguments.output,
                "Written by `bielle convert` from " + std::filesystem::path(robot.file).filename().string() + ".");
+  } else if (isFirmware(arguments.format)) {
+    writeFirmware(robot, arguments);
   } else if (arguments.format == "urdf") {
     const UrdfText text = formatUrdf(robot.model);
     warn(text.warnings);
@@ -116,13 +149,17 @@ void addConvert(CLI::App& command, Action& action) {
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
       ->required();
   command
-      .add_option("--to", arguments->format,
-                  "bielle: a directory with URDF and YAML, without losses; drake: a URDF with loops and motors for "
-                  "Drake; dxf: plates of the plane links, for a workshop; mjcf: a MuJoCo file; sdf: a Gazebo file with "
-                  "loops; sheet: an SVG drawing with distances, and a CSV file of lengths, masses and motors; step: "
-                  "solids for CAD "
-                  "(AP214), an assembly of links; urdf: a URDF alone; usd: a USD file with loops for Isaac and Newton")
-      ->check(CLI::IsMember({"bielle", "drake", "dxf", "mjcf", "sdf", "sheet", "step", "urdf", "usd"}))
+      .add_option(
+          "--to", arguments->format,
+          "bielle: a directory with URDF and YAML, without losses; c, cpp: a directory with the maps of its linkages "
+          "between joints and motors, for firmware; drake: a URDF with loops and motors for "
+          "Drake; dxf: plates of the plane links, for a workshop; mjcf: a MuJoCo file; sdf: a Gazebo file with "
+          "loops; numpy: those maps as modules for Python; sheet: an SVG drawing with distances, and a CSV file of "
+          "lengths, masses and motors; step: "
+          "solids for CAD "
+          "(AP214), an assembly of links; urdf: a URDF alone; usd: a USD file with loops for Isaac and Newton")
+      ->check(
+          CLI::IsMember({"bielle", "c", "cpp", "drake", "dxf", "mjcf", "numpy", "sdf", "sheet", "step", "urdf", "usd"}))
       ->capture_default_str();
   command
       .add_option(
@@ -132,6 +169,21 @@ void addConvert(CLI::App& command, Action& action) {
       ->check(CLI::IsMember({"balls", "hinges"}));
   command.add_option("--hole", arguments->hole, "with --to dxf: diameter of the holes [mm]")
       ->check(isWithin(0.1, 1000))
+      ->capture_default_str();
+  command.add_option("--precision", arguments->precision, "with --to c or cpp: of all numbers")
+      ->check(CLI::IsMember({"double", "float"}))
+      ->capture_default_str();
+  command
+      .add_option("--range", arguments->ranges,
+                  "with --to c, cpp or numpy: JOINT LOW HIGH [rad, m], instead of the limits of the robot's file, or "
+                  "where it has none "
+                  "the range around its posture that stays 0.1 rad away from dead points; again for other joints")
+      ->expected(3)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command
+      .add_option("--postures", arguments->postures,
+                  "with --to c, cpp or numpy: at how many of each linkage errors are measured")
+      ->check(isWithin(100, 10000000))
       ->capture_default_str();
   addFixedBase(command, arguments->robot);
   CLI::Option* payload = command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg]")
@@ -144,7 +196,8 @@ void addConvert(CLI::App& command, Action& action) {
       ->needs(payload);
   command
       .add_option("-o,--output", arguments->output,
-                  "the file; for bielle the directory, whose last part names its files")
+                  "the file; for bielle the directory, whose last part names its files; for c, cpp and numpy a "
+                  "directory of its own")
       ->required();
   command.footer(
       "Lost elements are listed as warnings; a conversion that would change the mechanism is refused.\n"
@@ -162,7 +215,10 @@ void addConvert(CLI::App& command, Action& action) {
       "keep the\n"
       "digits of float.\n"
       "A URDF alone is a tree: loops are left out, linear couplers of two joints become <mimic>.\n"
+      "Maps of linkages come with a README.md and tests; they are exact to rounding, and say how exact they were "
+      "found.\n"
       "Examples:\n"
+      "  bielle convert bipetto --to c --precision float -o maps\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
       "  bielle convert bipetto --to mjcf --joints hinges -o trained.xml\n"
       "  bielle convert bipetto --to usd -o bipetto.usda\n"

@@ -1,5 +1,6 @@
 #include "formats/aside_file.h"
 
+#include <fcntl.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -77,6 +78,36 @@ void writeTextFile(const std::string& path, const std::string& text) {
   AsideFile file(path);
   file.write(text);
   file.commit();
+}
+
+void writeTextDirectory(const std::string& path, const std::map<std::string, std::string>& files) {
+  namespace fs = std::filesystem;
+  fs::path place = path;
+  if (!place.has_filename()) place = place.parent_path();  // "DIR/"
+  std::error_code error;
+  const bool is_there = fs::exists(place, error);
+  if (is_there && !fs::is_directory(place, error)) failToWrite(path, "it is a file");
+  if (is_there)
+    for (const fs::directory_entry& entry : fs::directory_iterator(place, error))
+      if (!files.count(entry.path().filename().string()))
+        throw InputError(path, "directory", "it holds another file, '" + entry.path().filename().string() + "'",
+                         "give a new directory, so that nothing is lost");
+  const std::string aside = place.string() + kPart + std::to_string(getpid());
+  const auto fail = [&](const std::string& why) {
+    std::error_code ignored;
+    fs::remove_all(aside, ignored);
+    failToWrite(path, why);
+  };
+  if (!fs::create_directory(aside, error)) fail(error ? error.message() : "'" + aside + "' is there");
+  for (const auto& [name, text] : files) {
+    std::ofstream file(fs::path(aside) / name, std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) fail(std::strerror(errno));
+  }
+  if (renameat2(AT_FDCWD, aside.c_str(), AT_FDCWD, place.c_str(), is_there ? RENAME_EXCHANGE : RENAME_NOREPLACE) != 0)
+    fail(std::strerror(errno));
+  if (is_there) fs::remove_all(aside, error);  // the one that was there
 }
 
 }  // namespace bielle

@@ -1,5 +1,6 @@
 #pragma once
 // Whole text files, read and written.
+#include <map>
 #include <string>
 
 namespace bielle {
@@ -15,5 +16,10 @@ size_t findNotUtf8(const std::string& text);
 /// Written to a temporary file and renamed when complete, like all results.
 /// \throws InputError naming the file and the reason it cannot be written
 void writeTextFile(const std::string& path, const std::string& text);
+
+/// A directory of these files, by name, written beside its place and moved there when complete: whole or not at all. One that
+/// holds nothing but files of these names is replaced.
+/// \throws InputError naming the directory, where it holds others or cannot be written
+void writeTextDirectory(const std::string& path, const std::map<std::string, std::string>& files);
 
 }  // namespace bielle

@@ -1,0 +1,163 @@
+#include "firmware/expression.h"
+
+#include <array>
+
+namespace bielle::firmware {
+namespace {
+
+Scalar makeNode(Op op, std::vector<Scalar> operands) {
+  return Scalar(std::make_shared<const Node>(Node{op, 0, 0, std::move(operands)}));
+}
+
+double getConstant(const Scalar& a) { return a.node().constant; }
+const Scalar& getOperand(const Scalar& a, size_t i = 0) { return a.node().operands[i]; }
+bool isNegated(const Scalar& a) { return a.node().op == Op::Negate; }
+
+}  // namespace
+
+Scalar::Scalar(double constant) : node_(std::make_shared<const Node>(Node{Op::Constant, constant, 0, {}})) {}
+bool Scalar::isConstant() const { return node_->op == Op::Constant; }
+bool Scalar::is(double constant) const { return isConstant() && node_->constant == constant; }
+Scalar& Scalar::operator+=(const Scalar& o) { return *this = *this + o; }
+Scalar& Scalar::operator-=(const Scalar& o) { return *this = *this - o; }
+Scalar& Scalar::operator*=(const Scalar& o) { return *this = *this * o; }
+
+Scalar makeInput(int index) { return Scalar(std::make_shared<const Node>(Node{Op::Input, 0, index, {}})); }
+
+Scalar operator+(const Scalar& a, const Scalar& b) {
+  if (a.isConstant() && b.isConstant()) return getConstant(a) + getConstant(b);
+  if (a.is(0)) return b;
+  if (b.is(0)) return a;
+  if (isNegated(b)) return a - getOperand(b);
+  if (isNegated(a)) return b - getOperand(a);
+  return makeNode(Op::Add, {a, b});
+}
+
+Scalar operator-(const Scalar& a, const Scalar& b) {
+  if (a.isConstant() && b.isConstant()) return getConstant(a) - getConstant(b);
+  if (a.is(0)) return -b;
+  if (b.is(0)) return a;
+  if (isNegated(b)) return a + getOperand(b);
+  if (&a.node() == &b.node()) return 0;
+  return makeNode(Op::Subtract, {a, b});
+}
+
+Scalar operator*(const Scalar& a, const Scalar& b) {
+  if (a.isConstant() && b.isConstant()) return getConstant(a) * getConstant(b);
+  if (b.isConstant()) return b * a;
+  if (a.is(0)) return 0;
+  if (a.is(1)) return b;
+  if (a.is(-1)) return -b;
+  if (isNegated(a)) return -(getOperand(a) * b);
+  if (isNegated(b)) return a.isConstant() ? Scalar(-getConstant(a)) * getOperand(b) : -(a * getOperand(b));
+  // Constants of a chain become one.
+  if (a.isConstant() && b.node().op == Op::Multiply && getOperand(b).isConstant())
+    return Scalar(getConstant(a) * getConstant(getOperand(b))) * getOperand(b, 1);
+  return makeNode(Op::Multiply, {a, b});
+}
+
+Scalar operator/(const Scalar& a, const Scalar& b) {
+  if (b.isConstant()) return Scalar(1 / getConstant(b)) * a;
+  if (a.is(0)) return 0;
+  if (isNegated(a)) return -(getOperand(a) / b);
+  return makeNode(Op::Divide, {a, b});
+}
+
+Scalar operator-(const Scalar& a) {
+  if (a.isConstant()) return -getConstant(a);
+  if (isNegated(a)) return getOperand(a);
+  if (a.node().op == Op::Subtract) return getOperand(a, 1) - getOperand(a);
+  return makeNode(Op::Negate, {a});
+}
+
+Scalar sqrt(const Scalar& a) { return a.isConstant() ? Scalar(std::sqrt(getConstant(a))) : makeNode(Op::Sqrt, {a}); }
+Scalar sin(const Scalar& a) { return a.isConstant() ? Scalar(std::sin(getConstant(a))) : makeNode(Op::Sin, {a}); }
+Scalar cos(const Scalar& a) { return a.isConstant() ? Scalar(std::cos(getConstant(a))) : makeNode(Op::Cos, {a}); }
+Scalar atan2(const Scalar& y, const Scalar& x) { return makeNode(Op::Atan2, {y, x}); }
+Scalar min(const Scalar& a, const Scalar& b) { return makeNode(Op::Min, {a, b}); }
+
+Scalar Derivative::operator()(const Scalar& formula) {
+  if (const auto known = known_.find(&formula.node()); known != known_.end()) return known->second;
+  const Scalar derived = derive(formula.node());
+  kept_.push_back(formula);
+  return known_[&formula.node()] = derived;
+}
+
+Scalar Derivative::derive(const Node& node) {
+  const auto a = [&]() -> const Scalar& { return node.operands[0]; };
+  const auto b = [&]() -> const Scalar& { return node.operands[1]; };
+  switch (node.op) {
+    case Op::Constant:
+      return 0;
+    case Op::Input: {
+      const auto rate = rates_.find(node.input);
+      return rate == rates_.end() ? Scalar(0) : rate->second;
+    }
+    case Op::Negate:
+      return -(*this)(a());
+    case Op::Sqrt:
+      return (*this)(a()) / (2 * sqrt(a()));
+    case Op::Sin:
+      return cos(a()) * (*this)(a());
+    case Op::Cos:
+      return -(sin(a()) * (*this)(a()));
+    case Op::Add:
+      return (*this)(a()) + (*this)(b());
+    case Op::Subtract:
+      return (*this)(a()) - (*this)(b());
+    case Op::Multiply:
+      return (*this)(a()) * b() + a() * (*this)(b());
+    case Op::Divide:
+      return ((*this)(a()) - (a() / b()) * (*this)(b())) / b();
+    case Op::Atan2:
+      return (b() * (*this)(a()) - a() * (*this)(b())) / (a() * a() + b() * b());
+    case Op::Min:
+      break;  // a test of what is reached, which nobody differentiates
+  }
+  return 0;
+}
+
+OperationCount& OperationCount::operator+=(const OperationCount& o) {
+  additions += o.additions;
+  multiplications += o.multiplications;
+  divisions += o.divisions;
+  roots += o.roots;
+  trigonometric += o.trigonometric;
+  return *this;
+}
+
+OperationCount OperationCount::operator*(int times) const {
+  return {additions * times, multiplications * times, divisions * times, roots * times, trigonometric * times};
+}
+
+Program::Program(const std::vector<Scalar>& outputs) {
+  using Key = std::tuple<Op, double, int, int>;
+  std::map<Key, int> found;                 // equal operations are one
+  std::map<const Node*, int> instructions;  // of formulas that share a part, once
+  const std::function<int(const Scalar&)> add = [&](const Scalar& formula) {
+    const Node& node = formula.node();
+    if (const auto known = instructions.find(&node); known != instructions.end()) return known->second;
+    std::array<int, 2> at = {node.op == Op::Input ? node.input : -1, -1};
+    for (size_t i = 0; i < node.operands.size(); ++i) at[i] = add(node.operands[i]);
+    if ((node.op == Op::Add || node.op == Op::Multiply) && at[1] < at[0]) std::swap(at[0], at[1]);
+    const auto [place, is_new] =
+        found.try_emplace(Key{node.op, node.constant, at[0], at[1]}, static_cast<int>(code_.size()));
+    if (is_new) code_.push_back({node.op, node.constant, at[0], at[1]});
+    return instructions[&node] = place->second;
+  };
+  for (const Scalar& output : outputs) outputs_.push_back(add(output));
+}
+
+OperationCount Program::count() const {
+  OperationCount out;
+  for (const Instruction& line : code_) {
+    out.additions += line.op == Op::Add || line.op == Op::Subtract;
+    out.multiplications += line.op == Op::Multiply;
+    out.divisions += line.op == Op::Divide;
+    out.roots += line.op == Op::Sqrt;
+    out.trigonometric += line.op == Op::Sin || line.op == Op::Cos || line.op == Op::Atan2;
+  }
+  return out;
+}
+
+}  // namespace bielle::firmware

@@ -1,0 +1,24 @@
+#pragma once
+// Maps as files of a language.
+#include "firmware/map.h"
+
+namespace bielle::firmware {
+
+// Source, header and test, by name. is_cpp: in a namespace instead of by a prefix.
+std::map<std::string, std::string> writeC(const Maps& maps, bool is_single, bool is_cpp);
+// One module of functions over arrays of postures.
+std::map<std::string, std::string> writeNumPy(const Maps& maps);
+
+// What holds of the maps, line by line: ranges, ways to compute, operations, errors.
+std::vector<std::string> describe(const Maps& maps, bool is_single);
+
+// Formulas beyond positions.
+struct Formulas {
+  explicit Formulas(const Maps& maps);
+  Program ratio;       // R, R^-1 by rows
+  Program ratio_rate;  // dR/dt by rows, and d log D_J/dt
+  Program held;        // of the joints
+  Program branch;      // positive on the branch of the reference
+};
+
+}  // namespace bielle::firmware

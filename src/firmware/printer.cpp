@@ -1,0 +1,95 @@
+#include "firmware/printer.h"
+
+#include "model/number_text.h"
+
+namespace bielle::firmware {
+namespace {
+
+constexpr size_t kLongestInline = 50;
+
+}  // namespace
+
+std::string formatConstant(double value, const Style& style) {
+  std::string text = style.is_single ? formatNumber(value, "%.9g") : formatExact(value);
+  if (text.find_first_of(".e") == std::string::npos) text += ".0";
+  return text + style.suffix;
+}
+
+std::string printProgram(const Program& program, const Style& style, const std::function<std::string(int)>& nameInput,
+                         const std::vector<std::string>& targets) {
+  std::vector<int> uses(program.code().size());
+  for (const auto& line : program.code()) {
+    if (line.op == Op::Constant || line.op == Op::Input) continue;
+    ++uses[static_cast<size_t>(line.a)];
+    if (line.b >= 0) ++uses[static_cast<size_t>(line.b)];
+  }
+  for (int i : program.outputs()) ++uses[static_cast<size_t>(i)];
+  std::string out;
+  std::vector<std::string> text(program.code().size());
+  int named = 0;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const Program::Instruction& line = program.code()[i];
+    const auto a = [&] { return text[static_cast<size_t>(line.a)]; };
+    const auto b = [&] { return text[static_cast<size_t>(line.b)]; };
+    const auto call = [&](const std::string& name, bool of_math = true) {
+      return (of_math ? style.functions + name + (style.functions.empty() ? style.suffix : "") : name) + "(" + a() +
+             (line.b >= 0 ? ", " + b() : "") + ")";
+    };
+    const auto infix = [&](const char* sign) { return "(" + a() + " " + sign + " " + b() + ")"; };
+    switch (line.op) {
+      case Op::Constant:
+        text[i] = formatConstant(line.constant, style);
+        if (line.constant < 0) text[i] = "(" + text[i] + ")";
+        continue;
+      case Op::Input:
+        text[i] = nameInput(line.a);
+        continue;
+      case Op::Negate:
+        text[i] = "(-" + a() + ")";
+        break;
+      case Op::Sqrt:
+        text[i] = call("root", false);
+        break;
+      case Op::Sin:
+        text[i] = call("sin");
+        break;
+      case Op::Cos:
+        text[i] = call("cos");
+        break;
+      case Op::Atan2:
+        text[i] = call(style.functions.empty() ? "atan2" : "arctan2");
+        break;
+      case Op::Min:
+        text[i] = call("least", false);
+        break;
+      case Op::Add:
+        text[i] = infix("+");
+        break;
+      case Op::Subtract:
+        text[i] = infix("-");
+        break;
+      case Op::Multiply:
+        text[i] = infix("*");
+        break;
+      case Op::Divide:
+        text[i] = infix("/");
+        break;
+    }
+    if (uses[i] < 2 && text[i].size() < kLongestInline) continue;
+    const std::string name = "t" + std::to_string(named++);
+    out += "  " + style.declare + name + " = " + text[i] + style.end + "\n";
+    text[i] = name;
+  }
+  for (size_t k = 0; k < targets.size(); ++k)
+    out += "  " + targets[k] + " = " + text[static_cast<size_t>(program.outputs()[k])] + style.end + "\n";
+  return out;
+}
+
+std::string fillIn(std::string text, const std::vector<std::pair<std::string, std::string>>& values) {
+  for (const auto& [key, value] : values)
+    for (size_t at = 0; (at = text.find(key, at)) != std::string::npos; at += value.size())
+      text.replace(at, key.size(), value);
+  return text;
+}
+
+}  // namespace bielle::firmware
