@@ -19,6 +19,11 @@ endif()
 add_test(NAME dxf COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_dxf.py $<TARGET_FILE:bielle_command>)
 set_tests_properties(dxf PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
+# Maps of linkages as C, compiled.
+add_test(NAME firmware COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_firmware.py $<TARGET_FILE:bielle_command>)
+add_test(NAME firmware_all COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_firmware.py $<TARGET_FILE:bielle_command> all)
+set_tests_properties(firmware firmware_all PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+
 # Manual pages and completion follow the help of the command.
 foreach(name man completion)
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_${name}.py

@@ -118,10 +118,12 @@ class CWriter {
       }
       const std::string U = std::to_string(s.unknowns.size());
       body += "  if (guess) {\n" + kept + "  } else {\n" + indent(print(s.guesses, targets)) + "  }\n";
-      body += "  for (n = 0; n < " + std::to_string(s.iterations) + "; ++n) {\n    REAL d[" + U + "];\n" +
-              indent(print(s.steps, steps)) + "    last = 0;\n    for (k = 0; k < " + U +
+      const LoopText loop = printLoop(
+          Program(s.steps), style_, [this](int i) { return nameInput(i); }, steps, s.unknowns);
+      body += "  {\n" + indent(loop.before) + "  for (n = 0; n < " + std::to_string(s.iterations) +
+              "; ++n) {\n    REAL d[" + U + "];\n" + indent(loop.body) + "    last = 0;\n    for (k = 0; k < " + U +
               "; ++k) {\n      d[k] = limit(d[k], " + number(-kLongestStep) + ", " + number(kLongestStep) +
-              ");\n      if (fabsFN(d[k]) > last) last = fabsFN(d[k]);\n    }\n" + moved + "  }\n";
+              ");\n      if (fabsFN(d[k]) > last) last = fabsFN(d[k]);\n    }\n" + moved + "  }\n  }\n";
       body += "  if (!(last <= " + number(1e-3) + ")) return 0;\n";
       out += "  REAL last = 0;\n  int n, k;\n";
     } else {
@@ -262,12 +264,12 @@ class CWriter {
     code.emplace_back("REAL", is_single_ ? "float" : "double");
     code.emplace_back("FN", is_single_ ? "f" : "");
     if (is_cpp_)
-      for (const char* type : {"real", "status", "posture", "ratio"}) {
-        std::string name = type;
-        name[0] = static_cast<char>(std::toupper(name[0]));
-        code.emplace_back(std::string("NAME_") + type + (type == std::string("ratio") ? " " : ""),
-                          name + (type == std::string("ratio") ? " " : ""));
-      }
+      for (const auto& [prefixed, name] : {std::pair("NAME_real", "Real"),
+                                           {"NAME_status", "Status"},
+                                           {"NAME_posture", "Posture"},
+                                           {"NAME_ratio ", "Ratio "},
+                                           {"NAME_ratio;", "Ratio;"}})
+        code.emplace_back(prefixed, name);
     code.emplace_back("SIZE", is_cpp_ ? "kSize" : "NAME_S_I_Z_E");
     code.emplace_back("S_I_Z_E", "SIZE");
     code.emplace_back("NAMEbare", maps_.name);

@@ -1,6 +1,8 @@
 #include "firmware/expression.h"
 
+#include <algorithm>
 #include <array>
+#include <tuple>
 
 namespace bielle::firmware {
 namespace {
@@ -148,14 +150,30 @@ Program::Program(const std::vector<Scalar>& outputs) {
   for (const Scalar& output : outputs) outputs_.push_back(add(output));
 }
 
-OperationCount Program::count() const {
-  OperationCount out;
+std::vector<bool> Program::findVarying(const std::vector<int>& inputs) const {
+  std::vector<bool> out;
   for (const Instruction& line : code_) {
-    out.additions += line.op == Op::Add || line.op == Op::Subtract;
-    out.multiplications += line.op == Op::Multiply;
-    out.divisions += line.op == Op::Divide;
-    out.roots += line.op == Op::Sqrt;
-    out.trigonometric += line.op == Op::Sin || line.op == Op::Cos || line.op == Op::Atan2;
+    if (line.op == Op::Input)
+      out.push_back(std::find(inputs.begin(), inputs.end(), line.a) != inputs.end());
+    else
+      out.push_back(line.op != Op::Constant &&
+                    (out[static_cast<size_t>(line.a)] || (line.b >= 0 && out[static_cast<size_t>(line.b)])));
+  }
+  return out;
+}
+
+OperationCount Program::count() const { return count(std::vector<bool>(code_.size(), true), true); }
+
+OperationCount Program::count(const std::vector<bool>& varying, bool which) const {
+  OperationCount out;
+  for (size_t i = 0; i < code_.size(); ++i) {
+    if (varying[i] != which) continue;
+    const Op op = code_[i].op;
+    out.additions += op == Op::Add || op == Op::Subtract;
+    out.multiplications += op == Op::Multiply;
+    out.divisions += op == Op::Divide;
+    out.roots += op == Op::Sqrt;
+    out.trigonometric += op == Op::Sin || op == Op::Cos || op == Op::Atan2;
   }
   return out;
 }

@@ -85,6 +85,10 @@ class Program {
   const std::vector<Instruction>& code() const { return code_; }
   const std::vector<int>& outputs() const { return outputs_; }  // instructions
   OperationCount count() const;
+  // Instructions that depend on an input.
+  std::vector<bool> findVarying(const std::vector<int>& inputs) const;
+  // Of these alone, or of the others.
+  OperationCount count(const std::vector<bool>& varying, bool which) const;
 
   // T: double or float; every constant and every result is rounded to it, as the generated code does.
   template <typename T>

@@ -340,6 +340,7 @@ void measure(const Model& model, const Linkage& linkage, ConstVectorRef q, int p
   const int per_axis = std::max(3, static_cast<int>(std::ceil(std::pow(postures, 1.0 / map.size()) - 1e-9)));
   const long all = static_cast<long>(std::pow(per_axis, map.size()) + 0.5), every = std::max(1L, all / kVectors);
   // What is compared lies within the range, to which the code clamps.
+  VectorXd last, way = VectorXd::Zero(map.size());  // of the motors, from posture to posture
   const VectorXd lower = map.lower.array() + 1e-9, upper = map.upper.array() - 1e-9;
   visitGrid(lower, upper, per_axis, [&](const VectorXd& x) {
     if (!exact.lead(x))
@@ -349,11 +350,15 @@ void measure(const Model& model, const Linkage& linkage, ConstVectorRef q, int p
     const ExactPosture posture = exact.get();
     meter.add(posture, map.errors);
     map.largest_ratio = std::max(map.largest_ratio, posture.R.cwiseAbs().maxCoeff());
+    if (map.postures > 0) way = way.cwiseMax((posture.motors - last).cwiseAbs());
+    last = posture.motors;
     map.motor_lower = map.motor_lower.cwiseMin(posture.motors);
     map.motor_upper = map.motor_upper.cwiseMax(posture.motors);
     if (map.postures++ % every == every / 2) map.vectors.push_back(posture);
     return true;
   });
+  map.motor_lower -= way;  // their extremes may lie between postures
+  map.motor_upper += way;
 }
 
 }  // namespace

@@ -17,6 +17,17 @@ std::string formatConstant(double value, const Style& style) {
 
 std::string printProgram(const Program& program, const Style& style, const std::function<std::string(int)>& nameInput,
                          const std::vector<std::string>& targets) {
+  return printLoop(program, style, nameInput, targets, {}).before;
+}
+
+LoopText printLoop(const Program& program, const Style& style, const std::function<std::string(int)>& nameInput,
+                   const std::vector<std::string>& targets, const std::vector<int>& changing) {
+  const std::vector<bool> varying = program.findVarying(changing);
+  std::vector<bool> is_kept(varying.size(), false);  // constant in the loop, and used there
+  for (size_t i = 0; i < varying.size(); ++i)
+    if (const auto& line = program.code()[i]; varying[i] && line.op != Op::Input)
+      for (int operand : {line.a, line.b})
+        if (operand >= 0 && !varying[static_cast<size_t>(operand)]) is_kept[static_cast<size_t>(operand)] = true;
   std::vector<int> uses(program.code().size());
   for (const auto& line : program.code()) {
     if (line.op == Op::Constant || line.op == Op::Input) continue;
@@ -24,7 +35,7 @@ std::string printProgram(const Program& program, const Style& style, const std::
     if (line.b >= 0) ++uses[static_cast<size_t>(line.b)];
   }
   for (int i : program.outputs()) ++uses[static_cast<size_t>(i)];
-  std::string out;
+  LoopText out;
   std::vector<std::string> text(program.code().size());
   int named = 0;
   for (size_t i = 0; i < text.size(); ++i) {
@@ -75,13 +86,14 @@ std::string printProgram(const Program& program, const Style& style, const std::
         text[i] = infix("/");
         break;
     }
-    if (uses[i] < 2 && text[i].size() < kLongestInline) continue;
+    if (uses[i] < 2 && text[i].size() < kLongestInline && !is_kept[i]) continue;
     const std::string name = "t" + std::to_string(named++);
-    out += "  " + style.declare + name + " = " + text[i] + style.end + "\n";
+    (varying[i] ? out.body : out.before) += "  " + style.declare + name + " = " + text[i] + style.end + "\n";
     text[i] = name;
   }
   for (size_t k = 0; k < targets.size(); ++k)
-    out += "  " + targets[k] + " = " + text[static_cast<size_t>(program.outputs()[k])] + style.end + "\n";
+    (changing.empty() ? out.before : out.body) +=
+        "  " + targets[k] + " = " + text[static_cast<size_t>(program.outputs()[k])] + style.end + "\n";
   return out;
 }
 

@@ -21,6 +21,13 @@ std::string formatConstant(double value, const Style& style);
 std::string printProgram(const Program& program, const Style& style, const std::function<std::string(int)>& nameInput,
                          const std::vector<std::string>& targets);
 
+// The same within a loop that changes some inputs: what does not depend on them comes before it.
+struct LoopText {
+  std::string before, body;
+};
+LoopText printLoop(const Program& program, const Style& style, const std::function<std::string(int)>& nameInput,
+                   const std::vector<std::string>& targets, const std::vector<int>& changing);
+
 // A text with its keys replaced, one after the other.
 std::string fillIn(std::string text, const std::vector<std::pair<std::string, std::string>>& values);
 

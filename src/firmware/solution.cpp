@@ -456,7 +456,9 @@ SolutionPrograms::SolutionPrograms(const Solution& s) : solution(s) {
 
 OperationCount SolutionPrograms::count() const {
   OperationCount out = before.count();
-  out += step.count() * solution.iterations;
+  const std::vector<bool> varying = step.findVarying(solution.unknowns);
+  out += step.count(varying, true) * solution.iterations;
+  out += step.count(varying, false);
   if (!solution.after.empty()) out += after.count();
   return out;
 }

@@ -1,0 +1,274 @@
+"""test_firmware.py BIELLE [all]: maps of linkages in C are compiled and compared with closed forms and with the mechanism.
+
+With "all", every linkage of the included robots in both precisions at 1e5 postures, and a table of them (docs/firmware.md)."""
+import ctypes
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+BIELLE = os.path.abspath(sys.argv[1])
+ALL = "all" in sys.argv[2:]
+SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.argv = sys.argv[:1]
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+STRICT = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]
+OK, CLAMPED, NEAR, NOT_REACHED = range(4)
+if not COMPILERS:
+    print("neither gcc nor clang is there")
+    sys.exit(77)
+
+
+def run(*command, status=0, **options):
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    assert done.returncode == status, (command, done.stdout, done.stderr)
+    return done
+
+
+def convert(robot, place, *options, status=0):
+    return run(BIELLE, "convert", robot, "-o", place, *options, status=status)
+
+
+def list_names(place):
+    return sorted(re.sub(r"_test\.(c|cpp)$", "", name) for name in os.listdir(place) if re.search(r"_test\.c", name))
+
+
+def build_test(place, name, compiler="gcc", standard="c99", end="c"):
+    program = os.path.join(place, name + ".out")
+    run(compiler, "-std=" + standard, "-O1", *STRICT, name + "." + end, name + "_test." + end, "-lm", "-o", program, cwd=place)
+    return program
+
+
+class Linkage:
+    """The functions of a linkage of one joint, in double, called from Python."""
+
+    def __init__(self, place, name):
+        path = os.path.join(place, name + ".so")
+        run(COMPILERS[0], "-std=c99", "-O2", "-shared", "-fPIC", name + ".c", "-lm", "-o", path, cwd=place)
+        self.library, self.name = ctypes.CDLL(path), name
+
+    def call(self, function, *arguments, result=None):
+        found = getattr(self.library, self.name + "_" + function)
+        found.restype = result
+        return found(*arguments)
+
+    def solve(self, function, value):
+        """Status, joint, motor."""
+        at = (ctypes.c_double * 16)()
+        status = self.call(function, (ctypes.c_double * 1)(value), None, at, result=ctypes.c_int)
+        return status, at[0], at[1], at
+
+
+GROUND, CRANK, COUPLER, ROCKER = 0.4, 0.15, 0.35, 0.3
+
+
+def calc_fourbar(rocker):
+    """The crank of robots/fourbar for its rocker, by the angle between coupler and diagonal."""
+    x, z = GROUND + ROCKER * math.cos(rocker), ROCKER * math.sin(rocker)
+    diagonal = math.hypot(x, z)
+    return math.atan2(z, x) + math.acos((diagonal**2 + CRANK**2 - COUPLER**2) / (2 * diagonal * CRANK))
+
+
+class FirmwareTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        place = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(place.cleanup)
+        cls.place = place.name
+        cls.fourbar = os.path.join(cls.place, "fourbar")
+        convert("fourbar", cls.fourbar, "--to", "c", "--postures", "500")
+        cls.linkage = Linkage(cls.fourbar, "rocker_joint")
+        with open(os.path.join(cls.fourbar, "rocker_joint.h")) as file:
+            cls.low, cls.high = map(float, re.search(r"rocker_joint, ([\d.]+) to ([\d.]+) rad", file.read()).groups())
+
+    def test_generated_tests_of_all_kinds(self):
+        """Closed forms (four-bar, motors of an RSU), slides as struts, Newton's method; all compilers, without warnings."""
+        for robot, precision, language in (("rsu_biped", "double", "c"), ("kangaroo_leg", "float", "c"), ("fourbar", "float", "cpp")):
+            place = os.path.join(self.place, robot + precision)
+            convert(robot, place, "--to", language, "--precision", precision, "--postures", "400")
+            names = list_names(place)
+            self.assertTrue(names)
+            self.assertIn("README.md", os.listdir(place))
+            for name in names if robot != "rsu_biped" else names[:1]:
+                for compiler in COMPILERS:
+                    program = build_test(place, name, *((compiler,) if language == "c" else
+                                                        ({"gcc": "g++", "clang": "clang++"}[compiler], "c++11", "cpp")))
+                    self.assertIn(": ok", run(program).stdout)
+                with open(os.path.join(place, name + (".c" if language == "c" else ".cpp"))) as file:
+                    text = file.read()
+                self.assertNotRegex(text, r"malloc|while|goto")
+                if precision == "float":  # no number or function of double
+                    self.assertNotRegex(re.sub(r"/\*.*?\*/", "", text, flags=re.S), r"double|\d\.\d+(?![\d.]*(e[-+]?\d+)?f)|\b(sin|cos|sqrt)\(")
+
+    def test_a_wrong_entry_is_noticed(self):
+        place = os.path.join(self.place, "poisoned")
+        for number, (found, wrong) in enumerate(((r"(ratio->motor_per_joint\[0\]\[0\] = )", r"\g<1>1.001 * "),
+                                                 (r"(rate->motor_per_joint\[0\]\[0\] = )", r"\g<1>1.01 * "),
+                                                 (r"(at->motor\[0\] = )\(", r"\g<1>1e-9 + ("))):
+            shutil.copytree(self.fourbar, place + str(number))
+            path = os.path.join(place + str(number), "rocker_joint.c")
+            with open(path) as file:
+                text = file.read()
+            with open(path, "w") as file:
+                file.write(re.sub(found, wrong, text))
+            run(build_test(place + str(number), "rocker_joint"), status=1)
+        run(build_test(self.fourbar, "rocker_joint"))
+
+    def test_four_bar_in_closed_form(self):
+        for i in range(1001):
+            rocker = min(self.low + (self.high - self.low) * i / 1000, self.high)
+            crank = calc_fourbar(rocker)
+            status, joint, motor, at = self.linkage.solve("joint_to_motor", rocker)
+            self.assertEqual(status, OK)
+            self.assertLess(abs(motor - crank), 1e-12)
+            status, joint, motor, at = self.linkage.solve("motor_to_joint", crank)
+            self.assertEqual(status, OK)
+            self.assertLess(abs(joint - rocker), 1e-12)
+            self.assertEqual(self.linkage.call("on_branch", at, result=ctypes.c_int), 1)
+        with open(os.path.join(self.fourbar, "rocker_joint.h")) as file:
+            n = list(map(int, re.search(r"joint_to_motor: closed form; (\d+) mult\w+, \d+ add\w+, (\d+) div\w+, (\d+) root, (\d+) trig",
+                                        file.read()).groups()))
+        self.assertLessEqual(n[0], 60)
+        self.assertEqual(n[2:], [1, 3])
+
+    def test_out_of_range_and_no_numbers(self):
+        for value, expected in ((self.high + 0.1, self.high), (self.low - 5, self.low), (math.inf, self.high), (math.nan, self.low)):
+            status, joint, motor, _ = self.linkage.solve("joint_to_motor", value)
+            self.assertEqual((status, joint), (CLAMPED, expected))
+            self.assertLess(abs(motor - calc_fourbar(expected)), 1e-12)
+        for value in (math.nan, -math.inf, 0.0, 100.0):
+            status, joint, motor, _ = self.linkage.solve("motor_to_joint", value)
+            self.assertEqual(status, CLAMPED)
+            self.assertLess(abs(motor - calc_fourbar(joint)), 1e-8)
+
+    def test_rates_torques_gains_limits(self):
+        def make(*numbers):
+            return (ctypes.c_double * len(numbers))(*numbers)
+
+        h = 1e-5
+        for rocker in (1.7, 2.0, 2.5):
+            at = self.linkage.solve("joint_to_motor", rocker)[3]
+            ratio, rate, out = make(0, 0), make(0, 0), make(0)
+            self.linkage.call("update_ratio", at, ratio)
+            R = (calc_fourbar(rocker + h) - calc_fourbar(rocker - h)) / (2 * h)
+            self.assertLess(abs(ratio[0] - R), 1e-7 * abs(R))
+            self.assertLess(abs(ratio[0] * ratio[1] - 1), 1e-14)
+            self.linkage.call("update_ratio_rate", at, ratio, make(0.7), rate)
+            self.assertLess(abs(rate[0] - 0.7 * (calc_fourbar(rocker + h) - 2 * calc_fourbar(rocker) + calc_fourbar(rocker - h)) / h**2),
+                            2e-4 * abs(rate[0]))
+            self.assertLess(abs(rate[1] + rate[0] / R**2), 1e-6 * abs(rate[1]))
+
+            # Weight of crank and coupler, of 2 kg/m each; the rocker is part of the serial model.
+            def calc_energy(rocker):
+                z_crank, z_rocker = CRANK * math.sin(calc_fourbar(rocker)), ROCKER * math.sin(rocker)
+                return 9.81 * 2 * (CRANK * z_crank / 2 + COUPLER * (z_crank + z_rocker) / 2)
+
+            held = make(0)
+            self.linkage.call("held_torque", at, ratio, make(0, 0, -9.81), held)
+            self.assertLess(abs(held[0] - (calc_energy(rocker + h) - calc_energy(rocker - h)) / (2 * h)), 1e-6)
+            motor, joint = make(0), make(0)
+            self.linkage.call("motor_torque", ratio, make(3), held, motor)
+            self.assertLess(abs(motor[0] * R - 3 - held[0]), 1e-6)
+            self.linkage.call("joint_torque", ratio, motor, held, joint)
+            self.assertLess(abs(joint[0] - 3), 1e-13)
+            # 10 N m and 20 rad/s of the motor.
+            self.assertLess(abs(self.linkage.call("torque_limit", ratio, None, make(0), make(1), result=ctypes.c_double) - 10 * abs(R)), 1e-5)
+            self.assertLess(abs(self.linkage.call("torque_limit", ratio, held, make(0), make(1), result=ctypes.c_double) -
+                                (10 * abs(R) - math.copysign(1, R) * held[0] * math.copysign(1, R))), 1e-5)
+            self.assertLess(abs(self.linkage.call("speed_limit", ratio, make(-1), result=ctypes.c_double) - 20 / abs(R)), 1e-5)
+            gain, left = make(0), make(0)
+            self.linkage.call("motor_gain", ratio, make(50), gain, left)
+            self.assertLess(abs(gain[0] - 50 / R**2), 1e-4)
+            self.assertLess(abs(left[0]), 1e-12)
+            self.linkage.call("joint_gain", ratio, gain, out)
+            self.assertLess(abs(out[0] - 50), 1e-12)
+        # At the upper end the crank is next to where the rocker turns back: crank and coupler in line.
+        at = self.linkage.solve("joint_to_motor", self.high)[3]
+        distance = self.linkage.call("dead_point_distance", at, result=ctypes.c_double)
+        end = math.pi - math.acos((GROUND**2 + ROCKER**2 - (COUPLER - CRANK) ** 2) / (2 * GROUND * ROCKER))
+        crank = math.atan2(ROCKER * math.sin(end), GROUND + ROCKER * math.cos(end)) + math.pi
+        self.assertLess(abs(distance - abs(crank - at[1])), 0.2 * distance)
+
+    def test_bad_input_writes_nothing(self):
+        place = os.path.join(self.place, "nothing")
+        for robot, options, said in (
+                ("fourbar", ("--range", "rocker_joint", "1", "2.5"), r"joint 'rocker_joint': its range from 1 to 2.5 contains a dead point.* "
+                 r"between 1\.\d+ and 1\.\d+; .*--range rocker_joint LOW HIGH"),
+                ("fourbar", ("--range", "knee", "1", "2"), r"--range knee.*it is no serial joint.*rocker_joint"),
+                ("fourbar", ("--range", "rocker_joint", "2", "1"), r"is no range"),
+                ("fivebar", (), r"serial_joints"),
+                ("cleobot", (), r"serial_joints")):
+            error = convert(robot, place, "--to", "c", *options, status=2).stderr
+            self.assertRegex(error, said)
+            self.assertFalse(os.path.exists(place))
+        # The remedies help.
+        convert("fourbar", place, "--to", "c", "--range", "rocker_joint", "1.7", "2.5", "--postures", "100")
+        # A name that C does not know.
+        other = os.path.join(self.place, "renamed", "fourbar")
+        shutil.copytree(os.path.join(SOURCE, "robots", "fourbar"), other)
+        for name in ("fourbar.urdf", "fourbar.yaml"):
+            with open(os.path.join(other, name)) as file:
+                text = file.read()
+            with open(os.path.join(other, name), "w") as file:
+                file.write(text.replace("rocker_joint", "rocker-joint"))
+        error = convert(other, os.path.join(self.place, "none"), "--to", "c", status=2).stderr
+        self.assertRegex(error, "joint 'rocker-joint': its name cannot be one of C.*rename")
+        self.assertFalse(os.path.exists(os.path.join(self.place, "none")))
+
+    def test_directory_is_whole_or_as_it_was(self):
+        place = os.path.join(self.place, "again")
+        convert("fourbar", place, "--to", "c", "--postures", "100")
+        before = {name: os.path.getmtime(os.path.join(place, name)) for name in os.listdir(place)}
+        convert("fourbar", place, "--to", "c", "--postures", "100")  # replaced
+        self.assertEqual(set(before), set(os.listdir(place)))
+        with open(os.path.join(place, "mine.txt"), "w") as file:
+            file.write("notes")
+        error = convert("fourbar", place, "--to", "c", "--postures", "100", status=2).stderr
+        self.assertIn("'mine.txt'", error)
+        self.assertEqual(set(before) | {"mine.txt"}, set(os.listdir(place)))
+        self.assertFalse([name for name in os.listdir(self.place) if ".part" in name])
+        convert("fourbar", os.path.join(self.place, "no", "such"), "--to", "c", "--postures", "100", status=2)
+
+
+class AllTest(unittest.TestCase):
+    def test_all(self):
+        print("| linkage | joint to motor | motor to joint | error (double) | error (float) | over goal | bytes (float) |\n|---|---|---|---|---|---|---|")
+        with tempfile.TemporaryDirectory() as place:
+            for robot in ("fourbar", "bipetto", "rsu_biped", "kangaroo", "humanoid", "leg_biped", "belt_biped", "differential_ankle", "spring_biped",
+                          "spring_leg"):
+                texts = {}
+                for precision in ("double", "float"):
+                    out = os.path.join(place, robot, precision)
+                    os.makedirs(os.path.dirname(out), exist_ok=True)
+                    convert(robot, out, "--to", "c", "--precision", precision)
+                    for name in list_names(out):
+                        for compiler in COMPILERS:
+                            self.assertIn(": ok", run(build_test(out, name, compiler)).stdout)
+                        with open(os.path.join(out, name + ".h")) as file:
+                            texts[name, precision] = file.read()
+                for name in sorted({name for name, _ in texts}):
+                    errors, ways = {}, []
+                    for precision in ("double", "float"):
+                        text = texts[name, precision]
+                        errors[precision] = list(map(float, re.search(r"motors (\S+), joints (\S+) ", text).groups()))
+                        ratio = float(re.search(r"Largest entry of R: (\S+);", text).group(1))
+                    for function in ("joint_to_motor", "motor_to_joint"):
+                        how, n, roots, calls = re.search(function + r": (.*); (\d+) mult.* (\d+) roots?, (\d+) trig", texts[name, "double"]).groups()
+                        steps = re.search(r"(\d+) iteration", how)
+                        ways.append((steps.group(1) + " steps" if steps else "closed") + f": {n}, {roots}, {calls}")
+                    self.assertLess(max(errors["double"]), 1e-12, name)
+                    float_goal = 2e-6 * max(1, ratio)
+                    source = os.path.join(place, robot, "float", name + ".c")
+                    run("gcc", "-Os", "-c", source, "-o", source + ".o")
+                    size = run("size", source + ".o").stdout.split("\n")[1].split()[0]
+                    worst = {key: max(value) for key, value in errors.items()}
+                    print(f"| {robot}: {name} | {ways[0]} | {ways[1]} | {worst['double']:.1e} | {worst['float']:.1e} | "
+                          f"{worst['float'] / float_goal:.2f} | {size} |", flush=True)
+
+
+if __name__ == "__main__":
+    unittest.main(defaultTest="AllTest" if ALL else "FirmwareTest")
