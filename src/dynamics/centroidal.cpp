@@ -1,17 +1,11 @@
 #include "bielle/dynamics/kinematics.h"
-#include "dynamics/joint_force.h"
-#include "dynamics/point_spring.h"
+#include "dynamics/energy.h"
 
 namespace bielle {
 
 Vector3d calcCom(const Model& model, const Workspace& ws) {
   requireStage(ws, WorkspaceStage::Placement, "calcCom", "updatePlacements or updatePositions");
-  Vector3d sum = Vector3d::Zero();
-  for (int i = 1; i < model.numBodies(); ++i) {
-    const Inertia& inertia = model.bodies()[i].inertia;
-    sum += inertia.mass * ws.X_WB[i].act(inertia.com);
-  }
-  return sum / model.mass();
+  return calcComOf(model, ws);
 }
 
 Vector3d calcComVelocity(const Model& model, const Workspace& ws) {
@@ -43,16 +37,9 @@ Vector6d calcCentroidalMomentum(const Model& model, const Workspace& ws) {
 
 double calcKineticEnergy(const Model& model, const Workspace& ws) {
   requireStage(ws, WorkspaceStage::Velocity, "calcKineticEnergy", "updateVelocities");
-  double energy = 0.5 * model.armature().dot(ws.v.cwiseAbs2());
-  for (int i = 1; i < model.numBodies(); ++i) energy += 0.5 * ws.V[i].dot(ws.h[i]);
-  return energy;
+  return calcKineticEnergyOf(model, ws);
 }
 
-double calcPotentialEnergy(const Model& model, const Workspace& ws) {
-  double energy = -model.mass() * model.gravity().dot(calcCom(model, ws));
-  for (const JointForce& force : model.jointForces()) energy += calcSpringEnergy(force, ws.q);
-  for (const PointSpring& spring : model.pointSprings()) energy += calcSpringEnergy(spring, ws);
-  return energy;
-}
+double calcPotentialEnergy(const Model& model, const Workspace& ws) { return calcPotentialEnergyOf(model, ws); }
 
 }  // namespace bielle

@@ -1,5 +1,5 @@
 #pragma once
-// The force of springs, dampers and friction on a joint (model.h), its derivatives and its energy.
+// The force of springs, dampers and friction on a joint (model.h) and its derivatives.
 #include <cmath>
 
 #include "bielle/dynamics/workspace.h"
@@ -46,11 +46,6 @@ inline Eigen::Matrix<double, 5, 1> calcJointForceSlopes(const JointForce& force,
   Eigen::Matrix<double, 5, 1> slopes;
   slopes << force.rest - ws.q[force.idx_q], force.stiffness, 1, -v, -calcSmoothSign(v, force.friction_speed).value;
   return slopes;
-}
-
-inline double calcSpringEnergy(const JointForce& force, ConstVectorRef q) {
-  const double stretch = q[force.idx_q] - force.rest;
-  return stretch * (force.stiffness / 2 * stretch - force.preload);
 }
 
 }  // namespace bielle

@@ -1,5 +1,5 @@
 #pragma once
-/// \file The force of springs and dampers between two points (model.h), its change and its energy.
+/// \file The force of springs and dampers between two points (model.h) and its change.
 ///
 /// With the points p_1, p_2 and r = p_2 - p_1, e = kShortestLine, u = r / l, the force on body 1 at p_1 is f u and that on
 /// body 2 at p_2 is -f u, both along one line:
@@ -94,12 +94,6 @@ constexpr double kShortestSpring = 1e-6;
 /// l of Eq. (1); needs placements.
 inline double calcPointSpringLength(const PointSpring& spring, const Workspace& ws) {
   return calcLineLength<double>(ws.X_WB[spring.body2].act(spring.point2) - ws.X_WB[spring.body1].act(spring.point1));
-}
-
-/// Zero at the rest length; needs placements.
-inline double calcSpringEnergy(const PointSpring& spring, const Workspace& ws) {
-  const double stretch = calcPointSpringLength(spring, ws) - spring.rest;
-  return stretch * (spring.stiffness / 2 * stretch + spring.preload);
 }
 
 }  // namespace bielle

@@ -29,11 +29,13 @@ std::vector<int> listFreeTurns(const Model& model) {
   return places;
 }
 
+double leaveOutTurns(double angle) { return std::abs(angle) <= kFarAngle ? angle : std::remainder(angle, 2 * kPi); }
+
 bool leaveOutTurns(const std::vector<int>& free_turns, VectorXd& q, VectorXd& turns) {
   bool any = false;
   for (int i : free_turns) {
-    if (std::abs(q[i]) <= kFarAngle) continue;
-    const double rest = std::remainder(q[i], 2 * kPi);
+    const double rest = leaveOutTurns(q[i]);
+    if (rest == q[i]) continue;
     turns[i] += q[i] - rest;
     q[i] = rest;
     any = true;

@@ -12,6 +12,8 @@ bool countsTurns(const Model& model, int joint);
 std::vector<int> listFreeTurns(const Model& model);
 
 inline constexpr double kFarAngle = 1e4;  // rad
+// The angle without its whole turns if it is beyond kFarAngle.
+double leaveOutTurns(double angle);
 // Leaves whole turns out of angles beyond kFarAngle, and adds them to `turns` (nq, rad). Returns whether there were any.
 bool leaveOutTurns(const std::vector<int>& free_turns, VectorXd& q, VectorXd& turns);
 

@@ -1,26 +1,65 @@
 #include "worlds/closed_tree.h"
 
+#include <utility>
+
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/energy.h"
 #include "dynamics/whole_turns.h"
+#include "math/small_dense.h"
 #include "model/joint.h"
 #include "model/number_text.h"
 
 namespace bielle::worlds {
+namespace {
 
-ClosedTree::Cluster::Cluster(const ReducedCluster& l) : cluster(l), scratch(l), state(l), next(l), kept(l), motion(l) {
-  for (VectorXd* x : {&d, &a_d}) x->setZero(l.model.nv());
-  for (VectorXd* x : {&drift, &zeta}) x->setZero(l.rank);
+template <typename T>
+void gather(const std::vector<int>& dofs, const VectorX<T>& v, VectorX<T>& out) {
+  for (size_t k = 0; k < dofs.size(); ++k) out[k] = v[dofs[k]];
+}
+
+// out = A^T x
+template <typename T, typename Out>
+void multiplyTransposed(const MatrixX<T>& A, const VectorX<T>& x, Out&& out) {
+  if constexpr (std::is_same_v<T, double>) {
+    out.noalias() = A.transpose() * x;
+  } else {
+    out.setZero();
+    addSmallProductTransposed(A, x, out);
+  }
+}
+
+template <typename T>
+void assignState(const MaskOf<T>& mask, const ClusterStateOf<T>& from, ClusterStateOf<T>& to) {
+  for (auto part : {&ClusterBasisOf<T>::N, &ClusterBasisOf<T>::WN, &ClusterBasisOf<T>::J, &ClusterBasisOf<T>::L})
+    assignLanes(mask, from.basis.*part, to.basis.*part);
+  assignLanes(mask, from.basis.q, to.basis.q);
+  for (size_t i = 0; i < to.basis.rows.size(); ++i)
+    to.basis.rows[i] = select(mask, from.basis.rows[i], to.basis.rows[i]);
+  for (size_t i = 0; i < to.placements.size(); ++i) {
+    assignLanes(mask, from.placements[i].R, to.placements[i].R);
+    assignLanes(mask, from.placements[i].p, to.placements[i].p);
+  }
+  assignLanes(mask, from.zeta, to.zeta);
+  assignLanes(mask, from.step, to.step);
+}
+
+}  // namespace
+
+template <typename T>
+ClosedTreeOf<T>::Cluster::Cluster(const ReducedCluster& l) : cluster(l), scratch(l), next(l), motion(l) {
+  for (Vector* x : {&d, &a_d}) x->setZero(l.model.nv());
+  for (Vector* x : {&drift, &zeta}) x->setZero(l.rank);
   rows.setZero(l.closures.rows);
 }
 
-ClosedTree::ClosedTree(const Model& model, ConstVectorRef q, const std::vector<int>& tips)
+template <typename T>
+ClosedTreeOf<T>::ClosedTreeOf(const Model& model, ConstVectorRef q, const std::vector<int>& tips)
     : model_(model),
       reduction_(makeReduction(model, q)),
       tree_(model, reduction_, tips),
       ws_(model),
-      free_turns_(listFreeTurns(model)),
-      turns_(VectorXd::Zero(model.nq())) {
+      free_turns_(listFreeTurns(model)) {
   places_.resize(model.nv());
   clusters_.reserve(reduction_.clusters.size());  // lifts point into them
   for (const ReducedCluster& cluster : reduction_.clusters) {
@@ -28,140 +67,219 @@ ClosedTree::ClosedTree(const Model& model, ConstVectorRef q, const std::vector<i
       places_[cluster.dofs[k]] = {static_cast<int>(clusters_.size()), static_cast<int>(k)};
     clusters_.emplace_back(cluster);
     lifts_.push_back({&clusters_.back().motion, nullptr});
+    state_.clusters.emplace_back(cluster);
+    state_.drifts.push_back(Vector::Zero(cluster.rank));
   }
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model.joints()[reduction_.free_joints[i]];
     for (int k = 0; k < joint.nv; ++k) places_[joint.idx_v + k] = {-1, reduction_.free_offsets[i] + k};
   }
   M_.setZero(size(), size());
-  for (VectorXd* x : {&q_, &q_next_, &q_kept_}) *x = model.makeNeutral();
-  for (VectorXd* x : {&v_, &v_foreseen_, &a_d_}) x->setZero(model.nv());
-  for (VectorXd* x : {&w_, &w_foreseen_, &loads_, &w_kept_}) x->setZero(size());
+  for (Vector* x : {&state_.q, &q_next_, &q_kept_}) *x = model.makeNeutral().cast<T>();
+  state_.turns.setZero(model.nq());
+  for (Vector* x : {&state_.v, &v_next_, &v_foreseen_, &a_d_}) x->setZero(model.nv());
+  for (Vector* x : {&state_.w, &w_next_, &loads_, &w_kept_}) x->setZero(size());
 }
 
-bool ClosedTree::set(ConstVectorRef q, ConstVectorRef v) {
-  q_ = q;
-  turns_.setZero();
-  leaveOutTurns(free_turns_, q_, turns_);
+template <typename T>
+MaskOf<T> ClosedTreeOf<T>::set(const Vector& q, const Vector& v, const Mask& which) {
+  Mask done = which;
+  assignLanes(which, q, state_.q);
+  assignLanes(which, Vector::Zero(q.size()), state_.turns);
+  leaveOutTurns(which);
+  w_next_ = state_.w;
   for (size_t i = 0; i < clusters_.size(); ++i) {
     Cluster& c = clusters_[i];
-    gatherConfiguration(model_, c.cluster, q_, c.state.basis.q);
-    c.zeta.setZero();
-    c.drift.setZero();  // of the state before
-    if (!updateClusterState<double>(c.cluster, c.scratch, c.state.basis.q, c.state)) {
-      failed_ = i;
-      return false;
-    }
-    gatherVelocity(c.cluster, v, c.d);
-    w_.segment(c.cluster.offset, c.cluster.size).noalias() = c.state.basis.WN.transpose() * c.d;
+    const Mask regular = renew(i, which);
+    describe(i, done && !regular);
+    done = done && regular;
+    if (!any(done)) return done;
+    gather(c.cluster.dofs, v, c.d);
+    multiplyTransposed<T>(state_.clusters[i].basis.WN, c.d, w_next_.segment(c.cluster.offset, c.cluster.size));
   }
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    w_.segment(reduction_.free_offsets[i], joint.nv) = v.segment(joint.idx_v, joint.nv);
+    w_next_.segment(reduction_.free_offsets[i], joint.nv) = v.segment(joint.idx_v, joint.nv);
   }
-  updateTree();
-  return true;
+  assignLanes(which, w_next_, state_.w);
+  updateTree(which);
+  return done;
 }
 
-bool ClosedTree::drift(double h, int halvings) {
-  if (driftAtOnce(h)) return true;
-  return halvings > 0 && drift(0.5 * h, halvings - 1) && drift(0.5 * h, halvings - 1);
+// The state of a cluster at q: its bases are the same however it is reached. \returns false where it is singular
+template <typename T>
+MaskOf<T> ClosedTreeOf<T>::renew(size_t cluster, const Mask& which) {
+  Cluster& c = clusters_[cluster];
+  gatherConfiguration<T>(model_, c.cluster, state_.q, c.next.basis.q);
+  const Mask regular = updateClusterState<T>(c.cluster, c.scratch, c.next.basis.q, c.next);
+  takeNext(which, cluster);
+  assignLanes(which, Vector::Zero(c.cluster.rank), state_.drifts[cluster]);  // of another state
+  return regular;
 }
 
-// Changes nothing if it fails.
-bool ClosedTree::driftAtOnce(double h) {
+template <typename T>
+MaskOf<T> ClosedTreeOf<T>::drift(const T& h, const Mask& which, int halvings) {
+  const Mask done = driftAtOnce(h, which, halvings == 0), left = which && !done;
+  if (halvings == 0 || !any(left)) return done;
+  const T half = 0.5 * h;
+  const Mask first = drift(half, left, halvings - 1);
+  return any(first) ? done || drift(half, first, halvings - 1) : done;
+}
+
+// Changes nothing where it fails.
+template <typename T>
+MaskOf<T> ClosedTreeOf<T>::driftAtOnce(const T& h, const Mask& which, bool is_last) {
+  Mask done = which;
   for (size_t i = 0; i < clusters_.size(); ++i) {
     Cluster& c = clusters_[i];
-    gatherVelocity(c.cluster, v_, c.d);
+    gather(c.cluster.dofs, state_.v, c.d);
     c.d *= h;
-    // To second order the closures open by h^2/2 times their drift. `drift` has it since updateLoads(), solved.
-    c.zeta = -0.5 * h * h * c.drift;
-    if (!closeCluster<double>(c.cluster, c.scratch, c.state.basis, c.d, c.zeta, c.next)) {
-      failed_ = i;
-      return false;
+    // To second order the closures open by h^2/2 times their drift.
+    c.zeta = -0.5 * h * h * state_.drifts[i];
+    if (!all(done)) {  // the others close at once
+      assignLanes(!done, Vector::Zero(c.d.size()), c.d);
+      assignLanes(!done, Vector::Zero(c.zeta.size()), c.zeta);
     }
+    const Mask closed = closeCluster<T>(c.cluster, c.scratch, state_.clusters[i].basis, c.d, c.zeta, c.next);
+    if (is_last) describe(i, done && !closed);
+    done = done && closed;
+    if (!any(done)) return done;
   }
-  for (Cluster& c : clusters_) {
-    auto w = w_.segment(c.cluster.offset, c.cluster.size);
-    w.noalias() = c.next.basis.WN.transpose() * c.next.step;
+  w_next_ = state_.w;
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    Cluster& c = clusters_[i];
+    auto w = w_next_.segment(c.cluster.offset, c.cluster.size);
+    multiplyTransposed<T>(c.next.basis.WN, c.next.step, w);
     w /= h;
-    std::swap(c.state, c.next);
-    scatterConfiguration(model_, c.cluster, c.state.basis.q, q_next_);
+    takeNext(done, i);
+    scatterConfiguration<T>(model_, c.cluster, state_.clusters[i].basis.q, q_next_);
   }
   for (int i : reduction_.free_joints) {
     const Joint& joint = model_.joints()[i];
-    v_foreseen_.segment(joint.idx_v, joint.nv) = h * v_.segment(joint.idx_v, joint.nv);
-    integrateJoint(joint, q_.segment(joint.idx_q, joint.nq), v_foreseen_.segment(joint.idx_v, joint.nv),
-                   q_next_.segment(joint.idx_q, joint.nq));
+    v_foreseen_.segment(joint.idx_v, joint.nv) = h * state_.v.segment(joint.idx_v, joint.nv);
+    integrateJoint<T>(joint, state_.q.segment(joint.idx_q, joint.nq), v_foreseen_.segment(joint.idx_v, joint.nv),
+                      q_next_.segment(joint.idx_q, joint.nq));
   }
-  q_.swap(q_next_);
-  updateTree();
-  return true;
-}
-
-void ClosedTree::keep() {
-  const bool is_near = !leaveOutTurns(free_turns_, q_, turns_);
-  for (Cluster& c : clusters_) {
-    if (!is_near) gatherConfiguration(model_, c.cluster, q_, c.state.basis.q);
-    c.kept = c.state;
+  if (!all(done)) {
+    assignLanes(!done, state_.q, q_next_);
+    assignLanes(!done, state_.w, w_next_);
   }
-  q_kept_ = q_;
-  w_kept_ = w_;
+  state_.q.swap(q_next_);
+  state_.w.swap(w_next_);
+  updateTree(done);
+  return done;
 }
 
-void ClosedTree::restore() {
-  for (Cluster& c : clusters_) {
-    c.state = c.kept;
-    c.drift.setZero();  // of another state
+template <typename T>
+void ClosedTreeOf<T>::takeNext(const Mask& which, size_t cluster) {
+  if (all(which))
+    std::swap(state_.clusters[cluster], clusters_[cluster].next);
+  else
+    assignState(which, clusters_[cluster].next, state_.clusters[cluster]);
+}
+
+template <typename T>
+bool ClosedTreeOf<T>::leaveOutTurns(const Mask& which) {
+  if constexpr (std::is_same_v<T, double>) {
+    return bielle::leaveOutTurns(free_turns_, state_.q, state_.turns);
+  } else {
+    bool is_far = false;
+    for (int i : free_turns_)
+      for (int l = 0; l < kLane; ++l) {
+        const double angle = state_.q[i][l], rest = bielle::leaveOutTurns(angle);
+        if (!which[l] || rest == angle) continue;
+        state_.turns[i].set(l, state_.turns[i][l] + (angle - rest));
+        state_.q[i].set(l, rest);
+        is_far = true;
+      }
+    return is_far;
   }
-  q_ = q_kept_;
-  w_ = w_kept_;
-  updateTree();
 }
 
-// Bodies and velocities at q and w.
-void ClosedTree::updateTree() {
-  updatePositions(model_, ws_, q_);
-  v_.setZero();
-  addReduced(w_, v_);
+template <typename T>
+void ClosedTreeOf<T>::keep(const Mask& which) {
+  if (leaveOutTurns(which))
+    for (size_t i = 0; i < clusters_.size(); ++i)
+      gatherConfiguration<T>(model_, clusters_[i].cluster, state_.q, state_.clusters[i].basis.q);
+  assignLanes(which, state_.q, q_kept_);
+  assignLanes(which, state_.w, w_kept_);
 }
 
-double ClosedTree::calcPotential() const { return calcPotentialEnergy(model_, ws_); }
-
-double ClosedTree::calcEnergy() {
-  updateVelocities<double>(model_, ws_, v_);
-  return calcKineticEnergy(model_, ws_) + calcPotential();
+template <typename T>
+void ClosedTreeOf<T>::restore(const Mask& which) {
+  assignLanes(which, q_kept_, state_.q);
+  assignLanes(which, w_kept_, state_.w);
+  for (size_t i = 0; i < clusters_.size(); ++i) renew(i, which);
+  updateTree(which);
 }
 
-std::string ClosedTree::failure() const {
-  const Cluster& c = clusters_[failed_];
-  const std::string why = describeFailure(c.cluster, c.scratch);
-  if (c.scratch.closed) return why;
-  return why + "; " + formatNumber(c.scratch.residual.cwiseAbs().maxCoeff(), "%.3g") + " m or rad are left open";
+// Bodies at q, and velocities at w.
+template <typename T>
+void ClosedTreeOf<T>::updateTree(const Mask& which) {
+  updatePlacements<T>(model_, ws_, state_.q);
+  updateColumns<T>(model_, ws_);
+  v_next_.setZero();
+  addReduced(state_.w, v_next_);
+  if (!all(which)) assignLanes(!which, state_.v, v_next_);
+  state_.v.swap(v_next_);
 }
 
-void ClosedTree::updateMassMatrix() {
+template <typename T>
+T ClosedTreeOf<T>::calcPotential() const {
+  return calcPotentialEnergyOf(model_, ws_);
+}
+
+template <typename T>
+T ClosedTreeOf<T>::calcEnergy() {
+  updateVelocities<T>(model_, ws_, state_.v);
+  return calcKineticEnergyOf(model_, ws_) + calcPotential();
+}
+
+template <typename T>
+void ClosedTreeOf<T>::describe(size_t cluster, const Mask& which) {
+  if (!any(which)) return;
+  const Cluster& c = clusters_[cluster];
+  for (int l = 0; l < kLanesOf<T>; ++l) {
+    if (!getLane(which, l)) continue;
+    failures_[l] = describeFailure(c.cluster, c.scratch, l);
+    if (getLane(c.scratch.closed, l)) continue;
+    double largest = 0;
+    for (const T& gap : c.scratch.residual) largest = std::max(largest, std::abs(getLane(gap, l)));
+    failures_[l] += "; " + formatNumber(largest, "%.3g") + " m or rad are left open";
+  }
+}
+
+template <typename T>
+void ClosedTreeOf<T>::updateMassMatrix() {
   updateCompositeInertias(model_, ws_);
-  for (Cluster& c : clusters_) updateTwists(getPlacedView(c.cluster, ws_), c.state.basis, c.motion);
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    Cluster& c = clusters_[i];
+    updateTwists(getPlacedView(c.cluster, ws_), state_.clusters[i].basis, c.motion);
+  }
   tree_.updateMassMatrix(ws_, lifts_, M_);
 }
 
-void ClosedTree::updateLoads(ConstVectorRef tau, const VectorXd& dw) {
-  v_foreseen_ = v_;
+template <typename T>
+void ClosedTreeOf<T>::updateLoads(const Vector& tau, const Vector& dw, const Mask& which) {
+  v_foreseen_ = state_.v;
   addReduced(dw, v_foreseen_);
-  updateVelocities<double>(model_, ws_, v_foreseen_);
+  updateVelocities<T>(model_, ws_, v_foreseen_);
   updateDrift(model_, ws_);
   a_d_.setZero();
-  for (Cluster& c : clusters_) {
-    calcClusterDrift<double>(getPlacedView(c.cluster, ws_), c.cluster, c.state.basis, c.rows, c.drift);
-    applyPseudoInverse<double>(c.cluster, c.state.basis, -1, c.drift, c.a_d);  // leaves the solution in c.drift
-    scatterVelocity(c.cluster, c.a_d, a_d_);
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    Cluster& c = clusters_[i];
+    const ClusterBasisOf<T>& basis = state_.clusters[i].basis;
+    calcClusterDrift<T>(getPlacedView(c.cluster, ws_), c.cluster, basis, c.rows, c.drift);
+    applyPseudoInverse<T>(c.cluster, basis, -1, c.drift, c.a_d);  // leaves the solution in c.drift
+    assignLanes(which, c.drift, state_.drifts[i]);
+    for (size_t k = 0; k < c.cluster.dofs.size(); ++k) a_d_[c.cluster.dofs[k]] = c.a_d[k];
   }
-  updateInverseDynamics<double>(model_, ws_, a_d_);
+  updateInverseDynamics<T>(model_, ws_, a_d_);
   v_foreseen_ = tau - ws_.b;
-  for (Cluster& c : clusters_) {
-    gatherVelocity(c.cluster, v_foreseen_, c.d);
-    loads_.segment(c.cluster.offset, c.cluster.size).noalias() = c.state.basis.N.transpose() * c.d;
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    Cluster& c = clusters_[i];
+    gather(c.cluster.dofs, v_foreseen_, c.d);
+    multiplyTransposed<T>(state_.clusters[i].basis.N, c.d, loads_.segment(c.cluster.offset, c.cluster.size));
   }
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
@@ -169,20 +287,34 @@ void ClosedTree::updateLoads(ConstVectorRef tau, const VectorXd& dw) {
   }
 }
 
-void ClosedTree::kick(const VectorXd& dw) {
-  w_ += dw;
-  addReduced(dw, v_);
+template <typename T>
+void ClosedTreeOf<T>::kick(const Vector& dw, const Mask& which) {
+  w_next_ = state_.w + dw;
+  v_next_ = state_.v;
+  addReduced(dw, v_next_);
+  if (!all(which)) {
+    assignLanes(!which, state_.w, w_next_);
+    assignLanes(!which, state_.v, v_next_);
+  }
+  state_.w.swap(w_next_);
+  state_.v.swap(v_next_);
 }
 
 // v += N dw
-void ClosedTree::addReduced(const VectorXd& dw, VectorXd& v) const {
-  for (const Cluster& c : clusters_)
-    for (size_t k = 0; k < c.cluster.dofs.size(); ++k)
-      v[c.cluster.dofs[k]] += c.state.basis.N.row(k).dot(dw.segment(c.cluster.offset, c.cluster.size));
+template <typename T>
+void ClosedTreeOf<T>::addReduced(const Vector& dw, Vector& v) const {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    const ReducedCluster& cluster = clusters_[i].cluster;
+    for (size_t k = 0; k < cluster.dofs.size(); ++k)
+      v[cluster.dofs[k]] += state_.clusters[i].basis.N.row(k).dot(dw.segment(cluster.offset, cluster.size));
+  }
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
     v.segment(joint.idx_v, joint.nv) += dw.segment(reduction_.free_offsets[i], joint.nv);
   }
 }
+
+template class ClosedTreeOf<double>;
+template class ClosedTreeOf<Lanes>;
 
 }  // namespace bielle::worlds

@@ -7,102 +7,124 @@
 ///
 /// where a_d, minus the pseudo-inverse of the closures times their drift, keeps the loops closed. The steps are those of
 /// robot_problem.h, Eq. (4).
+///
+/// T is double, or Lanes for as many robots at once. Lanes never mix: what a function does to one robot is the same to the last bit
+/// whatever the others do, since those that a mask leaves out stay as they are.
+#include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bielle/dynamics/workspace.h"
 #include "dynamics/reduced_tree.h"
 #include "dynamics/reduction.h"
+#include "math/lane_masks.h"
 
 namespace bielle::worlds {
 
 /// No function allocates after the constructor, except to describe a failure.
-class ClosedTree {
+template <typename T>
+class ClosedTreeOf {
  public:
+  using Vector = VectorX<T>;
+  using Mask = MaskOf<T>;
+
+  /// What there is to remember of robots while others use the tree.
+  struct State {
+    Vector q, turns, v, w;                    ///< nq, nq, nv, size
+    std::vector<ClusterStateOf<T>> clusters;  ///< at q
+    std::vector<Vector> drifts;               ///< rank: (J W^{-1} J^T)^{-1} times the drift of the closures
+  };
+
   /// \param q  closed configuration at which ranks are determined   \param tips  bodies
   /// whose velocities and loads are of interest
   /// \throws InputError as makeReduction() does
-  ClosedTree(const Model& model, ConstVectorRef q, const std::vector<int>& tips);
-  ClosedTree(const ClosedTree&) = delete;
-  ClosedTree& operator=(const ClosedTree&) = delete;
+  ClosedTreeOf(const Model& model, ConstVectorRef q, const std::vector<int>& tips);
+  ClosedTreeOf(const ClosedTreeOf&) = delete;
+  ClosedTreeOf& operator=(const ClosedTreeOf&) = delete;
 
-  /// Sets a closed configuration, and the velocity nearest to v that keeps it closed.
+  /// Sets closed configurations of the robots of the mask, and the velocities nearest to v that keep them closed.
   /// \returns false where the linkages are singular; failure() then names a closure, also below
-  bool set(ConstVectorRef q, ConstVectorRef v);
-  /// Moves with the present velocity for a duration h, not zero: where a loop does not close, by two halves, which are
-  /// divided again up to kMostHalvings times. If that does not help, the state is somewhere on the way: restore() it.
-  bool drift(double h, int halvings = kMostHalvings);
+  Mask set(const Vector& q, const Vector& v, const Mask& which);
+  /// Robots of the mask move with the present velocity for a duration h, not zero: where a loop does not close, by two halves, which
+  /// are divided again up to kMostHalvings times. Those that do not are somewhere on the way: restore() them.
+  Mask drift(const T& h, const Mask& which, int halvings = kMostHalvings);
   static constexpr int kMostHalvings = 6;
   /// Keeps configuration and velocity, and returns to those that were kept last. Whole turns of far angles are left out.
-  void keep();
-  void restore();
+  void keep(const Mask& which);
+  void restore(const Mask& which);
   /// M^, and the columns of the tips, at q.
   void updateMassMatrix();
-  /// The part N^T (tau - b - M a_d) of Eq. (1) at the velocity w + dw (size).
-  void updateLoads(ConstVectorRef tau, const VectorXd& dw);
+  /// The part N^T (tau - b - M a_d) of Eq. (1) at the velocity w + dw (size), and the drift for the next drift() of those of the mask.
+  void updateLoads(const Vector& tau, const Vector& dw, const Mask& which);
   /// w <- w + dw
-  void kick(const VectorXd& dw);
+  void kick(const Vector& dw, const Mask& which);
+  /// Exchanges the robots for others. Placements and all that is updated are those of the former until the next drift().
+  void swap(State& state) { std::swap(state_, state); }
+  const State& state() const { return state_; }
 
-  double calcPotential() const;  ///< of gravity and springs of the model, J
-  double calcEnergy();           ///< that and the kinetic one, J
+  T calcPotential() const;  ///< of gravity and springs of the model, J
+  T calcEnergy();           ///< that and the kinetic one, J
 
   int size() const { return reduction_.size; }
-  const MatrixXd& massMatrix() const { return M_; }
-  const VectorXd& loads() const { return loads_; }
-  const VectorXd& reducedVelocity() const { return w_; }  ///< w
-  const VectorXd& configuration() const { return q_; }    ///< nq, without turns()
-  const VectorXd& turns() const { return turns_; }        ///< nq, whole turns of hinges that nothing counts, rad
-  const VectorXd& velocity() const { return v_; }         ///< nv
-  const SE3& getPlacement(int body) const { return ws_.X_WB[body]; }
+  const MatrixX<T>& massMatrix() const { return M_; }
+  const Vector& loads() const { return loads_; }
+  const Vector& reducedVelocity() const { return state_.w; }  ///< w
+  const Vector& configuration() const { return state_.q; }    ///< nq, without turns()
+  const Vector& turns() const { return state_.turns; }        ///< nq, whole turns of hinges that nothing counts, rad
+  const Vector& velocity() const { return state_.v; }         ///< nv
+  const SE3Of<T>& getPlacement(int body) const { return ws_.X_WB[body]; }
   /// Columns J_b N of a tip, about the origin of the world; `outer` are their indices into w.
-  const ReducedTree::Columns& getTip(int index) const { return tree_.getTip(index); }
+  const typename ReducedTreeOf<T>::Columns& getTip(int index) const { return tree_.getTip(index); }
   /// Row `dof` of N: calls visit(index into w, entry) for entries that may differ from zero.
   template <typename Visit>
   void visitRow(int dof, const Visit& visit) const {
     const DofPlace& place = places_[dof];
     if (place.cluster < 0) {
-      visit(place.index, 1.0);
+      visit(place.index, T(1));
       return;
     }
     const ReducedCluster& cluster = reduction_.clusters[place.cluster];
     for (int c = 0; c < cluster.size; ++c)
-      visit(cluster.offset + c, clusters_[place.cluster].state.basis.N(place.index, c));
+      visit(cluster.offset + c, state_.clusters[place.cluster].basis.N(place.index, c));
   }
-  /// Why set() or drift() has just failed, with the closure and how far it is open.
-  std::string failure() const;
+  /// Why set() or drift() failed last, with the closure and how far it is open.
+  const std::string& failure(int lane = 0) const { return failures_[lane]; }
 
  private:
   struct Cluster {
     explicit Cluster(const ReducedCluster& cluster);
     const ReducedCluster& cluster;
-    ClusterScratch scratch;
-    ClusterState state, next, kept;
-    ClusterMotion motion;
-    // n; n; m; rank: (J W^{-1} J^T)^{-1} times the drift of the closures; rank
-    VectorXd d, a_d, rows, drift, zeta;
+    ClusterScratchOf<T> scratch;
+    ClusterStateOf<T> next;
+    ClusterMotionOf<T> motion;
+    Vector d, a_d, rows, drift, zeta;  // n; n; m; rank; rank
   };
   struct DofPlace {
     int cluster = -1, index = 0;  // row of N of the cluster; without one, index into w
   };
-  bool driftAtOnce(double h);
-  void updateTree();
-  void addReduced(const VectorXd& dw, VectorXd& v) const;
+  Mask driftAtOnce(const T& h, const Mask& which, bool is_last);
+  Mask renew(size_t cluster, const Mask& which);
+  void updateTree(const Mask& which);
+  void addReduced(const Vector& dw, Vector& v) const;
+  void takeNext(const Mask& which, size_t cluster);
+  bool leaveOutTurns(const Mask& which);
+  void describe(size_t cluster, const Mask& which);
 
   Model model_;
   const Reduction reduction_;
   std::vector<Cluster> clusters_;
-  std::vector<ClusterLift> lifts_;
+  std::vector<ClusterLiftOf<T>> lifts_;
   std::vector<DofPlace> places_;
-  ReducedTree tree_;
-  Workspace ws_;
-  MatrixXd M_;  // size x size
+  ReducedTreeOf<T> tree_;
+  WorkspaceOf<T> ws_;
+  State state_;
+  MatrixX<T> M_;  // size x size
   const std::vector<int> free_turns_;
-  VectorXd turns_;                   // nq
-  VectorXd q_, q_next_, v_;          // nq, nq, nv
-  VectorXd v_foreseen_, a_d_;        // nv
-  VectorXd w_, w_foreseen_, loads_;  // size
-  VectorXd q_kept_, w_kept_;         // nq, size
-  size_t failed_ = 0;                // cluster
+  Vector q_next_, v_next_, w_next_;  // nq, nv, size
+  Vector v_foreseen_, a_d_, loads_;  // nv, nv, size
+  Vector q_kept_, w_kept_;           // nq, size
+  std::array<std::string, kLanesOf<T>> failures_;
 };
 
 }  // namespace bielle::worlds

@@ -16,13 +16,15 @@ constexpr double kOver = 2e-4, kUnder = 5e-3;
 constexpr double kSteep = 0.5;  // cosine between a sole and the level: points of steeper ones stay where they are
 
 // Eq. (1)
+template <typename T>
 struct NormalForce {
-  double force = 0, rate = 0;  // rate: d force / d d'
+  T force, rate;  // rate: d force / d d'
 };
-NormalForce calcNormalForce(double stiffness, double damping, double depth, double depth_rate) {
-  const double factor = 1 + damping * depth_rate;
-  if (factor <= 0) return {};
-  return {stiffness * depth * factor, stiffness * depth * damping};
+template <typename T>
+NormalForce<T> calcNormalForce(double stiffness, double damping, const T& depth, const T& depth_rate) {
+  const T factor = 1 + damping * depth_rate;
+  const auto pulls = factor <= T(0);
+  return {select(pulls, T(0), T(stiffness * depth * factor)), select(pulls, T(0), T(stiffness * depth * damping))};
 }
 
 // N. From it follows how hard soles and stops are, which does not vanish with the gravity.
@@ -32,19 +34,37 @@ double calcWeight(const Model& model) {
 }
 
 // Eq. (5), from a to b.
+template <typename T>
 struct MeanDepth {
-  double depth = 0, rate = 0;  // rate: d depth / d b
+  T depth, rate;  // rate: d depth / d b
 };
-MeanDepth calcMeanDepth(double a, double b) {
-  if (a > 0 && b > 0) return {0.5 * (a + b), 0.5};
-  if (b > 0) return {0.5 * b * b / (b - a), 0.5 * b * (b - 2 * a) / ((b - a) * (b - a))};
-  if (a > 0) return {0.5 * a * a / (a - b), 0.5 * a * a / ((a - b) * (a - b))};
-  return {};
+template <typename T>
+MeanDepth<T> calcMeanDepth(const T& a, const T& b) {
+  const auto from = a > T(0), to = b > T(0), enters = to && !from, leaves = from && !to;
+  MeanDepth<T> out{select(from && to, T(0.5 * (a + b)), T(0)), select(from && to, T(0.5), T(0))};
+  if (any(enters)) {
+    out.depth = select(enters, T(0.5 * b * b / (b - a)), out.depth);
+    out.rate = select(enters, T(0.5 * b * (b - 2 * a) / ((b - a) * (b - a))), out.rate);
+  }
+  if (any(leaves)) {
+    out.depth = select(leaves, T(0.5 * a * a / (a - b)), out.depth);
+    out.rate = select(leaves, T(0.5 * a * a / ((a - b) * (a - b))), out.rate);
+  }
+  return out;
 }
 
-Vector3d shorten(const Vector3d& vector, double length) {
-  const double norm = vector.norm();
-  return norm > length ? Vector3d(vector * (length / norm)) : vector;
+template <typename T>
+T calcNorm(const Vector3<T>& x) {
+  using std::sqrt;
+  return sqrt(x.squaredNorm());
+}
+
+template <typename T>
+Vector3<T> shorten(const Vector3<T>& vector, const T& length) {
+  const T norm = calcNorm(vector);
+  const auto is_longer = norm > length;
+  if (!any(is_longer)) return vector;
+  return select(is_longer, Vector3<T>(vector * (length / norm)), vector);
 }
 
 }  // namespace
@@ -75,64 +95,100 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
   return points;
 }
 
-ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
-                              const Vector3d& velocity, bool with_damping, const ContactStep& step) {
-  return calcContactForce(terrain.touch(x, point.from), terrain.ground().friction, point, x, velocity, with_damping,
-                          step);
+template <typename T>
+TouchOf<T> findTouch(const Terrain& terrain, const Vector3<T>& x, const Vector3<T>& from) {
+  if constexpr (std::is_same_v<T, double>) {
+    const Terrain::Touch touch = terrain.touch(x, from);
+    return {touch.depth, touch.normal};
+  } else {
+    if (terrain.ground().steps.empty()) return {terrain.ground().height - x.z(), Vector3<T>::UnitZ()};
+    TouchOf<T> out;
+    for (Eigen::Index l = 0; l < kLane; ++l) {
+      const auto getLane = [l](const Vector3<T>& v) { return Vector3d(v[0][l], v[1][l], v[2][l]); };
+      const Terrain::Touch touch = terrain.touch(getLane(x), getLane(from));
+      out.depth.set(l, touch.depth);
+      for (int i = 0; i < 3; ++i) out.normal[i].set(l, touch.normal[i]);
+    }
+    return out;
+  }
 }
 
-ContactForce calcContactForce(const Terrain::Touch& touch, double mu, const ContactPoint& point, const Vector3d& x,
+ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
                               const Vector3d& velocity, bool with_damping, const ContactStep& step) {
-  ContactForce out;
-  const Vector3d& n = touch.normal;
-  const double approach = -n.dot(velocity), before = -n.dot(step.before), h = step.h;
-  const MeanDepth mean = calcMeanDepth(touch.depth - 0.5 * h * before, touch.depth + 0.5 * h * (2 * approach - before));
-  if (!(mean.depth > 0)) return out;
-  NormalForce normal = calcNormalForce(point.stiffness, point.damping, mean.depth, approach);
+  return calcContactForce<double>(findTouch<double>(terrain, x, point.from), terrain.ground().friction, point, x,
+                                  velocity, with_damping, step);
+}
+
+template <typename T>
+ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, double mu, const ContactPointOf<T>& point,
+                                   const Vector3<T>& x, const Vector3<T>& velocity, bool with_damping,
+                                   const ContactStepOf<T>& step) {
+  ContactForceOf<T> out;
+  const Vector3<T>& n = touch.normal;
+  const T approach = -n.dot(velocity), before = -n.dot(step.before), h = step.h;
+  const MeanDepth<T> mean =
+      calcMeanDepth<T>(touch.depth - 0.5 * h * before, touch.depth + 0.5 * h * (2 * approach - before));
+  const auto touches = mean.depth > T(0);
+  if (!any(touches)) return out;
+  NormalForce<T> normal = calcNormalForce<T>(point.stiffness, point.damping, mean.depth, approach);
   normal.rate += normal.force / mean.depth * mean.rate * h;
-  const double limit = mu * normal.force;
-  const Vector3d anchor = point.touches ? point.anchor : x;
+  const T limit = mu * normal.force;
+  const Vector3<T> anchor = select(point.touches, point.anchor, x);
   out.shift = 0.5 * h * (velocity - step.before);
-  const Vector3d shift = x + out.shift - anchor, sliding = velocity + approach * n;
-  const Vector3d held = -point.shear_stiffness * (shift - n.dot(shift) * n);
-  out.spring = shorten(held, limit);
-  const Vector3d wanted = out.spring - point.shear_damping * sliding, friction = shorten(wanted, limit);
+  const Vector3<T> shift = x + out.shift - anchor, sliding = velocity + approach * n;
+  const Vector3<T> held = -point.shear_stiffness * (shift - n.dot(shift) * n);
+  out.spring = shorten<T>(held, limit);
+  const Vector3<T> wanted = out.spring - point.shear_damping * sliding, friction = shorten<T>(wanted, limit);
   out.force = normal.force * n + friction;
   out.elastic =
       0.5 * point.stiffness * mean.depth * mean.depth + 0.5 * out.spring.squaredNorm() / point.shear_stiffness;
-  const double stretch = held.norm(), size = wanted.norm();
-  out.slides = stretch > limit || size > limit;
-  if (!with_damping) return out;
-  const Matrix3d along = n * n.transpose();
-  const double limit_rate = mu * normal.rate;  // the cone narrows as the point lifts
-  const Matrix3d across = Matrix3d::Identity() - along;
-  Matrix3d shear = point.shear_damping * across;
-  const double stiff = 0.5 * h * point.shear_stiffness;
-  if (stretch > limit) {
-    const Vector3d direction = held / stretch;
-    shear +=
-        limit / stretch * stiff * (across - direction * direction.transpose()) + limit_rate * direction * n.transpose();
-  } else {
-    shear += stiff * across;
+  const T stretch = calcNorm(held), size = calcNorm(wanted);
+  const auto drags = stretch > limit, slips = size > limit;
+  out.slides = touches && (drags || slips);
+  if (with_damping) {
+    const Matrix3<T> along = n * n.transpose();
+    const T limit_rate = mu * normal.rate;  // the cone narrows as the point lifts
+    const Matrix3<T> across = Matrix3<T>::Identity() - along;
+    const T stiff = 0.5 * h * point.shear_stiffness;
+    const Matrix3<T> damper = point.shear_damping * across;
+    Matrix3<T> shear = damper;
+    if (!all(drags)) shear += stiff * across;
+    if (any(drags)) {
+      const Vector3<T> direction = held / stretch;
+      Matrix3<T> dragged = damper;
+      dragged += limit / stretch * stiff * (across - direction * direction.transpose()) +
+                 limit_rate * direction * n.transpose();
+      shear = select(drags, dragged, shear);
+    }
+    if (any(slips)) {
+      const Vector3<T> direction = wanted / size;
+      const Matrix3<T> slipping =
+          limit / size * (shear - direction * (direction.transpose() * shear)) + limit_rate * direction * n.transpose();
+      shear = select(slips, slipping, shear);
+    }
+    out.damping = normal.rate * along + shear;
   }
-  if (size > limit) {
-    const Vector3d direction = wanted / size;
-    shear =
-        (limit / size * (shear - direction * (direction.transpose() * shear)) + limit_rate * direction * n.transpose())
-            .eval();
+  if (!all(touches)) {
+    const Vector3<T> zero = Vector3<T>::Zero();
+    out.force = select(touches, out.force, zero);
+    out.spring = select(touches, out.spring, zero);
+    out.shift = select(touches, out.shift, zero);
+    out.elastic = select(touches, out.elastic, T(0));
+    out.damping = select(touches, out.damping, Matrix3<T>(Matrix3<T>::Zero()));
   }
-  out.damping = normal.rate * along + shear;
   return out;
 }
 
-void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point) {
-  const Vector3d at = x + force.shift;
-  const Terrain::Touch touch = terrain.touch(at, point.from);
-  point.touches = touch.depth > 0;
+template <typename T>
+void updateAnchor(const Terrain& terrain, const Vector3<T>& x, const ContactForceOf<T>& force,
+                  ContactPointOf<T>& point) {
+  const Vector3<T> at = x + force.shift;
+  const TouchOf<T> touch = findTouch<T>(terrain, at, point.from);
+  point.touches = touch.depth > T(0);
   point.anchor = point.from = at;
-  if (!point.touches) return;
-  point.anchor += force.spring / point.shear_stiffness;
-  point.from += touch.depth * touch.normal;
+  if (!any(point.touches)) return;
+  point.anchor = select(point.touches, Vector3<T>(at + force.spring / T(point.shear_stiffness)), at);
+  point.from = select(point.touches, Vector3<T>(at + touch.depth * touch.normal), at);
 }
 
 std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<ContactPoint>& points) {
@@ -148,7 +204,8 @@ std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<
   return areas;
 }
 
-void settle(const Terrain& terrain, const SE3& X_WF, ContactArea& area, std::vector<ContactPoint>& points) {
+template <>
+void settle<double>(const Terrain& terrain, const SE3& X_WF, ContactArea& area, std::vector<ContactPoint>& points) {
   const Matrix3d& R = X_WF.R;
   const Eigen::Matrix2d along = R.topLeftCorner<2, 2>(), back = along.inverse();
   const Eigen::Vector2d slope = -R.col(2).head<2>() / R(2, 2), centre = X_WF.p.head<2>();
@@ -174,6 +231,28 @@ void settle(const Terrain& terrain, const SE3& X_WF, ContactArea& area, std::vec
   }
 }
 
+// One robot after the other: only where the ground has steps.
+template <>
+void settle<Lanes>(const Terrain& terrain, const SE3Of<Lanes>& X_WF, ContactArea& area,
+                   std::vector<ContactPointOf<Lanes>>& points) {
+  constexpr Vector3<Lanes> ContactPointOf<Lanes>::*kParts[] = {
+      &ContactPointOf<Lanes>::p, &ContactPointOf<Lanes>::anchor, &ContactPointOf<Lanes>::from};
+  constexpr Vector3d ContactPoint::*kOwn[] = {&ContactPoint::p, &ContactPoint::anchor, &ContactPoint::from};
+  std::vector<ContactPoint> one(points.size());
+  for (Eigen::Index l = 0; l < kLane; ++l) {
+    SE3 X;
+    for (int i = 0; i < 9; ++i) X.R.data()[i] = X_WF.R.data()[i][l];
+    for (int i = 0; i < 3; ++i) X.p[i] = X_WF.p[i][l];
+    for (size_t k = area.first; k < area.first + area.homes.size(); ++k)
+      for (int part = 0; part < 3; ++part)
+        for (int i = 0; i < 3; ++i) (one[k].*kOwn[part])[i] = (points[k].*kParts[part])[i][l];
+    settle<double>(terrain, X, area, one);
+    for (size_t k = area.first; k < area.first + area.homes.size(); ++k)
+      for (int part = 0; part < 3; ++part)
+        for (int i = 0; i < 3; ++i) (points[k].*kParts[part])[i].set(l, (one[k].*kOwn[part])[i]);
+  }
+}
+
 std::vector<JointStop> makeJointStops(const Model& model) {
   const double weight = calcWeight(model);
   std::vector<JointStop> stops;
@@ -194,14 +273,30 @@ std::vector<JointStop> makeJointStops(const Model& model) {
 
 bool hasStops(JointKind kind) { return getNv(kind) == 1 || kind == JointKind::Universal; }
 
-StopForce calcStopForce(const JointStop& stop, double q, double v, const StopStep& step) {
-  const double above = q - stop.upper, below = stop.lower - q;
-  const double sign = above > below ? 1 : -1, depth = std::max(above, below), h = sign * step.h;
-  const MeanDepth mean = calcMeanDepth(depth - 0.5 * h * step.before, depth + 0.5 * h * (2 * v - step.before));
-  if (!(mean.depth > 0)) return {};
-  const NormalForce normal = calcNormalForce(stop.stiffness, stop.damping, mean.depth, sign * v);
-  return {-sign * normal.force, 0.5 * stop.stiffness * mean.depth * mean.depth,
-          normal.rate + normal.force / mean.depth * mean.rate * step.h};
+template <typename T>
+StopForceOf<T> calcStopForce(const JointStop& stop, const T& q, const T& v, const StopStepOf<T>& step) {
+  const T above = q - stop.upper, below = stop.lower - q;
+  const auto is_above = above > below;
+  const T sign = select(is_above, T(1), T(-1)), depth = select(is_above, above, below), h = sign * step.h;
+  const MeanDepth<T> mean = calcMeanDepth<T>(depth - 0.5 * h * step.before, depth + 0.5 * h * (2 * v - step.before));
+  const auto touches = mean.depth > T(0);
+  if (!any(touches)) return {};
+  const NormalForce<T> normal = calcNormalForce<T>(stop.stiffness, stop.damping, mean.depth, sign * v);
+  return {select(touches, T(-sign * normal.force), T(0)),
+          select(touches, T(0.5 * stop.stiffness * mean.depth * mean.depth), T(0)),
+          select(touches, T(normal.rate + normal.force / mean.depth * mean.rate * step.h), T(0))};
 }
+
+template TouchOf<double> findTouch(const Terrain&, const Vector3d&, const Vector3d&);
+template TouchOf<Lanes> findTouch(const Terrain&, const Vector3<Lanes>&, const Vector3<Lanes>&);
+template ContactForce calcContactForce(const TouchOf<double>&, double, const ContactPoint&, const Vector3d&,
+                                       const Vector3d&, bool, const ContactStep&);
+template ContactForceOf<Lanes> calcContactForce(const TouchOf<Lanes>&, double, const ContactPointOf<Lanes>&,
+                                                const Vector3<Lanes>&, const Vector3<Lanes>&, bool,
+                                                const ContactStepOf<Lanes>&);
+template void updateAnchor(const Terrain&, const Vector3d&, const ContactForce&, ContactPoint&);
+template void updateAnchor(const Terrain&, const Vector3<Lanes>&, const ContactForceOf<Lanes>&, ContactPointOf<Lanes>&);
+template StopForce calcStopForce(const JointStop&, const double&, const double&, const StopStep&);
+template StopForceOf<Lanes> calcStopForce(const JointStop&, const Lanes&, const Lanes&, const StopStepOf<Lanes>&);
 
 }  // namespace bielle::worlds

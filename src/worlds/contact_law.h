@@ -32,24 +32,30 @@
 ///
 /// in (1) and (2), so that springs take, within the cone, exactly the work that they hold after it, however hard they are and
 /// wherever in the step the point touches down (Gonzalez, "Time integration and discrete Hamiltonian systems", 1996).
+///
+/// T is double, or Lanes for the same point of as many robots.
 #include <vector>
 
 #include "bielle/worlds/bielle_world.h"
+#include "math/lane_masks.h"
 #include "worlds/terrain.h"
 
 namespace bielle::worlds {
 
 /// One point of a contact, with its coefficients.
-struct ContactPoint {
+template <typename T>
+struct ContactPointOf {
   int contact = 0;                                ///< index into Model::contacts()
   int body = 0;                                   ///< that carries it
-  Vector3d p = Vector3d::Zero();                  ///< in the frame of the body, m
+  Vector3<T> p = Vector3<T>::Zero();              ///< in the frame of the body, m
   double stiffness = 0, damping = 0;              ///< k, N/m; c, s/m
   double shear_stiffness = 0, shear_damping = 0;  ///< k_t, N/m; c_t, N s/m
-  Vector3d anchor = Vector3d::Zero();             ///< a, m (world)
-  bool touches = false;                           ///< as of the last update of the anchor
-  Vector3d from = Vector3d::Zero();  ///< outside of the ground: through which of its surfaces the point came, m (world)
+  Vector3<T> anchor = Vector3<T>::Zero();         ///< a, m (world)
+  MaskOf<T> touches = makeMask<T>(false);         ///< as of the last update of the anchor
+  Vector3<T> from =
+      Vector3<T>::Zero();  ///< outside of the ground: through which of its surfaces the point came, m (world)
 };
+using ContactPoint = ContactPointOf<double>;
 
 /// The points of a sole or an edge, and where they lie on it while the ground is under them.
 struct ContactArea {
@@ -68,33 +74,51 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
 /// Of those points. Contacts of a single point have none.
 std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<ContactPoint>& points);
 
-struct ContactForce {
-  Vector3d force = Vector3d::Zero();   ///< on the point, N (world)
-  Vector3d spring = Vector3d::Zero();  ///< s, N (world)
-  Vector3d shift = Vector3d::Zero();   ///< from x to where the spring is taken, in a step, m (world)
-  double elastic = 0;                  ///< e, J
-  Matrix3d damping = Matrix3d::
+template <typename T>
+struct ContactForceOf {
+  Vector3<T> force = Vector3<T>::Zero();   ///< on the point, N (world)
+  Vector3<T> spring = Vector3<T>::Zero();  ///< s, N (world)
+  Vector3<T> shift = Vector3<T>::Zero();   ///< from x to where the spring is taken, in a step, m (world)
+  T elastic = 0;                           ///< e, J
+  Matrix3<T> damping = Matrix3<T>::
       Zero();  ///< -df/dx', in a step with what springs add by then, N s/m; not symmetric where the point slides: (1) sets the cone
-  bool slides = false;  ///< whether s or f_t is at the cone
+  MaskOf<T> slides = makeMask<T>(false);  ///< whether s or f_t is at the cone
 };
+using ContactForce = ContactForceOf<double>;
 /// A step of length h, whose first half has the velocity `before` and whose second half another one; the mean of both is that of
 /// the force, which is (5) then. Without one, (1) and (2) hold at an instant.
-struct ContactStep {
-  double h = 0;                        ///< s
-  Vector3d before = Vector3d::Zero();  ///< m/s (world)
+template <typename T>
+struct ContactStepOf {
+  T h = 0;                                 ///< s
+  Vector3<T> before = Vector3<T>::Zero();  ///< m/s (world)
 };
+using ContactStep = ContactStepOf<double>;
+/// Terrain::Touch.
+template <typename T>
+struct TouchOf {
+  T depth = 0;
+  Vector3<T> normal = Vector3<T>::UnitZ();
+};
+/// Terrain::touch(x, from)
+template <typename T>
+TouchOf<T> findTouch(const Terrain& terrain, const Vector3<T>& x, const Vector3<T>& from);
 /// Eqs. (1), (2) and (4) at a position and a velocity (world).
 /// \param with_damping  whether to fill the derivative
 ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
                               const Vector3d& velocity, bool with_damping = false, const ContactStep& step = {});
-/// \param touch     Terrain::touch(x, point.from), which does not depend on the velocity   \param mu  friction of the ground
-ContactForce calcContactForce(const Terrain::Touch& touch, double mu, const ContactPoint& point, const Vector3d& x,
-                              const Vector3d& velocity, bool with_damping, const ContactStep& step);
+/// \param touch     findTouch(terrain, x, point.from), which does not depend on the velocity   \param mu  friction of the ground
+template <typename T>
+ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, double mu, const ContactPointOf<T>& point,
+                                   const Vector3<T>& x, const Vector3<T>& velocity, bool with_damping,
+                                   const ContactStepOf<T>& step);
 /// Eq. (3), for the force at x, and where the point came from.
-void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point);
+template <typename T>
+void updateAnchor(const Terrain& terrain, const Vector3<T>& x, const ContactForceOf<T>& force,
+                  ContactPointOf<T>& point);
 
 /// Moves points of an area that overhang a step onto its edge, where they are nearest, and back. Their bristles stay as they are bent.
-void settle(const Terrain& terrain, const SE3& X_WF, ContactArea& area, std::vector<ContactPoint>& points);
+template <typename T>
+void settle(const Terrain& terrain, const SE3Of<T>& X_WF, ContactArea& area, std::vector<ContactPointOf<T>>& points);
 
 /// A stop of a joint: (1) in one coordinate.
 struct JointStop {
@@ -107,46 +131,59 @@ bool hasStops(JointKind kind);
 /// Of all limits of these joints. Without gravity they are as hard as on Earth.
 std::vector<JointStop> makeJointStops(const Model& model);
 
-struct StopForce {
-  double force = 0;    ///< on the coordinate, N m or N
-  double elastic = 0;  ///< J
-  double damping = 0;  ///< -d force/dv, not negative
+template <typename T>
+struct StopForceOf {
+  T force = 0;    ///< on the coordinate, N m or N
+  T elastic = 0;  ///< J
+  T damping = 0;  ///< -d force/dv, not negative
 };
+using StopForce = StopForceOf<double>;
 /// As ContactStep, of a coordinate.
-struct StopStep {
-  double h = 0;       ///< s
-  double before = 0;  ///< rad/s or m/s
+template <typename T>
+struct StopStepOf {
+  T h = 0;       ///< s
+  T before = 0;  ///< rad/s or m/s
 };
-StopForce calcStopForce(const JointStop& stop, double q, double v, const StopStep& step = {});
+using StopStep = StopStepOf<double>;
+template <typename T>
+StopForceOf<T> calcStopForce(const JointStop& stop, const T& q, const T& v, const StopStepOf<T>& step);
+inline StopForce calcStopForce(const JointStop& stop, double q, double v, const StopStep& step = {}) {
+  return calcStopForce<double>(stop, q, v, step);
+}
 
 /// All points and stops of a robot on its ground, with the energy that their springs held at the start.
 /// Places are those of points in the world: body, point of it -> m. Coordinates are those of joints with stops: stop -> rad or m.
-class ContactSet {
+template <typename T>
+class ContactSetOf {
  public:
-  ContactSet(const Model& model, const Ground& ground, const ContactOptions& options)
-      : terrain(ground), points(makeContactPoints(model, ground, options)), stops(makeJointStops(model)) {
-    if (!ground.steps.empty()) areas_ = makeContactAreas(model, points);
+  ContactSetOf(const Model& model, const Ground& ground, const ContactOptions& options)
+      : terrain(ground), stops(makeJointStops(model)) {
+    const std::vector<ContactPoint> made = makeContactPoints(model, ground, options);
+    for (const ContactPoint& point : made)
+      points.push_back({point.contact, point.body, point.p.cast<T>(), point.stiffness, point.damping,
+                        point.shear_stiffness, point.shear_damping});
+    if (!ground.steps.empty()) areas_ = makeContactAreas(model, made);
   }
 
   const Terrain terrain;
-  std::vector<ContactPoint> points;
+  std::vector<ContactPointOf<T>> points;
   const std::vector<JointStop> stops;
 
   /// Points that have not touched before. \param getPlacement  body -> X_WB
   template <typename GetPlacement>
   void reset(const GetPlacement& getPlacement) {
-    for (ContactPoint& point : points) {
-      point.touches = false;
-      point.from = getPlacement(point.body).act(point.p) + kLift * Vector3d::UnitZ();
+    for (ContactPointOf<T>& point : points) {
+      point.touches = makeMask<T>(false);
+      point.from = getPlacement(point.body).act(point.p) + T(kLift) * Vector3<T>::UnitZ();
     }
     settle(getPlacement);
-    for (ContactPoint& point : points)
-      updateAnchor(terrain, getPlacement(point.body).act(point.p), ContactForce(), point);
+    for (ContactPointOf<T>& point : points)
+      updateAnchor<T>(terrain, getPlacement(point.body).act(point.p), ContactForceOf<T>(), point);
   }
   /// Of all soles and edges; once per step, after the anchors.
   template <typename GetPlacement>
   void settle(const GetPlacement& getPlacement) {
-    for (ContactArea& area : areas_) worlds::settle(terrain, getPlacement(area.body) * area.X_BF, area, points);
+    for (ContactArea& area : areas_) worlds::settle<T>(terrain, getPlacement(area.body) * area.X_BF, area, points);
   }
   template <typename GetPlace, typename GetCoordinate>
   void setStart(const GetPlace& getPlace, const GetCoordinate& getCoordinate) {
@@ -170,12 +207,13 @@ class ContactSet {
   template <typename GetPlace, typename GetCoordinate>
   Elastic calcElastic(const GetPlace& getPlace, const GetCoordinate& getCoordinate) const {
     double contacts = 0, stop = 0;
-    for (const ContactPoint& point : points)
+    for (const ContactPointOf<T>& point : points)
       contacts += calcContactForce(terrain, point, getPlace(point.body, point.p), Vector3d::Zero()).elastic;
     for (const JointStop& each : stops) stop += calcStopForce(each, getCoordinate(each), 0).elastic;
     return {contacts + stop, stop};
   }
   Elastic start_;
 };
+using ContactSet = ContactSetOf<double>;
 
 }  // namespace bielle::worlds

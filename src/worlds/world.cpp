@@ -105,6 +105,8 @@ void World::addFootForce(int contact, const Vector3d& x, const Vector3d& force) 
   wrenches_[contact].tail<3>() += x.cross(force);
 }
 
+void World::setFootWrench(int contact, const Vector6d& wrench) { wrenches_[contact] = wrench; }
+
 void World::reportFoot(size_t contact, const SE3& X_WF) {
   FootReport& foot = feet_[contact];
   foot.wrench = X_WF.actInvForce(wrenches_[contact]);

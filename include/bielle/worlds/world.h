@@ -87,6 +87,8 @@ class World {
   const std::vector<std::string>& warnings() const { return warnings_; }
   const Integration& integration() const { return integration_; }
   virtual Books books() const;
+  /// How many steps of this length, or a little shorter, make up a duration; maybe more than an integer holds.
+  static double countSteps(double duration, double time_step);
   virtual double gap() const;  ///< opening of the closures at present: the largest distance of their points, m
 
  protected:
@@ -103,11 +105,10 @@ class World {
   bool fail(const std::string& why);  ///< sets message_; false
   void noteStep(double h);            ///< for integration()
   bool isInterrupted() const { return interrupt_ && *interrupt_; }
-  /// How many steps of this length, or a little shorter, make up a duration; maybe more than an integer holds.
-  static double countSteps(double duration, double time_step);
   /// Wrenches of the ground on the feet are sums of forces at x (world).
   void clearFootForces();
   void addFootForce(int contact, const Vector3d& x, const Vector3d& force);
+  void setFootWrench(int contact, const Vector6d& wrench);  ///< about the origin of the world
   /// Their wrenches and slips for the present placements. \param getPlacement  body -> SE3
   template <typename GetPlacement>
   void reportFeet(const GetPlacement& getPlacement) {
