@@ -38,12 +38,12 @@ PostureHold::PostureHold(const Model& model) : model_(model), q_(makeStandingPos
   u_ = calcStaticTorques(model, makeConstraintSet(model, makeContactTargets(model, q_, feet, 0, 0)), q_).u;
 }
 
-VectorXd PostureHold::calcTorques(const World& world) const {
+VectorXd PostureHold::calcTorques(ConstVectorRef q, ConstVectorRef v) const {
   VectorXd u = u_;
   for (int m = 0; m < model_.nu(); ++m) {
     const Motor& motor = model_.motors()[m];
     const int at = model_.joints()[motor.joint].idx_q;
-    u[m] += kStiffness * (q_[at] - world.configuration()[at]) - kDamping * world.velocity()[motor.dof];
+    u[m] += kStiffness * (q_[at] - q[at]) - kDamping * v[motor.dof];
   }
   return u;
 }

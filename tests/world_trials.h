@@ -13,7 +13,8 @@ class PostureHold {
  public:
   explicit PostureHold(const Model& model);
   const VectorXd& posture() const { return q_; }
-  VectorXd calcTorques(const World& world) const;
+  VectorXd calcTorques(ConstVectorRef q, ConstVectorRef v) const;
+  VectorXd calcTorques(const World& world) const { return calcTorques(world.configuration(), world.velocity()); }
 
  private:
   const Model& model_;

@@ -1,0 +1,61 @@
+#pragma once
+/// \file Many worlds of one robot, for learning and for campaigns: those of makeBielleWorld() (bielle_world.h), as many at once as a
+/// register holds numbers.
+///
+/// One world never disturbs another, to the last bit: results depend neither on the number of threads, nor on which worlds share a
+/// register, nor on how many there are. Each halves its own steps, and is masked in Newton's method once its forces are found. They
+/// differ from those of a single world by rounding.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bielle/worlds/bielle_world.h"
+
+namespace bielle::worlds {
+
+struct WorldBatchOptions {
+  BielleWorldOptions world;
+  int threads = 0;  ///< 0: as many as the processor has cores
+};
+
+/// Matrices have a column per world. Not thread-safe.
+class WorldBatch {
+ public:
+  /// All worlds wait for a reset(). \throws InputError as makeBielleWorld(); std::invalid_argument for a count below one
+  WorldBatch(const Model& model, int count, const WorldBatchOptions& options = {});
+  ~WorldBatch();
+  WorldBatch(WorldBatch&&) noexcept;
+  WorldBatch& operator=(WorldBatch&&) noexcept;
+
+  /// Sets closed configurations q (nq x count) and velocities v (nv x count) that keep them closed, of all worlds or of those that
+  /// `where` (count) marks; their time starts from zero.
+  /// \throws std::invalid_argument for a wrong shape, or a number of theirs that is not finite; nothing has changed then
+  void reset(const Eigen::Ref<const MatrixXd>& q, const Eigen::Ref<const MatrixXd>& v,
+             const std::vector<char>& where = {});
+  /// Advances by a duration, s, under torques of the motors u (nu x count, N m or N), cut at their limits, and a force at the centre of
+  /// mass of the pushed body (3 x count), N (world). Worlds that are not ok() stay as they are.
+  /// \returns whether all are ok() \throws std::invalid_argument for a wrong shape, or a duration that is not positive
+  bool step(const Eigen::Ref<const MatrixXd>& u, const Eigen::Ref<const MatrixXd>& push, double duration);
+
+  const Model& model() const;
+  int count() const;
+  Eigen::Ref<const MatrixXd> configurations() const;  ///< nq x count
+  Eigen::Ref<const MatrixXd> velocities() const;      ///< nv x count
+  /// Of the ground on the feet in their contact frames, one after the other (6 contacts x count), N and N m.
+  Eigen::Ref<const MatrixXd> wrenches() const;
+  const VectorXd& times() const;  ///< count, since reset(), s
+  /// False from a step on that could not be taken, or whose torques or push were not finite, until reset(): the state is the last
+  /// that is closed and balances, and message() says why it is not ok.
+  bool ok(int world) const;
+  const std::string& message(int world) const;
+  /// What the worlds leave out of the model (World::warnings()).
+  const std::vector<std::string>& warnings() const;
+  /// Rounds of Newton's method so far, of whole registers.
+  double rounds() const;
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+}  // namespace bielle::worlds

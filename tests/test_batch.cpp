@@ -1,0 +1,202 @@
+// Many worlds at once: the single world as an oracle, one step at a time, and independence to the last bit.
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/worlds/batch.h"
+#include "own_robots.h"
+#include "world_trials.h"
+
+namespace bielle::worlds {
+namespace {
+
+using bielle::testing::getBipetto;
+
+struct Start {
+  MatrixXd q, v, u, push;  // a column per world
+};
+
+// Near the ground, turned and moving in all coordinates, with random torques and pushes.
+Start makeStarts(const Model& model, int count, unsigned seed) {
+  const testing::PostureHold posture(model);
+  const ConstraintSet closures = makeConstraintSet(model);
+  Workspace ws(model);
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> any(-1, 1);
+  const auto draw = [&] { return any(generator); };
+  Start out{posture.posture().replicate(1, count), MatrixXd(model.nv(), count), MatrixXd(model.nu(), count),
+            MatrixXd::Zero(3, count)};
+  for (int i = 0; i < count; ++i) {
+    VectorXd turn = VectorXd::Zero(model.nv());
+    turn.head<6>() << 0, 0, 2e-3 * draw(), 0.02 * draw(), 0.02 * draw(), 3 * draw();
+    out.q.col(i) = model.integrate(out.q.col(i), turn);
+    VectorXd v(model.nv());
+    for (double& x : v) x = draw();
+    out.v.col(i) = projectVelocity(model, ws, closures, out.q.col(i), v);
+    for (double& x : out.u.col(i)) x = 10 * draw();
+    if (i % 3 == 0) out.push.col(i) << 20 * draw(), 20 * draw(), 0;
+  }
+  return out;
+}
+
+WorldBatchOptions makeOptions(double time_step, int threads = 1) {
+  WorldBatchOptions options;
+  options.world.world.time_step = time_step;
+  options.threads = threads;
+  return options;
+}
+
+bool isEqual(const VectorXd& a, const VectorXd& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), sizeof(double) * static_cast<size_t>(a.size())) == 0;
+}
+
+// Largest difference of two steps from those of single worlds: of coordinates and velocities, and 1e-3 of that of wrenches, relative.
+double compareStep(const Model& model, const WorldBatchOptions& options, const BielleWorldOptions& single, int count) {
+  const Start starts = makeStarts(model, count, 5);
+  WorldBatch batch(model, count, options);
+  batch.reset(starts.q, starts.v);
+  CHECK(batch.step(starts.u, starts.push, 1e-3));
+  CHECK(batch.step(starts.u, starts.push, 1e-3));
+  double worst = 0;
+  const auto world = makeBielleWorld(model, single);
+  for (int i = 0; i < count; ++i) {
+    world->reset(starts.q.col(i), starts.v.col(i));
+    for (int k = 0; k < 2; ++k) {
+      world->setTorques(starts.u.col(i));
+      world->setPush(starts.push.col(i));
+      REQUIRE(world->advance(1e-3));
+    }
+    CHECK(batch.times()[i] == world->time());
+    worst = std::max({worst, (batch.configurations().col(i) - world->configuration()).cwiseAbs().maxCoeff(),
+                      (batch.velocities().col(i) - world->velocity()).cwiseAbs().maxCoeff()});
+    for (size_t c = 0; c < model.contacts().size(); ++c) {
+      const Vector6d& wrench = world->feet()[c].wrench;
+      const Vector6d other = batch.wrenches().col(i).segment<6>(6 * static_cast<Eigen::Index>(c));
+      worst = std::max(worst, 1e-3 * (other - wrench).norm() / (1 + wrench.norm()));
+    }
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("batch: a step is that of a single world") {
+  for (double h : {2.5e-4, 1e-3}) {
+    const WorldBatchOptions options = makeOptions(h);
+    CHECK(compareStep(getBipetto(), options, options.world, 100) < 1e-11);
+    BielleWorldOptions other = options.world;
+    other.world.ground.friction = 0.7007;
+    CHECK(compareStep(getBipetto(), options, other, 20) > 1e-9);
+  }
+}
+
+TEST_CASE("batch: a step on a ground of steps, and of a robot with springs between points, is that of a single world") {
+  WorldBatchOptions options = makeOptions(1e-3);
+  GroundStep step;
+  step.top = {0.02, 0.05, 1e-3};
+  step.length = step.width = 0.15;
+  step.yaw = 0.3;
+  options.world.world.ground.steps = {step};
+  CHECK(compareStep(getBipetto(), options, options.world, 9) < 1e-11);
+  CHECK(compareStep(bielle::testing::loadOwn("spring_biped").model, options, options.world, 9) < 1e-11);
+}
+
+TEST_CASE("batch: what becomes of a world does not depend on the others, to the last bit") {
+  const Model& model = getBipetto();
+  constexpr int kCount = 19, kLimp = 4, kBroken = 6;
+  const Start starts = makeStarts(model, kCount, 7);
+  const auto run = [&](WorldBatch& batch, const std::vector<int>& worlds) {
+    const auto select = [&](const MatrixXd& all) {
+      MatrixXd out(all.rows(), static_cast<Eigen::Index>(worlds.size()));
+      for (size_t i = 0; i < worlds.size(); ++i) out.col(static_cast<Eigen::Index>(i)) = all.col(worlds[i]);
+      return out;
+    };
+    batch.reset(select(starts.q), select(starts.v));
+    for (int tick = 0; tick < 40; ++tick) {
+      MatrixXd u = starts.u, push = starts.push;
+      if (tick == 5) u(2, kLimp) = std::numeric_limits<double>::quiet_NaN();
+      if (tick == 7) push(0, kBroken) = 1e13;
+      batch.step(select(u), select(push), 2e-3);
+    }
+  };
+  std::vector<int> all(kCount), reversed;
+  for (int i = 0; i < kCount; ++i) all[static_cast<size_t>(i)] = i;
+  reversed.assign(all.rbegin(), all.rend());
+  WorldBatch together(model, kCount, makeOptions(2e-3)), threads(model, kCount, makeOptions(2e-3, 2)),
+      backward(model, kCount, makeOptions(2e-3));
+  run(together, all);
+  run(threads, all);
+  run(backward, reversed);
+  double least = 1;
+  for (int i = 0; i < kCount; ++i) {
+    CAPTURE(i, together.message(i));
+    const VectorXd q = together.configurations().col(i), v = together.velocities().col(i);
+    WorldBatch alone(model, 1, makeOptions(2e-3));
+    run(alone, {i});
+    const auto check = [&](const WorldBatch& batch, int at) {
+      CHECK(isEqual(batch.configurations().col(at), q));
+      CHECK(isEqual(batch.velocities().col(at), v));
+      CHECK(isEqual(batch.wrenches().col(at), together.wrenches().col(i)));
+      CHECK(batch.message(at) == together.message(i));
+      CHECK(batch.times()[at] == together.times()[i]);
+    };
+    check(threads, i);
+    check(backward, kCount - 1 - i);
+    check(alone, 0);
+    CHECK(q.allFinite());
+    CHECK(together.ok(i) == (i != kLimp && i != kBroken));
+    if (i > 0) least = std::min(least, (q - together.configurations().col(i - 1)).norm());
+  }
+  CHECK(least > 0);
+  CHECK(together.message(kLimp) == "its torques or its push are not finite");
+  CHECK(together.times()[kLimp] == Approx(0.01));
+  CHECK_THAT(together.message(kBroken), Catch::StartsWith("after 0.01") && Catch::Contains("s, in a step of "));
+  CHECK(together.times()[kBroken] == Approx(0.014));
+}
+
+TEST_CASE("batch: worlds are reset alone, and begin as the others did") {
+  const Model& model = getBipetto();
+  const Start starts = makeStarts(model, 10, 3);
+  WorldBatch batch(model, 10, makeOptions(1e-3));
+  CHECK(batch.message(9) == "it has not been reset");
+  CHECK_FALSE(batch.step(starts.u, starts.push, 1e-3));
+  batch.reset(starts.q, starts.v);
+  CHECK(batch.step(starts.u, starts.push, 2e-3));
+  const MatrixXd after = batch.configurations();
+  std::vector<char> where(10, 0);
+  where[1] = where[8] = 1;
+  batch.reset(starts.q, starts.v, where);
+  CHECK(batch.times()[1] == 0);
+  CHECK(batch.times()[2] == 2e-3);
+  CHECK(isEqual(batch.configurations().col(2), after.col(2)));
+  CHECK(batch.step(starts.u, starts.push, 2e-3));
+  for (int i : {1, 8}) CHECK(isEqual(batch.configurations().col(i), after.col(i)));
+  // Those that were not reset go on as if nothing had been.
+  WorldBatch other(model, 10, makeOptions(1e-3));
+  other.reset(starts.q, starts.v);
+  other.step(starts.u, starts.push, 2e-3);
+  other.step(starts.u, starts.push, 2e-3);
+  for (int i : {0, 2, 9}) CHECK(isEqual(batch.configurations().col(i), other.configurations().col(i)));
+}
+
+TEST_CASE("batch: what it cannot take is refused, and nothing is stepped") {
+  const Model& model = getBipetto();
+  const Start starts = makeStarts(model, 3, 3);
+  CHECK_THROWS_WITH(WorldBatch(model, 0), Catch::Contains("count is 0"));
+  WorldBatch batch(model, 3, makeOptions(1e-3));
+  batch.reset(starts.q, starts.v);
+  CHECK_THROWS_WITH(batch.reset(starts.q.leftCols(2), starts.v), Catch::Contains(" x 2; give "));
+  CHECK_THROWS_WITH(batch.reset(starts.q, starts.v, {1, 0}), Catch::Contains("where has 2 entries; give 3"));
+  MatrixXd v = starts.v;
+  v(0, 1) = std::numeric_limits<double>::infinity();
+  CHECK_THROWS_WITH(batch.reset(starts.q, v), Catch::Contains("world 1"));
+  CHECK_THROWS_WITH(batch.step(starts.u.topRows(2), starts.push, 1e-3), Catch::Contains("u is 2 x 3"));
+  CHECK_THROWS_WITH(batch.step(starts.u, starts.push, 0), Catch::Contains("positive"));
+  CHECK(batch.times().isZero(0));
+  CHECK((batch.velocities() - starts.v).cwiseAbs().maxCoeff() < 1e-9);
+}
+
+}  // namespace bielle::worlds
