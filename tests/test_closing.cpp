@@ -77,6 +77,40 @@ TEST_CASE("closing: a four-bar with its crank held, and with its rocker held, ag
                     Catch::Contains("joint 'elbow'") && Catch::Contains("choose some of: " + crank));
 }
 
+TEST_CASE("closing: two joints that cannot be held together are both at the nearest values, which then can be") {
+  const Mechanism start = makePlanarFourBar(kGround, kCrank, kCoupler, kRocker, 1);
+  const Model& model = start.model;
+  const std::string crank = model.joints()[1].name;
+  for (int other = 1; other < 3; ++other) {
+    const std::string name = model.joints()[static_cast<size_t>(other) + 1].name;
+    for (const double off : {0.3, -0.2, 1e-6}) {
+      CAPTURE(name, off);
+      VectorXd q = start.q_closed;
+      q[other] += off;
+      const AssemblyResult result = closeConfiguration(model, q, {crank, name});
+      CHECK(result.status == NumericalStatus::NotClosed);
+      CHECK(calcGap(model, result.q) < 1e-10);
+      // Of all angles of the crank, that which leaves the least sum of squares.
+      const auto calcSum = [&](double angle) {
+        const VectorXd exact = makePlanarFourBar(kGround, kCrank, kCoupler, kRocker, angle).q_closed;
+        return std::pow(std::remainder(exact[0] - q[0], 2 * M_PI), 2) +
+               std::pow(std::remainder(exact[other] - q[other], 2 * M_PI), 2);
+      };
+      double low = 0.5, high = 1.5;
+      while (high - low > 1e-9) {
+        const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+        (calcSum(a) < calcSum(b) ? high : low) = calcSum(a) < calcSum(b) ? b : a;
+      }
+      CHECK(std::remainder(result.q[0] + low, 2 * M_PI) == Approx(0).margin(1e-5 * std::abs(off) + 1e-7));
+      CHECK_THAT(result.message, Catch::Contains("joints " + crank + ", " + name + " cannot be held at ") &&
+                                     Catch::Contains(" together: the nearest values in reach are ") &&
+                                     Catch::Contains("; alone, " + crank + ", " + name + " can be held where asked"));
+      q[0] = result.q[0], q[other] = result.q[other];
+      CHECK(closeConfiguration(model, q, {crank, name}).status == NumericalStatus::Ok);
+    }
+  }
+}
+
 TEST_CASE("closing: a rocker beyond its dead point is refused with the gap and the nearest value, and nothing jumps") {
   const Model model = loadOwn("fourbar").model;
   const VectorXd start = assembleReference(model, model.references()[0].name).q;

@@ -342,6 +342,37 @@ bool LinkageMap::reset(ConstVectorRef q) {
   return true;
 }
 
+namespace {
+
+// Of the linkage that is farthest from what is asked of it. \param nearest  with the values in reach   \param start  closed
+std::string describeUnheld(const Model& model, ConstVectorRef q, const VectorXd& nearest,
+                           const std::vector<std::string>& held, const VectorXd& start, const HeldResult& closed) {
+  const auto getLinkage = [&model](const Joint& joint) {
+    const auto has = [&](const LoopCluster& cluster) { return contains(cluster.dofs, joint.idx_v); };
+    return std::find_if(model.clusters().begin(), model.clusters().end(), has) - model.clusters().begin();
+  };
+  const auto linkage = getLinkage(model.joints()[static_cast<size_t>(closed.joint)]);
+  std::vector<std::string> names, alone;
+  std::string asked, found;
+  for (const std::string& name : held) {
+    const Joint& joint = model.joints()[static_cast<size_t>(model.findJoint(name))];
+    if (getLinkage(joint) != linkage || std::abs(nearest[joint.idx_q] - q[joint.idx_q]) <= kMet) continue;
+    asked += (names.empty() ? "" : ", ") + formatNumber(q[joint.idx_q]);
+    found += (names.empty() ? "" : ", ") + formatNumber(nearest[joint.idx_q]);
+    names.push_back(name);
+    VectorXd only = start;
+    only[joint.idx_q] = q[joint.idx_q];
+    if (LoopCloser(model, start, {name}).close(only).status != NumericalStatus::NotClosed) alone.push_back(name);
+  }
+  if (names.size() == 1)
+    return "joint '" + names[0] + "' cannot be held at " + asked + ": the nearest value in reach is " + found + ", " +
+           formatNumber(closed.gap) + " (rad or m) from it";
+  return "joints " + listItems(names) + " cannot be held at " + asked + " together: the nearest values in reach are " +
+         found + " (rad or m)" + (alone.empty() ? "" : "; alone, " + listItems(alone) + " can be held where asked");
+}
+
+}  // namespace
+
 AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const std::vector<std::string>& held,
                                   const AssemblyOptions& options) {
   // The start: near what is held, whatever else has to move.
@@ -352,19 +383,17 @@ AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const st
     problem.weights[model.joints()[static_cast<size_t>(findHeldJoint(model, name))].idx_v] = 1;
   AssemblyResult result = assemble(model, problem, options);
   if (result.status != NumericalStatus::Ok || held.empty()) return result;
-  LoopCloser closer(model, result.q, held);
+  const VectorXd start = result.q;
+  LoopCloser closer(model, start, held);
   for (const std::string& name : held) {
     const Joint& joint = model.joints()[static_cast<size_t>(model.findJoint(name))];
     result.q[joint.idx_q] = q[joint.idx_q];
   }
   const HeldResult closed = closer.close(result.q);
   if (closed.status != NumericalStatus::NotClosed) return result;
-  const Joint& joint = model.joints()[static_cast<size_t>(closed.joint)];
   result.status = NumericalStatus::NotClosed;
-  result.worst = "joint '" + joint.name + "'";
-  result.message = "joint '" + joint.name + "' cannot be held at " + formatNumber(q[joint.idx_q]) +
-                   ": the nearest value in reach is " + formatNumber(result.q[joint.idx_q]) + ", " +
-                   formatNumber(closed.gap) + " (rad or m) from it";
+  result.worst = "joint '" + model.joints()[static_cast<size_t>(closed.joint)].name + "'";
+  result.message = describeUnheld(model, q, result.q, held, start, closed);
   return result;
 }
 
