@@ -293,6 +293,61 @@ TEST_CASE("feasibility: a robot that falls over where it starts, and soles one i
              Catch::Contains("foot_left") && Catch::Contains("foot_right") && Catch::Contains("overlap"));
 }
 
+TEST_CASE(
+    "feasibility: heights and lengths out of the legs' reach are refused at once, and what is offered is reached") {
+  const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
+  const auto refuse = [](const auto& make) {
+    const auto begin = std::chrono::steady_clock::now();
+    const std::string error = getError(make);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+    CHECK(took.count() < 0.5);
+    return error;
+  };
+  const auto makeSquatOf = [&](double depth) {
+    SquatOptions squat;
+    squat.depth = depth, squat.time_step = 0.03;
+    return makeSquat(robot.model, squat);
+  };
+  const auto findRatio = [&](double depth, const std::string& bound) {
+    const Motion motion = makeSquatOf(depth);
+    const std::string error = refuse([&] { listDoubts(motion); });
+    CAPTURE(error);
+    REQUIRE(error.find("give at " + bound + " ") != std::string::npos);
+    return std::stod(error.substr(error.find("give at " + bound + " ") + 8 + bound.size() + 1));
+  };
+  const double highest = findRatio(1.3, "most"), lowest = findRatio(0.06, "least");
+  CHECK(highest > 1);
+  CHECK(highest < 1.25);
+  CHECK(lowest < 0.5);
+  CHECK(findRatio(2, "most") == highest);  // wherever it comes from
+  CHECK_NOTHROW(listDoubts(makeSquatOf(highest)));
+  CHECK_NOTHROW(listDoubts(makeSquatOf(lowest)));
+  CHECK_THROWS(listDoubts(makeSquatOf(highest + 0.03)));
+  CHECK_THROWS(listDoubts(makeSquatOf(lowest - 0.06)));
+  const std::string error_of_squat = getError([&] { listDoubts(makeSquatOf(1.3)); });
+  const Solution stretched =
+      solveQuietly(makeSquatOf(std::stod(error_of_squat.substr(error_of_squat.find("e.g. ") + 5))));
+  CHECK(stretched.converged());
+
+  const auto makeJumpOf = [&](double length) {
+    JumpOptions jump;
+    jump.length = length, jump.time_step = 0.01;
+    return makeJump(robot.model, jump);
+  };
+  const std::string error = refuse([&] { makeJumpOf(2); });
+  CAPTURE(error);
+  const double most = std::stod(error.substr(error.find("at most ") + 8));
+  CHECK(most < 2);
+  CHECK_NOTHROW(makeJumpOf(0.99 * most));
+  CHECK_THROWS(makeJumpOf(-1.01 * most));
+  const Motion offered = makeJumpOf(std::stod(error.substr(error.find("e.g. ") + 5)));
+  CHECK(solveQuietly(offered).converged());
+  // Longer flights carry farther.
+  JumpOptions longer;
+  longer.length = 1.01 * most, longer.flight = 0.4, longer.time_step = 0.01;
+  CHECK_NOTHROW(makeJump(robot.model, longer));
+}
+
 TEST_CASE("feasibility: flights that legs cannot give are refused before solving") {
   JumpOptions jump;
   jump.flight = 1;

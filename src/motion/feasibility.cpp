@@ -14,6 +14,7 @@
 #include "math/so3.h"
 #include "model/number_text.h"
 #include "motion/applied_options.h"
+#include "motion/com_reach.h"
 #include "motion/motor_scale.h"
 #include "motion/statics.h"
 
@@ -66,6 +67,7 @@ class FeasibilityCheck {
   void check(const StartingPoint* given) {
     checkTrajectory(given ? given->trajectory : motion_.guess, given ? "start" : "guess");
     checkSolesApart();
+    checkHeights();
     if (!motion_.cycle) checkStartingMotors();  // a cycle starts in motion
     if (!warn_) return;
     doubtUnits();
@@ -167,6 +169,32 @@ class FeasibilityCheck {
                            "their soles overlap by " + formatNumber(-distance, "%.3g") + " m where the robot starts",
                            "place the feet farther apart in the reference, by as much, or give narrower soles");
       }
+  }
+
+  // Whether standing legs are long enough, and fold far enough, for the height of the centre of mass.
+  void checkHeights() const {
+    for (const Goal& goal : motion_.goals) {
+      if (goal.kind != GoalKind::Height || !model_.hasFreeFlyer()) continue;
+      double level = 0;
+      std::vector<FrameTarget> feet;
+      for (const ContactTarget& target : start_.phase->contacts) {
+        level += target.X_WT.p.z() / static_cast<double>(start_.phase->contacts.size());
+        feet.push_back(makeFrameTarget(getContact(target), target.X_WT));
+      }
+      const double start = com_.z() - level, needed = start * goal.requested;
+      const ConstraintSet constraints = makeConstraintSet(model_, start_.phase->contacts);
+      const double reached = calcReachedComHeight(model_, constraints, feet, getStart(), level + needed) - level;
+      if (std::abs(reached - needed) <= start * goal.tolerance) continue;
+      const bool too_high = reached < needed;
+      const double ratio = std::round(100 * reached / start) / 100;  // within the tolerance of a goal
+      throw InputError(
+          model_.name(), "--" + goal.name + " " + formatNumber(goal.requested),
+          "the centre of mass would have to be " + formatNumber(needed, "%.3g") + " m over the feet, and " +
+              (too_high ? "with straight legs" : "with legs folded up to the limits of joints") + " it is " +
+              formatNumber(reached, "%.3g") + " m",
+          "give " + std::string(too_high ? "at most " : "at least ") + formatNumber(ratio, "%.2f") +
+              ", and less of it for a motion with room to spare, e.g. " + formatNumber(1 + 0.5 * (ratio - 1), "%.2f"));
+    }
   }
 
   // Torques that hold a posture of the plan; of single support, while the weight falls past a sole that is not under it as the

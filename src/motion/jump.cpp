@@ -1,9 +1,11 @@
 #include "bielle/motion/jump.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bielle/model/error.h"
 #include "model/number_text.h"
+#include "motion/com_reach.h"
 #include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
 #include "motion/quintic.h"
@@ -137,6 +139,45 @@ void checkHeights(const JumpOptions& o, double gravity, double height) {
   }
 }
 
+// How far feet can be apart that the centre of mass carries over in the flight: it leaves them at the distance that straight legs
+// leave it, and with the velocity that they can have given it, from rest, while it moved from as far behind them as legs reach when
+// they are bent most; feet push it ahead by friction alone. Landing is the mirror image. No motors count.
+void checkLength(const JumpScene& scene, double gravity) {
+  const JumpOptions& o = scene.options;
+  if (o.length == 0 || !scene.model.hasFreeFlyer()) return;
+  const JumpFigures& f = scene.figures;
+  double level = 0;
+  std::vector<FrameTarget> feet;
+  for (const ContactTarget& foot : scene.before) {
+    level += foot.X_WT.p.z() / static_cast<double>(scene.before.size());
+    feet.push_back(makeFrameTarget(scene.model.contacts()[foot.contact], foot.X_WT));
+  }
+  const double height = scene.standing.com.z() - level;
+  double lowest = height, strongest = gravity;
+  for (double t = 0; t < f.stand + f.push; t += o.time_step) {
+    const JumpHeight com = calcJumpHeight(o, gravity, t);
+    lowest = std::min(lowest, height + com.height);
+    strongest = std::max(strongest, gravity + com.acceleration);
+  }
+  const auto calcMost = [&](double reach) {
+    const auto calcAside = [reach](double z) { return std::sqrt(std::max(0.0, reach * reach - z * z)); };
+    const double before = calcAside(height + o.stretch), behind = calcAside(lowest);
+    const double speed = std::min(o.friction * (gravity * (f.stand + f.push) + f.take_off),
+                                  std::sqrt(2 * o.friction * strongest * (before + behind)));
+    return 2 * before + speed * f.flight;
+  };
+  if (std::abs(o.length) <= calcMost(height)) return;  // legs are at least as long as they are at the start
+  const double reach = calcReachedComHeight(scene.model, makeConstraintSet(scene.model, scene.before), feet,
+                                            scene.standing.q, level + 10 * height) -
+                       level;
+  const double most = calcMost(reach);
+  requireOption(
+      std::abs(o.length) <= most, "length",
+      "in a flight of " + formatNumber(f.flight) + " s feet with a friction of " + formatNumber(o.friction) +
+          " and legs of " + formatNumber(reach, "%.3g") + " m carry it at most " + formatNumber(most, "%.3g") + " m",
+      "give a length, e.g. " + formatNumber(std::copysign(most / 3, o.length), "%.1g") + ", or a longer flight");
+}
+
 JumpOptions suit(const RobotSize& size, JumpOptions o) {
   scaleWeights(size, o);
   for (double* weight : {&o.apex_weight, &o.com_weight, &o.swing_weight, &o.terminal_weight})
@@ -230,6 +271,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Standi
   check(model, options);
   const JumpScene scene = makeScene(model, options, standing);
   checkHeights(options, model.gravity().norm(), standing.com.z() - scene.before.front().X_WT.p.z());
+  checkLength(scene, model.gravity().norm());
   MotionPlan plan;
   plan.name = "jump";
   if (options.length != 0) requireLevel(model, scene.before, "jump forward");

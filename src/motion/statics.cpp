@@ -19,7 +19,7 @@ namespace bielle {
 namespace {
 
 // Of pivots over the largest: where springs balance the weight but for rounding, a smaller one is that balance.
-constexpr double kRankTolerance = 1e-8;
+constexpr double kHeldRank = 1e-8;
 
 double calcForceScale(const Model& model) { return std::max(1.0, model.mass() * model.gravity().norm()); }
 
@@ -57,7 +57,7 @@ StaticHold calcStaticHold(const Model& model, const ConstraintSet& constraints, 
   const int n = static_cast<int>(dofs.size());
   const MatrixXd A = makeHoldMatrix(model, ws, constraints, dofs);
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-  decomposition.setThreshold(kRankTolerance);
+  decomposition.setThreshold(kHeldRank);
   decomposition.compute(A);
   const VectorXd solution = decomposition.solve(ws.b);
   return {solution.head(n), calcLargest(A * solution - ws.b)};
@@ -174,7 +174,7 @@ double calcLeastShare(const Model& model, const ConstraintSet& constraints, cons
   MatrixXd Z = MatrixXd::Identity(A.rows(), A.rows());
   if (loops.cols() > 0) {
     Eigen::ColPivHouseholderQR<MatrixXd> decomposition;
-    decomposition.setThreshold(kRankTolerance);
+    decomposition.setThreshold(kHeldRank);
     decomposition.compute(loops);
     Z = MatrixXd(decomposition.householderQ()).rightCols(A.rows() - decomposition.rank()).eval();
   }
@@ -216,7 +216,7 @@ HoldingShare calcHoldingShare(const Model& model, const ConstraintSet& constrain
   for (const JointForce* spring : listFreeSprings(model)) dofs.push_back(spring->dof);
   const MatrixXd A = makeHoldMatrix(model, ws, constraints, dofs);
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-  decomposition.setThreshold(kRankTolerance);
+  decomposition.setThreshold(kHeldRank);
   decomposition.compute(A);
   const VectorXd solution = decomposition.solve(b);
   const double scale = calcForceScale(model);
