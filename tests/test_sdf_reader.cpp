@@ -232,6 +232,28 @@ TEST_CASE("a model of SDF that nothing holds has a free base, one that is static
   CHECK((held.joints()[1].X_PJ.p - Vector3d(1, 2, 3)).norm() < 1e-12);
 }
 
+TEST_CASE("of several models in SDF one is read, and which are not is told") {
+  const auto model = [](const std::string& name, bool moves) {
+    return "<model name='" + name + "'><link name='trunk'/><link name='leg'/>" +
+           (moves ? "<joint name='hip' type='revolute'><parent>trunk</parent><child>leg</child><axis><xyz>1 0 0</xyz>"
+                    "</axis></joint>"
+                  : "") +
+           "</model>";
+  };
+  const auto wrap = [](const std::string& models) {
+    return "<sdf version='1.7'><world name='w'>" + models + "</world></sdf>";
+  };
+  const LoadedRobot robot = loadSdf(wrap(model("table", false) + model("robot", true)));
+  CHECK(robot.model.name() == "robot");
+  CHECK(warnsOf(robot, "model 'table': it is left out, because it has no joints"));
+  CHECK_FALSE(warnsOf(robot, "model 'robot'"));
+  const std::string several = "it has several models: 'one', 'two'; keep one of them, in a file of its own";
+  const std::string two = model("one", true) + model("two", true);
+  CHECK_THAT(getError([&] { loadSdf(wrap(two)); }), Catch::Contains(several) && Catch::Contains(".sdf: document: "));
+  CHECK_THAT(getError([&] { loadSdf("<sdf version='1.7'>" + two + "</sdf>"); }), Catch::Contains(several));
+  CHECK_THAT(getError([&] { loadSdf(wrap(model("one", false))); }), Catch::Contains("it has no model with joints"));
+}
+
 TEST_CASE("Drake's bushings in SDF are the joints that they stand for") {
   const auto bushing = [](const std::string& torque, const std::string& force = "30000 30000 30000") {
     return "<frame name=\"fb\" attached_to=\"b\"><pose>0 0 1 1.5707963267948966 0 0</pose></frame><frame name=\"fc\" "

@@ -48,6 +48,7 @@ RobotFiles SdfReader::read() {
     fail("file", "it exceeds the largest size of an SDF file (16 MB)", "give one without embedded data");
   parseXml(xml, path_, "sdf", document_);
   checkVersion(*document_.RootElement());
+  checkModels(*document_.RootElement());
   load(xml);
   model_ = &findModel();
   tree_.name = model_->Name();
@@ -124,6 +125,18 @@ void SdfReader::load(const std::string& xml) {
   check(errors);
 }
 
+void SdfReader::failForSeveral(const std::string& names) const {
+  fail("document", "it has several models: " + names, "keep one of them, in a file of its own");
+}
+
+// libsdformat reads the first one alone.
+void SdfReader::checkModels(const XMLElement& root) const {
+  std::string names;
+  const auto models = getChildren(root, "model");
+  for (const XMLElement* model : models) names += (names.empty() ? "'" : ", '") + getAttribute(model, "name") + "'";
+  if (models.size() > 1) failForSeveral(names);
+}
+
 // The only one of the file.
 const sdf::Model& SdfReader::findModel() {
   const XMLElement& root = *document_.RootElement();
@@ -137,13 +150,15 @@ const sdf::Model& SdfReader::findModel() {
   for (uint64_t w = 0; w < root_.WorldCount(); ++w)
     for (uint64_t i = 0; i < root_.WorldByIndex(w)->ModelCount(); ++i) {
       const sdf::Model& model = *root_.WorldByIndex(w)->ModelByIndex(i);
-      if (model.JointCount() == 0) continue;
+      if (model.JointCount() == 0) {
+        tree_.warnings.push_back(path_ + ": model '" + model.Name() + "': it is left out, because it has no joints");
+        continue;
+      }
       moving.push_back(&model);
       names += (names.empty() ? "'" : ", '") + model.Name() + "'";
     }
-  if (moving.size() != 1)
-    fail("document", moving.empty() ? "it has no model with joints" : "it has several models with joints: " + names,
-         "give a file with one model");
+  if (moving.empty()) fail("document", "it has no model with joints", "give a file with one");
+  if (moving.size() > 1) failForSeveral(names);
   const sdf::World& world = *root_.WorldByIndex(0);
   const auto& g = world.Gravity();
   yaml_.gravity = Vector3d(g.X(), g.Y(), g.Z());

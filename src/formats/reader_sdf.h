@@ -23,6 +23,8 @@ class SdfReader {
  private:
   // reader_sdf.cpp
   void load(const std::string& xml);
+  [[noreturn]] void failForSeveral(const std::string& names) const;
+  void checkModels(const XMLElement& root) const;
   const sdf::Model& findModel();
   void readLink(const sdf::Link& link);
   void chooseCarriers();
