@@ -193,6 +193,48 @@ class FirmwareTest(unittest.TestCase):
         crank = math.atan2(ROCKER * math.sin(end), GROUND + ROCKER * math.cos(end)) + math.pi
         self.assertLess(abs(distance - abs(crank - at[1])), 0.2 * distance)
 
+    def test_numpy(self):
+        """The same formulas, over many postures at once."""
+        try:
+            import numpy as np
+        except ImportError:
+            self.skipTest("NumPy is not installed")
+        place = os.path.join(self.place, "arrays")
+        convert("fourbar", place, "--to", "numpy", "--postures", "200")
+        convert("rsu_biped", os.path.join(place, "ankles"), "--to", "numpy", "--postures", "200")
+        sys.path[:0] = [place, os.path.join(place, "ankles")]
+        import ankley_left_anklex_left as ankle
+        import rocker_joint as rocker
+
+        angles = np.linspace(self.low, self.high, 301)[:, None]
+        motors, inside = rocker.joint_to_motor(angles)
+        self.assertTrue(inside.all())
+        self.assertLess(max(abs(motors[i, 0] - calc_fourbar(angles[i, 0])) for i in range(301)), 1e-12)
+        self.assertFalse(rocker.joint_to_motor([self.high + 0.1])[1])
+        self.assertTrue(np.isfinite(rocker.joint_to_motor([np.nan])[0]).all())
+        at, ratio, held = self.linkage.solve("joint_to_motor", 2.0)[3], (ctypes.c_double * 2)(), (ctypes.c_double * 1)()
+        self.linkage.call("update_ratio", at, ratio)
+        self.linkage.call("held_torque", at, ratio, (ctypes.c_double * 3)(0, 0, -9.81), held)
+        self.assertLess(abs(rocker.held_torque([2.0])[0] - held[0]), 1e-13)
+        # Two joints: there and back, rates by differences, power.
+        share = np.random.default_rng(0).uniform(0.05, 0.95, (500, 2))
+        joints = ankle.LOWER + share * (ankle.UPPER - ankle.LOWER)
+        motors, inside = ankle.joint_to_motor(joints)
+        self.assertTrue(inside.all())
+        back, inside = ankle.motor_to_joint(motors)
+        self.assertTrue(inside.all())
+        self.assertLess(abs(back - joints).max(), 1e-12)
+        h, v = 1e-6, np.array([0.3, -0.8])
+        R, S = ankle.ratio(joints)
+        change = (ankle.joint_to_motor(joints + h * v)[0] - ankle.joint_to_motor(joints - h * v)[0]) / (2 * h)
+        self.assertLess(abs(change - ankle.motor_velocity(joints, v)).max(), 1e-7)
+        change = (ankle.ratio(joints + h * v)[0] - ankle.ratio(joints - h * v)[0]) / (2 * h)
+        rate = ankle.ratio_rate(joints, v * np.ones_like(joints))
+        self.assertLess(abs(change - rate).max(), 1e-6 * abs(rate).max())
+        torques = np.array([5.0, 2.0]) * np.ones_like(joints)
+        self.assertLess(abs((ankle.motor_torque(joints, torques) * (R @ v)).sum(-1) - torques @ v).max(), 1e-12)
+        self.assertLess(abs(ankle.joint_torque(joints, ankle.motor_torque(joints, torques, (0, 0, -9.81)), (0, 0, -9.81)) - torques).max(), 1e-12)
+
     def test_bad_input_writes_nothing(self):
         place = os.path.join(self.place, "nothing")
         for robot, options, said in (
@@ -238,7 +280,7 @@ class AllTest(unittest.TestCase):
     def test_all(self):
         print("| linkage | joint to motor | motor to joint | error (double) | error (float) | over goal | bytes (float) |\n|---|---|---|---|---|---|---|")
         with tempfile.TemporaryDirectory() as place:
-            for robot in ("fourbar", "bipetto", "rsu_biped", "kangaroo", "humanoid", "leg_biped", "belt_biped", "differential_ankle", "spring_biped",
+            for robot in ("fourbar", "bipetto", "rsu_biped", "kangaroo_leg", "humanoid", "leg_biped", "belt_biped", "differential_ankle", "spring_biped",
                           "spring_leg"):
                 texts = {}
                 for precision in ("double", "float"):

@@ -1,4 +1,232 @@
 #include "firmware/languages.h"
+#include "firmware/printer.h"
+#include "model/listing.h"
+#include "model/number_text.h"
+
 namespace bielle::firmware {
-std::map<std::string, std::string> writeNumPy(const Maps&) { return {}; }
+namespace {
+
+using Eigen::Index;
+
+// Keys: SIZE, @..@.
+constexpr const char* kModuleText = R"("""@title@
+
+@about@
+Arrays hold a posture a row: joints and motors (N, SIZE), or (SIZE,) for one.
+"""
+import numpy as np
+
+SIZE = SIZE_
+LOWER, UPPER = np.array([@lower@]), np.array([@upper@])  # of the joints
+MOTOR_LOWER, MOTOR_UPPER = np.array([@motor_lower@]), np.array([@motor_upper@])
+ROTOR = np.array([@rotor@])  # inertia, kg m^2 or kg
+EFFORT, SPEED = np.array([@effort@]), np.array([@speed@])  # limits of the motors
+
+
+def root(x):
+    return np.sqrt(np.maximum(x, 0.0))
+
+
+def least(a, b):
+    return np.minimum(a, b)
+
+
+def _limit(x, low, high):
+    return np.minimum(np.maximum(np.where(np.isnan(x), low, x), low), high)
+
+
+def _solve_motors(q):
+@solve_motors@
+
+def _solve_joints(q):
+@solve_joints@
+
+def joint_to_motor(joints):
+    """Motors for joints, clamped to the range, and whether they were in it and reached."""
+    joints = np.asarray(joints, float)
+    q = _start(_limit(joints, LOWER, UPPER), 0)
+    reached = _solve_motors(q)
+    return _stack(q[SIZE:2 * SIZE]), reached & ((joints >= LOWER) & (joints <= UPPER)).all(-1)
+
+
+def motor_to_joint(motors):
+    """Joints for motors, likewise."""
+    motors = np.asarray(motors, float)
+    q = _start(_limit(motors, MOTOR_LOWER, MOTOR_UPPER), SIZE)
+    reached = _solve_joints(q)
+    joints = _stack(q[:SIZE])
+    inside = ((motors >= MOTOR_LOWER) & (motors <= MOTOR_UPPER)).all(-1) & ((joints >= LOWER - 1e-9) & (joints <= UPPER + 1e-9)).all(-1)
+    return _limit(joints, LOWER, UPPER), reached & inside
+
+
+def _start(given, first):
+    zero = np.zeros(given.shape[:-1])
+    q = [zero] * @coordinates@
+    q[first:first + SIZE] = [given[..., i] for i in range(SIZE)]
+    return q
+
+
+def _stack(values):
+    return np.stack(np.broadcast_arrays(*values), -1)
+
+
+def _close(joints):
+    q = _start(_limit(np.asarray(joints, float), LOWER, UPPER), 0)
+    _solve_motors(q)
+    return q
+
+
+def _ratio(q):
+    r = [None] * (2 * SIZE * SIZE)
+@ratio@    both = _stack([x + 0 * q[0] for x in r])
+    return both.reshape(both.shape[:-1] + (2, SIZE, SIZE))
+
+
+def ratio(joints):
+    """R (N, SIZE, SIZE), speeds of motors over those of joints, and its inverse."""
+    both = _ratio(_close(joints))
+    return both[..., 0, :, :], both[..., 1, :, :]
+
+
+def ratio_rate(joints, joint_velocities):
+    """Time derivative of R (N, SIZE, SIZE)."""
+    q = _close(joints)
+    v = [np.asarray(joint_velocities, float)[..., i] for i in range(SIZE)]
+    r = [None] * (SIZE * SIZE + 1)
+@rate@    R = _stack([x + 0 * q[0] for x in r[:-1]])
+    return R.reshape(R.shape[:-1] + (SIZE, SIZE))
+
+
+def held_torque(joints, gravity=(0, 0, -9.81)):
+    """What springs and the weight of cranks and rods ask of the joints (N, SIZE); gravity (3,) or (N, 3) in the frame of @base@."""
+    q = _close(joints)
+    gravity = [np.asarray(gravity, float)[..., i] for i in range(3)]
+    h = [None] * SIZE
+@held@    return _stack([x + 0 * q[0] for x in h])
+
+
+def motor_velocity(joints, joint_velocities):
+    return np.einsum("...ij,...j->...i", ratio(joints)[0], joint_velocities)
+
+
+def motor_torque(joints, joint_torques, gravity=None):
+    """By virtual work; with what springs and weight take, if gravity is given."""
+    torques = np.asarray(joint_torques, float) + (0 if gravity is None else held_torque(joints, gravity))
+    return np.einsum("...ji,...j->...i", ratio(joints)[1], torques)
+
+
+def joint_torque(joints, motor_torques, gravity=None):
+    torques = np.einsum("...ji,...j->...i", ratio(joints)[0], motor_torques)
+    return torques - (0 if gravity is None else held_torque(joints, gravity))
+
+
+def clip_joint_torque(joints, joint_torques):
+    """Joint torques, shortened where the motors cannot give them: what a policy's action becomes."""
+    needed = np.abs(motor_torque(joints, joint_torques))
+    with np.errstate(divide="ignore"):
+        share = np.where(needed > EFFORT, EFFORT / needed, 1.0).min(-1)
+    return np.asarray(joint_torques, float) * share[..., None]
+
+
+def reflected_inertia(joints):
+    """Of the rotors (N, SIZE, SIZE), kg m^2."""
+    R = ratio(joints)[0]
+    return np.einsum("...ki,k,...kj->...ij", R, ROTOR, R)
+)";
+
+}  // namespace
+
+std::map<std::string, std::string> writeNumPy(const Maps& maps) {
+  const int m = maps.size();
+  const Mechanism& mechanism = maps.mechanism;
+  Style style;
+  style.declare = "  ";
+  style.end = "";
+  style.functions = "np.";
+  const auto nameInput = [&](int i) {
+    const auto entry = [](const char* array, int k) { return std::string(array) + "[" + std::to_string(k) + "]"; };
+    if (i < mechanism.gravity()) return entry("q", i);
+    return i < mechanism.velocity() ? entry("gravity", i - mechanism.gravity()) : entry("v", i - mechanism.velocity());
+  };
+  const auto deepen = [](const std::string& text, const std::string& by) {
+    std::string out;
+    for (size_t at = 0, end = 0; at < text.size(); at = end) {
+      end = text.find('\n', at) + 1;
+      const size_t first = text.find_first_not_of(' ', at);
+      out += by + text.substr(first, end - first);
+    }
+    return out;
+  };
+  const auto print = [&](const Program& program, const std::vector<std::string>& targets) {
+    return deepen(printProgram(program, style, nameInput, targets), "    ");
+  };
+  const auto printSolution = [&](const Solution& s) {
+    std::string out = "    reached = np.ones(np.shape(q[" + std::to_string(s.given.front()) + "]), bool)\n";
+    const auto addClosedForms = [&](const std::vector<std::pair<int, Scalar>>& list, const Scalar& least) {
+      std::vector<Scalar> formulas;
+      std::vector<std::string> targets;
+      for (const auto& [c, formula] : list) formulas.push_back(formula), targets.push_back(nameInput(c));
+      if (!least.isConstant()) formulas.push_back(least), targets.emplace_back("margin");
+      if (list.empty()) return;
+      out += print(Program(formulas), targets);
+      if (!least.isConstant()) out += "    reached = reached & (margin >= 0)\n";
+    };
+    addClosedForms(s.before, s.least_before);
+    if (!s.unknowns.empty()) {
+      std::vector<std::string> unknowns, steps;
+      for (size_t u = 0; u < s.unknowns.size(); ++u) {
+        unknowns.push_back(nameInput(s.unknowns[u]));
+        steps.push_back("d[" + std::to_string(u) + "]");
+      }
+      const std::string U = std::to_string(s.unknowns.size());
+      out += print(Program(s.guesses), unknowns);
+      const LoopText loop = printLoop(Program(s.steps), style, nameInput, steps, s.unknowns);
+      out += deepen(loop.before, "    ") + "    for _ in range(" + std::to_string(s.iterations) +
+             "):\n        d = [None] * " + U + "\n" + deepen(loop.body, "        ") + "        d = [_limit(x, " +
+             formatConstant(-kLongestStep, style) + ", " + formatConstant(kLongestStep, style) + ") for x in d]\n";
+      for (size_t u = 0; u < unknowns.size(); ++u)
+        out += "        " + unknowns[u] + " = " + unknowns[u] + " + " + steps[u] + "\n";
+      out += "    reached = reached & (np.max(np.abs(np.broadcast_arrays(*d)), 0) <= 1e-3)\n";
+    }
+    addClosedForms(s.after, s.least_after);
+    return out + "    return reached\n";
+  };
+  const auto list = [&](const auto& get) {
+    std::vector<std::string> out;
+    for (int i = 0; i < m; ++i) {
+      const double x = get(i);
+      out.push_back(std::isinf(x) ? (x < 0 ? "-np.inf" : "np.inf") : formatConstant(x, style));
+    }
+    return listItems(out);
+  };
+  const auto listTargets = [](const char* array, int n) {
+    std::vector<std::string> out;
+    for (int i = 0; i < n; ++i) out.push_back(std::string(array) + "[" + std::to_string(i) + "]");
+    return out;
+  };
+  const Formulas formulas(maps);
+  std::string about;
+  for (const std::string& line : describe(maps, false)) about += line + "\n";
+  const auto motor = [&](int i) -> const Motor& { return maps.motors[static_cast<size_t>(i)]; };
+  return {{maps.name + ".py", fillIn(kModuleText, {{"SIZE_", std::to_string(m)},
+                                                   {"@lower@", list([&](int i) { return maps.lower[i]; })},
+                                                   {"@upper@", list([&](int i) { return maps.upper[i]; })},
+                                                   {"@motor_lower@", list([&](int i) { return maps.motor_lower[i]; })},
+                                                   {"@motor_upper@", list([&](int i) { return maps.motor_upper[i]; })},
+                                                   {"@rotor@", list([&](int i) { return motor(i).armature; })},
+                                                   {"@effort@", list([&](int i) { return motor(i).effort_limit; })},
+                                                   {"@speed@", list([&](int i) { return motor(i).velocity_limit; })},
+                                                   {"@solve_motors@", printSolution(maps.inverse)},
+                                                   {"@solve_joints@", printSolution(maps.direct)},
+                                                   {"@coordinates@", std::to_string(mechanism.coordinates.size())},
+                                                   {"@ratio@", print(formulas.ratio, listTargets("r", 2 * m * m))},
+                                                   {"@rate@", print(formulas.ratio_rate, listTargets("r", m * m + 1))},
+                                                   {"@held@", print(formulas.held, listTargets("h", m))},
+                                                   {"@about@", about},
+                                                   {"@base@", maps.base},
+                                                   {"@title@", maps.robot + ": " + listItems(maps.joint_names) +
+                                                                   " by " + listItems(maps.motor_names) +
+                                                                   ". Written by `bielle convert --to numpy`."}})}};
+}
+
 }  // namespace bielle::firmware
