@@ -35,6 +35,11 @@ if(BIELLE_BUILD_VALIDATION)
       set_tests_properties(results_${page} PROPERTIES LABELS system)
     endforeach()
   endif()
+  if(TARGET bielle-batch-speed)
+    add_test(NAME results_batch COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/batch.py --quick
+      --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
+    set_tests_properties(results_batch PROPERTIES LABELS system)
+  endif()
   # The figure of the jump with and without springs, by coarser stages and without the second solve of each.
   add_test(NAME springs_figure COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/examples/springs/jump.py
     --objective effort --time-step 0.005 -o ${CMAKE_CURRENT_BINARY_DIR}/springs.png)

@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+"""Writes docs/results/batch.md: the speed of many worlds at once, by bielle-batch-speed beside the command.
+
+    docs/results/batch.py [--bielle build/bin/bielle] [--rounds 9] [--quick]
+
+Processor time, each kind of world in turn: other programs on the machine lengthen all alike, more or less.
+"""
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import common
+
+REGISTERS = {8: "AVX-512, eight numbers", 4: "AVX2, four numbers", 2: "SSE2, two numbers"}
+TITLES = {"many": "many at once", "single": "one after the other", "mujoco": "MuJoCo 2.2.2, `mj_step` alone"}
+GOALS = {(8, 1e-3): 8, (8, 2.5e-4): 12, (4, 1e-3): 4, (4, 2.5e-4): 6}
+
+
+def measure(program, *options):
+    run = subprocess.run([program, *map(str, options)], capture_output=True, text=True, check=True)
+    if run.stderr:
+        print(run.stderr, file=sys.stderr, end="")
+    return json.loads(run.stdout)
+
+
+def add_table(page, report):
+    rows = []
+    for step in dict.fromkeys(row["time step [s]"] for row in report["runs"]):
+        runs = {row["world"]: row for row in report["runs"] if row["time step [s]"] == step}
+        for name, title in TITLES.items():
+            row = runs[name]
+            rows.append([f"{1e3 * step:g}", title,
+                         f"{row['median']:,.0f} ({row['least']:,.0f} to {row['most']:,.0f})",
+                         f"{row['median'] / runs['single']['median']:.2f}",
+                         f"{row['median'] / runs['mujoco']['median']:.2f}",
+                         f"{row['rounds']:.2f}" if name == "many" else "–", f"{row['gap [m]']:.1e}"])
+    page.table(["step [ms]", "worlds", "steps per second (least to most)", "over one after the other", "over MuJoCo",
+                "rounds of Newton", "closures open by at most [m]"], rows)
+
+
+def describe_goals(report):
+    parts = []
+    for step in dict.fromkeys(row["time step [s]"] for row in report["runs"]):
+        runs = {row["world"]: row["median"] for row in report["runs"] if row["time step [s]"] == step}
+        goal, ratio = GOALS.get((report["register"], step)), runs["many"] / runs["mujoco"]
+        if goal:
+            verdict = "met" if ratio >= goal else "missed"
+            parts.append(f"{goal} times MuJoCo's steps at {1e3 * step:g} ms: {ratio:.1f}, {verdict}")
+    memory = report["memory [kB]"]
+    parts.append(f"less than 30 kB a world: {memory:.1f}, {'met' if memory < 30 else 'missed'}")
+    return "Goals for a robot that stands: " + "; ".join(parts) + "."
+
+
+def main():
+    parser = common.make_parser(__doc__)
+    parser.add_argument("--rounds", type=int, default=9, help="runs of each kind of world")
+    arguments = parser.parse_args()
+    command = shutil.which(arguments.bielle) or arguments.bielle
+    program = os.path.join(os.path.dirname(os.path.realpath(command)), "bielle-batch-speed")
+    options = ["--rounds", 1, "--worlds", 16, "--seconds", 0.02] if arguments.quick else ["--rounds", arguments.rounds]
+    robot = common.SOURCE / "robots/bipetto"
+    stands, falls = (measure(program, "--robot", robot, *options, *more) for more in ([], ["--falls"]))
+    page = common.Page(__file__, "Many worlds at once", common.describe_run(arguments.commit))
+    page.add(f"""Steps per second of processor time on one thread, all in turn, medians; `validation/batch` measures them. The
+library is compiled for this processor, with registers of {REGISTERS[stands['register']]}. Torques change every millisecond.
+MuJoCo runs the file that `bielle convert --to mjcf` writes, with closures and contacts as soft as its time step allows.""")
+    page.heading("Bipetto stands")
+    page.add("""Springs and dampers on its motors hold a posture; pushes of different size at the trunk, for 50 ms, make the
+worlds differ. A round of Newton's method is one for all robots of a register, per step.""")
+    add_table(page, stands)
+    page.add(describe_goals(stands))
+    page.heading("Bipetto falls")
+    page.add("""Limp robots are dropped from 5 cm with random velocities of the trunk of up to 1 m/s and 1 rad/s. Soles land and
+slide, joints run into stops, and steps are halved, at other times in every world: a register goes as slowly as its slowest robot.
+MuJoCo's steps are never halved.""")
+    add_table(page, falls)
+    page.write(arguments.quick)
+
+
+if __name__ == "__main__":
+    main()
