@@ -11,6 +11,7 @@
 #include "design/evaluation.h"
 #include "design/joint_reach.h"
 #include "design/page_data.h"
+#include "design/run.h"
 #include "design/spec.h"
 #include "leg_biped.h"
 #include "robot_directory.h"
@@ -444,18 +445,34 @@ TEST_CASE("design: corners of what a motor can give lie on its limits") {
         std::vector<std::pair<double, double>>{{100, -50}, {100, 50}, {-100, 50}, {-100, -50}});
 }
 
-TEST_CASE("designs tell how far joints reach through their linkages, before and after") {
-  // A four-bar at the knee (robots/parts/knee/four_bar.yaml) is dead where crank and rod are in line, l +- c from the motor to the end
-  // of the arm, which is at the angle psi from the thigh, cos psi = sin(knee - middle); at the middle the ratio is arm / crank.
-  const double thigh = 0.22, arm = 0.05, middle = 1.2;
-  const auto make = [&](double crank) {
+namespace {
+
+// A four-bar at the knee (robots/parts/knee/four_bar.yaml) is dead where crank and rod are in line, l +- c from the motor to the end
+// of the arm, which is at the angle psi from the thigh, cos psi = sin(knee - middle); at the middle the ratio is arm / crank.
+struct FourBarKnee {
+  double thigh = 0.22, arm = 0.05, middle = 1.2;
+
+  Model make(double crank) const {
     return makeLegBiped({{"knee", "four_bar"},
                          {"ankle", "rsu"},
                          {"thigh_length", thigh},
                          {"knee_crank", crank},
                          {"knee_arm", arm},
                          {"knee_middle", middle}});
-  };
+  }
+  double calcKnee(double reach) const {
+    return middle + std::asin((thigh * thigh + arm * arm - reach * reach) / (2 * thigh * arm));
+  }
+  // Crank and rod stretched: the end of the range at its lower side.
+  double calcLower(double crank) const { return calcKnee(std::hypot(thigh, crank - arm) + crank); }
+};
+
+}  // namespace
+
+TEST_CASE("designs tell how far joints reach through their linkages, before and after") {
+  const FourBarKnee fourbar;
+  const double arm = fourbar.arm;
+  const auto make = [&](double crank) { return fourbar.make(crank); };
   const auto find = [](const std::vector<JointReach>& reaches, const std::string& joint) {
     const auto it =
         std::find_if(reaches.begin(), reaches.end(), [&](const auto& reach) { return reach.joint == joint; });
@@ -468,12 +485,9 @@ TEST_CASE("designs tell how far joints reach through their linkages, before and 
     const std::vector<JointReach> reaches = listReaches(model);
     const JointReach knee = find(reaches, "knee_left");
     const int dof = model.joints()[static_cast<size_t>(model.findJoint("knee_left"))].idx_v;
-    const auto calcKnee = [&](double reach) {
-      return middle + std::asin((thigh * thigh + arm * arm - reach * reach) / (2 * thigh * arm));
-    };
-    const double rod = std::hypot(thigh, crank - arm);
-    CHECK(knee.lower == Approx(std::max(model.lowerLimits()[dof], calcKnee(rod + crank))).margin(1e-6));
-    CHECK(knee.upper == Approx(std::min(model.upperLimits()[dof], calcKnee(rod - crank))).margin(1e-6));
+    const double rod = std::hypot(fourbar.thigh, crank - arm);
+    CHECK(knee.lower == Approx(std::max(model.lowerLimits()[dof], fourbar.calcLower(crank))).margin(1e-6));
+    CHECK(knee.upper == Approx(std::min(model.upperLimits()[dof], fourbar.calcKnee(rod - crank))).margin(1e-6));
     REQUIRE(knee.ratio.has_value());
     CHECK(knee.ratio->first <= arm / crank);
     CHECK(knee.ratio->second >= arm / crank);
@@ -487,4 +501,115 @@ TEST_CASE("designs tell how far joints reach through their linkages, before and 
   }
   CHECK(changed == std::vector<std::string>{"knee_left", "knee_right"});
   CHECK(formatRange({"knee", -1e-12, 2.1, {}}) == "0 .. 2.1");
+}
+
+TEST_CASE("measures: the share of its angles that a joint reaches, and its ratios there") {
+  const FourBarKnee fourbar;
+  const double crank = 0.035, lower = fourbar.calcLower(crank);  // it does not reach 0
+  REQUIRE(lower > 0.1);
+  const Model model = fourbar.make(crank);
+  JointWays ways(model);
+  const RangeCoverage all = ways.calcCoverage({"knee_right", 0, 2});
+  CHECK(all.share == Approx((2 - lower) / 2).epsilon(1e-7));
+  CHECK(all.largest == std::numeric_limits<double>::infinity());  // at the dead point where it ends
+  const RangeCoverage none = ways.calcCoverage({"knee_right", -0.5, lower - 1e-3});
+  CHECK((none.share == 0 && none.least == 0 && none.largest == all.largest));
+  // Next to the middle, and anywhere against a sweep of small steps.
+  const RangeCoverage next = ways.calcCoverage({"knee_right", fourbar.middle - 1e-3, fourbar.middle + 1e-3});
+  CHECK(next.share == Approx(1));
+  CHECK(next.least == Approx(fourbar.arm / crank).epsilon(1e-3));
+  CHECK(next.largest == Approx(fourbar.arm / crank).epsilon(1e-3));
+  const VectorXd q = findClosedConfiguration(model).q;
+  SweepOptions fine;
+  fine.step = 1e-3;
+  const RatioSweep sweep = sweepRatio(model, makeLinkage(model, q, {"knee_right"}), q, 0, fine);
+  for (const double from : {lower + 0.02, 0.73, 1.401})
+    for (const double width : {0.005, 0.3}) {
+      CAPTURE(from, width);
+      const RangeCoverage found = ways.calcCoverage({"knee_right", from, from + width});
+      double least = HUGE_VAL, largest = 0;
+      for (const RatioSample& sample : sweep.samples) {
+        if (sample.branch != 0 || sample.joints[0] < from || sample.joints[0] > from + width) continue;
+        least = std::min(least, std::abs(sample.ratio.R(0, 0)));
+        largest = std::max(largest, std::abs(sample.ratio.R(0, 0)));
+      }
+      CHECK(found.share == Approx(1));
+      CHECK(found.least == Approx(least).epsilon(0.01));
+      CHECK(found.largest == Approx(largest).epsilon(0.01));
+    }
+  // A joint with a motor of its own and without limits goes round and round, with the ratio 1.
+  const RangeCoverage direct = ways.calcCoverage({"hipy_left", 1, 8});
+  CHECK((direct.share == 1 && direct.least == 1 && direct.largest == 1));
+
+  // Which joints: all of linkages, those of one motor, or by name; the angles are those of the start.
+  CHECK(findRanges(model, {}, false, "").size() == 6);  // knees, and the two joints of each ankle
+  const std::vector<JointRange> knees = findRanges(model, {}, true, "");
+  REQUIRE(knees.size() == 2);
+  CHECK(knees[0].lower == Approx(lower).epsilon(1e-7));
+  CHECK(findRanges(model, {{"*"}, {}}, true, "").size() > 2);
+  CHECK_THROWS_WITH(findRanges(model, {{"ankley_left"}, {}}, true, "constraints"), Contains("several motors"));
+  CHECK_THROWS_WITH(findRanges(model, {{"crank_knee_left"}, {}}, false, "constraints"),
+                    Contains("motors drive no joint"));
+}
+
+TEST_CASE("measures: a search keeps the range of a joint, and ends where it would be lost") {
+  const RobotDirectory directory;
+  const FourBarKnee fourbar;
+  const std::string text = R"(generator: leg_biped
+set: {knee: four_bar, ankle: rsu, thigh_length: 0.22, knee_crank: 0.049, knee_arm: 0.05, knee_middle: 1.2}
+variables:
+  - {name: crank, parameter: knee_crank, bounds: [0.03, 0.05]}
+objective:
+  - {measure: least_ratio, joints: "knee*", angles: [1, 1.4]}
+constraints:
+  - {measure: range, joints: ["knee*"], angles: [0.1, 2]}
+  - {measure: largest_ratio, joints: ["knee*"], angles: [0.4, 2], at_most: 50}
+search: {searches: 1, stages: [{algorithm: sbplx, evaluations: 60, tolerance: 1e-6}]}
+)";
+  const auto run = [&](const std::string& content, const std::string& name) {
+    const DesignSpec spec = readDesignSpec(directory.write(name + ".yaml", content));
+    const DesignEvaluator evaluator = makeEvaluator(spec);
+    DesignRunOptions options;
+    options.directory = directory.path() + "/" + name;
+    return std::pair{evaluator.start(), runDesign(evaluator, spec, options)};
+  };
+  const auto [before, kept] = run(text, "kept");
+  // The range is kept up to a thousandth of it, at the crank whose dead point is there.
+  double shortest = 0.03, longest = 0.05;
+  while (longest - shortest > 1e-9) {
+    const double crank = (shortest + longest) / 2;
+    (fourbar.calcLower(crank) > 0.1 + kConstraintSlack * 1.9 ? shortest : longest) = crank;
+  }
+  CHECK(before.constraints[0] == Approx(1));
+  CHECK(kept.evaluation.status == DesignStatus::Feasible);
+  CHECK(kept.best[0] == Approx(longest).epsilon(1e-4));
+  CHECK(kept.evaluation.constraints[0] == Approx(1 - kConstraintSlack).epsilon(1e-5));
+  CHECK(kept.evaluation.terms[0] < 0.95 * before.terms[0]);  // the inverse of the ratio
+  // Without the constraint it is lost.
+  const size_t first = text.find("  - {measure: range"), second = text.find("  - {measure: largest_ratio");
+  const auto [unused, lost] =
+      run(replaceOnce(std::string(text).erase(first, second - first), "evaluations: 60", "evaluations: 20"), "lost");
+  CHECK(fourbar.calcLower(lost.best[0]) > 0.2);
+  // Designs that lose it say so.
+  const DesignEvaluator evaluator = makeEvaluator(readDesignSpec(directory.write("spec.yaml", text)));
+  const Evaluation loses = evaluator.evaluate(VectorXd::Constant(1, 0.031));
+  CHECK(loses.status == DesignStatus::Violated);
+  CHECK_THAT(loses.message, Contains("range is 0.") && Contains("< 1"));
+
+  const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    const std::string path = directory.write("spec.yaml", changed);
+    CAPTURE(to);
+    CHECK_THROWS_WITH(makeEvaluator(readDesignSpec(path)), Contains(problem));
+  };
+  check("angles: [0.1, 2]", "angles: [2, 0.1]", "wrong order");
+  check("angles: [0.1, 2]", "angles: [2]", "it is not a range");
+  check("angles: [0.1, 2]", "at_least: 1.2", "at most 1");
+  check("angles: [0.1, 2]", "at_most: 1", "give `at_least`");
+  check("angles: [0.1, 2]", "motors: [motor_knee_left]", "does not depend on motors");
+  check("\"knee*\"], angles: [0.1, 2]", "elbow]", "motors drive no joint 'elbow'");
+  check("measure: range", "measure: margin, at_least: 0.2", "only ranges and ratios are about joints");
+  check("measure: least_ratio, joints", "measure: mass, joints", "only ranges and ratios are about joints");
+  check("sbplx", "slsqp", "the constraint on range does not have");
 }

@@ -41,6 +41,12 @@ std::vector<int> findNamed(const Model& model, const std::vector<std::string>& n
   return motors;
 }
 
+std::vector<JointRange> findRangesOf(const Model& model, Measure measure, const JointAngles& requested,
+                                     const char* where) {
+  if (!isOfJoints(measure)) return {};
+  return findRanges(model, requested, measure != Measure::Range, where);
+}
+
 void readNames(const std::vector<ObjectiveTerm>& objective, const std::vector<DesignConstraint>& constraints,
                ArchitectureStart& start) {
   const Model& model = start.model;
@@ -48,8 +54,10 @@ void readNames(const std::vector<ObjectiveTerm>& objective, const std::vector<De
     start.term_motors.push_back(findNamed(model, term.motors, "objective"));
     start.term_grids.emplace_back();
     if (term.measure == Measure::Workspace) start.term_grids.back() = makeWorkspaceGrid(model, term.region);
+    start.term_ranges.push_back(findRangesOf(model, term.measure, term.range, "objective"));
   }
   for (const DesignConstraint& constraint : constraints) {
+    start.constraint_ranges.push_back(findRangesOf(model, constraint.measure, constraint.range, "constraints"));
     std::vector<int> named = findNamed(model, constraint.motors, "constraints");
     const auto is_limited = [&](int m) {
       const Motor& motor = model.motors()[static_cast<size_t>(m)];
@@ -72,7 +80,7 @@ void readNames(const std::vector<ObjectiveTerm>& objective, const std::vector<De
 ArchitectureStart makeArchitectureStart(Model model, const std::vector<DesignMotion>& motions,
                                         const std::vector<ObjectiveTerm>& objective, const EvaluationOptions& options,
                                         bool must_solve, bool must_keep) {
-  ArchitectureStart start{std::move(model), {}, {}, {}, {}, {}};
+  ArchitectureStart start{std::move(model), {}, {}, {}, {}, {}, {}, {}};
   readNames(objective, options.constraints, start);
   for (const DesignConstraint& constraint : options.constraints) {
     if (constraint.measure != Measure::Distance) continue;

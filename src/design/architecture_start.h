@@ -14,6 +14,7 @@ struct ArchitectureStart {
   std::vector<std::optional<WorkspaceGrid>> term_grids;  ///< by objective, of workspaces
   std::vector<std::optional<SolvedMotion>> solved;       ///< none where the start has no such motion
   BodyPairs left_out;                                    ///< of constraints on distances
+  std::vector<std::vector<JointRange>> term_ranges, constraint_ranges;  ///< likewise, of measures of joints
 };
 
 /// \param must_solve  whether a motion that fails is an error

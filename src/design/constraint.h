@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "design/gradient.h"
+#include "design/joint_reach.h"
 #include "design/measures.h"
 
 namespace bielle {
@@ -17,7 +18,8 @@ struct DesignConstraint {
   double bound = 1;
   bool at_least = false;  ///< else at most
   std::vector<std::array<std::string, 2>> except =
-      {};  ///< of a distance: pairs of bodies that it leaves out (near_bodies.h)
+      {};                  ///< of a distance: pairs of bodies that it leaves out (near_bodies.h)
+  JointAngles range = {};  ///< of a measure of joints
 };
 
 /// Beyond a bound, over it: so much counts as kept, since solvers keep their own constraints to a tolerance.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bielle/model/error.h"
 #include "design/evaluation_data.h"
@@ -39,9 +40,7 @@ const char* getName(DesignStatus status) {
 void DesignEvaluator::Data::checkSpec() {
   const Model& model = robot.startModel();
   makeDrives(model, options.drives);  // \throws what is wrong with them
-  const auto is_of_motions = [](const auto& asked_for) {
-    return asked_for.measure != Measure::Workspace && asked_for.measure != Measure::Mass;
-  };
+  const auto is_of_motions = [](const auto& asked_for) { return !isOfRobot(asked_for.measure); };
   const bool needs_motions = std::any_of(objective.begin(), objective.end(), is_of_motions) ||
                              std::any_of(options.constraints.begin(), options.constraints.end(), is_of_motions);
   if (motions.empty() && needs_motions)
@@ -111,15 +110,16 @@ void DesignEvaluator::Data::solveStart() {
   makeMotions(base, model, start);
   if (start.status != DesignStatus::Feasible)
     throw InputError(model.name(), "start design", start.message, "request a motion that the robot can make");
+  JointWays ways(model);
   for (size_t i = 0; i < objective.size(); ++i) {
-    start.terms.push_back(calcTerm(i, base, model, start.motions));
+    start.terms.push_back(calcTerm(i, base, model, ways, start.motions));
     if (!(start.terms[i] > 0 && std::isfinite(start.terms[i])))
       throw InputError(model.name(), std::string("objective: ") + getName(objective[i].measure),
                        "its value at the start design is zero or infinite",
                        "choose another measure, other motors or other weights of motions");
   }
   start.value = weight;
-  checkConstraints(base, model, start);
+  checkConstraints(base, model, ways, start);
 }
 
 void DesignEvaluator::Data::makeMotions(const ArchitectureStart& base, const Model& model, Evaluation& out,
@@ -169,9 +169,37 @@ bool DesignEvaluator::Data::checkPostures(const ArchitectureStart& base, const M
   return false;
 }
 
-double DesignEvaluator::Data::calcTerm(size_t i, const ArchitectureStart& base, const Model& model,
+namespace {
+
+// The worst of the joints.
+double calcOfJoints(Measure measure, JointWays& ways, const std::vector<JointRange>& ranges) {
+  double value = isLeast(measure) ? std::numeric_limits<double>::infinity() : 0;
+  for (const JointRange& range : ranges) {
+    const RangeCoverage coverage = ways.calcCoverage(range);
+    value = measure == Measure::Range        ? std::min(value, coverage.share)
+            : measure == Measure::LeastRatio ? std::min(value, coverage.least)
+                                             : std::max(value, coverage.largest);
+  }
+  return value;
+}
+
+}  // namespace
+
+double DesignEvaluator::Data::calcTerm(size_t i, const ArchitectureStart& base, const Model& model, JointWays& ways,
                                        const std::vector<MotionMeasures>& measures) const {
-  if (objective[i].measure == Measure::Mass) return model.mass();
+  const Measure measure = objective[i].measure;
+  if (measure == Measure::Mass) return model.mass();
+  if (isOfJoints(measure)) {
+    constexpr double kLeastShare = 0.01;
+    const double value = calcOfJoints(measure, ways, base.term_ranges[i]);
+    const double term = measure == Measure::LargestRatio
+                            ? value
+                            : 1 / (measure == Measure::Range ? std::max(value, kLeastShare) : value);
+    if (!std::isfinite(term))
+      throw InputError(model.name(), std::string("objective: ") + getName(measure),
+                       "the joint has a dead point in its angles", "narrow `angles`");
+    return term;
+  }
   const std::optional<WorkspaceGrid>& grid = base.term_grids[i];
   if (!grid) return getMeasure(objective[i].measure, base.term_motors[i], measures, listWeights());
   return 1 / std::max(calcCoverage(model, *grid).share, 0.5 / static_cast<double>(grid->placements.size()));
@@ -187,13 +215,16 @@ std::string getNearest(const std::vector<MotionMeasures>& motions) {
 
 }  // namespace
 
-void DesignEvaluator::Data::checkConstraints(const ArchitectureStart& base, const Model& model, Evaluation& out) const {
+void DesignEvaluator::Data::checkConstraints(const ArchitectureStart& base, const Model& model, JointWays& ways,
+                                             Evaluation& out) const {
   double sum = 0;
   for (size_t i = 0; i < options.constraints.size(); ++i) {
     const DesignConstraint& constraint = options.constraints[i];
-    const double value = constraint.measure == Measure::Mass ? model.mass()
-                                                             : getMeasure(constraint.measure, base.constraint_motors[i],
-                                                                          out.motions, listWeights(constraint));
+    const double value =
+        constraint.measure == Measure::Mass ? model.mass()
+        : isOfJoints(constraint.measure)
+            ? calcOfJoints(constraint.measure, ways, base.constraint_ranges[i])
+            : getMeasure(constraint.measure, base.constraint_motors[i], out.motions, listWeights(constraint));
     const double violation = calcViolation(constraint, value);
     out.constraints.push_back(value);
     if (violation > 0)
@@ -218,11 +249,12 @@ void DesignEvaluator::Data::checkConstraints(const ArchitectureStart& base, cons
 std::string describeGoal(const DesignGoal& goal) { return goal.motion + ": " + goal.outcome.goal.name; }
 
 void DesignEvaluator::Data::sumUp(const ArchitectureStart& base, const Model& model, Evaluation& out) const {
+  JointWays ways(model);
   for (size_t i = 0; i < objective.size(); ++i) {
-    out.terms.push_back(calcTerm(i, base, model, out.motions));
+    out.terms.push_back(calcTerm(i, base, model, ways, out.motions));
     out.value += objective[i].weight * out.terms[i] / start.terms[i];  // Eq. (1)
   }
-  checkConstraints(base, model, out);
+  checkConstraints(base, model, ways, out);
 }
 
 DesignEvaluator::DesignEvaluator(const Parametrization& robot, std::vector<DesignMotion> motions,

@@ -5,8 +5,9 @@
 ///     f = sum_i w_i m_i / m_i0,                                                                                    (1)
 /// W = sum_i w_i at the start. Measures of motions are multiplied by the weights of these before the largest is taken or all
 /// are added, those in constraints only where they are added: other constraints hold for every motion as they are. Robots are
-/// loaded with the payload of each motion; the mass of a robot is that without. The measure of a workspace is the inverse of
-/// the reached share, of at least half a point. Infeasible designs are not errors; their values are
+/// loaded with the payload of each motion; the mass of a robot is that without. What is better the larger stands in the objective
+/// by its inverse: the share of a workspace, of at least half a point; the share of a range, of at least a hundredth; the least
+/// ratio. Infeasible designs are not errors; their values are
 ///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions is infeasible                   (2)
 ///     f = 1.5 W + 0.5 W s                    all are feasible, but a motion failed                                 (3)
 ///     f = 1.5 W + 0.5 W / (n + 1) V / (1 + V)        all n motions are made, but constraints are violated          (4)
@@ -48,6 +49,7 @@ struct ObjectiveTerm {
   std::vector<std::string> motors;  ///< empty: all
   double weight = 1;                ///< w_i
   WorkspaceRegion region = {};      ///< only for the workspace, which has no motors
+  JointAngles range = {};           ///< only of a measure of joints, likewise
 };
 
 struct EvaluationOptions {

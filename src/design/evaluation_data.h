@@ -54,9 +54,9 @@ struct DesignEvaluator::Data {
   MeasurePieces calcLimits(const ArchitectureStart& base, const std::vector<MotorSlopes>& slopes,
                            const RobotSlopes& robot_slopes) const;
   bool checkPostures(const ArchitectureStart& base, const Model& model, Evaluation& out) const;
-  double calcTerm(size_t i, const ArchitectureStart& base, const Model& model,
+  double calcTerm(size_t i, const ArchitectureStart& base, const Model& model, JointWays& ways,
                   const std::vector<MotionMeasures>& measures) const;
-  void checkConstraints(const ArchitectureStart& base, const Model& model, Evaluation& out) const;
+  void checkConstraints(const ArchitectureStart& base, const Model& model, JointWays& ways, Evaluation& out) const;
   void sumUp(const ArchitectureStart& base, const Model& model, Evaluation& out) const;
 };
 

@@ -91,6 +91,13 @@ Curve makeCurve(const MotorTrace& trace, const MatrixXd& values, int motor, cons
   return curve;
 }
 
+std::string describeMeasure(Measure measure, const std::vector<std::string>& motors, const JointAngles& range) {
+  std::string text = getName(measure);
+  const std::vector<std::string>& names = isOfJoints(measure) ? range.joints : motors;
+  for (const std::string& name : names) text += (&name == &names.front() ? " of " : ", ") + name;
+  return text;
+}
+
 DesignFigure makeMotionFigure(const DesignEvaluator& evaluator, const std::string& name, const MotionMeasures& before,
                               const MotionMeasures& after) {
   Plot torque{"Motor torques", "time [s]", "torque [N m]"};
@@ -109,13 +116,11 @@ DesignFigure makeMotionFigure(const DesignEvaluator& evaluator, const std::strin
 
 }  // namespace
 
-std::string describeMeasure(Measure measure, const std::vector<std::string>& motors) {
-  std::string text = getName(measure);
-  for (const std::string& motor : motors) text += (&motor == &motors.front() ? " of " : ", ") + motor;
-  return text;
-}
+std::string describeTerm(const ObjectiveTerm& term) { return describeMeasure(term.measure, term.motors, term.range); }
 
-std::string describeTerm(const ObjectiveTerm& term) { return describeMeasure(term.measure, term.motors); }
+std::string describeConstraint(const DesignConstraint& constraint) {
+  return describeMeasure(constraint.measure, constraint.motors, constraint.range);
+}
 
 std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, const DesignRun& run) {
   std::vector<DesignFigure> figures;

@@ -13,9 +13,9 @@ struct DesignFigure {
   std::vector<Plot> plots;
 };
 
-// A term of the objective in words.
-std::string describeMeasure(Measure measure, const std::vector<std::string>& motors);
+// A measure of the objective or of a constraint in words, with the motors or joints that it names.
 std::string describeTerm(const ObjectiveTerm& term);
+std::string describeConstraint(const DesignConstraint& constraint);
 
 // `design`: values over evaluations. `design_front`: where several objectives are kept apart, the first over each of the
 // others. `design_MOTION`: torques and speeds over time, of the start and of the best design.

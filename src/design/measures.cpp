@@ -198,10 +198,24 @@ const char* getName(Measure measure) {
       return "dead_point_distance";
     case Measure::Distance:
       return "distance";
+    case Measure::Range:
+      return "range";
+    case Measure::LeastRatio:
+      return "least_ratio";
+    case Measure::LargestRatio:
+      return "largest_ratio";
     case Measure::Conditioning:
       break;
   }
   return "conditioning";
+}
+
+bool isOfJoints(Measure measure) {
+  return measure == Measure::Range || measure == Measure::LeastRatio || measure == Measure::LargestRatio;
+}
+
+bool isOfRobot(Measure measure) {
+  return measure == Measure::Workspace || measure == Measure::Mass || isOfJoints(measure);
 }
 
 bool isSum(Measure measure) {
@@ -209,7 +223,16 @@ bool isSum(Measure measure) {
 }
 
 bool isLeast(Measure measure) {
-  return measure == Measure::Margin || measure == Measure::DeadPointDistance || measure == Measure::Distance;
+  switch (measure) {
+    case Measure::Margin:
+    case Measure::DeadPointDistance:
+    case Measure::Distance:
+    case Measure::Range:
+    case Measure::LeastRatio:
+      return true;
+    default:
+      return false;
+  }
 }
 
 namespace {

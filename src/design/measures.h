@@ -28,7 +28,10 @@ enum class Measure {
   Heat,               ///< most of a motor's root mean square torque over what it bears for ever
   Margin,             ///< from dead points: least motion of a joint in a unit motion of its linkage
   DeadPointDistance,  ///< least way of a motor or joint to a dead point (linkage.h), at most kFarthestDeadPoint, rad or m
-  Distance            ///< least one of bodies that are not neighbours, m
+  Distance,           ///< least one of bodies that are not neighbours, m
+  Range,              ///< least share of angles that joints reach through their linkages (joint_reach.h)
+  LeastRatio,         ///< of motor and joint over the angles that are reached
+  LargestRatio
 };
 
 /// Conversion of electrical into mechanical power. For a motor with motor constant K (torque over the square root of
@@ -104,14 +107,18 @@ const char* getName(Measure measure);
 /// Of torques that of motors that turn, and empty where there is none.
 const char* getUnit(Measure measure);
 bool isOfMotors(Measure measure);
+/// Whether it is about ranges of joints.
+bool isOfJoints(Measure measure);
+/// Whether it does not depend on motions.
+bool isOfRobot(Measure measure);
 /// Whether larger values are better, and that of all motions is the least of them.
 bool isLeast(Measure measure);
 /// Whether that of all motions is the sum over them, as of energies and costs.
 bool isSum(Measure measure);
 
 /// The largest peak torque, rms torque or conditioning over the named motors and all motions, or the sum of an energy
-/// over them; the sum of the costs of all motions; the largest share of a limit; the least margin or distance. Workspace
-/// (workspace.h) and mass do not depend on motions.
+/// over them; the sum of the costs of all motions; the largest share of a limit; the least margin or distance. Not those of
+/// isOfRobot().
 /// \param weights  by which the measure of each motion is multiplied before; empty: 1. Margins and distances have none
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions,
                   const std::vector<double>& weights = {});

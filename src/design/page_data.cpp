@@ -32,7 +32,7 @@ Json describeColumns(const DesignEvaluator& evaluator) {
     columns.push_back({{"kind", "objective"}, {"name", describeTerm(term)}, {"unit", getUnit(term.measure)}});
   for (const DesignConstraint& c : evaluator.constraints())
     columns.push_back({{"kind", c.measure == Measure::Margin ? "margin" : "constraint"},
-                       {"name", describeMeasure(c.measure, c.motors)},
+                       {"name", describeConstraint(c)},
                        {"unit", getUnit(c.measure)},
                        {"bound", std::string(c.at_least ? "≥ " : "≤ ") + formatNumber(c.bound, "%.4g")}});
   if (!isMarginBound(evaluator)) columns.push_back({{"kind", "margin"}, {"name", "margin"}, {"unit", ""}});

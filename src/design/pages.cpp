@@ -71,9 +71,8 @@ void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const
   out << "\n| constraint | bound | before | after |\n|---|---|---|---|\n";
   for (size_t i = 0; i < evaluator.constraints().size() && i < run.evaluation.constraints.size(); ++i) {
     const DesignConstraint& constraint = evaluator.constraints()[i];
-    out << "| " << describeMeasure(constraint.measure, constraint.motors) << " | at "
-        << (constraint.at_least ? "least " : "most ") << format(constraint.bound) << " | "
-        << formatConstraint(constraint, evaluator.start().constraints[i]) << " | "
+    out << "| " << describeConstraint(constraint) << " | at " << (constraint.at_least ? "least " : "most ")
+        << format(constraint.bound) << " | " << formatConstraint(constraint, evaluator.start().constraints[i]) << " | "
         << formatConstraint(constraint, run.evaluation.constraints[i]) << " |\n";
   }
   const std::vector<std::string> left_out = evaluator.listLeftOut(run.best);
@@ -114,7 +113,7 @@ void writeUsual(std::ostream& out, const DesignEvaluator& evaluator, const Desig
     writeRow(out, describeTerm(evaluator.objective()[i]), search.terms[i], usual.terms[i]);
   for (size_t i = 0; i < evaluator.constraints().size(); ++i) {
     const DesignConstraint& constraint = evaluator.constraints()[i];
-    writeRow(out, describeMeasure(constraint.measure, constraint.motors), search.constraints[i], usual.constraints[i]);
+    writeRow(out, describeConstraint(constraint), search.constraints[i], usual.constraints[i]);
   }
   for (size_t i = 0; i < std::min(search.goals.size(), usual.goals.size()); ++i)
     out << "| " << describeGoal(usual.goals[i]) << " | " << formatAchieved(search.goals[i].outcome) << " | "
@@ -158,7 +157,7 @@ void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const Desig
   for (const DesignVariable& v : robot.variables())
     out << " | " << v.name << (v.isChoice() || v.unit == "1" ? "" : " [" + v.unit + "]");
   for (const DesignConstraint& constraint : evaluator.constraints())
-    if (constraint.measure != Measure::Margin) out << " | " << describeMeasure(constraint.measure, constraint.motors);
+    if (constraint.measure != Measure::Margin) out << " | " << describeConstraint(constraint);
   out << " | margin |\n|---";
   size_t columns = evaluator.objective().size() + robot.variables().size() + 1;
   for (const DesignConstraint& constraint : evaluator.constraints()) columns += constraint.measure != Measure::Margin;

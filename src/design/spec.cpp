@@ -27,10 +27,11 @@ const YamlKeys kVariableKeys("design", "variables[]",
 const YamlKeys kLengthKeys("design", "variables[].length[]", {"from", "to", "across", "stretch", "rod"});
 const YamlKeys kShiftKeys("design", "variables[].shift[]", {"of", "along"});
 const YamlKeys kGearKeys("design", "variables[].gear", {"loss", "mass"});
-const YamlKeys kTermKeys("design", "objective[]", {"measure", "motors", "weight", "region"});
+const YamlKeys kTermKeys("design", "objective[]", {"measure", "motors", "weight", "region", "joints", "angles"});
 const YamlKeys kRegionKeys("design", "objective[].region",
                            {"foot", "base", "max_conditioning", "x", "y", "z", "roll", "pitch", "yaw"});
-const YamlKeys kConstraintKeys("design", "constraints[]", {"measure", "motors", "at_most", "at_least", "except"});
+const YamlKeys kConstraintKeys("design", "constraints[]",
+                               {"measure", "motors", "at_most", "at_least", "except", "joints", "angles"});
 const YamlKeys kDesignDriveKeys("design", "drives", {"motor_constant", "motors", "regeneration"});
 
 Vector3d readDirection(const Entry& entry) {
@@ -271,17 +272,36 @@ DriveTable readDrives(const Entry& entry, DesignSpec& spec) {
   return drives;
 }
 
+// `joints` and `angles` of a measure of joints, which no other one has.
+JointAngles readJointAngles(const Fields& fields, Measure measure) {
+  JointAngles range;
+  const Entry *joints = find(fields, "joints"), *angles = find(fields, "angles");
+  for (const Entry* entry : {joints, angles})
+    if (entry && !isOfJoints(measure)) entry->fail("only ranges and ratios are about joints", "remove it");
+  if (joints) range.joints = readNames(*joints);
+  if (!angles) return range;
+  const std::vector<Entry> ends = angles->getList();
+  if (ends.size() != 2) angles->fail("it is not a range", "give [from, to], rad (m of sliders)");
+  range.angles = {ends[0].getNumber(), ends[1].getNumber()};
+  if (!((*range.angles)[0] < (*range.angles)[1]))
+    angles->fail("the range is in the wrong order", "give the lower angle first");
+  return range;
+}
+
 ObjectiveTerm readTerm(const Entry& entry, DesignSpec& spec) {
   const Fields fields = entry.getFields(kTermKeys);
   ObjectiveTerm term;
   term.measure =
       readChoice<Measure>(require(fields, "measure", entry),
                           {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy,
-                           Measure::Cost, Measure::Conditioning, Measure::Workspace, Measure::Mass});
+                           Measure::Cost, Measure::Conditioning, Measure::Workspace, Measure::Mass, Measure::Range,
+                           Measure::LeastRatio, Measure::LargestRatio});
   const Entry *motors = find(fields, "motors"), *region = find(fields, "region");
   const bool is_workspace = term.measure == Measure::Workspace;
   if (motors && is_workspace) motors->fail("a workspace does not depend on motors", "remove it");
   if (motors && term.measure == Measure::Mass) motors->fail("the mass is that of the whole robot", "remove it");
+  if (motors && isOfJoints(term.measure)) motors->fail("the measure does not depend on motors", "give `joints`");
+  term.range = readJointAngles(fields, term.measure);
   if (motors && term.measure == Measure::Cost) motors->fail("the cost is that of the whole motion", "remove it");
   if (region && !is_workspace) region->fail("only a workspace has a region", "remove it");
   if (region) term.region = readRegion(*region);
@@ -297,11 +317,15 @@ DesignConstraint readConstraint(const Entry& entry, DesignSpec& spec) {
   constraint.measure = readChoice<Measure>(
       require(fields, "measure", entry),
       {Measure::Envelope, Measure::Heat, Measure::Mass, Measure::Margin, Measure::DeadPointDistance, Measure::Distance,
-       Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy, Measure::Conditioning});
+       Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy, Measure::Conditioning,
+       Measure::Range, Measure::LeastRatio, Measure::LargestRatio});
   const Entry *most = find(fields, "at_most"), *least = find(fields, "at_least"), *motors = find(fields, "motors");
   if (motors && !isOfMotors(constraint.measure)) motors->fail("the measure does not depend on motors", "remove it");
   if (motors) constraint.motors = motors->getTexts(), addMotorNames(*motors, spec);
-  const bool is_share = constraint.measure == Measure::Envelope || constraint.measure == Measure::Heat;
+  constraint.range = readJointAngles(fields, constraint.measure);
+  constraint.at_least = constraint.measure == Measure::Range;
+  const bool is_share =
+      constraint.measure == Measure::Envelope || constraint.measure == Measure::Heat || constraint.at_least;
   if ((most && least) || (!most && !least && !is_share))
     entry.fail("it does not have exactly one bound", "give one of `at_most` and `at_least`");
   const bool is_least = isLeast(constraint.measure);
@@ -310,6 +334,8 @@ DesignConstraint readConstraint(const Entry& entry, DesignSpec& spec) {
     least->fail("smaller values of this measure are better", "give `at_most`");
   if (most) constraint.bound = most->getNumber();
   if (least) constraint.bound = least->getNumber(), constraint.at_least = true;
+  if (constraint.measure == Measure::Range && constraint.bound > 1)
+    least->fail("the share of a range is at most 1", "leave it out, or give `angles` that are wider");
   if (constraint.measure == Measure::DeadPointDistance && constraint.bound > kFarthestDeadPoint)
     least->fail("dead points are looked for within " + formatNumber(kFarthestDeadPoint) + " rad", "give less");
   if (const Entry* except = find(fields, "except")) {

@@ -41,6 +41,8 @@
 ///   - {measure: mass, at_most: 26}
 ///   - {measure: margin, at_least: 0.2}       # from dead points
 ///   - {measure: dead_point_distance, at_least: 0.1}   # way of a motor or joint to there, up to 0.5 rad
+///   - {measure: range, joints: ["knee*"], angles: [0, 2.1]}   # all of these angles are reached; without `angles`, those of the
+///                                # start, without `joints`, all of linkages. Likewise least_ratio and largest_ratio over them
 ///   - {measure: distance, at_least: 0.005, except: [["thigh*", "rod_knee*"]]}     # of bodies that are not neighbours and
 ///                                # do not overlap as they are drawn (near_bodies.h), m; but for these
 /// drives:                        # for electrical_energy (measures.h)
