@@ -27,12 +27,12 @@ class BackwardPass {
 
   /// Returns the first node that could not be linearized, or -1; in either case the sweep may have stopped.
   int update(const BackwardInput& input);
-  /// Sweeps over the same models with another regularization or other weights. Only nodes where rows have weights that had none
-  /// before are linearized again. Returns as update() does.
-  int sweepAgain(const BackwardInput& input);
   /// The same in two parts: all nodes but the first, then that one. The input must be the same but for the first node.
   void prepare(const BackwardInput& input);
   int finish(const BackwardInput& input);
+  /// Sweeps over the same models with another regularization or other weights. Only nodes where rows have weights that had none
+  /// before are linearized again. Returns as update() does.
+  int sweepAgain(const BackwardInput& input);
   /// Why a node could not be linearized, empty if it could.
   const std::string& getFailure(int node) const { return failures_[node]; }
 
