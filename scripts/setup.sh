@@ -64,12 +64,12 @@ if command -v ccache >/dev/null; then
   export CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_BASEDIR=$bielle_root CCACHE_NOHASHDIR=1
 fi
 
-# run_tests DIRECTORY CTEST_OPTION...: as many tests at once as there are cores, with one thread each: more would wait for each
-# other.
+# run_tests DIRECTORY CTEST_OPTION...: one test more at once than there are cores, with one thread each: those of signals, workers
+# and browsers sleep most of their time.
 run_tests() {
   local directory=$1
   shift
-  OMP_NUM_THREADS=1 ctest --test-dir "$directory" --parallel "$(nproc)" --output-on-failure "$@"
+  OMP_NUM_THREADS=1 ctest --test-dir "$directory" --parallel "$(($(nproc) + 1))" --output-on-failure "$@"
 }
 
 # build DIRECTORY CMAKE_OPTION...: configures, then builds `bielle_targets` (default: everything) on as many cores as memory

@@ -30,8 +30,20 @@ set(bielle_long_tests
   # What is given away: packages, libraries for every machine, the pages of Doxygen.
   install package portable doxygen)
 
+# What takes longest begins first, so that no core waits for it in the end: CTest knows that by itself from the second run on.
+set(bielle_slow_tests
+  place_long parallel_bipeds_long results_alone_long results_architectures check edge_feet_long place workers report_page
+  interruptions mutated_robots reduced_long simulate_predictive check_sequence
+  # Under the sanitizers.
+  reduced policy bielle_world mujoco_world ocp_problem python_arguments)
+
 # bielle_set_tiers(): at the end of each directory that adds tests.
 function(bielle_set_tiers)
+  foreach(test IN LISTS bielle_slow_tests)
+    if(TEST ${test})
+      set_property(TEST ${test} PROPERTY COST 100)
+    endif()
+  endforeach()
   foreach(test IN LISTS bielle_long_tests)
     if(TEST ${test})
       get_property(labels TEST ${test} PROPERTY LABELS)
@@ -57,6 +69,9 @@ function(bielle_add_cases name target labels)
   string(REPLACE ";" "," long "${long}")
   add_test(NAME ${name} COMMAND ${target} --filenames-as-tags ${short})
   set_tests_properties(${name} PROPERTIES LABELS "${labels}")
+  if(BIELLE_SANITIZE)
+    set_tests_properties(${name} PROPERTIES ENVIRONMENT BIELLE_SWEEP=few)
+  endif()
   if(tags)
     add_test(NAME ${name}_long COMMAND ${target} --filenames-as-tags ${long})
     set_tests_properties(${name}_long PROPERTIES LABELS long ENVIRONMENT BIELLE_SWEEP=all)
