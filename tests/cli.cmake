@@ -1,4 +1,5 @@
 bielle_command_test(cli SOURCES test_cli.cpp test_cli_solve.cpp LIBS bielle_results)
+bielle_command_test(softness_command SOURCES test_softness_command.cpp LIBS bielle_results)
 
 # A separate project finds, links and runs an installation of the current build.
 add_test(NAME install COMMAND ${CMAKE_COMMAND}

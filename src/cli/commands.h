@@ -31,6 +31,7 @@ void addRobots(CLI::App& command, Action& action);
 void addBench(CLI::App& command, Action& action);
 void addRatio(CLI::App& command, Action& action);
 void addModes(CLI::App& command, Action& action);
+void addSoftness(CLI::App& command, Action& action);
 void addSynthesize(CLI::App& command, Action& action);
 void addLift(CLI::App& command, Action& action);
 void addCampaign(CLI::App& command, Action& action);

@@ -16,5 +16,6 @@ int main(int argc, char** argv) {
                      {"generate", &addGenerate},
                      {"ratio", &addRatio},
                      {"modes", &addModes},
+                     {"softness", &addSoftness},
                      {"lift", &addLift}});
 }

@@ -44,6 +44,8 @@ RobotFiles MjcfReader::read() {
   forEach("custom", [this](const XMLElement& e) { readCustom(e); });
   forEach("keyframe", [this](const XMLElement& e) { readKey(e); });
   addStart();
+  for (const Slot& slot : slots_)
+    softness_.start[slot.joint] = {slot.q_ref.data(), slot.q_ref.data() + slot.q_ref.size()};
   for (const XMLElement* e : getChildren(settings_.files.root())) noteSection(*e);
   tree_.warnings = settings_.notes.format();
   GeometryDecimals decimals;
@@ -78,10 +80,15 @@ void MjcfReader::readSettings() {
   forEachSection("option", [this](const XMLElement& e) {
     MjcfElement option(e, "", settings_);
     yaml_.gravity = option.getVector("gravity", yaml_.gravity.value_or(Vector3d(0, 0, -9.81)));
-    time_step_ = option.getNumber("timestep", time_step_);
+    SoftStep& step = softness_.step;
+    step.duration = option.getNumber("timestep", step.duration);
+    const std::string integrator = option.getText("integrator");
+    if (integrator == "Euler") step.integrator = SoftIntegrator::Euler;
+    if (integrator == "RK4") step.integrator = SoftIntegrator::RungeKutta;
+    if (integrator == "implicit" || integrator == "implicitfast") step.integrator = SoftIntegrator::Implicit;
     for (const XMLElement* f : getChildren(e)) {
       MjcfElement flag(*f, "", settings_);
-      if (flag.getText("refsafe", "enable") == "disable") is_safe_ = false;
+      if (flag.getText("refsafe", "enable") == "disable") step.is_safe = false;
       if (flag.getText("gravity", "enable") == "disable") has_gravity_ = false;
       if (flag.getText("equality", "enable") == "disable") has_equalities_ = false;
     }
@@ -181,7 +188,9 @@ void MjcfReader::readBody(const Child& child, const BodyPlace& parent) {
   BodyPlace place = {name, {}, parent.X_WB * X_PB};
   place.X_LB = addJoints(body, name, children, parent, X_PB);
   place.is_static = parent.is_static && slots_.size() == num_slots;
-  tree_.links[name].inertia = keepBounds(readInertia(children)).transformed(place.X_LB);
+  const Inertia inertia = keepBounds(readInertia(children));
+  softness_.centres[name] = place.X_LB.act(inertia.mass > 0 ? inertia.com : Vector3d::Zero());
+  tree_.links[name].inertia = inertia.transformed(place.X_LB);
   places_[name] = place;
   readContents(children, place);
 }
@@ -216,5 +225,11 @@ std::string MjcfReader::findFrame(const std::string& link, const SE3& X, bool is
 }
 
 RobotFiles readMjcf(const std::string& path) { return MjcfReader(path).read(); }
+
+MjcfSoftness readMjcfSoftness(const std::string& path) {
+  MjcfReader reader(path);
+  reader.read();
+  return reader.softness();
+}
 
 }  // namespace bielle

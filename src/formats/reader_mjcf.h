@@ -9,6 +9,7 @@
 
 #include "formats/exchange_readers.h"
 #include "formats/mjcf_element.h"
+#include "formats/mjcf_softness.h"
 
 namespace bielle {
 
@@ -27,6 +28,8 @@ class MjcfReader {
  public:
   explicit MjcfReader(const std::string& path);
   RobotFiles read();
+  /// What read() found of the loops' softness.
+  const MjcfSoftness& softness() const { return softness_; }
 
  private:
   // A body of the file: the link that carries it, its frame there and, with all joints at `ref`, in the world.
@@ -99,6 +102,7 @@ class MjcfReader {
     double length = 0;    // of a distance
     std::string coupler;  // a coupler is a ClosureSpec already
     int line = 0;
+    std::vector<size_t> equalities{};  // in softness_
   };
 
   template <typename F>
@@ -180,7 +184,8 @@ class MjcfReader {
   const BodyPlace& findBody(MjcfElement& e, const char* attribute);
   const BodyPlace& findSite(MjcfElement& e, const char* attribute);
   void readEquality(const XMLElement& element);
-  void noteSoftness(MjcfElement& e) const;
+  void readSoftness(MjcfElement& e, const std::string& name);
+  void noteSoftness(const MjcfElement& e, const SoftSettings& settings) const;
   void readTie(MjcfElement& e, const std::string& name);
   void joinHinges();
   void addClosures();
@@ -211,8 +216,8 @@ class MjcfReader {
   // <compiler>: whether geoms give mass and those of which groups, least mass and moment of a body, mass of all
   std::string inertia_from_geom_ = "auto", mesh_directory_;
   double first_group_ = 0, last_group_ = 5, least_mass_ = 0, least_moment_ = 0, total_mass_ = 0;
-  bool has_gravity_ = true, has_equalities_ = true, is_safe_ = true;  // flags of <option>
-  double time_step_ = 0.002;                                          // s
+  bool has_gravity_ = true, has_equalities_ = true;  // flags of <option>
+  MjcfSoftness softness_;
   bool balances_inertia_ = false, strips_path_ = false, is_exact_ = false, discards_visuals_ = false;
   std::set<std::string> taken_, joint_names_,
       named_;  // names of links; of joints; of joints named by an actuator and the like

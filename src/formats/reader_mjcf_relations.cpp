@@ -28,16 +28,22 @@ void MjcfReader::readEquality(const XMLElement& element) {
   MjcfElement e(element, "", settings_, "equality");
   if (!e.getFlag("active", true)) return e.leaveOut("it is not active, and left out");
   if (!has_equalities_) return e.leaveOut("it is left out, because <flag> disables equalities");
-  noteSoftness(e);
   std::string name = getAttribute(&element, "name");
   if (name.empty())
     name = makeUnusedName(e.tag() + "_" + std::to_string(e.line()), [this](const std::string& made) {
       return std::any_of(ties_.begin(), ties_.end(), [&](const Tie& tie) { return tie.name == made; });
     });
-  if (e.tag() == "connect" || e.tag() == "weld") return readTie(e, name);
-  if (e.tag() == "joint") return readJointEquality(e, name);
-  if (e.tag() == "tendon") return readTendonEquality(e, name);
-  e.fail("such equalities are not supported", "use connect, weld, joint or tendon, or remove it");
+  readSoftness(e, name);
+  if (e.tag() == "connect" || e.tag() == "weld")
+    readTie(e, name);
+  else if (e.tag() == "joint")
+    readJointEquality(e, name);
+  else if (e.tag() == "tendon")
+    readTendonEquality(e, name);
+  else
+    e.fail("such equalities are not supported", "use connect, weld, joint or tendon, or remove it");
+  ties_.back().equalities = {softness_.equalities.size() - 1};
+  softness_.equalities.back().links = {ties_.back().body1, ties_.back().body2};
 }
 
 // Loops are rigid here. In MuJoCo they are springs and dampers (its documentation, "Computation", section on parameters of the
@@ -45,26 +51,34 @@ void MjcfReader::readEquality(const XMLElement& element) {
 // moves at
 //     a = (1 - d) a0 - d (b v + k r)                                                                                 (1)
 // a0 being its acceleration without any force of it. At rest, r = (1 - d) a0 / (d k).
-void MjcfReader::noteSoftness(MjcfElement& e) const {
+void MjcfReader::readSoftness(MjcfElement& e, const std::string& name) {
+  MjcfEquality equality;
+  equality.tag = e.tag();
+  equality.name = name;
+  const std::vector<double> ref = e.getNumbers("solref", 1, 2), imp = e.getNumbers("solimp", 1, 5);
+  std::copy(ref.begin(), ref.end(), equality.settings.solref.begin());
+  std::copy(imp.begin(), imp.end(), equality.settings.solimp.begin());
+  noteSoftness(e, equality.settings);
+  softness_.equalities.push_back(equality);
+}
+
+void MjcfReader::noteSoftness(const MjcfElement& e, const SoftSettings& settings) const {
   constexpr double kLeastShare = 2e-3, kLeastGap = 1e-6;  // of 1 - d, and of r in m under the gravity of the Earth
-  std::vector<double> ref = e.getNumbers("solref", 1, 2), imp = e.getNumbers("solimp", 1, 5);
-  const std::vector<double> usual_ref{0.02, 1}, usual_imp{0.9, 0.95, 0.001, 0.5, 2};
-  ref.insert(ref.end(), usual_ref.begin() + static_cast<std::ptrdiff_t>(ref.size()), usual_ref.end());
-  imp.insert(imp.end(), usual_imp.begin() + static_cast<std::ptrdiff_t>(imp.size()), usual_imp.end());
+  const auto& [ref, imp] = settings;
   const auto clamp = [](double impedance) { return std::clamp(impedance, 0.0001, 0.9999); };
   const double d = clamp(imp[0]), most = clamp(imp[1]);
   const bool is_direct = ref[0] <= 0;
-  const double time = is_safe_ ? std::max(ref[0], 2 * time_step_) : ref[0];
+  const double time = softness_.step.is_safe ? std::max(ref[0], 2 * softness_.step.duration) : ref[0];
   const double k = is_direct ? -ref[0] * d / (most * most) : d / std::pow(most * time * ref[1], 2);
   const double gap = (1 - d) * 9.81 / (d * k);
   if (1 - d < kLeastShare && gap < kLeastGap) return;
-  const auto join = [](const std::vector<double>& values) {
+  const auto join = [](const auto& values) {
     std::string text;
     for (double value : values) text += (text.empty() ? "" : " ") + formatNumber(value);
     return text;
   };
   e.note("it is read as rigid. In MuJoCo, solref " + join(ref) + " and solimp " + join(imp) + " at steps of " +
-         formatNumber(1e3 * time_step_) + " ms let it give way: " + formatNumber(100 * (1 - d), "%.2g") +
+         formatNumber(1e3 * softness_.step.duration) + " ms let it give way: " + formatNumber(100 * (1 - d), "%.2g") +
          " % of an acceleration that opens it pass, it stands open by about " + formatNumber(1e3 * gap, "%.1g") +
          " mm (mrad) per g at which its parts would move apart, often tens under the weight of a robot" +
          (is_direct ? "" : ", and it closes within " + formatNumber(1e3 * time, "%.3g") + " ms") +
@@ -132,6 +146,9 @@ void MjcfReader::joinHinges() {
       a.axis = a.X_L1.R.transpose() * along.normalized();
       if (!along.isApprox(turned, kSameLength))  // its frames do not have the axis in common
         a.X_L2.R = Eigen::Quaterniond::FromTwoVectors(a.axis, along2).toRotationMatrix();
+      for (const size_t at : a.equalities) softness_.equalities[at].lever = along.norm() / 2;
+      for (const size_t at : b.equalities) softness_.equalities[at].lever = -along.norm() / 2;
+      a.equalities.insert(a.equalities.end(), b.equalities.begin(), b.equalities.end());
       a.X_L1.p = (a.X_L1.p + b.X_L1.p) / 2;
       a.X_L2.p = (a.X_L2.p + b.X_L2.p) / 2;
       ties_.erase(ties_.begin() + static_cast<std::ptrdiff_t>(j));
@@ -153,6 +170,7 @@ void MjcfReader::addClosures() {
       closure.frame1 = findFrame(tie.body1, tie.X_L1, is_point, tie.name + "_frame1");
       closure.frame2 = findFrame(tie.body2, tie.X_L2, is_point, tie.name + "_frame2");
     }
+    for (const size_t at : tie.equalities) softness_.equalities[at].closure = closure.name;
     yaml_.closures.push_back(closure);
   }
 }
@@ -210,6 +228,7 @@ void MjcfReader::readJointEquality(MjcfElement& e, const std::string& name) {
   coupler.coefficients = {{y, 1}};
   coupler.offset = y_ref + p[0];
   subtractPolynomial(p, 1, x, x_ref, coupler);
+  softness_.equalities.back().sums = {{{y, 1}}, {{x, 1}}};
   addCoupler(name, coupler, e);
 }
 
@@ -325,6 +344,8 @@ void MjcfReader::readTendonEquality(MjcfElement& e, const std::string& name) {
     if (it == tendons_.end()) e.fail("there is no tendon of joints '" + tendon + "'", "name a <fixed> tendon");
     return it->second;
   };
+  for (const std::string& tendon : {first, second})
+    if (!tendon.empty()) softness_.equalities.back().sums.push_back(find(tendon).coefficients);
   addTendonLength(find(first), 1, coupler, e);
   const bool is_linear = std::all_of(p.begin() + 2, p.end(), [](double c) { return c == 0; });
   if (second.empty() || is_linear) {

@@ -1,0 +1,157 @@
+#include "cli/softness_page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "formats/text_file.h"
+#include "model/number_text.h"
+#include "results/plot.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+constexpr double kImpedance = 0.9999;  // the most that MuJoCo takes
+constexpr double kMargin = 0.95;       // of what is promised
+
+// A number with two digits, not above x.
+double roundDown(double x) {
+  const double unit = std::pow(10, std::floor(std::log10(x)) - 1);
+  return std::stod(formatNumber(std::floor(x / unit + 1e-9) * unit, "%.2g"));
+}
+
+double read(const Json& row, const char* key) { return row.at(key).is_null() ? NAN : row.at(key).get<double>(); }
+
+std::string escape(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '>' ? "&gt;" : std::string(1, c);
+  return out;
+}
+
+std::vector<std::string> listLoops(const std::vector<Json>& rows) {
+  std::vector<std::string> loops;
+  for (const Json& row : rows)
+    if (const std::string loop = row.at("loop"); std::find(loops.begin(), loops.end(), loop) == loops.end())
+      loops.push_back(loop);
+  return loops;
+}
+
+Plot makePlot(const std::string& loop, const std::vector<Json>& rows, double within) {
+  Plot plot{loop, "position of the joint [rad or m]", "gap [m or rad]"};
+  plot.scale = PlotScale::Logarithmic;
+  std::vector<std::string> joints;
+  for (const Json& row : rows)
+    if (const std::string joint = row.at("joint");
+        row.at("loop") == loop && std::find(joints.begin(), joints.end(), joint) == joints.end())
+      joints.push_back(joint);
+  double first = INFINITY, last = -INFINITY;
+  for (size_t j = 0; j < joints.size(); ++j) {
+    Curve weight{joints[j] + ": gravity", getCurveColor(j), {}, CurveStyle::LinesPoints};
+    Curve limit{joints[j] + ": motors at their limits", getCurveColor(j), {}, CurveStyle::LinesPoints, true};
+    for (const Json& row : rows) {
+      if (row.at("loop") != loop || row.at("joint") != joints[j]) continue;
+      const double x = row.at("position");
+      first = std::min(first, x), last = std::max(last, x);
+      weight.points.emplace_back(x, std::max(read(row, "gap"), read(row, "angle")));
+      limit.points.emplace_back(x, std::max(read(row, "gap_at_limit"), read(row, "angle_at_limit")));
+    }
+    plot.curves.push_back(weight);
+    plot.curves.push_back(limit);
+  }
+  if (first == last) first -= 0.1, last += 0.1;
+  plot.curves.push_back({"asked for", "#7f7f7f", {{first, within}, {last, within}}, CurveStyle::Lines, true});
+  return plot;
+}
+
+struct Column {
+  const char *key, *title, *format;
+};
+constexpr Column kColumns[] = {{"joint", "joint", ""},
+                               {"position", "position [rad, m]", "%.4g"},
+                               {"gap", "gap [m]", "%.2e"},
+                               {"angle", "gap [rad]", "%.2e"},
+                               {"sag", "sag [rad, m]", "%.2e"},
+                               {"torque_error", "torque error [N m]", "%.2e"},
+                               {"gap_at_limit", "gap at the limit [m]", "%.2e"},
+                               {"angle_at_limit", "gap at the limit [rad]", "%.2e"},
+                               {"sag_at_limit", "sag at the limit [rad, m]", "%.2e"},
+                               {"frequency", "frequency [Hz]", "%.3g"},
+                               {"frequency_error", "its error", "%.1e"},
+                               {"energy_loss", "energy lost [1/s]", "%.2e"},
+                               {"stable_step", "largest stable step [s]", "%.3g"},
+                               {"state", "", ""}};
+
+std::string makeTable(const std::string& loop, const std::vector<Json>& rows) {
+  std::string html = "<table><tr>";
+  for (const Column& column : kColumns) html += std::string("<th>") + column.title + "</th>";
+  html += "</tr>\n";
+  for (const Json& row : rows) {
+    if (row.at("loop") != loop) continue;
+    html += "<tr>";
+    for (const Column& column : kColumns) {
+      const Json& value = row.at(column.key);
+      html += "<td>" +
+              (value.is_string() ? escape(value)
+               : value.is_null() ? ""
+                                 : formatNumber(value, column.format)) +
+              "</td>";
+    }
+    html += "</tr>\n";
+  }
+  return html + "</table>\n";
+}
+
+}  // namespace
+
+SoftnessAdvice advise(const std::vector<Json>& rows, double within, double time_step) {
+  double pull = 0;
+  for (const Json& row : rows) pull = std::max(pull, read(row, "pull"));
+  SoftnessAdvice advice;
+  advice.within = within;
+  advice.time_step = time_step;
+  if (const double needed = std::sqrt(kMargin * within / ((1 - kImpedance) * pull)) / 2; needed < time_step)
+    advice.time_step = roundDown(needed);
+  const double time = 2 * advice.time_step;
+  advice.settings = {{time, 1}, {kImpedance, kImpedance, 0.001, 0.5, 2}};
+  advice.gap = (1 - kImpedance) * pull * time * time;
+  return advice;
+}
+
+std::string formatMjcf(const SoftnessAdvice& advice) {
+  const auto join = [](const auto& values) {
+    std::string text;
+    for (const double value : values) text += (text.empty() ? "" : " ") + formatExact(value);
+    return text;
+  };
+  return "<mujoco>\n  <option timestep=\"" + formatExact(advice.time_step) +
+         "\"/>\n  <default>\n    <equality solref=\"" + join(advice.settings.solref) + "\" solimp=\"" +
+         join(advice.settings.solimp) + "\"/>\n  </default>\n</mujoco>\n";
+}
+
+void writeSoftnessPage(const std::string& directory, const std::string& title, const std::vector<Json>& rows,
+                       const SoftnessAdvice& advice) {
+  std::string html =
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + escape(title) +
+      "</title>\n<style>body{font-family:sans-serif;margin:2em;max-width:80em}table{border-collapse:collapse;"
+      "font-size:80%}td,th{border:1px solid #ccc;padding:2px 6px;text-align:right}pre{background:#f4f4f4;"
+      "padding:1em}</style></head><body>\n<h1>" +
+      escape(title) + "</h1>\n<p>Within " + formatNumber(advice.within, "%.2g") +
+      " m and rad, gravity and motors at their limits: a gap of " + formatNumber(advice.gap, "%.2g") +
+      " with</p>\n<pre>" + escape(formatMjcf(advice)) + "</pre>\n";
+  const fs::path figure = fs::path(directory) / "softness.svg";
+  for (const std::string& loop : listLoops(rows)) {
+    html += "<h2>" + escape(loop) + "</h2>\n";
+    if (drawPlots(figure.string(), {makePlot(loop, rows, advice.within)})) {
+      const std::string svg = readTextFile(figure.string());
+      html += svg.substr(std::min(svg.size(), svg.find("<svg")));
+      fs::remove(figure);
+    }
+    html += makeTable(loop, rows);
+  }
+  writeTextFile((fs::path(directory) / "softness.html").string(), html + "</body></html>\n");
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,343 @@
+// Predictions of how soft loops are in MuJoCo, against MuJoCo's own steps.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/modes.h"
+#include "bielle/robots/robot_loader.h"
+#include "formats/mjcf.h"
+#include "formats/mjcf_softness.h"
+#include "load_mujoco.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// A file in both programs.
+struct SoftFile {
+  RobotDirectory directory;
+  std::string path;
+  LoadedRobot robot;
+  MjcfSoftness softness;
+  MjModel mj{nullptr, mj_deleteModel};
+  MjData data{nullptr, mj_deleteData};
+  VectorXd start;  // q where the file stands
+  std::vector<double> armature;
+
+  explicit SoftFile(const std::string& xml)
+      : path(directory.write("robot.xml", xml)),
+        robot(loadRobot(path)),
+        softness(readMjcfSoftness(path)),
+        mj(loadMujoco(path)),
+        data(mj_makeData(mj.get()), mj_deleteData),
+        start(robot.model.makeNeutral()),
+        armature(mj->dof_armature, mj->dof_armature + mj->nv) {
+    for (const Joint& joint : robot.model.joints())
+      if (softness.start.count(joint.name))
+        start.segment(joint.idx_q, joint.nq) =
+            Eigen::Map<const VectorXd>(softness.start.at(joint.name).data(), joint.nq);
+  }
+
+  SoftLoops loops() const { return makeSoftLoops(robot.model, softness, MujocoVersion::Two); }
+  void set(const VectorXd& q) {
+    mj_resetData(mj.get(), data.get());
+    const VectorXd qpos = calcMjcfQpos(robot.model, start, q, MjcfRotations::Balls);
+    std::copy(qpos.begin(), qpos.end(), data->qpos);
+  }
+  int dof(int k) const {
+    const Joint& joint = robot.model.joints()[robot.model.dofs()[k].joint];
+    return mj->jnt_dofadr[mj_name2id(mj.get(), mjOBJ_JOINT, getMjcfName(joint).c_str())] + k - joint.idx_v;
+  }
+  // All dofs but these stand: next to nothing moves what is so heavy.
+  void holdOthers(const std::vector<int>& dofs) {
+    std::copy(armature.begin(), armature.end(), mj->dof_armature);
+    for (int k = 0; k < robot.model.nv(); ++k)
+      if (std::find(dofs.begin(), dofs.end(), k) == dofs.end()) mj->dof_armature[dof(k)] = 1e12;
+  }
+  void step(double duration) {
+    const int steps = static_cast<int>(std::lround(duration / mj->opt.timestep));
+    for (int i = 0; i < steps; ++i) mj_step(mj.get(), data.get());
+    mj_forward(mj.get(), data.get());
+  }
+  // Of an equality: its rows as they stand open.
+  double gap(const std::string& name) const {
+    const int id = mj_name2id(mj.get(), mjOBJ_EQUALITY, name.c_str());
+    double sum = 0;
+    for (int i = 0; i < data->ne; ++i)
+      if (data->efc_id[i] == id) sum += data->efc_pos[i] * data->efc_pos[i];
+    return std::sqrt(sum);
+  }
+};
+
+struct Pendulum {
+  double mass = 2, centre = 0.2, inertia = 0.03, radius = 0.5;  // kg, m, kg m^2 about the centre, m
+  std::string solref = "0.02 1", solimp = "0.9 0.95 0.001 0.5 2", option = "timestep=\"0.001\"", rest = "";
+  std::string xml() const {
+    return "<mujoco><compiler angle=\"radian\"/><option " + option + "/><worldbody><body name=\"arm\">" +
+           "<joint name=\"pivot\" axis=\"0 1 0\"/><inertial pos=\"" + std::to_string(centre) + " 0 0\" mass=\"" +
+           std::to_string(mass) + "\" diaginertia=\"0.01 " + std::to_string(inertia) + " 0.03\"/>" + rest +
+           "</body></worldbody><equality><connect name=\"tie\" body1=\"arm\" body2=\"world\" anchor=\"" +
+           std::to_string(radius) + " 0 0\" solref=\"" + solref + "\" solimp=\"" + solimp + "\"/></equality></mujoco>";
+  }
+};
+
+std::vector<int> listAll(const Model& model) {
+  std::vector<int> dofs(model.nv());
+  for (int k = 0; k < model.nv(); ++k) dofs[k] = k;
+  return dofs;
+}
+
+}  // namespace
+
+TEST_CASE("A pendulum that a connect holds sags as the documentation of MuJoCo says", "[softness]") {
+  Pendulum pendulum;
+  struct Case {
+    std::string solref, solimp, option;
+    double expected;  // 1 / stiffness of a row whose A is 1
+  };
+  for (const Case& c : std::vector<Case>{
+           {"0.02 1", "0.95 0.95", "timestep=\"0.001\"", 0.05 * 4e-4},
+           {"0.02 0.7", "0.99 0.99", "timestep=\"0.001\"", 0.01 * 4e-4 * 0.49},
+           {"0.001 1", "0.99 0.99", "timestep=\"0.005\"", 0.01 * 1e-4},  // refsafe: two steps
+           {"-1000 -100", "0.9 0.9", "timestep=\"0.001\"", 0.1 / 1000},
+       }) {
+    INFO(c.solref << ", " << c.solimp);
+    pendulum.solref = c.solref, pendulum.solimp = c.solimp, pendulum.option = c.option;
+    SoftFile file(pendulum.xml());
+    const SoftLoops loops = file.loops();
+    const SoftRest rest = loops.findRest(file.start, loops.makeDirections(file.start, {0}), VectorXd::Zero(1));
+    REQUIRE(rest.status == NumericalStatus::Ok);
+    const double about = pendulum.inertia + pendulum.mass * pendulum.centre * pendulum.centre;
+    const double A = pendulum.centre * pendulum.centre / about / 3;
+    const double force = pendulum.mass * 9.81 * pendulum.centre / pendulum.radius;
+    CHECK(rest.gap[0].position == Approx(c.expected * A * force).epsilon(1e-4));
+    CHECK(rest.pull[0] == Approx(A * force));
+    file.set(file.start);
+    file.step(3);
+    CHECK(file.gap("tie") == Approx(rest.gap[0].position).epsilon(1e-4));
+    CHECK(file.data->qpos[0] == Approx(rest.q[0]).epsilon(1e-4));
+  }
+}
+
+namespace {
+
+// Two rods that hang on the world, with a third between their ends, which stands a little oblique: it swings.
+std::string makeFourBar(const std::string& solref, const std::string& solimp, const std::string& option,
+                        const std::string& joint = "", const std::string& tie = "") {
+  const auto rod = [](double mass) {
+    return "<inertial pos=\"0 0 -0.1\" mass=\"" + std::to_string(mass) + "\" diaginertia=\"0.002 0.002 0.001\"/>";
+  };
+  return "<mujoco><compiler angle=\"radian\"/><option " + option +
+         "/><worldbody><body name=\"crank\"><joint name=\"crank\" axis=\"0 1 0\" " + joint + "/>" + rod(0.5) +
+         "<body name=\"coupler\" pos=\"0 0 -0.3\"><joint name=\"coupler\" axis=\"0 1 0\"/>"
+         "<inertial pos=\"0.2 0 -0.05\" mass=\"2\" diaginertia=\"0.01 0.02 0.02\"/><site name=\"a\" pos=\"0.1 0 "
+         "-0.1\"/></body></body>"
+         "<body name=\"rocker\" pos=\"0.35 0 0.05\"><joint name=\"rocker\" axis=\"0 1 0\"/>" +
+         rod(0.8) +
+         "<site name=\"b\" pos=\"0 0 -0.1\"/></body></worldbody><tendon><fixed name=\"sum\">"
+         "<joint joint=\"crank\" coef=\"0.3\"/><joint joint=\"coupler\" coef=\"2\"/></fixed><fixed name=\"other\">"
+         "<joint joint=\"rocker\" coef=\"1\"/></fixed><spatial name=\"line\"><site site=\"a\"/><site site=\"b\"/>"
+         "</spatial></tendon><equality>" +
+         (tie.empty() ? "<connect name=\"pin\" body1=\"coupler\" body2=\"rocker\" anchor=\"0.35 0 0\" solref=\"" +
+                            solref + "\" solimp=\"" + solimp + "\"/>"
+                      : tie) +
+         "</equality><actuator><motor name=\"crank\" joint=\"crank\" ctrllimited=\"true\" ctrlrange=\"-5 5\"/>"
+         "</actuator></mujoco>";
+}
+
+std::vector<int> leaveOut(const std::vector<int>& dofs, const std::vector<int>& out) {
+  std::vector<int> left;
+  for (const int k : dofs)
+    if (std::find(out.begin(), out.end(), k) == out.end()) left.push_back(k);
+  return left;
+}
+
+std::vector<int> listMotors(const Model& model) {
+  std::vector<int> dofs;
+  for (const Motor& motor : model.motors()) dofs.push_back(motor.dof);
+  return dofs;
+}
+
+double norm(const SoftEquality& equality, const ClosureGap& gap) {  // of MuJoCo's rows
+  return std::hypot(gap.position, (equality.closure.kind == ClosureKind::Weld6D ? 0.5 : 1) * gap.angle);
+}
+
+constexpr double kTolerance = 0.02;  // measured: 0.002; of all predictions 0.1 is promised
+
+}  // namespace
+
+TEST_CASE("Loops of robots stand open under gravity in MuJoCo as predicted", "[softness]") {
+  // Hinges, welds, couplers and balls
+  for (const char* name : {"fourbar", "fivebar", "belt_biped", "bipetto"}) {
+    const Model model = loadRobot(name).model;
+    MjcfOptions options;
+    options.time_step = 1e-3, options.closure_time = 0.02, options.impedance = 0.95;
+    SoftFile file(formatMjcf(model, findClosedConfiguration(model).q, options).xml);
+    file.mj->opt.disableflags |= mjDSBL_CONTACT | mjDSBL_LIMIT | mjDSBL_FRICTIONLOSS;
+    const SoftLoops loops = file.loops();
+    const Model& soft = file.robot.model;
+    const std::vector<LoopCluster>& clusters = soft.clusters();
+    for (size_t c = 0; c < (clusters.size() + 1) / 2; ++c) {  // a leg
+      const std::vector<int> dofs = leaveOut(clusters[c].dofs, listMotors(soft));
+      const SoftRest rest =
+          loops.findRest(file.start, loops.makeDirections(file.start, dofs), VectorXd::Zero(soft.nv()));
+      REQUIRE(rest.status == NumericalStatus::Ok);
+      file.holdOthers(dofs);
+      file.set(file.start);
+      file.step(1);
+      for (size_t e = 0; e < loops.equalities().size(); ++e) {
+        const SoftEquality& equality = loops.equalities()[e];
+        INFO(name << " " << equality.name);
+        CHECK(file.gap(equality.name) == Approx(norm(equality, rest.gap[e])).epsilon(kTolerance).margin(1e-9));
+      }
+    }
+  }
+}
+
+TEST_CASE("A motor against a blocked joint opens the loop in MuJoCo as predicted", "[softness]") {
+  // A soft loop opens by 4 mm, where its impedance changes on the way.
+  for (const char* solimp : {"0.9 0.95", "0.5 0.95 0.01", "0.9 0.99 0.02 0.3 3", "0.95 0.9 0.003 0.5 1"}) {
+    INFO(solimp);
+    SoftFile file(makeFourBar("0.06 1", solimp, "timestep=\"0.001\""));
+    const SoftLoops loops = file.loops();
+    VectorXd tau = VectorXd::Zero(3);
+    tau[0] = 5;
+    const SoftRest rest = loops.findRest(file.start, loops.makeDirections(file.start, {0, 1}), tau);
+    REQUIRE(rest.status == NumericalStatus::Ok);
+    file.holdOthers({0, 1});
+    file.set(file.start);
+    file.data->qfrc_applied[0] = 5;
+    file.step(3);
+    CHECK(rest.gap[0].position > 1e-3);
+    CHECK(file.gap("pin") == Approx(rest.gap[0].position).epsilon(1e-3));
+    CHECK(file.data->qpos[0] == Approx(rest.displacement[0]).epsilon(1e-3));
+  }
+}
+
+TEST_CASE("A motor holds a sagging mechanism in MuJoCo by the torque predicted", "[softness]") {
+  SoftFile file(makeFourBar("0.2 1", "0.8 0.8", "timestep=\"0.001\""));
+  const SoftLoops loops = file.loops();
+  const SoftRest rest = loops.findRest(file.start, loops.makeDirections(file.start, {1, 2}), VectorXd::Zero(3));
+  file.holdOthers({1, 2});
+  file.set(file.start);
+  file.step(3);
+  const double held = file.data->qfrc_bias[0] - file.data->qfrc_constraint[0];
+  CHECK(std::abs(rest.load[0] - rest.rigid_load[0]) > 0.001);
+  CHECK(held - rest.rigid_load[0] == Approx(rest.load[0] - rest.rigid_load[0]).epsilon(0.01));
+}
+
+TEST_CASE("Equalities of every kind give way in MuJoCo as predicted", "[softness]") {
+  struct Case {
+    const char* tie;
+    std::vector<int> free;
+  };
+  for (const Case& c : std::vector<Case>{
+           {"<weld name=\"pin\" body1=\"coupler\" body2=\"rocker\"", {1, 2}},
+           {"<weld name=\"pin\" body1=\"coupler\" body2=\"world\"", {1}},
+           {"<joint name=\"pin\" joint1=\"coupler\" joint2=\"rocker\" polycoef=\"0 0.5 0.3 0 0\"", {1}},
+           {"<tendon name=\"pin\" tendon1=\"sum\"", {1}},
+           {"<tendon name=\"pin\" tendon1=\"sum\" tendon2=\"other\" polycoef=\"0 0.4 0 0 0\"", {1}},
+           {"<tendon name=\"pin\" tendon1=\"line\"", {1}},
+       }) {
+    INFO(c.tie);
+    SoftFile file(
+        makeFourBar("", "", "timestep=\"0.001\"", "", c.tie + std::string(" solref=\"0.03 1\" solimp=\"0.9 0.9\"/>")));
+    SoftRest rest[2];
+    for (const MujocoVersion version : {MujocoVersion::Two, MujocoVersion::Three}) {
+      const SoftLoops loops = makeSoftLoops(file.robot.model, file.softness, version);
+      SoftRest& now = rest[version == MujocoVersion::Three];
+      now = loops.findRest(file.start, loops.makeDirections(file.start, c.free), Vector3d(0, 2, 0));
+      REQUIRE(now.status == NumericalStatus::Ok);
+    }
+    const SoftEquality equality = file.loops().equalities()[0];
+    file.holdOthers(c.free);
+    file.set(file.start);
+    file.data->qfrc_applied[1] = 2;
+    file.step(3);
+    CHECK(file.gap("pin") == Approx(norm(equality, rest[0].gap[0])).epsilon(kTolerance));
+    CHECK(file.data->qpos[1] == Approx(rest[0].displacement[1]).epsilon(kTolerance));
+    // MuJoCo 3 would let the weld of a single body turn by another angle; where two turn, their places hold them.
+    const bool turns = std::string(c.tie).find("world") != std::string::npos;
+    CHECK((std::abs(rest[1].displacement[1] / rest[0].displacement[1] - 1) > 0.1) == turns);
+  }
+}
+
+TEST_CASE("Small motions in MuJoCo are as slow and as damped as predicted", "[softness]") {
+  struct Case {
+    const char *solref, *solimp, *option, *joint;
+  };
+  for (const Case& c : std::vector<Case>{{"0.1 1", "0.8 0.8", "timestep=\"0.001\"", ""},
+                                         {"0.1 0.5", "0.9 0.9", "timestep=\"0.001\" integrator=\"RK4\"", ""},
+                                         {"-400 -30", "0.9 0.9", "timestep=\"0.0005\"", "stiffness=\"20\""},
+                                         {"0.04 1", "0.9 0.95", "timestep=\"0.02\"", "damping=\"0.01\""}}) {
+    INFO(c.solref << ", " << c.option);
+    SoftFile file(makeFourBar(c.solref, c.solimp, c.option, c.joint));
+    const SoftLoops loops = file.loops();
+    const MatrixXd Z = loops.makeDirections(file.start, listAll(file.robot.model));
+    const SoftRest rest = loops.findRest(file.start, loops.makeDirections(file.start, {1, 2}), VectorXd::Zero(3));
+    const SoftMotion motion = loops.calcMotion(file.start, rest, Z);
+    const MatrixXd N = loops.makeClosedMotions(file.start, Z);
+    REQUIRE(N.cols() == 1);
+    file.set(rest.q);
+    file.data->qfrc_applied[0] = rest.load[0];
+    for (int k = 0; k < 3; ++k) file.data->qvel[k] = 1e-4 * N(k, 0) / N(0, 0);
+    std::vector<double> crossings, peaks;
+    double before = 0, peak = 0;
+    const double h = file.mj->opt.timestep;
+    for (int i = 1; crossings.size() < 11; ++i) {
+      mj_step(file.mj.get(), file.data.get());
+      const double now = file.data->qpos[0] - rest.q[0];
+      peak = std::max(peak, now);
+      if (before < 0 && now >= 0) {
+        crossings.push_back((i - now / (now - before)) * h);
+        peaks.push_back(peak);
+        peak = 0;
+      }
+      before = now;
+      if (i * h > 60) FAIL("it does not swing");
+    }
+    // The motion with rigid loops, by constrained dynamics.
+    const Model& model = file.robot.model;
+    const Mode rigid =
+        calcModes(model, makeConstraintSet(model), file.start, rest.rigid_load[0] * Vector3d::UnitX()).modes[0];
+    const double time = crossings[10] - crossings[1], frequency = 9 / time;
+    CHECK(motion.frequency == Approx(rigid.frequency).epsilon(1e-3));
+    CHECK(frequency / motion.frequency - 1 == Approx(motion.frequency_error).epsilon(0.05));
+    CHECK(2 * (std::log(peaks[1] / peaks[10]) / time + rigid.eigenvalue.real()) ==
+          Approx(motion.energy_loss).epsilon(0.05));
+    CHECK_FALSE(motion.diverges);
+  }
+}
+
+TEST_CASE("The largest stable step is MuJoCo's", "[softness]") {
+  struct Case {
+    const char *solref, *option, *joint;
+  };
+  for (const Case& c : std::vector<Case>{{"-1e6 -1000", "", ""},
+                                         {"-4e5 -10", "", ""},
+                                         {"-1e6 -1000", "integrator=\"RK4\"", ""},
+                                         {"0.001 1", "", "stiffness=\"2000\""},
+                                         {"0.001 1", "", "stiffness=\"2000\" damping=\"1\""}}) {
+    INFO(c.solref << " " << c.option << " " << c.joint);
+    SoftFile file(makeFourBar(c.solref, "0.95 0.95", c.option, c.joint));
+    const SoftLoops loops = file.loops();
+    const SoftRest rest = loops.findRest(file.start, loops.makeDirections(file.start, {1, 2}), VectorXd::Zero(3));
+    const double stable =
+        loops.calcMotion(file.start, rest, loops.makeDirections(file.start, listAll(file.robot.model))).stable_step;
+    const auto diverges = [&](double step) {
+      file.mj->opt.timestep = step;
+      file.set(rest.q);
+      file.data->qfrc_applied[0] = rest.load[0];
+      file.data->qvel[1] = 1e-6;
+      for (int i = 0; i < 40000; ++i) {
+        mj_step(file.mj.get(), file.data.get());
+        if (!(std::abs(file.data->qvel[1]) < 20)) return true;
+      }
+      return false;
+    };
+    CHECK(stable < 0.1);
+    CHECK_FALSE(diverges(0.95 * stable));
+    CHECK(diverges(1.05 * stable));
+  }
+}

@@ -1,0 +1,129 @@
+// bielle softness: rows, page, settings, and what it refuses.
+#include <catch2/catch.hpp>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "cli_command.h"
+#include "robot_directory.h"
+
+using namespace bielle::testing;
+using Json = nlohmann::json;
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string convert(const RobotDirectory& directory, const std::string& robot) {
+  const std::string path = directory.path() + "/" + robot + ".xml";
+  REQUIRE(run({"convert", robot, "--to", "mjcf", "-o", path}).status == 0);
+  return path;
+}
+
+// Warnings of the reader come first.
+void checkRefusal(const CommandResult& result, const std::string& text) {
+  CHECK(result.status == 2);
+  CHECK(result.out.empty());
+  CHECK_THAT(result.err, Catch::Contains("bielle: error: ") && Catch::Contains(text));
+}
+
+std::vector<Json> readRows(const std::string& output) {
+  std::ifstream stream(output + "/softness.jsonl");
+  std::vector<Json> rows;
+  for (std::string line; std::getline(stream, line);) rows.push_back(Json::parse(line));
+  rows.erase(rows.begin());
+  return rows;
+}
+
+}  // namespace
+
+TEST_CASE("Loops of Bipetto have rows, plots and settings", "[softness]") {
+  const RobotDirectory directory;
+  const std::string file = convert(directory, "bipetto"), output = directory.path() + "/soft";
+  const CommandResult result = run({"softness", file, "--timestep", "0.002", "--torque", "20", "--json", "-o", output});
+  REQUIRE(result.status == 0);
+  CHECK_THAT(result.err, Catch::Contains("54 of 54 postures"));
+  const Json json = Json::parse(result.out);
+  REQUIRE(json["loops"].size() == 6);
+  double largest = 0;
+  for (const Json& loop : json["loops"]) {
+    CHECK(loop["state"] != "diverges");
+    CHECK(loop["gap_at_limit"] > 1e-7);
+    largest = std::max({largest, loop["gap"].get<double>(), loop["gap_at_limit"].get<double>()});
+  }
+  CHECK(json["loops"][0]["driven"] == Json{"knee_right"});
+  // solimp is as stiff as it can be: only a shorter step helps, with the square of which gaps go.
+  CHECK(json["timestep"] < 0.002);
+  CHECK(json["gap"] <= 1e-4);
+  CHECK(json["gap"].get<double>() ==
+        Approx(largest * std::pow(json["timestep"].get<double>() / 0.002, 2)).epsilon(0.01));
+  CHECK_THAT(readFile(output + "/settings.xml"), Catch::Contains("0.9999 0.9999"));
+  const std::string page = readFile(output + "/softness.html");
+  for (const Json& loop : json["loops"]) CHECK_THAT(page, Catch::Contains("<h2>" + loop["loop"].get<std::string>()));
+  for (const Json& row : readRows(output)) CHECK(row["stable_step"] > 0.002);
+}
+
+TEST_CASE("Softness that was interrupted goes on to the same bytes", "[softness]") {
+  const RobotDirectory directory;
+  const std::string file = convert(directory, "bipetto"), output = directory.path() + "/soft";
+  const std::vector<std::string> arguments = {"softness", file, "--postures", "15", "-o"};
+  const auto with = [&](const std::string& place) {
+    std::vector<std::string> all = arguments;
+    all.push_back(place);
+    return all;
+  };
+  REQUIRE(run(with(output)).status == 0);
+  const std::string log = readFile(output + "/softness.jsonl"), page = readFile(output + "/softness.html");
+
+  // Within a row, within a posture
+  const std::string cut = directory.path() + "/cut";
+  fs::create_directory(cut);
+  std::ofstream(cut + "/softness.jsonl", std::ios::binary) << log.substr(0, log.size() / 2);
+  REQUIRE(run(with(cut)).status == 0);
+  CHECK(readFile(cut + "/softness.jsonl") == log);
+  CHECK(readFile(cut + "/softness.html") == page);
+
+  const std::string stopped = directory.path() + "/stopped";
+  std::vector<std::string> all = with(stopped);
+  all.insert(all.begin(), BIELLE_COMMAND);
+  Command command(all);
+  for (int i = 0; i < 6000 && countLines(stopped + "/softness.jsonl") < 3; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  command.sendSignal(SIGINT);
+  const CommandResult result = command.wait();
+  CHECK(result.status == 1);
+  CHECK_THAT(result.err, Catch::Contains("the same command goes on"));
+  const std::string part = readFile(stopped + "/softness.jsonl");
+  CHECK(part.size() < log.size());
+  CHECK(log.rfind(part, 0) == 0);
+  REQUIRE(run(with(stopped)).status == 0);
+  CHECK(readFile(stopped + "/softness.jsonl") == log);
+
+  checkRefusal(run({"softness", file, "--postures", "16", "-o", stopped}), "of other settings");
+}
+
+TEST_CASE("Steps that are too long diverge, and loops that are too soft give way", "[softness]") {
+  const RobotDirectory directory;
+  const std::string file = convert(directory, "fourbar");
+  const auto state = [&](const std::string& name, std::vector<std::string> more) {
+    const std::string output = directory.path() + "/" + name;
+    more.insert(more.begin(), {"softness", file, "--postures", "3", "-o", output});
+    REQUIRE(run(more).status == 0);
+    return readRows(output).front()["state"];
+  };
+  CHECK(state("direct", {"--solref", "-1e6", "-2000", "--timestep", "0.002"}) == "diverges");
+  CHECK(state("short", {"--solref", "-1e6", "-2000", "--timestep", "0.0002"}) == "holds");
+  CHECK(state("soft", {"--solref", "2", "1", "--solimp", "0.5", "0.5"}) == "gives way");
+}
+
+TEST_CASE("Softness refuses what has no soft loops", "[softness]") {
+  const RobotDirectory directory;
+  const std::string output = directory.path() + "/soft";
+  const std::string tree = directory.write(
+      "tree.xml",
+      "<mujoco><worldbody><body name=\"arm\"><joint name=\"pivot\"/><geom size=\"0.1\"/></body></worldbody></mujoco>");
+  checkRefusal(run({"softness", tree, "-o", output}), "no equalities");
+  CHECK_FALSE(fs::exists(output));
+  checkRefusal(run({"softness", "fourbar", "-o", output}), "convert");
+}
