@@ -2,6 +2,8 @@
 
 #include <functional>
 #include <limits>
+#include <memory>
+#include <vector>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/model/error.h"

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <vector>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/model/error.h"
