@@ -373,8 +373,8 @@ true motion comes from their equations, extrapolated to the same accuracy. Neith
     page.add("""Simbody is version 3.7, MuJoCo version 2.2.2. Simbody's accuracy is the relative error of a step, a tenth of which is the tolerance of its constraints in metres. MuJoCo's closures are
 soft; their time constant is twice the step, the least that it takes. MuJoCo 3 is 3.14, as npm has it: WebAssembly in node, which is
 said to take 1.1 to 1.6 times as long as its native library; the steps of its `discrete` integrator are implicit in springs and
-dampers. DART is version 6.12 with the least force mixing that it takes (1e-9), ODE version 0.16 as it comes, which refuses the four-bars
-because thin rods have no moment of inertia about their axis; both have steps of first order, and DART, ODE and MuJoCo 3 run in programs of their own, which time themselves.
+dampers. DART is version 6.12 with the least force mixing that it takes (1e-9), ODE version 0.16 as it comes, which breaks off on the four-bars,
+whose thin rods have no moment of inertia about their axis; both have steps of first order, and DART, ODE and MuJoCo 3 run in programs of their own, which time themselves.
 *Opening*: the largest distance of points that a closure
 ties. *Drift*: the largest change of the energy, less the work of motors, over the largest kinetic energy.""")
     page.add("""Every engine is stopped twenty times a motion and at the times compared, to be looked at. Errors do not depend on the load of the machine.
