@@ -90,7 +90,7 @@ void NAME_joint_limits(const NAME_ratio *ratio, REAL torque[SIZE], REAL speed[SI
 )";
 
 inline constexpr const char* kSourceText = R"(/* @title@ See the header. */
-#include "@header@"
+@include@
 
 #include <math.h>
 #include <stddef.h>
@@ -326,7 +326,7 @@ void NAME_joint_limits(const NAME_ratio *ratio, REAL torque[SIZE], REAL fastest[
 
 inline constexpr const char* kTestText =
     R"(/* Test of NAMEbare: postures of the mechanism with all its bodies and closures. @build@ */
-#include "@header@"
+@include@
 
 #include <math.h>
 #include <stdio.h>
