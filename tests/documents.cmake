@@ -1,6 +1,6 @@
 # Runs every command of the pages as a reader would and compares its output; compares programs with the examples.
 set(pages tutorial tutorial_walker modelling springs signs new_robot parts formats motions objectives constraints linkages checks
-  execution datasets problems suite ten_results free_motions speed design_reference new_controller on_a_robot installing)
+  execution datasets problems suite ten_results free_motions softness speed design_reference new_controller on_a_robot installing)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()

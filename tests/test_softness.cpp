@@ -70,7 +70,7 @@ struct SoftFile {
   }
 };
 
-struct Pendulum {
+struct HeldPendulum {
   double mass = 2, centre = 0.2, inertia = 0.03, radius = 0.5;  // kg, m, kg m^2 about the centre, m
   std::string solref = "0.02 1", solimp = "0.9 0.95 0.001 0.5 2", option = "timestep=\"0.001\"", rest = "";
   std::string xml() const {
@@ -82,7 +82,7 @@ struct Pendulum {
   }
 };
 
-std::vector<int> listAll(const Model& model) {
+std::vector<int> listAllDofs(const Model& model) {
   std::vector<int> dofs(model.nv());
   for (int k = 0; k < model.nv(); ++k) dofs[k] = k;
   return dofs;
@@ -91,7 +91,7 @@ std::vector<int> listAll(const Model& model) {
 }  // namespace
 
 TEST_CASE("A pendulum that a connect holds sags as the documentation of MuJoCo says", "[softness]") {
-  Pendulum pendulum;
+  HeldPendulum pendulum;
   struct Case {
     std::string solref, solimp, option;
     double expected;  // 1 / stiffness of a row whose A is 1
@@ -123,8 +123,8 @@ TEST_CASE("A pendulum that a connect holds sags as the documentation of MuJoCo s
 namespace {
 
 // Two rods that hang on the world, with a third between their ends, which stands a little oblique: it swings.
-std::string makeFourBar(const std::string& solref, const std::string& solimp, const std::string& option,
-                        const std::string& joint = "", const std::string& tie = "") {
+std::string makeSwing(const std::string& solref, const std::string& solimp, const std::string& option,
+                      const std::string& joint = "", const std::string& tie = "") {
   const auto rod = [](double mass) {
     return "<inertial pos=\"0 0 -0.1\" mass=\"" + std::to_string(mass) + "\" diaginertia=\"0.002 0.002 0.001\"/>";
   };
@@ -146,24 +146,24 @@ std::string makeFourBar(const std::string& solref, const std::string& solimp, co
          "</actuator></mujoco>";
 }
 
-std::vector<int> leaveOut(const std::vector<int>& dofs, const std::vector<int>& out) {
+std::vector<int> leaveOutDofs(const std::vector<int>& dofs, const std::vector<int>& out) {
   std::vector<int> left;
   for (const int k : dofs)
     if (std::find(out.begin(), out.end(), k) == out.end()) left.push_back(k);
   return left;
 }
 
-std::vector<int> listMotors(const Model& model) {
+std::vector<int> listMotorDofs(const Model& model) {
   std::vector<int> dofs;
   for (const Motor& motor : model.motors()) dofs.push_back(motor.dof);
   return dofs;
 }
 
-double norm(const SoftEquality& equality, const ClosureGap& gap) {  // of MuJoCo's rows
+double calcOpening(const SoftEquality& equality, const ClosureGap& gap) {  // of MuJoCo's rows
   return std::hypot(gap.position, (equality.closure.kind == ClosureKind::Weld6D ? 0.5 : 1) * gap.angle);
 }
 
-constexpr double kTolerance = 0.02;  // measured: 0.002; of all predictions 0.1 is promised
+constexpr double kSoftTolerance = 0.02;  // measured: 0.002; of all predictions 0.1 is promised
 
 }  // namespace
 
@@ -179,7 +179,7 @@ TEST_CASE("Loops of robots stand open under gravity in MuJoCo as predicted", "[s
     const Model& soft = file.robot.model;
     const std::vector<LoopCluster>& clusters = soft.clusters();
     for (size_t c = 0; c < (clusters.size() + 1) / 2; ++c) {  // a leg
-      const std::vector<int> dofs = leaveOut(clusters[c].dofs, listMotors(soft));
+      const std::vector<int> dofs = leaveOutDofs(clusters[c].dofs, listMotorDofs(soft));
       const SoftRest rest =
           loops.findRest(file.start, loops.makeDirections(file.start, dofs), VectorXd::Zero(soft.nv()));
       REQUIRE(rest.status == NumericalStatus::Ok);
@@ -189,7 +189,8 @@ TEST_CASE("Loops of robots stand open under gravity in MuJoCo as predicted", "[s
       for (size_t e = 0; e < loops.equalities().size(); ++e) {
         const SoftEquality& equality = loops.equalities()[e];
         INFO(name << " " << equality.name);
-        CHECK(file.gap(equality.name) == Approx(norm(equality, rest.gap[e])).epsilon(kTolerance).margin(1e-9));
+        CHECK(file.gap(equality.name) ==
+              Approx(calcOpening(equality, rest.gap[e])).epsilon(kSoftTolerance).margin(1e-9));
       }
     }
   }
@@ -199,7 +200,7 @@ TEST_CASE("A motor against a blocked joint opens the loop in MuJoCo as predicted
   // A soft loop opens by 4 mm, where its impedance changes on the way.
   for (const char* solimp : {"0.9 0.95", "0.5 0.95 0.01", "0.9 0.99 0.02 0.3 3", "0.95 0.9 0.003 0.5 1"}) {
     INFO(solimp);
-    SoftFile file(makeFourBar("0.06 1", solimp, "timestep=\"0.001\""));
+    SoftFile file(makeSwing("0.06 1", solimp, "timestep=\"0.001\""));
     const SoftLoops loops = file.loops();
     VectorXd tau = VectorXd::Zero(3);
     tau[0] = 5;
@@ -216,7 +217,7 @@ TEST_CASE("A motor against a blocked joint opens the loop in MuJoCo as predicted
 }
 
 TEST_CASE("A motor holds a sagging mechanism in MuJoCo by the torque predicted", "[softness]") {
-  SoftFile file(makeFourBar("0.2 1", "0.8 0.8", "timestep=\"0.001\""));
+  SoftFile file(makeSwing("0.2 1", "0.8 0.8", "timestep=\"0.001\""));
   const SoftLoops loops = file.loops();
   const SoftRest rest = loops.findRest(file.start, loops.makeDirections(file.start, {1, 2}), VectorXd::Zero(3));
   file.holdOthers({1, 2});
@@ -242,7 +243,7 @@ TEST_CASE("Equalities of every kind give way in MuJoCo as predicted", "[softness
        }) {
     INFO(c.tie);
     SoftFile file(
-        makeFourBar("", "", "timestep=\"0.001\"", "", c.tie + std::string(" solref=\"0.03 1\" solimp=\"0.9 0.9\"/>")));
+        makeSwing("", "", "timestep=\"0.001\"", "", c.tie + std::string(" solref=\"0.03 1\" solimp=\"0.9 0.9\"/>")));
     SoftRest rest[2];
     for (const MujocoVersion version : {MujocoVersion::Two, MujocoVersion::Three}) {
       const SoftLoops loops = makeSoftLoops(file.robot.model, file.softness, version);
@@ -255,8 +256,8 @@ TEST_CASE("Equalities of every kind give way in MuJoCo as predicted", "[softness
     file.set(file.start);
     file.data->qfrc_applied[1] = 2;
     file.step(3);
-    CHECK(file.gap("pin") == Approx(norm(equality, rest[0].gap[0])).epsilon(kTolerance));
-    CHECK(file.data->qpos[1] == Approx(rest[0].displacement[1]).epsilon(kTolerance));
+    CHECK(file.gap("pin") == Approx(calcOpening(equality, rest[0].gap[0])).epsilon(kSoftTolerance));
+    CHECK(file.data->qpos[1] == Approx(rest[0].displacement[1]).epsilon(kSoftTolerance));
     // MuJoCo 3 would let the weld of a single body turn by another angle; where two turn, their places hold them.
     const bool turns = std::string(c.tie).find("world") != std::string::npos;
     CHECK((std::abs(rest[1].displacement[1] / rest[0].displacement[1] - 1) > 0.1) == turns);
@@ -272,9 +273,9 @@ TEST_CASE("Small motions in MuJoCo are as slow and as damped as predicted", "[so
                                          {"-400 -30", "0.9 0.9", "timestep=\"0.0005\"", "stiffness=\"20\""},
                                          {"0.04 1", "0.9 0.95", "timestep=\"0.02\"", "damping=\"0.01\""}}) {
     INFO(c.solref << ", " << c.option);
-    SoftFile file(makeFourBar(c.solref, c.solimp, c.option, c.joint));
+    SoftFile file(makeSwing(c.solref, c.solimp, c.option, c.joint));
     const SoftLoops loops = file.loops();
-    const MatrixXd Z = loops.makeDirections(file.start, listAll(file.robot.model));
+    const MatrixXd Z = loops.makeDirections(file.start, listAllDofs(file.robot.model));
     const SoftRest rest = loops.findRest(file.start, loops.makeDirections(file.start, {1, 2}), VectorXd::Zero(3));
     const SoftMotion motion = loops.calcMotion(file.start, rest, Z);
     const MatrixXd N = loops.makeClosedMotions(file.start, Z);
@@ -320,11 +321,11 @@ TEST_CASE("The largest stable step is MuJoCo's", "[softness]") {
                                          {"0.001 1", "", "stiffness=\"2000\""},
                                          {"0.001 1", "", "stiffness=\"2000\" damping=\"1\""}}) {
     INFO(c.solref << " " << c.option << " " << c.joint);
-    SoftFile file(makeFourBar(c.solref, "0.95 0.95", c.option, c.joint));
+    SoftFile file(makeSwing(c.solref, "0.95 0.95", c.option, c.joint));
     const SoftLoops loops = file.loops();
     const SoftRest rest = loops.findRest(file.start, loops.makeDirections(file.start, {1, 2}), VectorXd::Zero(3));
     const double stable =
-        loops.calcMotion(file.start, rest, loops.makeDirections(file.start, listAll(file.robot.model))).stable_step;
+        loops.calcMotion(file.start, rest, loops.makeDirections(file.start, listAllDofs(file.robot.model))).stable_step;
     const auto diverges = [&](double step) {
       file.mj->opt.timestep = step;
       file.set(rest.q);

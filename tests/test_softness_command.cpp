@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::string convert(const RobotDirectory& directory, const std::string& robot) {
+std::string convertToMjcf(const RobotDirectory& directory, const std::string& robot) {
   const std::string path = directory.path() + "/" + robot + ".xml";
   REQUIRE(run({"convert", robot, "--to", "mjcf", "-o", path}).status == 0);
   return path;
@@ -40,7 +40,7 @@ std::vector<Json> readRows(const std::string& output) {
 
 TEST_CASE("Loops of Bipetto have rows, plots and settings", "[softness]") {
   const RobotDirectory directory;
-  const std::string file = convert(directory, "bipetto"), output = directory.path() + "/soft";
+  const std::string file = convertToMjcf(directory, "bipetto"), output = directory.path() + "/soft";
   const CommandResult result = run({"softness", file, "--timestep", "0.002", "--torque", "20", "--json", "-o", output});
   REQUIRE(result.status == 0);
   CHECK_THAT(result.err, Catch::Contains("54 of 54 postures"));
@@ -66,7 +66,7 @@ TEST_CASE("Loops of Bipetto have rows, plots and settings", "[softness]") {
 
 TEST_CASE("Softness that was interrupted goes on to the same bytes", "[softness]") {
   const RobotDirectory directory;
-  const std::string file = convert(directory, "bipetto"), output = directory.path() + "/soft";
+  const std::string file = convertToMjcf(directory, "bipetto"), output = directory.path() + "/soft";
   const std::vector<std::string> arguments = {"softness", file, "--postures", "15", "-o"};
   const auto with = [&](const std::string& place) {
     std::vector<std::string> all = arguments;
@@ -105,7 +105,7 @@ TEST_CASE("Softness that was interrupted goes on to the same bytes", "[softness]
 
 TEST_CASE("Steps that are too long diverge, and loops that are too soft give way", "[softness]") {
   const RobotDirectory directory;
-  const std::string file = convert(directory, "fourbar");
+  const std::string file = convertToMjcf(directory, "fourbar");
   const auto state = [&](const std::string& name, std::vector<std::string> more) {
     const std::string output = directory.path() + "/" + name;
     more.insert(more.begin(), {"softness", file, "--postures", "3", "-o", output});
