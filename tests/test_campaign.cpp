@@ -275,8 +275,61 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
     CHECK_FALSE(fs::exists(out + "/runs.jsonl"));
     CHECK_FALSE(fs::exists(out + "/motions"));
   }
-  const std::string late = directory.write("spec.yaml", head + "push: {phase: 99, impulse: 1}\n");
-  CHECK_THAT(runCampaign(late, makeOutput(directory)).err, Contains("key 'phase' (line 2)") && Contains("no phase 99"));
+}
+
+TEST_CASE("campaign: pushes that are not over when their motions end are told before these are solved") {
+  const RobotDirectory directory;
+  const std::string out = directory.path() + "/out",
+                    squat = "solve: squat, robot: " BIELLE_SOURCE_DIR "/robots/bipetto",
+                    head = "motions:\n  - {name: short, " + squat + ", set: {duration: 0.6}}\n",
+                    longer = head + "  - {name: long, " + squat + ", set: {duration: 3}}\n";
+  const fs::path programs = fs::path(BIELLE_COMMAND).parent_path();
+  std::set<std::string> warnings;
+  const auto check =
+      [&](const std::string& text) {  // a squat stands for 0.3 s before and after, and a simulation holds for 1 s
+        const tasks::CampaignSpec spec = tasks::readCampaignSpec(directory.write("spec.yaml", text));
+        warnings.clear();
+        return tasks::checkCommands(spec, (programs / "bielle-complete").string(),
+                                    (programs / "bielle-simulate").string(), directory.path() + "/log", warnings);
+      };
+  const auto refuses = [&](const std::string& text, const std::string& message) {
+    CAPTURE(text);
+    CHECK_THROWS_WITH(check(text), Contains(message) && Contains("spec.yaml"));
+  };
+  CHECK(check(head + "push: {time: [0.3, 2.1], impulse: 1}\n"));
+  CHECK(warnings.empty());
+  refuses(head + "push: {time: [0.3, 2.11], impulse: 1}\n",
+          "key 'time' (line 3): a push at 2.11 s is over at 2.21 s, but");
+  refuses(head + "push: {time: [0.3, 2.11], impulse: 1}\n", "give an earlier time, or `options: {hold: 3}`");
+  CHECK(check(head + "push: {time: [0.3, 2.11], impulse: 1}\noptions: {hold: 3}\n"));
+  CHECK(check(head + "push: {time: [0.3, 2.11], duration: 0.05, impulse: 1}\n"));
+  refuses(head + "push: {time: 1.5, impulse: 1}\noptions: {duration: 1.2}\n", "`options: {duration: 3}`");
+  CHECK(check(head + "push: {time: 1.5, impulse: 1}\noptions: {duration: 3}\n"));
+  // One motion is long enough.
+  CHECK(check(longer + "push: {time: 2.11, impulse: 1}\n"));
+  REQUIRE(warnings.size() == 1);
+  CHECK_THAT(*warnings.begin(), Contains("motion short: a push at 2.11 s") && Contains("these runs are refused"));
+  refuses(longer + "push: {time: 5, impulse: 1}\n", "the simulations end at 4.6 s");
+  refuses(head + "push: {phase: 99, impulse: 1}\n", "key 'phase' (line 3): motion short has no phase 99");
+  // Cycles go on.
+  CHECK(check("motions: [{name: w, solve: walk, robot: " BIELLE_SOURCE_DIR
+              "/robots/bipetto, options: {periodic: true}}]\npush: {time: 90, impulse: 1}\n"));
+  // That is what the program says of a motion that is solved.
+  const CommandResult late = runCampaign(directory.write("late.yaml", head + "push: {time: 2.11, impulse: 1}\n"), out);
+  CHECK(late.status == 2);
+  CHECK_FALSE(fs::exists(out + "/motions"));
+  const std::string solved = directory.path() + "/solved";
+  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--set",
+                      "duration=0.6", "--quiet", "--no-report", "--no-check", "-o", solved})
+              .status == 0);
+  const auto push = [&](const std::string& time) {
+    return runCommand({BIELLE_COMMAND, "simulate", solved, "-o", directory.path() + "/one", "--summary-only",
+                       "--control", "gains", "--push", "impulse=1,t=" + time})
+        .status;
+  };
+  CHECK(push("2.1") == 0);
+  CHECK(push("2.11") == 2);
+  refuses("motions: [solved]\npush: {time: 2.11, impulse: 1}\n", "a push at 2.11 s is over at 2.21 s");
 }
 
 TEST_CASE("campaign: options without effect on some of its runs are told once, before anything runs") {

@@ -75,6 +75,8 @@ def main():
         assert summary["robot_fingerprint"] == calc_fingerprint(*mechanism), summary["robot_fingerprint"]
         for arguments, told in use_all(place):
             assert "has changed" not in told.stderr, (arguments, told.stderr)
+        start = ["solve", *SQUAT, "--robot", "robot", "--warm-start", "squat", "--dry-run"]
+        assert "another robot" not in run(*start, where=place).stderr
         simulate(place, "as it was")
 
         original = read(place, "robot", "bipetto.yaml"), read(place, "robot", "bipetto.urdf")
@@ -94,6 +96,10 @@ def main():
                 assert os.path.join(place, "robot", "bipetto.urdf") in first and "mechanism.urdf" in first, first
                 assert "`" + " ".join([BIELLE, *solve, motion][:2]) in first, first
                 assert {heavier: "<mass value=", "<robot": "cannot be read"}.get(text, "gravity: ") in first, first
+            if text != "<robot":  # another robot may start from it, which is told as well
+                told = run(*start, where=place).stderr
+                assert "squat: the motion to start from was solved for another robot" in told.splitlines()[0], told
+                assert {heavier: "<mass value="}.get(text, "gravity: ") in told, told
             told = simulate(place, "replayed").stderr
             assert TOLD in told.splitlines()[0], told
             assert calc_distance(place, "as it was", "replayed") < 1e-9

@@ -212,6 +212,34 @@ TEST_CASE("info describes the model, in words and in JSON") {
   CHECK(json::parse(run({"info", "fourbar", "--json"}).out)["mobility"]["mobility"] == 1);
 }
 
+TEST_CASE("what changes no mechanism is one line of a robot's warnings, and a list if that is asked for") {
+  const RobotDirectory directory;
+  const std::string path = directory.write("arm.xml", R"(<mujoco model="arm">
+<option cone="elliptic"/>
+<worldbody><light/><camera/>
+<body name="link"><joint name="turn" axis="0 1 0"/><camera/><inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/></body>
+</worldbody>
+<actuator><motor joint="turn"/></actuator>
+<sensor><jointpos joint="turn"/></sensor>
+</mujoco>)");
+  const std::string told =
+      "bielle: warning: " + path + ": what changes no mechanism is left out (4 kinds of elements; ";
+  const std::string list = "bielle: left out: " + path + ": ";
+  for (std::vector<std::string> command : std::vector<std::vector<std::string>>{
+           {"info", path}, {"convert", path, "-o", directory.path() + "/copy"}, {"ratio", path, "--joint", "turn"}}) {
+    const CommandResult result = run(command);
+    CAPTURE(command[0], result.err);
+    CHECK_THAT(result.err, Catch::Contains(told) && !Catch::Contains("camera") && !Catch::Contains(list));
+    command.push_back("--verbose");
+    for (const char* element :
+         {"<light> (line 3)", "<camera> (lines 3, 4)", "<option> (line 2): 'cone'", "<sensor> <jointpos> (line 7)"})
+      CHECK_THAT(run(command).err, Catch::Contains(told) && Catch::Contains(list + element + "\n"));
+  }
+  for (const std::string command : {"info", "eval", "view", "convert", "adopt", "ratio", "modes", "bench"})
+    CHECK_THAT(run({command, "--help"}).out, Catch::Contains("--verbose"));
+  CHECK_THAT(run({"solve", "walk", "--help"}).out, Catch::Contains("--verbose"));
+}
+
 TEST_CASE("info lists the joints of references as given and as assembled, and tells where these differ") {
   const RobotDirectory directory;
   const fs::path fourbar = fs::path(BIELLE_SOURCE_DIR) / "robots/fourbar";

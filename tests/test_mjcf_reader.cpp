@@ -15,6 +15,7 @@
 #include "formats/drake.h"
 #include "formats/mjcf.h"
 #include "formats/mjcf_coordinates.h"
+#include "formats/robot_files.h"
 #include "formats/sdf.h"
 #include "get_error.h"
 #include "mechanisms.h"
@@ -60,11 +61,23 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
     REQUIRE(found.size() == 1);
     CHECK(found[0] == directory.path() + "/swing.xml: " + warning);
   };
-  checkWarning(makeSwing("\n<camera name=\"eye\"/>\n<camera name=\"other\"/>"), "<camera> (lines 2, 3): left out");
-  checkWarning(makeSwing("\n<geom type=\"plane\" size=\"1 1 1\"/>"), "<geom> (line 2): left out");
-  checkWarning(makeSwing("\n<camera/>\n<geom type=\"plane\" size=\"1 1 1\"/>\n<camera/>\n<light/>"),
-               "<geom> (line 3), <camera> (lines 2, 4), <light> (line 5): left out");
-  checkWarning(makeSwing("", "\n<sensor>\n<gyro site=\"a\"/></sensor>"), "<sensor> <gyro> (line 3): left out");
+  // What changes no mechanism is one line, with a list.
+  const auto checkHarmless = [&](const std::string& text, const std::vector<std::string>& elements) {
+    const std::vector<std::string> found = load(text).warnings;
+    REQUIRE(found.size() == 1);
+    const std::string path = directory.path() + "/swing.xml", number = std::to_string(elements.size());
+    CHECK_THAT(found[0], Catch::StartsWith(path + ": what changes no mechanism is left out (" + number + " kind") &&
+                             Catch::Contains("`bielle info " + path + " --verbose` lists them"));
+    std::vector<std::string> lines;
+    for (const std::string& element : elements) lines.push_back(path + ": " + element);
+    CHECK(listHarmless(path) == lines);
+  };
+  checkHarmless(makeSwing("\n<camera name=\"eye\"/>\n<camera name=\"other\"/>"), {"<camera> (lines 2, 3)"});
+  checkHarmless(makeSwing("\n<camera/>\n<geom type=\"plane\" size=\"1 1 1\"/>\n<camera/>\n<light/>"),
+                {"<geom> (line 3)", "<camera> (lines 2, 4)", "<light> (line 5)"});
+  checkHarmless(makeSwing("", "\n<sensor>\n<gyro site=\"a\"/></sensor>\n<option cone=\"elliptic\" timestep=\"1e-3\"/>"),
+                {"<sensor> <gyro> (line 3)", "<option> (line 4): 'cone'"});
+  CHECK(load(makeSwing("\n<camera/>", "\n<option wind=\"1 0 0\" cone=\"elliptic\"/>")).warnings.size() == 2);
   checkWarning(makeSwing("", "\n<tendon><spatial/></tendon>"),
                "<spatial> (line 2): it does not run between two sites, and is left out");
   checkWarning(makeSwing("", "\n<actuator><muscle joint=\"swing\"/></actuator>"),

@@ -387,7 +387,7 @@ TEST_CASE("simulate: the robot of the world alone may carry a load, or be anothe
   };
   const MotionRecord bare = carry({});
   CHECK_FALSE(parseSummary(output).contains("payload"));
-  const MotionRecord loaded = carry({"--payload", "3", "--payload-at", "thigh_left,0.01,0.02,-0.03"});
+  const MotionRecord loaded = carry({"--payload", "3", "--at", "thigh_left,0.01,0.02,-0.03"});
   const nlohmann::json payload = parseSummary(output)["payload"];
   CHECK((payload["mass_kg"] == 3 && payload["link"] == "thigh_left"));
   CHECK(payload["at_m"] == std::vector<double>{0.01, 0.02, -0.03});
@@ -408,6 +408,7 @@ TEST_CASE("simulate: the robot of the world alone may carry a load, or be anothe
            {{"--robot", BIELLE_SOURCE_DIR "/robots/cleobot"}, {"cleobot", "of the same joints, motors and contacts"}},
            {{"--robot", heavy, "--speed", "0.3"}, {"--speed", "a solved motion has its own"}},
            {{"--payload", "3", "--payload-at", "tail,0,0,0"}, {"link 'tail' does not exist", "name a link that moves"}},
+           {{"--payload", "3", "--at", "0,0,0", "--payload-at", "0,0,0"}, {"--at", "excludes"}},
            {{"--payload", "3", "--payload-at", "0,0"}, {"--payload-at 0,0", "e.g. --payload-at trunk,0.15,0,0.1"}},
            {{"--payload", "3", "--payload-at", "0,x,0"}, {"--payload-at 0,x,0", "it is not a place"}}}) {
     const CommandResult refused = simulate(output, options, getSquat());

@@ -44,6 +44,7 @@ void addAdopt(CLI::App& command, Action& action) {
       ->required();
   command.add_option("-o,--output", *directory, "directory of the new robot; its last part names the robot's file")
       ->required();
+  addVerbose(command);
   command.footer(
       "Writes DIR/NAME.yaml, which refers to the robot's own files. Correct it by hand: comments explain every guess.\n"
       "Example:\n"

@@ -153,6 +153,7 @@ void addBench(CLI::App& command, Action& action) {
       ->capture_default_str();
   command.add_flag("--quick", arguments->quick, "small sizes, measured once, to see that everything works");
   command.add_flag("--json", arguments->as_json, "print JSON");
+  addVerbose(command);
   command.footer(
       "A unit is one product of two 108 x 108 matrices by Eigen, on one thread, in the same run. Times are the\n"
       "least of several repetitions. Whole solves run once. The receding horizon reports the median, 99th percentile\n"

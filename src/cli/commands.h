@@ -47,12 +47,14 @@ void printWarnings(const std::vector<std::string>& warnings);
 struct RobotArgument {
   std::string name;
   bool fixed_base = false;
-  // Loads the robot and prints its warnings to the standard error.
+  // Loads the robot and prints its warnings to the standard error, and with --verbose what is harmless.
   LoadedRobot load() const;
 };
+void addVerbose(CLI::App& command);
 // The directory of a robot and its files, which no output may replace.
 std::vector<std::string> listFiles(const LoadedRobot& robot);
-void addFixedBase(CLI::App& command, RobotArgument& robot);
+// --fixed-base and --verbose.
+void addRobotFlags(CLI::App& command, RobotArgument& robot);
 
 // An option by its own flag. \param set  receives what the command line gives
 void addOption(CLI::App& command, const Option& option, const std::function<void(const OptionValue&)>& set);

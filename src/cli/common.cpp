@@ -6,11 +6,13 @@
 #include "bielle/results/robot_info.h"
 #include "cli/commands.h"
 #include "dynamics/loop_conflict.h"
+#include "formats/robot_files.h"
 
 namespace bielle::cli {
 namespace {
 
 std::vector<std::string> command_line;
+bool is_verbose = false;
 
 // Flags are written with hyphens.
 std::string makeFlag(std::string option) {
@@ -31,6 +33,8 @@ LoadedRobot RobotArgument::load() const {
   const std::vector<std::string> moved = checkReferences(robot);
   robot.warnings.insert(robot.warnings.end(), moved.begin(), moved.end());
   printWarnings(robot.warnings);
+  if (is_verbose)
+    for (const std::string& line : listHarmless(robot.path())) std::cerr << "bielle: left out: " << line << "\n";
   const AssemblyResult closed = findClosedConfiguration(robot.model);
   if (closed.status != NumericalStatus::Ok) throw makeClosingError(robot.model, robot.path(), closed);
   return robot;
@@ -41,8 +45,14 @@ std::vector<std::string> listFiles(const LoadedRobot& robot) {
   return {robot.directory, robot.file, std::filesystem::path(file).replace_extension(".yaml").string()};
 }
 
-void addFixedBase(CLI::App& command, RobotArgument& robot) {
+void addVerbose(CLI::App& command) {
+  command.add_flag("--verbose", is_verbose,
+                   "list what is left out of the robot's file and changes no mechanism, such as cameras");
+}
+
+void addRobotFlags(CLI::App& command, RobotArgument& robot) {
   command.add_flag("--fixed-base", robot.fixed_base, "fix the root link to the ground");
+  addVerbose(command);
 }
 
 void addOption(CLI::App& command, const Option& option, const std::function<void(const OptionValue&)>& set) {

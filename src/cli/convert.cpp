@@ -176,8 +176,8 @@ void addConvert(CLI::App& command, Action& action) {
   command
       .add_option("--range", arguments->ranges,
                   "with --to c, cpp or numpy: JOINT LOW HIGH [rad, m], instead of the limits of the robot's file, or "
-                  "where it has none "
-                  "the range around its posture that stays 0.1 rad away from dead points; again for other joints")
+                  "where it has none the range around its posture that stays 0.1 rad away from dead points; again for "
+                  "other joints")
       ->expected(3)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command
@@ -185,7 +185,7 @@ void addConvert(CLI::App& command, Action& action) {
                   "with --to c, cpp or numpy: at how many of each linkage errors are measured")
       ->check(isWithin(100, 10000000))
       ->capture_default_str();
-  addFixedBase(command, arguments->robot);
+  addRobotFlags(command, arguments->robot);
   CLI::Option* payload = command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg]")
                              ->check(isWithin(0, 1e6))
                              ->capture_default_str();

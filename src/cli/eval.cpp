@@ -134,7 +134,7 @@ void addEval(CLI::App& command, Action& action) {
   command.add_flag("--derivatives", arguments->derivatives, "add the derivatives with respect to q, v and u");
   command.add_flag("--close", arguments->close,
                    "close the loops first: joints that the state gives stay where they are, if they can");
-  addFixedBase(command, arguments->robot);
+  addRobotFlags(command, arguments->robot);
   command.footer(std::string(kStateHelp) +
                  "The output is JSON: accelerations by joint (rates of v); wrenches of closures and contacts\n"
                  "(fx fy fz nx ny nz, N and N m, in frame 1, on body 1; for a contact: from the ground on the foot); "

@@ -67,7 +67,7 @@ void addInfo(CLI::App& command, Action& action) {
   const auto as_json = std::make_shared<bool>(false);
   command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
       ->required();
-  addFixedBase(command, *robot);
+  addRobotFlags(command, *robot);
   command.add_flag("--json", *as_json, "print JSON");
   command.footer(
       "The gap of a closure is given at the neutral configuration and at each reference: the distance of its frames in "

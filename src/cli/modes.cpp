@@ -198,7 +198,7 @@ void addModes(CLI::App& command, Action& action) {
   command.add_flag("--in-the-air", arguments->in_the_air, "the robot does not stand on its contacts");
   command.add_option("-o,--output", arguments->output, "a page on which the robot swings in its modes");
   command.add_flag("--json", arguments->json, "print JSON, with all of the shapes");
-  addFixedBase(command, arguments->robot);
+  addRobotFlags(command, arguments->robot);
   command.footer(
       "Motors that are not locked keep the torques that hold the posture, as far as they can. Springs, dampers, "
       "gravity "

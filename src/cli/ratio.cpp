@@ -92,7 +92,7 @@ void addRatio(CLI::App& command, Action& action) {
       ->check(CLI::Range(2, 500))
       ->capture_default_str();
   command.add_flag("--json", arguments->json, "print JSON");
-  addFixedBase(command, arguments->robot);
+  addRobotFlags(command, arguments->robot);
   command.footer(
       "The ratio R is the speed of a motor over that of a joint [rad/rad], v_motor = R v_joint; motor torques u give "
       "the\n"

@@ -18,6 +18,7 @@
 #include "motion/applied_options.h"
 #include "motion/feasibility.h"
 #include "results/interrupt.h"
+#include "results/other_robot.h"
 #include "results/output_place.h"
 #include "results/setting.h"
 #include "solve/fddp_checks.h"
@@ -196,14 +197,32 @@ SolveObserver makeObserver(const SolveArguments& arguments) {
   return observer;
 }
 
-// Errors of the recorded motion name the directory of the result.
-StartingPoint readStart(const std::string& directory, const Motion& motion) {
+// Errors of the recorded motion name the directory of the result. \param robot  the closed one
+StartingPoint readStart(const std::string& directory, const Model& robot, const Motion& motion) {
+  if (const std::string other = describeOtherRobot(directory, robot); !other.empty())
+    printWarnings({directory + ": the motion to start from was solved for another robot than '" + robot.name() +
+                   "' is now" + other + "; it is no more than a guess"});
   const MotionRecord record = readResultRecord(directory);
   try {
     return makeStart(record, motion);
   } catch (const InputError& error) {
     throw InputError(directory, error.element(), error.problem(), error.remedy());
   }
+}
+
+// How long it will take; with free durations, at most. (A campaign reads it: tasks/campaign_command.cpp.)
+void printPlan(const Motion& motion) {
+  const RobotProblem& problem = *motion.problem;
+  double end = 0;
+  bool is_free = false;
+  for (int k = 0; k < problem.numStages(); ++k) {
+    const StageSpec& stage = problem.spec(k);
+    if (stage.timing.phase >= 0) is_free = true;
+    end += stage.dt * (stage.timing.phase >= 0 ? stage.timing.upper : 1);
+  }
+  std::cout << "planned: " << motion.schedule.phases.size() << " phases, " << problem.numStages() << " stages, "
+            << formatNumber(end, "%.6g") << " s" << (is_free ? " at most" : "") << (motion.cycle ? ", a cycle" : "")
+            << "\n";
 }
 
 int solve(const SolveArguments& arguments, MotionRequest request) {
@@ -227,9 +246,10 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   const Motion motion = makeMotion(model, request, problem);
   SolveOptions options;
   options.solver = arguments.solver;
-  if (!arguments.warm_start.empty()) options.start = readStart(arguments.warm_start, motion);
+  if (!arguments.warm_start.empty()) options.start = readStart(arguments.warm_start, robot.model, motion);
   if (arguments.dry_run) {
     checkFeasibility(motion, options.start ? &*options.start : nullptr, makeObserver(arguments).warn);
+    printPlan(motion);
     return kOk;
   }
   makeOutputDirectory(arguments.directory);
@@ -276,6 +296,7 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
 void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
   sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
       ->required();
+  addVerbose(sub);
   sub.add_option("-o,--output", arguments->directory,
                  "directory for trajectory.csv, trajectory.npz, summary.json, the robot (mechanism.urdf, .yaml) and "
                  "report.html; "

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "formats/robot_files.h"
 #include "math/direction.h"
 #include "math/so3.h"
 #include "model/number_text.h"
@@ -13,6 +14,45 @@ namespace {
 const std::string kLeftOut = "left out";  // the usual problem of what changes no mechanism
 
 constexpr size_t kMostAttributes = 200, kMostDefaults = 100000;  // per element; copied from class to class
+
+bool isOfContactsOrSolver(const std::string& attribute) {
+  static const std::set<std::string> names = {"condim",
+                                              "friction",
+                                              "margin",
+                                              "gap",
+                                              "priority",
+                                              "solmix",
+                                              "solref",
+                                              "solimp",
+                                              "solreflimit",
+                                              "solimplimit",
+                                              "solreffriction",
+                                              "solimpfriction",
+                                              "fluidshape",
+                                              "fluidcoef",
+                                              "rgba",
+                                              "material",
+                                              "timestep",
+                                              "integrator",
+                                              "cone",
+                                              "impratio",
+                                              "jacobian",
+                                              "solver",
+                                              "iterations",
+                                              "tolerance",
+                                              "ls_iterations",
+                                              "ls_tolerance",
+                                              "noslip_iterations",
+                                              "noslip_tolerance",
+                                              "ccd_iterations",
+                                              "ccd_tolerance",
+                                              "mpr_iterations",
+                                              "mpr_tolerance",
+                                              "sdf_iterations",
+                                              "sdf_initpoints",
+                                              "apirate"};
+  return names.count(attribute) > 0;
+}
 
 // Actuators of all kinds share their defaults.
 std::string getDefaultTag(const std::string& tag) {
@@ -44,25 +84,35 @@ void MjcfNotes::addAttribute(const std::string& path, const std::string& element
   lines.insert(line);
 }
 
-std::vector<std::string> MjcfNotes::format() const {
-  std::vector<std::string> out;
-  std::map<std::string, std::string> harmless;  // of each file: one line, so that it does not bury the others
+void MjcfNotes::addHarmless(const std::string& path, const std::string& element, int line) {
+  add(path, element, line, kLeftOut);
+  harmless_.insert({path, element, kLeftOut});
+}
+
+void MjcfNotes::addTo(UrdfFile& tree) const {
+  std::map<std::string, std::string> left_out;
   for (const Kind& kind : order_) {
     const std::string elements = kind.element + formatLines(lines_.at(kind));
-    if (kind.problem != kLeftOut) {
-      out.push_back(kind.path + ": " + elements + ": " + kind.problem);
-      continue;
+    if (harmless_.count(kind)) {
+      tree.harmless.push_back(kind.path + ": " + elements);
+    } else if (kind.problem != kLeftOut) {
+      tree.warnings.push_back(kind.path + ": " + elements + ": " + kind.problem);
+    } else {
+      std::string& list = left_out[kind.path];
+      list += (list.empty() ? "" : ", ") + elements;
     }
-    std::string& list = harmless[kind.path];
-    list += (list.empty() ? "" : ", ") + elements;
   }
   for (const auto& [place, found] : attributes_) {
-    std::string names;
-    for (const std::string& name : found.first) names += (names.empty() ? "'" : ", '") + name + "'";
-    out.push_back(place.first + ": " + place.second + formatLines(found.second) + ": left out: " + names);
+    std::string names, harmless;
+    for (const std::string& name : found.first) {
+      std::string& list = isOfContactsOrSolver(name) ? harmless : names;
+      list += (list.empty() ? "'" : ", '") + name + "'";
+    }
+    const std::string element = place.first + ": " + place.second + formatLines(found.second) + ": ";
+    if (!names.empty()) tree.warnings.push_back(element + "left out: " + names);
+    if (!harmless.empty()) tree.harmless.push_back(element + harmless);
   }
-  for (const auto& [path, elements] : harmless) out.push_back(path + ": " + elements + ": " + kLeftOut);
-  return out;
+  for (const auto& [path, elements] : left_out) tree.warnings.push_back(path + ": " + elements + ": " + kLeftOut);
 }
 
 void readMjcfDefaults(const XMLElement& element, const std::string& parent, MjcfSettings& settings) {
@@ -116,7 +166,10 @@ void MjcfElement::fail(const std::string& problem, const std::string& remedy) co
 }
 
 void MjcfElement::note(const std::string& problem) const {
-  settings_.notes.add(path_, "<" + tag_ + ">", line_, problem);
+  if (problem == kLeftOut)
+    settings_.notes.addHarmless(path_, "<" + tag_ + ">", line_);
+  else
+    settings_.notes.add(path_, "<" + tag_ + ">", line_, problem);
 }
 
 void MjcfElement::leaveOut(const std::string& problem) {

@@ -13,6 +13,8 @@
 
 namespace bielle {
 
+struct UrdfFile;
+
 struct MjcfAttribute {
   std::string value, path;  ///< and the file that says it
   int line = 0;
@@ -24,9 +26,11 @@ class MjcfNotes {
  public:
   void add(const std::string& path, const std::string& element, int line, const std::string& problem);
   void addAttribute(const std::string& path, const std::string& element, int line, const std::string& attribute);
-  /// "path: element (lines ...): problem", in the order in which they were first added; elements that are just "left out" are
-  /// one line at the end.
-  std::vector<std::string> format() const;
+  /// Of what changes no mechanism, such as cameras and lights.
+  void addHarmless(const std::string& path, const std::string& element, int line);
+  /// "path: element (lines ...): problem", in the order in which they were first added, as warnings; what is just "left out" is one
+  /// line of a file at the end. What changes no mechanism, to which most attributes about contacts and solvers belong, goes apart.
+  void addTo(UrdfFile& tree) const;
 
  private:
   struct Kind {
@@ -36,6 +40,7 @@ class MjcfNotes {
     }
   };
   std::vector<Kind> order_;
+  std::set<Kind> harmless_;
   std::map<Kind, std::set<int>> lines_;
   // Attributes and their lines, by path and element.
   std::map<std::pair<std::string, std::string>, std::pair<std::set<std::string>, std::set<int>>> attributes_;

@@ -415,9 +415,14 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
   addNamed(urdf, yaml, builder);
   builder.setSource(urdf.path);
   addMimics(urdf, builder);
-  if (warnings)
+  if (warnings) {
     for (const std::vector<std::string>* own : {&urdf.warnings, &yaml.warnings})
       warnings->insert(warnings->end(), own->begin(), own->end());
+    if (const size_t count = urdf.harmless.size(); count > 0)  // one line, so that it does not bury the others
+      warnings->push_back(urdf.path + ": what changes no mechanism is left out (" + std::to_string(count) +
+                          (count > 1 ? " kinds" : " kind") + " of elements; `bielle info " + urdf.path +
+                          " --verbose` lists them)");
+  }
   RoundedLinkages linkages = findRoundedLinkages(builder.build(warnings), findTolerance(urdf, yaml));
   if (warnings) warnOfRounding(linkages, urdf.path, *warnings);
   return std::move(linkages.model);
@@ -438,6 +443,8 @@ RobotSources& getRobotSources() {
 std::string LoadedRobot::path() const {
   return (std::filesystem::path(directory) / std::filesystem::path(file).filename()).lexically_normal().string();
 }
+
+std::vector<std::string> listHarmless(const std::string& file) { return readRobotFiles(file).urdf.harmless; }
 
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {
   // So that all messages name a file alike.

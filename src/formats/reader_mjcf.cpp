@@ -15,6 +15,13 @@ namespace {
 constexpr size_t kMostJoints = 3000;
 constexpr double kCoincident = 1e-10;  // of frames; the writer's loops are closed to 1e-12
 
+// Elements that change no mechanism, and sections of such.
+bool isHarmless(const XMLElement& e) {
+  static const std::set<std::string> tags = {"camera", "light",  "texture", "material", "hfield",    "skin",
+                                             "size",   "visual", "sensor",  "contact",  "statistic", "deformable"};
+  return tags.count(getTag(e)) > 0;
+}
+
 }  // namespace
 
 MjcfReader::MjcfReader(const std::string& path) : settings_(path) {
@@ -47,7 +54,7 @@ RobotFiles MjcfReader::read() {
   for (const Slot& slot : slots_)
     softness_.start[slot.joint] = {slot.q_ref.data(), slot.q_ref.data() + slot.q_ref.size()};
   for (const XMLElement* e : getChildren(settings_.files.root())) noteSection(*e);
-  tree_.warnings = settings_.notes.format();
+  settings_.notes.addTo(tree_);
   GeometryDecimals decimals;
   for (const XMLElement* root : settings_.files.listRoots()) decimals.add(*root, settings_.angle != 1);
   tree_.rounding = decimals.calcTolerance();
@@ -55,7 +62,11 @@ RobotFiles MjcfReader::read() {
 }
 
 void MjcfReader::noteElement(const XMLElement& e, const std::string& problem) {
-  settings_.notes.add(settings_.files.getPath(e), "<" + getTag(e) + ">", e.GetLineNum(), problem);
+  const std::string &path = settings_.files.getPath(e), element = "<" + getTag(e) + ">";
+  if (isHarmless(e))
+    settings_.notes.addHarmless(path, element, e.GetLineNum());
+  else
+    settings_.notes.add(path, element, e.GetLineNum(), problem);
 }
 
 void MjcfReader::refuse(const XMLElement& e, const std::string& problem, const std::string& remedy) const {
@@ -125,7 +136,11 @@ void MjcfReader::noteSection(const XMLElement& e) {
   for (const XMLElement* c : getChildren(e)) {
     if (tag == "deformable" && getTag(*c) != "skin")
       refuse(*c, "bodies that bend are not supported", "remove it, or replace it by rigid bodies");
-    settings_.notes.add(settings_.files.getPath(*c), "<" + tag + "> <" + getTag(*c) + ">", c->GetLineNum(), "left out");
+    const std::string &path = settings_.files.getPath(*c), element = "<" + tag + "> <" + getTag(*c) + ">";
+    if (isHarmless(e))
+      settings_.notes.addHarmless(path, element, c->GetLineNum());
+    else
+      settings_.notes.add(path, element, c->GetLineNum(), "left out");
   }
 }
 

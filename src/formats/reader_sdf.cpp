@@ -83,8 +83,7 @@ RobotFiles SdfReader::read() {
     noteElements(*element_);
   }
   addStart();
-  const std::vector<std::string> notes = notes_.format();
-  tree_.warnings.insert(tree_.warnings.end(), notes.begin(), notes.end());
+  notes_.addTo(tree_);
   GeometryDecimals decimals;
   decimals.add(*document_.RootElement());
   tree_.rounding = decimals.calcTolerance();
@@ -338,11 +337,16 @@ void SdfReader::noteElements(const XMLElement& element) {
       {"axis2", {"xyz", "limit", "dynamics", "use_parent_model_frame"}},
       {"limit", {"lower", "upper", "effort", "velocity"}},
       {"dynamics", {"damping", "friction", "spring_reference", "spring_stiffness"}}};
+  static const std::set<std::string> harmless = {
+      "sensor",           "light",     "plugin",       "battery",     "audio_source",       "audio_sink",
+      "particle_emitter", "projector", "self_collide", "enable_wind", "allow_auto_disable", "physics"};
   const std::string& tag = getTag(element);
   for (const XMLElement* e : getChildren(element)) {
     const std::string& own = getTag(*e);
     if (own.rfind("drake:", 0) == 0 && tag == "model") continue;  // reader_sdf_drake.cpp
-    if (!read.at(tag).count(own))
+    if (harmless.count(own))
+      notes_.addHarmless(path_, "<" + tag + "> <" + own + ">", e->GetLineNum());
+    else if (!read.at(tag).count(own))
       notes_.add(path_, "<" + tag + "> <" + own + ">", e->GetLineNum(), "left out");
     else if (read.count(own))
       noteElements(*e);

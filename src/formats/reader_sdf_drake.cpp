@@ -15,6 +15,8 @@ void SdfReader::readDrake(const XMLElement& model) {
       readBall(*e);
     } else if (tag == "drake:joint") {
       fail(describe(*e), "joints of Drake's own are not supported", "replace it by a joint of SDF");
+    } else if (tag == "drake:collision_filter_group") {
+      notes_.addHarmless(path_, "<" + tag + ">", e->GetLineNum());
     } else {
       notes_.add(path_, "<" + tag + ">", e->GetLineNum(), "left out");
     }

@@ -175,8 +175,7 @@ RobotFiles UsdReader::read() {
   for (const UsdJoint& joint : joints_) readMimic(joint);
   addStart();
   for (const auto& prim : layer_->root.children) noteUnused(*prim);
-  const std::vector<std::string> notes = notes_.format();
-  tree_.warnings.insert(tree_.warnings.end(), notes.begin(), notes.end());
+  notes_.addTo(tree_);
   tree_.rounding = {angles_.calcHalfUnit(), lengths_.calcHalfUnit()};
   return {std::move(tree_), std::move(yaml_)};
 }

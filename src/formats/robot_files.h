@@ -38,9 +38,11 @@ struct UrdfFile {
   std::map<std::string, UrdfLink> links;
   std::vector<UrdfJoint> joints;
   std::vector<std::string> warnings;
-  RoundingTolerance rounding;            ///< of the numbers of its placements
-  bool has_own_base = false;             ///< it says itself what is free: the option of a free base has no effect
-  bool is_urdf = false;                  ///< its floating joints have origins, from which other formats do not count
+  std::vector<std::string>
+      harmless;                ///< what is left out and changes no mechanism: "file: element (lines)", maybe attributes
+  RoundingTolerance rounding;  ///< of the numbers of its placements
+  bool has_own_base = false;   ///< it says itself what is free: the option of a free base has no effect
+  bool is_urdf = false;        ///< its floating joints have origins, from which other formats do not count
   std::vector<std::string> dependent{};  ///< joints that it says depend on others
 };
 
@@ -175,7 +177,10 @@ const std::vector<std::string>& listExchangeExtensions();
 /// The files that formatRobot() wrote the text of. \param path  named in errors, and the place of meshes
 RobotFiles parseRobotText(const RobotText& text, const std::string& path);
 
-/// The model of both files.
+/// UrdfFile::harmless of the file of a robot. \throws InputError as loadRobot() does
+std::vector<std::string> listHarmless(const std::string& file);
+
+/// The model of both files. Of what is harmless, the warnings give the number.
 /// \param base  overrides the file's key   \param warnings  receives what is valid but suspicious; null for none
 Model combineFiles(RobotFiles files, std::optional<BaseKind> base, std::vector<std::string>* warnings);
 

@@ -12,6 +12,7 @@
 #include "model/hash.h"
 #include "model/number_text.h"
 #include "results/json_text.h"
+#include "results/other_robot.h"
 #include "results/result_files.h"
 
 namespace fs = std::filesystem;
@@ -135,6 +136,25 @@ LoadedRobot loadByName(const RobotEntry& entry) {
   return robot;
 }
 
+// The robot in a result. \throws InputError if it is not the one that the motion was solved for
+RobotText readOwn(const std::string& directory, const RobotEntry& entry) {
+  const std::string mechanism = (fs::path(directory) / kMechanismUrdf).string(),
+                    yaml = (fs::path(directory) / kMechanismYaml).string();
+  RobotText own = {readTextFile(mechanism, "restore it and " + yaml + ", or solve the motion again"),
+                   readTextFile(yaml, "restore it, or solve the motion again")};
+  if (calcFingerprint(own) != entry.fingerprint)
+    throw InputError(mechanism, "file", "it is not, or " + yaml + " is not, the robot that the motion was solved for",
+                     "restore both, or solve the motion again");
+  return own;
+}
+
+// Of two robots as they are read; empty if they are the same.
+std::string describeChange(const RobotText& now, const RobotText& then) {
+  if (calcFingerprint(now) == calcFingerprint(then)) return "";
+  const bool same_tree = now.urdf == then.urdf;
+  return describeDifference(same_tree ? now.yaml : now.urdf, same_tree ? then.yaml : then.urdf);
+}
+
 }  // namespace
 
 std::string calcFingerprint(const RobotText& text) {
@@ -156,26 +176,25 @@ LoadedRobot loadRobotOf(const std::string& directory) {
   for (const BaseKind base : {BaseKind::Free, BaseKind::Fixed})  // it may have been loaded with another one
     if (const auto based = loadCurrent(entry.path, base))
       if (calcFingerprint(formatIfPossible(based->model)) == entry.fingerprint) return *based;
-  const std::string mechanism = (fs::path(directory) / kMechanismUrdf).string(),
-                    yaml = (fs::path(directory) / kMechanismYaml).string();
-  const RobotText own = {readTextFile(mechanism, "restore it and " + yaml + ", or solve the motion again"),
-                         readTextFile(yaml, "restore it, or solve the motion again")};
-  if (calcFingerprint(own) != entry.fingerprint)
-    throw InputError(mechanism, "file", "it is not, or " + yaml + " is not, the robot that the motion was solved for",
-                     "restore both, or solve the motion again");
-  LoadedRobot robot = loadOwn(mechanism, own, entry.path);
+  const std::string mechanism = (fs::path(directory) / kMechanismUrdf).string();
+  LoadedRobot robot = loadOwn(mechanism, readOwn(directory, entry), entry.path);
   if (!isFile(entry.path)) return robot;
   const RobotText then = formatIfPossible(robot.model), read = readAndFormat(now, robot.file);
   if (current && calcFingerprint(read) == calcFingerprint(then)) return *current;
-  const bool same_tree = read.urdf == then.urdf;
-  const std::string difference =
-      !current ? ", and cannot be read"
-               : describeDifference(same_tree ? read.yaml : read.urdf, same_tree ? then.yaml : then.urdf);
+  const std::string difference = !current ? ", and cannot be read" : describeChange(read, then);
   const std::string again = entry.command.empty() ? "" : ": `" + describeCommand(entry.command) + "`";
   robot.warnings.push_back(entry.path + ": the robot has changed since the motion in " + directory +
                            " was solved for it" + difference + "; what follows is of the robot of that time, " +
                            mechanism + "; for the robot of now solve the motion again" + again);
   return robot;
+}
+
+std::string describeOtherRobot(const std::string& directory, const Model& now) {
+  const RobotEntry entry = readEntry(directory);
+  const RobotText text = formatIfPossible(now);
+  if (entry.fingerprint.empty() || calcFingerprint(text) == entry.fingerprint) return "";
+  const LoadedRobot robot = loadOwn((fs::path(directory) / kMechanismUrdf).string(), readOwn(directory, entry), "");
+  return describeChange(readAndFormat(text, robot.file), formatIfPossible(robot.model));
 }
 
 }  // namespace bielle

@@ -1,6 +1,10 @@
 #include "tasks/campaign_command.h"
 
+#include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <optional>
+#include <regex>
 #include <set>
 
 #include "bielle/model/error.h"
@@ -20,13 +24,16 @@ const CampaignAxis* findAxis(const CampaignSpec& spec, Kind kind) {
   return nullptr;
 }
 
+void requirePhase(const CampaignAxis& axis, double index, int count, const std::string& plan) {
+  if (index < 0 || index >= count)
+    axis.entry.fail(plan + " has no phase " + formatExact(index), "its phases are 0 to " + std::to_string(count - 1));
+}
+
 // The time at which the share behind the point of a phase has passed, s.
 double calcPhaseTime(const CampaignAxis& axis, const std::string& value, const std::string& directory) {
   const double phase = parseNumber(value).value(), index = std::floor(phase);
   const MotionSummary summary = readSummary(directory);
-  if (index < 0 || index >= static_cast<double>(summary.phases.size()))
-    axis.entry.fail("the plan in " + directory + " has no phase " + formatExact(index),
-                    "its phases are 0 to " + std::to_string(summary.phases.size() - 1));
+  requirePhase(axis, index, static_cast<int>(summary.phases.size()), "the plan in " + directory);
   const MotionSummary::Phase& found = summary.phases[static_cast<size_t>(index)];
   const VectorXd time = readResultRecord(directory).time;
   const double start = time[found.start_node], end = time[found.start_node + found.nodes];
@@ -94,10 +101,96 @@ std::vector<std::string> CampaignCommands::make(const CampaignCell& cell, const 
   return arguments;
 }
 
+namespace {
+
+// When a motion ends, s, unless it goes on as long as is asked, and the number of its phases.
+struct MotionLength {
+  std::optional<double> end;
+  int phases = 0;
+};
+
+// Of a motion that is not solved yet, from the output of its dry run.
+MotionLength readPlanned(const std::string& log) {
+  std::ifstream file(log);
+  for (std::string line; std::getline(file, line);) {
+    std::smatch found;
+    if (!std::regex_match(line, found,
+                          std::regex("planned: (\\d+) phases, \\d+ stages, (\\S+) s( at most)?(, a cycle)?")))
+      continue;
+    return {found[4].matched ? std::nullopt : parseNumber(found[2].str()), std::stoi(found[1].str())};
+  }
+  return {};
+}
+
+MotionLength readSolved(const std::string& directory) {
+  const MotionRecord record = readResultRecord(directory);
+  MotionLength length{{}, static_cast<int>(readSummary(directory).phases.size())};
+  if (record.cycle.size() == 0 && record.time.size() > 0) length.end = record.time[record.time.size() - 1];
+  return length;
+}
+
+// As calcPhaseTime() will find.
+void checkPushPhases(const CampaignSpec& spec, const std::vector<MotionLength>& lengths) {
+  const CampaignAxis* phases = findAxis(spec, Kind::PushPhase);
+  for (size_t m = 0; phases && m < lengths.size(); ++m)
+    for (const std::string& value : phases->values)
+      if (const double index = std::floor(parseNumber(value).value_or(0)); lengths[m].phases > 0)
+        requirePhase(*phases, index, lengths[m].phases, "motion " + spec.motions[m].name);
+}
+
+// Pushes that are not over when the simulation ends, which `bielle simulate` refuses, before any motion is solved for them.
+void checkPushTimes(const CampaignSpec& spec, const std::vector<MotionLength>& lengths,
+                    std::set<std::string>& warnings) {
+  constexpr double kHold = 1, kPush = 0.1, kSlack = 1e-6;  // s, unless they are given (worlds/execution.h)
+  const CampaignAxis* times = findAxis(spec, Kind::PushTime);
+  if (!times || std::any_of(lengths.begin(), lengths.end(), [](const auto& length) { return !length.end; })) return;
+  const auto getMost = [&](const CampaignAxis* axis, double otherwise, bool least) {
+    double found = otherwise;
+    for (size_t i = 0; axis && i < axis->values.size(); ++i) {
+      const double value = parseNumber(axis->values[i]).value_or(otherwise);
+      found = i == 0 ? value : least ? std::min(found, value) : std::max(found, value);
+    }
+    return found;
+  };
+  const auto findOption = [&](const char* name) {
+    const auto it = std::find_if(spec.axes.begin(), spec.axes.end(), [name](const CampaignAxis& axis) {
+      return axis.kind == Kind::Option && axis.name == name;
+    });
+    return it == spec.axes.end() ? nullptr : &*it;
+  };
+  const double shortest = getMost(findAxis(spec, Kind::PushDuration), kPush, true);
+  const CampaignAxis *duration = findOption("duration"), *hold = findOption("hold");
+  for (const std::string& value : times->values) {
+    const double time = parseNumber(value).value_or(0), over = time + shortest;
+    double longest = 0;
+    for (size_t m = 0; m < lengths.size(); ++m) {
+      const double end = duration ? getMost(duration, 0, false) : *lengths[m].end + getMost(hold, kHold, false);
+      longest = std::max(longest, end);
+      if (over > end + kSlack)
+        warnings.insert("warning: motion " + spec.motions[m].name + ": a push at " + value + " s is over at " +
+                        formatExact(over) + " s, but its simulation ends at " + formatExact(end) +
+                        " s; these runs are refused");
+    }
+    if (over > longest + kSlack)
+      times->entry.fail("a push at " + value + " s is over at " + formatExact(over) +
+                            " s, but the simulations end at " + formatExact(longest) + " s",
+                        "give an earlier time, or `options: {" +
+                            (duration ? "duration: " + formatExact(std::ceil(over + kHold))
+                                      : "hold: " + formatExact(std::ceil(over - longest + 2 * kHold))) +
+                            "}`");
+  }
+}
+
+}  // namespace
+
 bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const std::string& simulate,
                    const std::string& log, std::set<std::string>& warnings) {
+  std::vector<MotionLength> lengths;
   for (const CampaignMotion& motion : spec.motions) {
-    if (motion.solve.empty()) continue;
+    if (motion.solve.empty()) {
+      lengths.push_back(readSolved(motion.directory));
+      continue;
+    }
     std::vector<std::string> command = {bielle};
     command.insert(command.end(), motion.solve.begin(), motion.solve.end());
     command.insert(command.end(), {"-o", "none"});
@@ -105,6 +198,7 @@ bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const st
     const std::optional<std::string> complaint = findComplaint(command, log, told);
     if (!complaint) return false;
     if (!complaint->empty()) refuse("solve " + motion.solve[1], *complaint, motion.options, *motion.entry);
+    lengths.push_back(readPlanned(log));
   }
   const CampaignCommands commands(spec, {});
   const std::string impulse = spec.search ? formatImpulse(*spec.search, 1) : "";
@@ -126,6 +220,8 @@ bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const st
       cell[i] = value;
       if (!check(cell, spec.axes[i])) return false;
     }
+  checkPushPhases(spec, lengths);
+  checkPushTimes(spec, lengths, warnings);
   return true;
 }
 

@@ -64,6 +64,7 @@ int liftWalk(const LiftArguments& arguments, const CommandLine& command) {
   for (const auto& [name, value] : summary.options)
     if (name == "speed") walk.speed = std::get<double>(value);
   const LoadedRobot robot = loadRobotOf(arguments.serial_directory);
+  for (const std::string& warning : robot.warnings) std::cerr << "bielle-paper: warning: " << warning << "\n";
   const SerialModel serial = makeSerial(robot.model);
   const Motion motion = makeWalk(serial.model, walk, makeStandingPosture(serial.model));
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, readResultRecord(arguments.serial_directory));

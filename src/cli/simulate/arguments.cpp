@@ -376,6 +376,7 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
                  "plan at the same times) and report.html")
       ->required();
   addFlags(a, app);
+  app.add_option("--at", a.payload_at, "short for --payload-at")->excludes(app.get_option("--payload-at"));
   app.get_option("--world")->check(isListOfWorlds());
   for (const char* name : {"--no-report", "--summary-only"}) app.get_option(name)->excludes(app.get_option("--live"));
   requireFiniteNumbers(app);
