@@ -66,6 +66,19 @@ PredictiveOptions makeShortWindow(int threads) {
   return options;
 }
 
+// Waits for the solve that begins at an instant of control, if any: how fast the machine is under what load is not known.
+class Patient : public Controller {
+ public:
+  explicit Patient(PredictiveController& inner) : inner_(inner) {}
+  void update(const Measurement& measurement, VectorRef u) override {
+    inner_.update(measurement, u);
+    inner_.waitForSolve();
+  }
+
+ private:
+  PredictiveController& inner_;
+};
+
 Execution carryOut(const Solved& solved, Controller& controller, const ExecutionOptions& options,
                    const PerceptionOptions& sensors = {}, const ContactSchedule& planned = {}) {
   const auto world = makeWorld("bielle", getBipetto());
@@ -120,9 +133,9 @@ TEST_CASE("predictive control: the motion that it is given stays as it is") {
   PredictiveController controller(motion, getShortSquat().solution.trajectory, options);
   ExecutionOptions execution;
   execution.duration = 20 * kStage;
-  carryOut(getShortSquat(), controller, execution);
-  controller.waitForSolve();
-  CHECK(controller.counts().solves > 5);
+  Patient patient(controller);
+  carryOut(getShortSquat(), patient, execution);
+  CHECK(controller.counts().solves >= 19);  // in a thread of its own the last one is not received
   for (int k = 0; k <= motion.problem->numStages(); ++k) {
     CAPTURE(k);
     const StageSpec& after = motion.problem->spec(k);
