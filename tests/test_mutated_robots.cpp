@@ -175,7 +175,7 @@ std::string mutate(std::string text, Random& rng) {
 }  // namespace
 
 TEST_CASE("Mutated robot files are models or clear errors") {
-  constexpr int kTrials = 6000;
+  constexpr int kTrials = 3000;
   const std::vector<RobotFiles> robots = collectRobots();
   REQUIRE(robots.size() >= 4);
   const RobotDirectory directory;
@@ -234,11 +234,11 @@ void tryMutatedFiles(int trials, const std::string& file, const Format& format) 
 }  // namespace
 
 TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
-  tryMutatedFiles(2000, "robot.xml", [](const Model& model, const VectorXd& q) { return formatMjcf(model, q).xml; });
+  tryMutatedFiles(1000, "robot.xml", [](const Model& model, const VectorXd& q) { return formatMjcf(model, q).xml; });
 }
 
 TEST_CASE("Mutated files of USD are models or clear errors") {
-  tryMutatedFiles(2000, "robot.usda", [](const Model& model, const VectorXd& q) { return formatUsd(model, q).usda; });
+  tryMutatedFiles(1400, "robot.usda", [](const Model& model, const VectorXd& q) { return formatUsd(model, q).usda; });
 }
 
 TEST_CASE("Mutated robots of parts are models or clear errors") {

@@ -45,7 +45,7 @@ TEST_CASE("objectives: a squat of least energy, with and without what flows back
   const Model model = loadRobot("bipetto").model;
   SquatOptions squat;
   squat.depth = 0.8;
-  squat.time_step = 0.02;
+  squat.time_step = 0.03;
   const SolvedSquat effort = finish(makeSquat(model, squat), nullptr);
   const SolvedSquat least = solveFromEffort(effort, model, squat, Objective::Energy);
   CAPTURE(effort.result.energy.total, least.result.energy.total);
@@ -84,7 +84,7 @@ TEST_CASE("objectives: a squat of least peak torque, in both formulations") {
   const Model model = loadRobot("cleobot").model;
   SquatOptions squat;
   squat.depth = 0.8;
-  squat.time_step = 0.02;
+  squat.time_step = 0.03;
   const SolvedSquat effort = finish(makeSquat(model, squat), nullptr);
   const SolvedSquat least = solveFromEffort(effort, model, squat, Objective::PeakTorque);
   CHECK(getPeak(least) < 0.95 * getPeak(effort));

@@ -137,12 +137,15 @@ void checkTimedStage(const RobotProblem& problem, int k, const VectorXd& x, cons
 }  // namespace
 
 TEST_CASE("free timings: derivatives by the length of a step, every joint kind times every closure kind") {
-  const Discretization how = GENERATE(from_range(kDiscretizations));
+  const int which = GENERATE(range(0, 4));
+  const Discretization how = kDiscretizations[which];
   std::mt19937 rng(31);
   int count = 0;
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds) {
       const MechanismBase base = ++count % 2 == 0 ? MechanismBase::Fixed : MechanismBase::FreeFlyer;
+      // Every other discretization for each pair, on either base.
+      if ((count / 2 + which) % 2 == 0) continue;
       CAPTURE(how, getName(kind), getName(closure), base == MechanismBase::Fixed);
       const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base, 3, 2);
       const Model& model = mechanism.model;
