@@ -165,7 +165,7 @@ def test_signals():
     rng = random.Random(1)
     outcomes = {}
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-        for trial in range(16):
+        for trial in range(8):
             shutil.rmtree("killed", ignore_errors=True)
             if trial % 2:
                 shutil.copytree("older", "killed")
@@ -296,7 +296,7 @@ def test_live_on_a_full_disk():
         with open("tight/out/report.html") as file:
             page = file.read()
         assert '"outcome":"failed"' in page and '"outcome":"running"' not in page
-        time.sleep(5)  # further pages fail in silence
+        time.sleep(2.5)  # further pages fail in silence
         child.send_signal(signal.SIGINT)
         out, error = child.communicate(timeout=60)
         assert child.returncode == 2 and "warning" not in error, (child.returncode, error)

@@ -107,8 +107,8 @@ TEST_CASE("Cleobot: bielle solve squat, walk and jump converge, are checked and 
           "[long]") {
   const double standing = 0.538, rise = 9.81 * 0.3 * 0.3 / 8;
   checkMotions("cleobot",
-               {{{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
-                {{"walk", "--steps", "4"}, 0.98 * standing, 1.02 * standing},
+               {{{"squat", "--depth", "0.6", "--set", "time_step=0.03"}, 0.6 * standing, standing},
+                {{"walk", "--steps", "3", "--set", "time_step=0.02"}, 0.98 * standing, 1.02 * standing},
                 {{"jump"}, 0.88 * standing, standing + 0.02 + rise}},
                45, 0.25, {0.015, 0.2});
 }
@@ -117,8 +117,8 @@ TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, are checked an
           "[long]") {
   const double standing = 0.393, rise = 9.81 * 0.3 * 0.3 / 8;
   checkMotions("rsu_biped",
-               {{{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
-                {{"walk", "--steps", "4"}, 0.98 * standing, 1.02 * standing},
+               {{{"squat", "--depth", "0.6", "--set", "time_step=0.03"}, 0.6 * standing, standing},
+                {{"walk", "--steps", "3", "--set", "time_step=0.02"}, 0.98 * standing, 1.02 * standing},
                 {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
                70, 0.25, {0.015, 0.2});
 }
@@ -126,8 +126,8 @@ TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, are checked an
 TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checked", "[long]") {
   const double standing = 0.403, rise = 9.81 * 0.3 * 0.3 / 8;
   checkMotions("belt_biped",
-               {{{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
-                {{"walk", "--steps", "4"}, 0.98 * standing, 1.055 * standing},
+               {{{"squat", "--depth", "0.6", "--set", "time_step=0.03"}, 0.6 * standing, standing},
+                {{"walk", "--steps", "3", "--set", "time_step=0.02"}, 0.98 * standing, 1.055 * standing},
                 {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
                70, 0.25, {0.015, 0.2});
 }
@@ -141,7 +141,7 @@ TEST_CASE(
   const Model model = loadRobot(robot).model;
   for (const std::string motion : {"squat", "walk"}) {
     CAPTURE(motion);
-    const MotionRecord record = solveByCommand(robot, {motion}, directory);
+    const MotionRecord record = solveByCommand(robot, {motion, "--set", "time_step=0.02"}, directory);
     CHECK(record.gap.maxCoeff() < 1e-10);
     CHECK(record.com.col(2).minCoeff() == Approx(motion == "squat" ? 0.7 * 0.402 : 0.400).margin(0.005));
     CHECK(record.u.cwiseAbs().maxCoeff() < 50);
@@ -155,7 +155,8 @@ TEST_CASE("belt knee and differential ankle: bielle solve squat and walk converg
   for (const char* name : {"belt_knee", "differential_ankle"}) {
     CAPTURE(name);
     checkMotions(name,
-                 {{{"squat"}, 0.7 * standing, standing}, {{"walk", "--steps", "4"}, 0.98 * standing, 1.055 * standing}},
+                 {{{"squat", "--set", "time_step=0.03"}, 0.7 * standing, standing},
+                  {{"walk", "--steps", "3", "--set", "time_step=0.02"}, 0.98 * standing, 1.055 * standing}},
                  70, 0.25, {0.015, 0.2});
   }
 }

@@ -26,7 +26,7 @@ PARTS = {"hip": ["serial", "three_rrs"], "knee": ["serial", "belt", "four_bar", 
          "ankle": ["rsu", "differential"]}
 MOTIONS = [("walk", {"speed": 0.5}), ("walk", {"speed": 1.0}), ("stairs", {"height": 0.08, "stairs": 2}), ("jump", {"flight": 0.25})]
 TITLES = ["walk, 0.5 m/s", "walk, 1.0 m/s", "stairs", "jump"]
-SPEEDS = [1.2, 1.4, 1.6]
+SPEEDS, FASTER = [1.2, 1.4, 1.6], {}  # and further settings of these walks
 SEARCHED = ["walk", "walk_2", "stairs", "jump"]  # their directories
 
 
@@ -101,7 +101,7 @@ def run(arguments, directory, specification):
             robots[name]["solved"].append({"passed": row["outcome"] == "passed", "J": float(row["electrical_energy_J"] or "nan")})
     walking = list(robots)
     for speed in SPEEDS:  # whoever fails does not try a higher one
-        settings = {"speed": speed}
+        settings = {"speed": speed, **FASTER}
         rows = compare(bielle, directory, f"walks-{speed:g}", {name: robots[name]["robot"] for name in walking},
                        [("walk", settings)], arguments.jobs) if walking else {}
         walking = [name for name in walking if rows[name, name_case("walk", settings)]["outcome"] == "passed"]
@@ -196,6 +196,7 @@ def main():
         PARTS.update(hip=["serial"], ankle=["rsu"])
         MOTIONS[:] = [("walk", {"speed": 0.5, "steps": 2})]
         TITLES[1:], SEARCHED[1:], SPEEDS[1:], arguments.solve = [], [], [], 1
+        FASTER.update(steps=2, time_step=0.02)
         with tempfile.TemporaryDirectory() as directory:
             page, _ = make_page(run(arguments, pathlib.Path(directory), small))
         page.write(True)
