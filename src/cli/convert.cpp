@@ -90,7 +90,8 @@ int convert(const ConvertArguments& arguments) {
     throw InputError("", "--joints", "it says how a file of MuJoCo is written", "add --to mjcf, or leave it out");
   LoadedRobot robot = arguments.robot.load();
   requireApart(arguments.output, listFiles(robot));
-  Payload payload{arguments.payload, {}};
+  Payload payload;
+  payload.mass = arguments.payload;
   if (!arguments.payload_at.empty()) payload.at = Eigen::Map<const Vector3d>(arguments.payload_at.data());
   robot.model = addPayload(robot.model, payload);
   if (arguments.format == "bielle") {
