@@ -20,7 +20,7 @@ constexpr double kMargin = 0.95;       // of what is promised
 // A number with two digits, not above x.
 double roundDown(double x) {
   const double unit = std::pow(10, std::floor(std::log10(x)) - 1);
-  return std::stod(formatNumber(std::floor(x / unit + 1e-9) * unit, "%.2g"));
+  return *parseNumber(formatNumber(std::floor(x / unit + 1e-9) * unit, "%.2g"));
 }
 
 double read(const Json& row, const char* key) { return row.at(key).is_null() ? NAN : row.at(key).get<double>(); }
