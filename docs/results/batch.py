@@ -59,13 +59,18 @@ def main():
     arguments = parser.parse_args()
     command = shutil.which(arguments.bielle) or arguments.bielle
     program = os.path.join(os.path.dirname(os.path.realpath(command)), "bielle-batch-speed")
-    options = ["--rounds", 1, "--worlds", 16, "--seconds", 0.02] if arguments.quick else ["--rounds", arguments.rounds]
+    options = ["--rounds", 1, "--worlds", 16, "--seconds", 0.02]
+    if not arguments.quick:
+        options = ["--rounds", arguments.rounds, "--worlds", 32, "--seconds", 0.2]
     robot = common.SOURCE / "robots/bipetto"
     stands, falls = (measure(program, "--robot", robot, *options, *more) for more in ([], ["--falls"]))
     page = common.Page(__file__, "Many worlds at once", common.describe_run(arguments.commit))
+    load = os.getloadavg()[0]
     page.add(f"""Steps per second of processor time on one thread, all in turn, medians; `validation/batch` measures them. The
-library is compiled for this processor, with registers of {REGISTERS[stands['register']]}. Torques change every millisecond.
+library is compiled for this processor, with registers of {REGISTERS[stands['register']]}. The load average was {load:.1f}. Torques change every millisecond.
 MuJoCo runs the file that `bielle convert --to mjcf` writes, with closures and contacts as soft as its time step allows.""")
+    if load > 0.5:
+        page.add("Other programs ran beside it: these numbers are those of a busy machine, and spread.")
     page.heading("Bipetto stands")
     page.add("""Springs and dampers on its motors hold a posture; pushes of different size at the trunk, for 50 ms, make the
 worlds differ. A round of Newton's method is one for all robots of a register, per step.""")

@@ -1,9 +1,12 @@
+#include <omp.h>
+
 #include <algorithm>
 #include <cmath>
 #include <exception>
 #include <optional>
 
 #include "bielle/model/error.h"
+#include "bielle/worlds/batch.h"
 #include "bielle/worlds/bielle_world.h"
 #include "bielle/worlds/sensors.h"
 #include "bind.h"
@@ -34,7 +37,7 @@ MakeWorld findEngine(const std::string& engine) {
   }
 }
 
-// One world, or many that are stepped together on all cores. Each has its own memory.
+// One world, or many that are stepped together on all cores: those of Bielle's own engine at fixed steps in a WorldBatch.
 class HeldWorlds {
  public:
   HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step,
@@ -45,6 +48,11 @@ class HeldWorlds {
     worlds::WorldOptions options{ground, time_step};
     options.tolerance = tolerance;
     const py::gil_scoped_release release;
+    if (count && engine == "bielle" && tolerance == 0) {
+      const worlds::WorldBatchOptions all{{options, {}}, omp_get_max_threads()};
+      batch_ = std::make_unique<worlds::WorldBatch>(*model_, *count, all);
+      return;
+    }
     for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(make(engine, *model_, options));
     ok_.assign(worlds_.size(), true);
   }
@@ -53,8 +61,14 @@ class HeldWorlds {
   py::object reset(const py::object& q, const py::object& v, const py::object& where) {
     const BusyGuard guard(is_busy_, "world");
     const MatrixXd q0 = readRows(q, model_->nq(), "q", true), v0 = readRows(v, model_->nv(), "v", true);
-    const VectorXd chosen = where.is_none() ? VectorXd::Ones(worlds_.size())
-                                            : readVector(where, static_cast<Eigen::Index>(worlds_.size()), "where");
+    const VectorXd chosen = where.is_none() ? VectorXd::Ones(numWorlds())
+                                            : readVector(where, static_cast<Eigen::Index>(numWorlds()), "where");
+    if (batch_) {
+      std::vector<char> marks;
+      for (const double mark : chosen) marks.push_back(mark != 0);
+      const py::gil_scoped_release release;
+      batch_->reset(q0, v0, marks);
+    }
     run([&](World& world, Eigen::Index i) {
       if (chosen[i] == 0) return;
       world.reset(q0.col(i), v0.col(i));
@@ -71,10 +85,12 @@ class HeldWorlds {
         .attr("Books")(books.kinetic, books.potential, books.elastic, books.motor_work, books.push_work,
                        books.contact_loss, books.stop_loss, books.other_loss);
   }
-  std::string message() {
-    std::string message;
-    observeOnly([&](const World& world) { message = world.message(); });
-    return message;
+  py::object message() {
+    const BusyGuard guard(is_busy_, "world");
+    py::list messages;
+    for (int i = 0; batch_ && i < batch_->count(); ++i) messages.append(batch_->message(i));
+    for (const std::unique_ptr<World>& world : worlds_) messages.append(world->message());
+    return many_ ? py::object(messages) : py::object(messages[0]);
   }
 
   py::object step(const py::object& u, double duration, const py::object& push) {
@@ -83,6 +99,10 @@ class HeldWorlds {
     const BusyGuard guard(is_busy_, "world");
     warnOfStep(duration);
     const MatrixXd torques = readRows(u, model_->nu(), "u", true), force = readRows(push, 3, "push", true);
+    if (batch_) {
+      const py::gil_scoped_release release;
+      batch_->step(torques, force, duration);
+    }
     run([&](World& world, Eigen::Index i) {
       world.setTorques(torques.col(i));
       world.setPush(force.col(i));
@@ -94,7 +114,8 @@ class HeldWorlds {
   py::array calcWrenches() {
     const BusyGuard guard(is_busy_, "world");
     const Eigen::Index contacts = static_cast<Eigen::Index>(model_->contacts().size());
-    MatrixXd out(6 * contacts, worlds_.size());
+    MatrixXd out(6 * contacts, numWorlds());
+    if (batch_) out = batch_->wrenches();
     for (size_t i = 0; i < worlds_.size(); ++i)
       for (Eigen::Index c = 0; c < contacts; ++c) out.col(i).segment<6>(6 * c) = worlds_[i]->feet()[c].wrench;
     Shape shape = {contacts, 6};
@@ -113,7 +134,7 @@ class HeldWorlds {
     out["longest_step"] = integration.longest_step;
     return out;
   }
-  const std::vector<std::string>& warnings() const { return worlds_.front()->warnings(); }
+  const std::vector<std::string>& warnings() const { return batch_ ? batch_->warnings() : worlds_.front()->warnings(); }
 
   const std::shared_ptr<Model>& model() const { return model_; }
   const std::optional<int>& count() const { return many_; }
@@ -143,12 +164,14 @@ class HeldWorlds {
     if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) < 0) throw py::error_already_set();
   }
 
+  size_t numWorlds() const { return batch_ ? static_cast<size_t>(batch_->count()) : worlds_.size(); }
+
   // One column per world.
   MatrixXd readRows(py::handle value, Eigen::Index size, const std::string& what, bool shared) const {
     const Array array = readArray(value, what);
     if (!std::all_of(array.data(), array.data() + array.size(), [](double x) { return std::isfinite(x); }))
       throw py::value_error(what + ": expected finite numbers");
-    const auto count = static_cast<Eigen::Index>(worlds_.size());
+    const auto count = static_cast<Eigen::Index>(numWorlds());
     if (many_ && !(shared && array.ndim() == 1)) {
       requireShape(array, {count, size}, what);
       return Eigen::Map<const MatrixXd>(array.data(), size, count);
@@ -165,8 +188,13 @@ class HeldWorlds {
   }
 
   py::object observe() const {
-    MatrixXd time(1, worlds_.size()), q(model_->nq(), worlds_.size()), v(model_->nv(), worlds_.size());
-    MatrixXd sound(1, worlds_.size());
+    MatrixXd time(1, numWorlds()), q(model_->nq(), numWorlds()), v(model_->nv(), numWorlds()), sound(1, numWorlds());
+    if (batch_) {
+      time = batch_->times().transpose();
+      q = batch_->configurations();
+      v = batch_->velocities();
+      for (int i = 0; i < batch_->count(); ++i) sound(0, i) = batch_->ok(i);
+    }
     for (size_t i = 0; i < worlds_.size(); ++i) {
       time(0, i) = worlds_[i]->time();
       q.col(i) = worlds_[i]->configuration();
@@ -194,6 +222,7 @@ class HeldWorlds {
   }
 
   std::shared_ptr<Model> model_;
+  std::unique_ptr<worlds::WorldBatch> batch_;  // or else
   std::vector<std::unique_ptr<World>> worlds_;
   std::vector<char> ok_;  // of each, since its last step or reset
   std::optional<int> many_;
@@ -289,7 +318,7 @@ void bindWorlds(py::module_& module) {
       .def_property_readonly("warnings", &HeldWorlds::warnings,
                              "what the world leaves out of the model, or takes otherwise")
       .def_property_readonly("message", &HeldWorlds::message,
-                             "why the integration of a single world failed; empty while it is sound")
+                             "why the integration failed, empty while it is sound; with `count`, a list of them")
       .def_property_readonly("wrenches", &HeldWorlds::calcWrenches,
                              "wrenches from the ground on the feet in their contact frames (contacts, 6), N and N m");
   bindSensors(module);
