@@ -11,6 +11,7 @@
 #include "bielle/solve/shooting_problem.h"
 #include "control/restricted_controller.h"
 #include "count_allocations.h"
+#include "selection.h"
 
 namespace bielle {
 namespace {
@@ -19,6 +20,7 @@ struct SolvedSquat {
   SolvedSquat() : robot(loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto")) {
     SquatOptions options;
     options.depth = 0.85;
+    options.time_step = 0.02;
     SolveOptions how;
     how.solver = FddpOptions();
     solution = solve(makeSquat(robot.model, options), how);
@@ -195,10 +197,12 @@ TEST_CASE("policy: gains of predictive control belong to the states about which 
   evaluator.evaluate(0, problem.initialState(), VectorXd::Zero(model.nu()));
   constexpr double kOff = 2e-3;
   int turned = 0;
+  testing::Selection selection(1);
   for (int i = 6; i < problem.tangentSize(0) / 2; ++i)
     for (const double off : {-kOff, kOff}) {
       const VectorXd q = evaluator.integrate(off * VectorXd::Unit(problem.tangentSize(0), i)).head(model.nq());
       turned += (calcBases(problem, q).cwiseProduct(bases).rowwise().sum().array() < 0).any();
+      if (selection.isLeftOut()) continue;
       const RowMatrixXd found = findGains(model, q);
       for (int column = 0; column < expected.cols(); ++column) {
         CAPTURE(i, off, column, expected.col(column).norm(), found.col(column).norm());
