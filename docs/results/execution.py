@@ -351,8 +351,8 @@ seconds until a robot falls by the torques of its plan alone (`open`), by gains 
 those of the estimated trunk, root mean squares; drift is that over the ground at the end."""),
     ("Errors of the robot", "errors", lambda: """Bipetto's walk at 0.4 m/s in Bielle's world: how many of five runs
 stand, seeds 1 to 5."""),
-    ("Loads", "loads", lambda: """Robots that carry what neither plan nor controller knows (`--payload`), on the trunk at the middle of
-the hips, 10 cm above it: walks at 0.4 m/s in Bielle's world, *stands*, or seconds until the robot falls."""),
+    ("Loads", "loads", lambda: """Robots that carry what neither plan nor controller knows (`--payload`), on the trunk, 10 cm above
+the middle of the hips or beside that place: walks at 0.4 m/s in Bielle's world, *stands*, or seconds until the robot falls."""),
     ("Sizes", "sizes", lambda: """Speed of the steady steps under predictive control, over that of the plan; the same options for all. The goal
 is 98 to 102 %, from 2 to 113 kg and from 1.62 to 9.81 m/s²."""),
     ("Delay", "delays", lambda: """Gains in Bielle's world, `--jitter 1`: *stands*, or seconds until the robot falls,

@@ -41,7 +41,7 @@ std::map<std::string, std::string> makeRobots(const DatasetSpec& spec, const std
     if (!is_new || !(motion.payload > 0)) continue;
     it->second = (fs::path(directory) / "robots" / motion.body).string();
     makeOutputDirectory(it->second);
-    writeRobot(addPayload(loadRobot(motion.robot).model, {motion.payload, {}}), it->second,
+    writeRobot(addPayload(loadRobot(motion.robot).model, {motion.payload, {}, {}}), it->second,
                "Written by `bielle dataset`.");
   }
   return robots;

@@ -61,7 +61,7 @@ bool AugmentedLagrangian::addWeighted(int node, std::vector<char>& rows) const {
   bool added = false;
   for (Eigen::Index i = 0; i < weights.gradient.size(); ++i) {
     if (rows[i] || (weights.gradient[i] == 0 && weights.hessian[i] == 0)) continue;
-    added = rows[i] = true;
+    rows[i] = added = true;
   }
   return added;
 }
