@@ -10,7 +10,6 @@
 #include "robot_directory.h"
 
 using namespace bielle::testing;
-using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
 namespace {
@@ -28,10 +27,10 @@ void checkRefusal(const CommandResult& result, const std::string& text) {
   CHECK_THAT(result.err, Catch::Contains("bielle: error: ") && Catch::Contains(text));
 }
 
-std::vector<Json> readRows(const std::string& output) {
+std::vector<nlohmann::json> readRows(const std::string& output) {
   std::ifstream stream(output + "/softness.jsonl");
-  std::vector<Json> rows;
-  for (std::string line; std::getline(stream, line);) rows.push_back(Json::parse(line));
+  std::vector<nlohmann::json> rows;
+  for (std::string line; std::getline(stream, line);) rows.push_back(nlohmann::json::parse(line));
   rows.erase(rows.begin());
   return rows;
 }
@@ -44,15 +43,15 @@ TEST_CASE("Loops of Bipetto have rows, plots and settings", "[softness]") {
   const CommandResult result = run({"softness", file, "--timestep", "0.002", "--torque", "20", "--json", "-o", output});
   REQUIRE(result.status == 0);
   CHECK_THAT(result.err, Catch::Contains("54 of 54 postures"));
-  const Json json = Json::parse(result.out);
+  const nlohmann::json json = nlohmann::json::parse(result.out);
   REQUIRE(json["loops"].size() == 6);
   double largest = 0;
-  for (const Json& loop : json["loops"]) {
+  for (const nlohmann::json& loop : json["loops"]) {
     CHECK(loop["state"] != "diverges");
     CHECK(loop["gap_at_limit"] > 1e-7);
     largest = std::max({largest, loop["gap"].get<double>(), loop["gap_at_limit"].get<double>()});
   }
-  CHECK(json["loops"][0]["driven"] == Json{"knee_right"});
+  CHECK(json["loops"][0]["driven"] == nlohmann::json{"knee_right"});
   // solimp is as stiff as it can be: only a shorter step helps, with the square of which gaps go.
   CHECK(json["timestep"] < 0.002);
   CHECK(json["gap"] <= 1e-4);
@@ -60,8 +59,9 @@ TEST_CASE("Loops of Bipetto have rows, plots and settings", "[softness]") {
         Approx(largest * std::pow(json["timestep"].get<double>() / 0.002, 2)).epsilon(0.01));
   CHECK_THAT(readFile(output + "/settings.xml"), Catch::Contains("0.9999 0.9999"));
   const std::string page = readFile(output + "/softness.html");
-  for (const Json& loop : json["loops"]) CHECK_THAT(page, Catch::Contains("<h2>" + loop["loop"].get<std::string>()));
-  for (const Json& row : readRows(output)) CHECK(row["stable_step"] > 0.002);
+  for (const nlohmann::json& loop : json["loops"])
+    CHECK_THAT(page, Catch::Contains("<h2>" + loop["loop"].get<std::string>()));
+  for (const nlohmann::json& row : readRows(output)) CHECK(row["stable_step"] > 0.002);
 }
 
 TEST_CASE("Softness that was interrupted goes on to the same bytes", "[softness]") {

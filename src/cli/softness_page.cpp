@@ -40,7 +40,7 @@ std::vector<std::string> listLoops(const std::vector<Json>& rows) {
 }
 
 Plot makePlot(const std::string& loop, const std::vector<Json>& rows, double within) {
-  Plot plot{loop, "position of the joint [rad or m]", "gap [m or rad]"};
+  Plot plot{loop, "position of the joint [rad or m]", "gap under gravity, and with motors at their limits [m, rad]"};
   plot.scale = PlotScale::Logarithmic;
   std::vector<std::string> joints;
   for (const Json& row : rows)
@@ -49,8 +49,8 @@ Plot makePlot(const std::string& loop, const std::vector<Json>& rows, double wit
       joints.push_back(joint);
   double first = INFINITY, last = -INFINITY;
   for (size_t j = 0; j < joints.size(); ++j) {
-    Curve weight{joints[j] + ": gravity", getCurveColor(j), {}, CurveStyle::LinesPoints};
-    Curve limit{joints[j] + ": motors at their limits", getCurveColor(j), {}, CurveStyle::LinesPoints, true};
+    Curve weight{joints[j], getCurveColor(j), {}, CurveStyle::LinesPoints};
+    Curve limit{"at limits", getCurveColor(j), {}, CurveStyle::LinesPoints, true};
     for (const Json& row : rows) {
       if (row.at("loop") != loop || row.at("joint") != joints[j]) continue;
       const double x = row.at("position");
@@ -136,7 +136,8 @@ void writeSoftnessPage(const std::string& directory, const std::string& title, c
   std::string html =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + escape(title) +
       "</title>\n<style>body{font-family:sans-serif;margin:2em;max-width:80em}table{border-collapse:collapse;"
-      "font-size:80%}td,th{border:1px solid #ccc;padding:2px 6px;text-align:right}pre{background:#f4f4f4;"
+      "font-size:80%}td,th{border:1px solid #ccc;padding:2px "
+      "6px;text-align:right}td{white-space:nowrap}pre{background:#f4f4f4;"
       "padding:1em}</style></head><body>\n<h1>" +
       escape(title) + "</h1>\n<p>Within " + formatNumber(advice.within, "%.2g") +
       " m and rad, gravity and motors at their limits: a gap of " + formatNumber(advice.gap, "%.2g") +
