@@ -45,7 +45,7 @@ for name, complete in shells.items():
         assert complete([*entry.path, "-"]) == options, (name, entry.path, complete([*entry.path, "-"]), options)
         if entry.commands:
             assert complete([*entry.path, ""]) == sorted(entry.commands), (name, entry.path)
-    assert complete(["so"]) == ["solve"]
+    assert complete(["sol"]) == ["solve"]
     assert complete(["solve", "squat", "--robot", ""]) == robots
     assert complete(["solve", "squat", "--robot", "bip"]) == ["bipetto"]
     assert complete(["solve", "squat", "--formulation", ""]) == ["full", "reduced"]

@@ -338,8 +338,8 @@ void SdfReader::noteElements(const XMLElement& element) {
       {"limit", {"lower", "upper", "effort", "velocity"}},
       {"dynamics", {"damping", "friction", "spring_reference", "spring_stiffness"}}};
   static const std::set<std::string> harmless = {
-      "sensor",           "light",     "plugin",       "battery",     "audio_source",       "audio_sink",
-      "particle_emitter", "projector", "self_collide", "enable_wind", "allow_auto_disable", "physics"};
+      "sensor",    "light",        "battery",     "audio_source",       "audio_sink", "particle_emitter",
+      "projector", "self_collide", "enable_wind", "allow_auto_disable", "physics"};
   const std::string& tag = getTag(element);
   for (const XMLElement* e : getChildren(element)) {
     const std::string& own = getTag(*e);

@@ -193,9 +193,10 @@ Execution carryOut(const Plan& plan, Controller& controller, World& world, const
   out.extension = std::max(0, tick - ticks) * o.control_period;
   if (!world.message().empty()) {
     balance.update(controller.getPlanTime(world.time()), controller.footholds(), false);
-    out.outcome = balance.falls() ? Outcome::Fell : Outcome::BrokeOff;
+    const bool falls = world.time() > 0 && balance.falls();  // before the first step no ground has borne a sole
+    out.outcome = falls ? Outcome::Fell : Outcome::BrokeOff;
     out.message = describeBreak(world);
-    if (balance.falls())
+    if (falls)
       out.message = balance.describe() + " at " + formatNumber(out.duration, "%.3f s") +
                     ", where the world broke off: " + out.message;
   } else if (!fall.empty()) {
