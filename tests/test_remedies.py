@@ -25,7 +25,7 @@ FOLLOWED = [  # command, what it refuses, the remedy, and what follows it: {} is
     (SOLVE.format("walk"), "--set landing_speed=0.05", r"add (\S+),", "--set landing_speed=0.05 --set {}"),
     (SOLVE.format("walk") + "--set rigid_landing=true ", "--set landing_speed=0.3", r"e\.g\. ([\d.]+)", "--set landing_speed={}"),
     (SOLVE.format("run"), "--set stance=0.01", r"e\.g\. ([\d.]+)", "--set stance={}"),
-    (SOLVE.format("squat"), "--set depth=5", r"a number, ([\d.]+)", "--set depth={}"),
+    (SOLVE.format("stairs"), "--set stairs=1000", r"a whole number, (\d+)", "--set stairs={}"),
     (SOLVE.format("squat"), "--set depth=1.3", r"at most ([\d.]+)", "--set depth={}"),
     (SOLVE.format("squat"), "--set depth=0.05", r"at least ([\d.]+)", "--set depth={}"),
     (SOLVE.format("jump"), "--set length=2", r"e\.g\. ([\d.]+)", "--set length={}"),
