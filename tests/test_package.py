@@ -19,9 +19,9 @@ def configure(name, *options):
     subprocess.run([cmake, "-S", source, "-B", build, "--preset", "package", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", *options],
                    check=True, stdout=subprocess.DEVNULL)
     with open(os.path.join(build, "compile_commands.json")) as file:
-        # Neither the library nor Eigen is in bielle-workers, which may have flags of its own.
-        workers = os.path.join(source, "workers")
-        commands = [entry["command"] for entry in json.load(file) if not entry["file"].startswith(workers)]
+        # The library is neither in bielle-workers nor in the programs of other engines, which may have flags of their own.
+        own = (os.path.join(source, "workers"), os.path.join(source, "validation/loops/engine_"))
+        commands = [entry["command"] for entry in json.load(file) if not entry["file"].startswith(own)]
     with open(os.path.join(build, "bielle.pc")) as file:
         return build, commands, file.read()
 
