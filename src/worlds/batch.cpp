@@ -4,10 +4,10 @@
 #include <atomic>
 #include <cmath>
 #include <stdexcept>
-#include <thread>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/motion/motion.h"
+#include "solve/team.h"
 #include "worlds/leapfrog.h"
 #include "worlds/left_out.h"
 
@@ -54,17 +54,14 @@ struct WorldBatch::Data {
   template <typename Task>
   void visit(const Task& task) {
     std::atomic<size_t> next{0};
-    const auto work = [&](size_t thread) {
+    const auto work = [&](int thread) {
       for (size_t group; (group = next++) < groups.size();) {
         steps[thread]->swap(groups[group]);
         task(*steps[thread], group);
         steps[thread]->swap(groups[group]);
       }
     };
-    std::vector<std::thread> team;
-    for (size_t t = 1; t < steps.size(); ++t) team.emplace_back(work, t);
-    work(0);
-    for (std::thread& thread : team) thread.join();
+    team.run(static_cast<int>(steps.size()), work);
   }
   void read(const Steps& steps, size_t group, const LaneMask& which);
   void takeSteps(Steps& steps, size_t group, const MatrixView& u, const MatrixView& push, double duration);
@@ -74,7 +71,8 @@ struct WorldBatch::Data {
   int count;
   double time_step;
   std::vector<std::unique_ptr<Steps>> steps;  // one a thread
-  std::vector<Steps::State> groups;           // of kLane worlds
+  Team team;
+  std::vector<Steps::State> groups;  // of kLane worlds
   MatrixXd q, v, wrenches;
   VectorXd times;
   std::vector<char> is_ok;
@@ -89,8 +87,8 @@ WorldBatch::Data::Data(const Model& model, int count, const WorldBatchOptions& a
       warnings(listMissingStops(model)) {
   if (count < 1) throw std::invalid_argument("worlds: the count is " + std::to_string(count) + "; give at least one");
   const size_t size = (static_cast<size_t>(count) + kLane - 1) / kLane;
-  const size_t cores = all.threads > 0 ? static_cast<size_t>(all.threads) : std::thread::hardware_concurrency();
-  for (size_t t = 0; t < std::clamp<size_t>(cores, 1, size); ++t)
+  const auto threads = static_cast<size_t>(all.threads > 0 ? all.threads : getDefaultThreads());
+  for (size_t t = 0; t < std::clamp<size_t>(threads, 1, size); ++t)
     steps.push_back(std::make_unique<Steps>(model, options.world.ground, options.contact, options.world.pushed_body));
   groups.assign(size, steps.front()->copyState());
   q = model.makeNeutral().replicate(1, count);
@@ -115,7 +113,8 @@ void WorldBatch::Data::read(const Steps& steps, size_t group, const LaneMask& wh
 
 void WorldBatch::Data::takeSteps(Steps& steps, size_t group, const MatrixView& u, const MatrixView& push,
                                  double duration) {
-  MatrixXd efforts = MatrixXd::Zero(model.nu(), kLane), forces = MatrixXd::Zero(3, kLane);
+  VectorX<Lanes> efforts = VectorX<Lanes>::Zero(model.nu());
+  Vector3<Lanes> force = Vector3<Lanes>::Zero();
   LaneMask which = choose(group, is_ok);
   for (int l = 0; l < kLane; ++l) {
     if (!which[l]) continue;
@@ -128,22 +127,16 @@ void WorldBatch::Data::takeSteps(Steps& steps, size_t group, const MatrixView& u
     }
     for (int m = 0; m < model.nu(); ++m) {
       const Motor& motor = model.motors()[m];
-      efforts(m, l) = motor.clampEffort(u(m, world), v(motor.dof, world));
+      efforts[m].set(l, motor.clampEffort(u(m, world), v(motor.dof, world)));
     }
-    forces.col(l) = push.col(world);
+    for (int i = 0; i < 3; ++i) force[i].set(l, push(i, world));
   }
   if (!any(which)) return;
-  VectorX<Lanes> torques(model.nu());
-  Vector3<Lanes> force;
-  for (int l = 0; l < kLane; ++l) {
-    for (int m = 0; m < model.nu(); ++m) torques[m].set(l, efforts(m, l));
-    for (int i = 0; i < 3; ++i) force[i].set(l, forces(i, l));
-  }
   const double count = World::countSteps(duration, time_step), h = duration / count;
   Steps::Courses courses;
   for (int l = 0; l < kLane; ++l)
     if (which[l]) courses[l].time = times[getFirst(group) + l];
-  steps.command(torques, force);
+  steps.command(efforts, force);
   steps.advance(count, h, which, options.world.interrupt, courses);
   for (int l = 0; l < kLane; ++l) {
     if (!which[l]) continue;

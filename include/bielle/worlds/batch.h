@@ -15,7 +15,7 @@ namespace bielle::worlds {
 
 struct WorldBatchOptions {
   BielleWorldOptions world;
-  int threads = 0;  ///< 0: as many as the processor has cores
+  int threads = 0;  ///< 0: all
 };
 
 /// Matrices have a column per world. Not thread-safe.
