@@ -53,7 +53,6 @@ std::string writeReadme(const std::vector<Maps>& all, const FirmwareOptions& opt
 
 FirmwareText formatFirmware(const Model& model, ConstVectorRef q, const FirmwareOptions& options) {
   FirmwareText out;
-  const std::string remedy = "list as many of its joints with one coordinate under `serial_joints` as it has motors";
   for (const LinkageLeftOut& left : listLinkagesLeftOut(model, q))
     if (left.has_motors) out.warnings.push_back("linkage of '" + left.name + "': " + left.why + "; it is left out");
   std::vector<Maps> all;
@@ -62,7 +61,7 @@ FirmwareText formatFirmware(const Model& model, ConstVectorRef q, const Firmware
     if (static_cast<int>(linkage.joints.size()) != linkage.size()) {
       out.warnings.push_back("linkage of '" + linkage.output + "': it has " + std::to_string(linkage.size()) +
                              " motor(s) and " + std::to_string(linkage.joints.size()) +
-                             " serial joint(s); it is left out; " + remedy);
+                             " of the `serial_joints`; it is left out");
       continue;
     }
     const std::optional<Maps> maps = makeMaps(model, linkage, q, options);
@@ -78,7 +77,7 @@ FirmwareText formatFirmware(const Model& model, ConstVectorRef q, const Firmware
     throw InputError(model.name(), "linkages",
                      "none has motors that move as many serial joints" +
                          (out.warnings.empty() ? std::string() : " (" + out.warnings.front() + ")"),
-                     remedy);
+                     "list as many of its joints with one coordinate under `serial_joints` as it has motors");
   for (const auto& [joint, range] : options.ranges)
     if (!contains(names, joint))
       throw InputError(model.name(), "--range " + joint, "it is no serial joint of a linkage",
