@@ -60,6 +60,17 @@ if(BUILD_SHARED_LIBS)
   endforeach()
 endif()
 
+# bielle_embed(LIST FILES...): the list of files that model/embed.h copies into a program, in the current binary directory.
+function(bielle_embed list)
+  set(entries "")
+  foreach(file IN LISTS ARGN)
+    get_filename_component(name ${file} NAME)
+    string(MAKE_C_IDENTIFIER ${name} id)
+    string(APPEND entries "BIELLE_FILE(${id}, \"${name}\", \"${file}\")\n")
+  endforeach()
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${list} CONTENT "${entries}")
+endfunction()
+
 # bielle_precompile(TARGET KIND HEADERS...): headers of the standard library and of Eigen that most files include are parsed once
 # for all targets of a KIND, whose flags are the same. A file that forgets one of them still compiles; scripts/check_includes.sh
 # finds it. A header whose inline functions call templates makes every file instantiate them: CLI11, 4 s each, is left to the

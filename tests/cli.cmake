@@ -22,7 +22,7 @@ set_tests_properties(dxf PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
 # Maps of linkages as C, compiled.
 add_test(NAME firmware COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_firmware.py $<TARGET_FILE:bielle_command>)
-add_test(NAME firmware_all COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_firmware.py $<TARGET_FILE:bielle_command> all)
+add_test(NAME firmware_all COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_firmware.py $<TARGET_FILE:bielle_command> all 5000)
 set_tests_properties(firmware firmware_all PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
 # Manual pages and completion follow the help of the command.

@@ -1,4 +1,4 @@
-"""test_firmware.py BIELLE [all]: maps of linkages in C are compiled and compared with closed forms and with the mechanism.
+"""test_firmware.py BIELLE [all [POSTURES]]: maps of linkages in C are compiled and compared with closed forms and with the mechanism.
 
 With "all", every linkage of the included robots in both precisions at 1e5 postures, and a table of them (docs/firmware.md)."""
 import ctypes
@@ -13,11 +13,16 @@ import unittest
 
 BIELLE = os.path.abspath(sys.argv[1])
 ALL = "all" in sys.argv[2:]
+POSTURES = sys.argv[3] if len(sys.argv) > 3 else "100000"
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 sys.argv = sys.argv[:1]
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]
 OK, CLAMPED, NEAR, NOT_REACHED = range(4)
+# An emulated Cortex-M4F.
+ARM = ["arm-none-eabi-gcc", "-std=c99", "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
+EMULATOR = ["qemu-system-arm", "-M", "mps2-an386", "-icount", "shift=7", "-nographic", "-semihosting", "-kernel"]
+HAS_ARM = shutil.which(ARM[0]) and shutil.which(EMULATOR[0])
 if not COMPILERS:
     print("neither gcc nor clang is there")
     sys.exit(77)
@@ -41,6 +46,60 @@ def build_test(place, name, compiler="gcc", standard="c99", end="c"):
     program = os.path.join(place, name + ".out")
     run(compiler, "-std=" + standard, "-O1", *STRICT, name + "." + end, name + "_test." + end, "-lm", "-o", program, cwd=place)
     return program
+
+
+# Postures drawn at random in the range: joints to motors, motors to joints, and the ratio, without guesses. Prints a hash of all
+# results, and, on Arm, the largest number of instructions: at this -icount, 40 of them are 128 ticks of SysTick.
+SAMPLER = r"""
+#include "NAME.c"
+#include <stdio.h>
+#include <string.h>
+#ifdef __arm__
+#define REGISTER(address) (*(volatile unsigned *)(address))
+extern void _mainCRTStartup(void);
+void reset(void) { REGISTER(0xE000ED88) |= 0xF00000; /* the floating-point unit */ _mainCRTStartup(); }
+__attribute__((section(".vectors"), used)) void *const vectors[2] = {(void *)0x20100000, (void *)reset};
+#define START() (REGISTER(0xE000E014) = 0xFFFFFF, REGISTER(0xE000E018) = 0, REGISTER(0xE000E010) = 5)
+#define TICKS() (0xFFFFFF - REGISTER(0xE000E018))
+#else
+#define START() (void)0
+#define TICKS() 0u
+#endif
+static unsigned state = 1, hash = 2166136261u, most;
+static float draw(void) { return (float)((state = state * 1664525u + 1013904223u) >> 8) * (1.0f / 16777216.0f); }
+static void add(const void *x, size_t n) { size_t i; for (i = 0; i < n; ++i) hash = (hash ^ ((const unsigned char *)x)[i]) * 16777619u; }
+int main(void) {
+  int n, i;
+  for (n = 0; n < COUNT; ++n) {
+    NAME_posture at, back;
+    NAME_ratio ratio;
+    float joint[NAME_SIZE];
+    unsigned ticks;
+    memset(&at, 0, sizeof at), memset(&back, 0, sizeof back);
+    for (i = 0; i < NAME_SIZE; ++i) joint[i] = lower[i] + (upper[i] - lower[i]) * draw();
+    START();
+    NAME_joint_to_motor(joint, NULL, &at), NAME_motor_to_joint(at.motor, NULL, &back), NAME_update_ratio(&at, &ratio);
+    ticks = TICKS();
+    if (ticks > most) most = ticks;
+    add(&at, sizeof at), add(&back, sizeof back), add(&ratio, sizeof ratio);
+  }
+  printf("%08x %u\n", hash, most);
+  return 0;
+}
+"""
+
+
+def run_on_arm(place, name, count):
+    """Hashes of `count` postures here and on Arm, and there the largest number of instructions and, by -Os, the bytes of all functions."""
+    source, host, arm = (os.path.join(place, name + end) for end in ("_sampler.c", "_host", "_arm"))
+    with open(source, "w") as file:
+        file.write(SAMPLER.replace("NAME", name).replace("COUNT", str(count)))
+    run(COMPILERS[0], "-std=c99", "-O2", source, "-lm", "-o", host)
+    run(*ARM, "-O2", "-fno-math-errno", source, "-lm", "--specs=rdimon.specs", "-Wl,--section-start=.vectors=0", "-o", arm)
+    run(*ARM, "-Os", *STRICT, "-Wdouble-promotion", "-c", os.path.join(place, name + ".c"), "-o", arm + ".o")
+    text, data = run("arm-none-eabi-size", arm + ".o").stdout.split("\n")[1].split()[:2]
+    there, ticks = run(*EMULATOR, arm, stdin=subprocess.DEVNULL, timeout=300).stdout.split()
+    return run(host).stdout.split()[0], there, int(ticks) * 40 // 128, int(text) + int(data)
 
 
 class Linkage:
@@ -235,6 +294,44 @@ class FirmwareTest(unittest.TestCase):
         self.assertLess(abs((ankle.motor_torque(joints, torques) * (R @ v)).sum(-1) - torques @ v).max(), 1e-12)
         self.assertLess(abs(ankle.joint_torque(joints, ankle.motor_torque(joints, torques, (0, 0, -9.81)), (0, 0, -9.81)) - torques).max(), 1e-12)
 
+    def test_own_functions_of_single_precision(self):
+        source, library = os.path.join(self.place, "own.c"), os.path.join(self.place, "own.so")
+        with open(source, "w") as file:
+            for name in ("sine", "arctangent"):
+                with open(os.path.join(SOURCE, "src", "firmware", name + ".h")) as text:
+                    file.write(text.read().replace("static ", "", 1))
+        run(COMPILERS[0], "-std=c99", "-O2", "-shared", "-fPIC", *STRICT, source, "-o", library)
+        own = ctypes.CDLL(library)
+        own.sine.restype = own.arctangent.restype = ctypes.c_float
+        single = lambda x: ctypes.c_float(x).value
+        sine = lambda x, n: own.sine(ctypes.c_float(x), n)
+        arctangent = lambda y, x: own.arctangent(ctypes.c_float(y), ctypes.c_float(x))
+        for i in range(-20000, 20001):
+            for x in (single(i * 3.1e-4), single(i * 0.2047)):
+                for n in (-1, 0, 1, 2):
+                    self.assertLess(abs(sine(x, n) - math.sin(x + n * math.pi / 2)), 1e-7)
+            y, x = single(3.7 * math.sin(i * 1.57e-4)), single(3.7 * math.cos(i * 1.57e-4))
+            exact = math.atan2(y, x)
+            self.assertLessEqual(abs(arctangent(y, x) - exact), 3.1 * 2.0 ** (math.frexp(exact)[1] - 24))
+        self.assertEqual([sine(x, n) for x in (math.nan, math.inf, -5000, 1e30) for n in (0, 1)], [0, 1] * 4)
+        self.assertEqual((arctangent(0, 0), arctangent(0, -1), arctangent(-2, 0)), (0, single(math.pi), -single(math.pi / 2)))
+
+    @unittest.skipUnless(HAS_ARM, "arm-none-eabi-gcc and qemu-system-arm are not installed")
+    def test_the_same_bits_on_arm(self):
+        place = os.path.join(self.place, "arm")
+        convert("rsu_biped", place, "--to", "c", "--precision", "float", "--postures", "400")
+        here, there, instructions, size = run_on_arm(place, "ankley_left_anklex_left", 1000)
+        self.assertEqual(here, there)
+        self.assertLess(instructions, 10000)
+        self.assertLess(size, 8192)
+        # Another last bit of a constant is noticed.
+        source = os.path.join(place, "ankley_left_anklex_left.c")
+        with open(source) as file:
+            text = file.read()
+        with open(source, "w") as file:
+            file.write(text.replace("0.166666552f", "0.166666567f"))
+        self.assertNotEqual(run_on_arm(place, "ankley_left_anklex_left", 1000)[0], here)
+
     def test_bad_input_writes_nothing(self):
         place = os.path.join(self.place, "nothing")
         for robot, options, said in (
@@ -278,7 +375,8 @@ class FirmwareTest(unittest.TestCase):
 
 class AllTest(unittest.TestCase):
     def test_all(self):
-        print("| linkage | joint to motor | motor to joint | error (double) | error (float) | over goal | bytes (float) |\n|---|---|---|---|---|---|---|")
+        print("| linkage | joint to motor | motor to joint | error (double) | error (float) | over goal | instructions | bytes |\n"
+              "|---|---|---|---|---|---|---|---|")
         with tempfile.TemporaryDirectory() as place:
             for robot in ("fourbar", "bipetto", "rsu_biped", "kangaroo_leg", "humanoid", "leg_biped", "belt_biped", "differential_ankle", "spring_biped",
                           "spring_leg"):
@@ -286,7 +384,7 @@ class AllTest(unittest.TestCase):
                 for precision in ("double", "float"):
                     out = os.path.join(place, robot, precision)
                     os.makedirs(os.path.dirname(out), exist_ok=True)
-                    convert(robot, out, "--to", "c", "--precision", precision)
+                    convert(robot, out, "--to", "c", "--precision", precision, "--postures", POSTURES)
                     for name in list_names(out):
                         for compiler in COMPILERS:
                             self.assertIn(": ok", run(build_test(out, name, compiler)).stdout)
@@ -304,12 +402,13 @@ class AllTest(unittest.TestCase):
                         ways.append((steps.group(1) + " steps" if steps else "closed") + f": {n}, {roots}, {calls}")
                     self.assertLess(max(errors["double"]), 1e-12, name)
                     float_goal = 2e-6 * max(1, ratio)
-                    source = os.path.join(place, robot, "float", name + ".c")
-                    run("gcc", "-Os", "-c", source, "-o", source + ".o")
-                    size = run("size", source + ".o").stdout.split("\n")[1].split()[0]
+                    instructions = size = "-"
+                    if HAS_ARM:
+                        here, there, instructions, size = run_on_arm(os.path.join(place, robot, "float"), name, int(POSTURES))
+                        self.assertEqual(here, there, name)
                     worst = {key: max(value) for key, value in errors.items()}
                     print(f"| {robot}: {name} | {ways[0]} | {ways[1]} | {worst['double']:.1e} | {worst['float']:.1e} | "
-                          f"{worst['float'] / float_goal:.2f} | {size} |", flush=True)
+                          f"{worst['float'] / float_goal:.2f} | {instructions} | {size} |", flush=True)
 
 
 if __name__ == "__main__":

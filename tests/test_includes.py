@@ -54,7 +54,7 @@ OTHERS = {
 }
 PUBLIC = "include/bielle/"
 OUTSIDE = ("examples/", "python/", "tests/consumer/")  # they see what users see, and the worlds of engines
-GENERATED = ("assets.inc", "help.inc", "foxglove.pb.h", "motion.pb.h")
+GENERATED = ("assets.inc", "help.inc", "functions.inc", "foxglove.pb.h", "motion.pb.h")
 FOLDERS = ("include/", "src/", "validation/", "workers/", "tests/", "examples/", "python/")
 
 

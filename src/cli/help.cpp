@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "report/embed.h"
+#include "model/embed.h"
 
 #define BIELLE_FILE BIELLE_EMBED
 #include "help.inc"

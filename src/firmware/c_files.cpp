@@ -70,7 +70,9 @@ class CWriter {
     if (i < 2 * m) return entry("at->motor", i - m);
     if (i < n) return entry("at->passive", i - 2 * m);
     if (i < maps_.mechanism.velocity()) return entry("gravity", i - n);
-    return entry("v", i - maps_.mechanism.velocity());
+    if (i < maps_.mechanism.ratio()) return entry("v", i - maps_.mechanism.velocity());
+    const int k = i - maps_.mechanism.ratio();
+    return entry("ratio->motor_per_joint", k / m) + "[" + std::to_string(k % m) + "]";
   }
   std::string print(const std::vector<Scalar>& formulas, const std::vector<std::string>& targets) const {
     return print(Program(formulas), targets);
@@ -151,13 +153,16 @@ class CWriter {
           entries.push_back(which + ("[" + std::to_string(i) + "]") + "[" + std::to_string(j) + "]");
     for (int i = 0; i < m * m; ++i) rates.push_back("rate" + entries[static_cast<size_t>(i)].substr(5));
     rates.emplace_back("log_rate");
+    entries.emplace_back("det");
     std::vector<std::string> held;
     for (int i = 0; i < m; ++i) held.push_back("held[" + std::to_string(i) + "]");
     const std::string solve_motors = printSolution(maps_.inverse), solve_joints = printSolution(maps_.direct),
                       ratio = print(formulas_.ratio, entries), rate = print(formulas_.ratio_rate, rates),
-                      holding = print(formulas_.held, held), branch = print(formulas_.branch, {"const REAL det"});
+                      holding = print(formulas_.held, held);
     std::string helpers;
-    const std::string all = solve_motors + solve_joints + ratio + rate + holding + branch;
+    const std::string all = solve_motors + solve_joints + ratio + rate + holding;
+    for (const char* name : {"sine", "arctangent"})
+      if (all.find(std::string(name) + "(") != std::string::npos) helpers += getSingleFunction(name) + "\n";
     if (all.find("root(") != std::string::npos)
       helpers += "static REAL root(REAL x) { return x > 0 ? sqrtFN(x) : 0; }\n\n";
     if (all.find("least(") != std::string::npos)
@@ -211,12 +216,11 @@ class CWriter {
                                          number(kNearDeadPoint) + ") status = NAME_NEAR_DEAD_POINT;\n"
                                    : ""},
         {"@branch@",
-         branch +
-             "  int i;\n  for (i = 0; i < SIZE; ++i)\n    if (!(at->joint[i] >= lower[i] - @slack@ && at->joint[i] <= "
-             "upper[i] + @slack@)) return 0;\n  return det > 0;\n"},
+         "  int i;\n  for (i = 0; i < SIZE; ++i)\n    if (!(at->joint[i] >= lower[i] - @slack@ && at->joint[i] <= "
+         "upper[i] + @slack@)) return 0;\n"},
         {"@slack@", number(is_single_ ? 1e-4 : 1e-9)},
-        {"@ratio@", "  (void)at;\n" + ratio},
-        {"@rate@", "  (void)at;\n  (void)v;\n" + rate},
+        {"@ratio@", "  REAL det;\n  (void)at;\n" + ratio + "  return det;\n"},
+        {"@rate@", "  (void)at;\n  (void)ratio;\n  (void)v;\n" + rate},
         {"@held_torque@", "  (void)at;\n  (void)ratio;\n  (void)gravity;\n" + holding},
         {"@cast_huge@", is_single_ ? "F" : ""},
         {"@one@", number(1)},

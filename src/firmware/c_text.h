@@ -143,14 +143,21 @@ NAME_status NAME_motor_to_joint(const REAL motor[SIZE], const NAME_posture *gues
 @near@  return status;
 }
 
-int NAME_on_branch(const NAME_posture *at) {
-@branch@}
-
-void NAME_update_ratio(const NAME_posture *at, NAME_ratio *ratio) {
+/* Its result has the sign of the determinant of R, + on the branch of the reference. */
+static REAL calc_ratio(const NAME_posture *at, NAME_ratio *ratio) {
 @ratio@}
 
+void NAME_update_ratio(const NAME_posture *at, NAME_ratio *ratio) {
+  (void)calc_ratio(at, ratio);
+}
+
+int NAME_on_branch(const NAME_posture *at) {
+  NAME_ratio ratio;
+@branch@  return calc_ratio(at, &ratio) > 0;
+}
+
 /* The rate of R, and of the logarithm of the determinant that vanishes at dead points of the output. */
-static REAL calc_rate(const NAME_posture *at, const REAL v[SIZE], NAME_ratio *rate) {
+static REAL calc_rate(const NAME_posture *at, const NAME_ratio *ratio, const REAL v[SIZE], NAME_ratio *rate) {
   REAL log_rate;
 @rate@  return log_rate;
 }
@@ -158,7 +165,7 @@ static REAL calc_rate(const NAME_posture *at, const REAL v[SIZE], NAME_ratio *ra
 void NAME_update_ratio_rate(const NAME_posture *at, const NAME_ratio *ratio, const REAL joint_velocity[SIZE],
                             NAME_ratio *rate) {
   int i, j, k, l;
-  (void)calc_rate(at, joint_velocity, rate);
+  (void)calc_rate(at, ratio, joint_velocity, rate);
   for (i = 0; i < SIZE; ++i)
     for (j = 0; j < SIZE; ++j) {
       REAL sum = 0;
@@ -177,7 +184,7 @@ REAL NAME_dead_point_distance(const NAME_posture *at) {
   for (k = 0; k < SIZE; ++k) {
     REAL unit[SIZE];
     for (i = 0; i < SIZE; ++i) unit[i] = i == k ? @one@ : @zero@;
-    way[0][k] = way[1][k] = calc_rate(at, unit, &rate);
+    way[0][k] = way[1][k] = calc_rate(at, &ratio, unit, &rate);
     for (i = 0; i < SIZE; ++i)
       for (j = 0; j < SIZE; ++j) way[1][k] += ratio.joint_per_motor[j][i] * rate.motor_per_joint[i][j];
   }

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "firmware/single.h"
+
 namespace bielle::firmware {
 
 enum class Op { Constant, Input, Negate, Sqrt, Sin, Cos, Add, Subtract, Multiply, Divide, Atan2, Min };
@@ -121,10 +123,10 @@ std::vector<T> Program::evaluate(const std::vector<T>& inputs) const {
         x[i] = a() > 0 ? std::sqrt(a()) : T(0);
         break;
       case Op::Sin:
-        x[i] = std::sin(a());
+        x[i] = calcSine(a());
         break;
       case Op::Cos:
-        x[i] = std::cos(a());
+        x[i] = calcCosine(a());
         break;
       case Op::Add:
         x[i] = a() + b();
@@ -139,7 +141,7 @@ std::vector<T> Program::evaluate(const std::vector<T>& inputs) const {
         x[i] = a() / b();
         break;
       case Op::Atan2:
-        x[i] = std::atan2(a(), b());
+        x[i] = calcArctangent(a(), b());
         break;
       case Op::Min:
         x[i] = a() < b() ? a() : b();

@@ -35,7 +35,11 @@ std::string writeReadme(const std::vector<Maps>& all, const FirmwareOptions& opt
            "update_ratio(&at, &ratio);\n" + prefix + "joint_velocity(&ratio, motor_velocity, joint_velocity);\n" +
            prefix + "motor_torque(&ratio, wanted_joint_torque, NULL, motor_torque);\n```\n\n`" + compile + " -O2 " +
            name + end + " " + name + "_test" + end +
-           " -lm && ./a.out` compares it with postures of the mechanism with all its bodies and closures.\n\nPositions "
+           " -lm && ./a.out` compares it with postures of the mechanism with all its bodies and closures." +
+           (options.is_single ? " All processors get the same bits, unless multiplications and additions are fused: "
+                                "`-ffp-contract=off` forbids it, as does `-std=c99`."
+                              : "") +
+           "\n\nPositions "
            "are rad (m of "
            "slides), counted as in the robot's file. What is out of range is clamped, and the status says so; a value "
            "that is no "

@@ -39,33 +39,28 @@ Formulas::Formulas(const Maps& maps) {
   std::vector<Scalar> entries;
   append(rates.R, entries);
   append(rates.S, entries);
-  ratio = Program(entries);
-
-  std::map<int, Scalar> moving;
-  for (Index c = 0; c < n; ++c) {
-    Scalar rate = 0;
-    for (Index k = 0; k < m; ++k) rate += rates.T(c, k) * makeInput(mechanism.velocity() + static_cast<int>(k));
-    moving.emplace(static_cast<int>(c), rate);
-  }
-  Derivative derivative(moving);
-  entries.clear();
-  append(rates.R.unaryExpr([&](const Scalar& entry) { return derivative(entry); }), entries);
-  entries.push_back(derivative(rates.determinant) / rates.determinant);
-  ratio_rate = Program(entries);
-
-  entries.clear();
-  for (Index k = 0; k < m; ++k) {
-    std::map<int, Scalar> column;
-    for (Index c = 0; c < n; ++c) column.emplace(static_cast<int>(c), rates.T(c, k));
-    entries.push_back(Derivative(column)(mechanism.potential));
-  }
-  held = Program(entries);
-
   const Eigen::VectorXd& reference = maps.samples.front();
   std::vector<double> inputs(reference.data(), reference.data() + n);
   inputs.resize(static_cast<size_t>(mechanism.velocity() + m));
   const double there = Program({rates.ratio_determinant}).evaluate(inputs)[0];
-  branch = Program({there > 0 ? rates.ratio_determinant : -rates.ratio_determinant});
+  entries.push_back(there > 0 ? rates.ratio_determinant : -rates.ratio_determinant);
+  ratio = Program(entries);
+
+  entries.clear();
+  append(rates.R_rate, entries);
+  entries.push_back(rates.log_rate);
+  ratio_rate = Program(entries);
+
+  // Each coordinate's part is the same in all columns.
+  std::vector<Scalar> slopes;
+  for (Index c = 0; c < n; ++c) slopes.push_back(Derivative({{static_cast<int>(c), 1.0}})(mechanism.potential));
+  entries.clear();
+  for (Index k = 0; k < m; ++k) {
+    Scalar sum = 0;
+    for (Index c = 0; c < n; ++c) sum += rates.T(c, k) * slopes[static_cast<size_t>(c)];
+    entries.push_back(sum);
+  }
+  held = Program(entries);
 }
 
 std::vector<std::string> describe(const Maps& maps, bool is_single) {

@@ -15,10 +15,9 @@ std::vector<std::string> describe(const Maps& maps, bool is_single);
 // Formulas beyond positions.
 struct Formulas {
   explicit Formulas(const Maps& maps);
-  Program ratio;       // R, R^-1 by rows
+  Program ratio;       // R, R^-1 by rows, and what is positive on the branch of the reference
   Program ratio_rate;  // dR/dt by rows, and d log D_J/dt
   Program held;        // of the joints
-  Program branch;      // positive on the branch of the reference
 };
 
 }  // namespace bielle::firmware

@@ -1,9 +1,5 @@
 #pragma once
-// A linkage as few equations in few coordinates.
-//
-// Bodies that are welded are one. A rod that touches two others by balls, universal joints or parallel hinges holds two points
-// at a distance: one equation, and no coordinate. So does a strut with a slide between its ends, whose length is the slide's. Of what
-// remains, a spanning tree with the fewest coordinates is chosen anew; each other joint closes a loop.
+// A linkage as few equations in few coordinates (linkage_graph.h).
 //
 // A distance D is an equation in each coordinate of the chain between its points. About the axis n of a hinge with the
 // angle u, the points are r_a and R(u) r_b, and
@@ -50,6 +46,7 @@ struct Mechanism {
 
   int gravity() const { return static_cast<int>(coordinates.size()); }  // first input
   int velocity() const { return gravity() + 3; }                        // first input, where there is one
+  int ratio() const { return velocity() + gravity(); }                  // likewise, R by rows
 };
 
 // \param q  nq of the whole model, closed

@@ -77,29 +77,33 @@ def _close(joints):
 
 
 def _ratio(q):
-    r = [None] * (2 * SIZE * SIZE)
-@ratio@    both = _stack([x + 0 * q[0] for x in r])
-    return both.reshape(both.shape[:-1] + (2, SIZE, SIZE))
+    """R and its inverse, by rows, and what is positive on the branch of the robot's file."""
+    r = [None] * (2 * SIZE * SIZE + 1)
+@ratio@    return r
 
 
 def ratio(joints):
     """R (N, SIZE, SIZE), speeds of motors over those of joints, and its inverse."""
-    both = _ratio(_close(joints))
+    q = _close(joints)
+    both = _stack([x + 0 * q[0] for x in _ratio(q)[:-1]])
+    both = both.reshape(both.shape[:-1] + (2, SIZE, SIZE))
     return both[..., 0, :, :], both[..., 1, :, :]
 
 
 def ratio_rate(joints, joint_velocities):
     """Time derivative of R (N, SIZE, SIZE)."""
     q = _close(joints)
+    R = _ratio(q)
     v = [np.asarray(joint_velocities, float)[..., i] for i in range(SIZE)]
     r = [None] * (SIZE * SIZE + 1)
-@rate@    R = _stack([x + 0 * q[0] for x in r[:-1]])
-    return R.reshape(R.shape[:-1] + (SIZE, SIZE))
+@rate@    rate = _stack([x + 0 * q[0] for x in r[:-1]])
+    return rate.reshape(rate.shape[:-1] + (SIZE, SIZE))
 
 
 def held_torque(joints, gravity=(0, 0, -9.81)):
     """What springs and the weight of cranks and rods ask of the joints (N, SIZE); gravity (3,) or (N, 3) in the frame of @base@."""
     q = _close(joints)
+    R = _ratio(q)
     gravity = [np.asarray(gravity, float)[..., i] for i in range(3)]
     h = [None] * SIZE
 @held@    return _stack([x + 0 * q[0] for x in h])
@@ -146,7 +150,8 @@ std::map<std::string, std::string> writeNumPy(const Maps& maps) {
   const auto nameInput = [&](int i) {
     const auto entry = [](const char* array, int k) { return std::string(array) + "[" + std::to_string(k) + "]"; };
     if (i < mechanism.gravity()) return entry("q", i);
-    return i < mechanism.velocity() ? entry("gravity", i - mechanism.gravity()) : entry("v", i - mechanism.velocity());
+    if (i < mechanism.velocity()) return entry("gravity", i - mechanism.gravity());
+    return i < mechanism.ratio() ? entry("v", i - mechanism.velocity()) : entry("R", i - mechanism.ratio());
   };
   const auto deepen = [](const std::string& text, const std::string& by) {
     std::string out;
@@ -219,7 +224,7 @@ std::map<std::string, std::string> writeNumPy(const Maps& maps) {
                                                    {"@solve_motors@", printSolution(maps.inverse)},
                                                    {"@solve_joints@", printSolution(maps.direct)},
                                                    {"@coordinates@", std::to_string(mechanism.coordinates.size())},
-                                                   {"@ratio@", print(formulas.ratio, listTargets("r", 2 * m * m))},
+                                                   {"@ratio@", print(formulas.ratio, listTargets("r", 2 * m * m + 1))},
                                                    {"@rate@", print(formulas.ratio_rate, listTargets("r", m * m + 1))},
                                                    {"@held@", print(formulas.held, listTargets("h", m))},
                                                    {"@about@", about},

@@ -62,13 +62,13 @@ LoopText printLoop(const Program& program, const Style& style, const std::functi
         text[i] = call("root", false);
         break;
       case Op::Sin:
-        text[i] = call("sin");
+        text[i] = style.is_single ? "sine(" + a() + ", 0)" : call("sin");
         break;
       case Op::Cos:
-        text[i] = call("cos");
+        text[i] = style.is_single ? "sine(" + a() + ", 1)" : call("cos");
         break;
       case Op::Atan2:
-        text[i] = call(style.functions.empty() ? "atan2" : "arctan2");
+        text[i] = style.is_single ? call("arctangent", false) : call(style.functions.empty() ? "atan2" : "arctan2");
         break;
       case Op::Min:
         text[i] = call("least", false);

@@ -28,6 +28,20 @@ MatrixXs derive(const std::vector<Scalar>& rows, const std::vector<int>& columns
   return J;
 }
 
+MatrixXs multiply(const MatrixXs& A, const MatrixXs& B) {
+  MatrixXs out = MatrixXs::Constant(A.rows(), B.cols(), Scalar(0));
+  for (Index i = 0; i < A.rows(); ++i)
+    for (Index j = 0; j < B.cols(); ++j)
+      for (Index k = 0; k < A.cols(); ++k) out(i, j) += A(i, k) * B(k, j);
+  return out;
+}
+
+MatrixXs makeIdentity(Index n) {
+  MatrixXs out = MatrixXs::Constant(n, n, Scalar(0));
+  for (Index i = 0; i < n; ++i) out(i, i) = 1;
+  return out;
+}
+
 std::vector<int> listRange(int begin, int end) {
   std::vector<int> out;
   for (int i = begin; i < end; ++i) out.push_back(i);
@@ -426,19 +440,35 @@ Solution solve(const Mechanism& mechanism, const std::vector<int>& given, const 
 
 RateSolution solveRates(const Mechanism& mechanism, const Postures& samples) {
   const Index m = mechanism.size, n = static_cast<Index>(mechanism.coordinates.size());
-  const MatrixXs J = derive(listRows(mechanism), listRange(0, static_cast<int>(n)));
+  const std::vector<Scalar> rows = listRows(mechanism);
+  const MatrixXs J = derive(rows, listRange(0, static_cast<int>(n))), J_joints = J.leftCols(m),
+                 J_rest = J.rightCols(n - m);
   RateSolution out;
-  const Elimination rest = eliminate(J.rightCols(n - m), -J.leftCols(m), samples);
+  const Elimination rest = eliminate(J_rest, -J_joints, samples);
   out.determinant = rest.determinant;
-  out.T = MatrixXs::Constant(n, m, Scalar(0));
-  for (Index k = 0; k < m; ++k) out.T(k, k) = 1;
-  out.T.bottomRows(n - m) = rest.X;
-  out.R = out.T.middleRows(m, m);
-  MatrixXs identity = MatrixXs::Constant(m, m, Scalar(0));
-  for (Index k = 0; k < m; ++k) identity(k, k) = 1;
-  const Elimination inverse = eliminate(out.R, identity, samples);
+  out.R = rest.X.topRows(m);
+  const Elimination inverse = eliminate(out.R, makeIdentity(m), samples);
   out.S = inverse.X;
   out.ratio_determinant = inverse.determinant;
+
+  out.T.resize(n, m);
+  out.T.topRows(m) = makeIdentity(m);
+  for (Index i = 0; i < m; ++i)
+    for (Index k = 0; k < m; ++k) out.T(m + i, k) = makeInput(mechanism.ratio() + static_cast<int>(i * m + k));
+  if (n > 2 * m)
+    out.T.bottomRows(n - 2 * m) =
+        eliminate(J.rightCols(n - 2 * m), -multiply(J.leftCols(2 * m), out.T.topRows(2 * m)), samples).X;
+  std::map<int, Scalar> moving;
+  for (Index c = 0; c < n; ++c) {
+    Scalar rate = 0;
+    for (Index k = 0; k < m; ++k) rate += out.T(c, k) * makeInput(mechanism.velocity() + static_cast<int>(k));
+    moving.emplace(static_cast<int>(c), rate);
+  }
+  // J T = 0, so that J dT/dt = -dJ/dt T.
+  Derivative derivative(moving);
+  const MatrixXs J_rate = J.unaryExpr([&](const Scalar& entry) { return derivative(entry); });
+  out.R_rate = eliminate(J_rest, -multiply(J_rate, out.T), samples).X.topRows(m);
+  out.log_rate = derivative(out.determinant) / out.determinant;
   return out;
 }
 

@@ -55,12 +55,15 @@ struct Solution {
 // \throws InputError when the equations do not determine the coordinates
 Solution solve(const Mechanism& mechanism, const std::vector<int>& given, const Postures& samples);
 
-// Rates of all coordinates for unit rates of the joints (coordinates x size), the ratio R of the motors' rates among them, and its
-// inverse.
+// Rates of the first order. R, the rates of the motors for unit rates of the joints, comes first; what follows from it has its
+// entries as inputs (Mechanism::ratio()), and the rates of the joints (Mechanism::velocity()).
 struct RateSolution {
-  MatrixXs T, R, S;
+  MatrixXs R, S;                 // S = R^-1
   Scalar determinant = 1;        // D_J of (3)
   Scalar ratio_determinant = 1;  // of R, but for the sign
+  MatrixXs T;                    // rates of all coordinates (coordinates x size)
+  MatrixXs R_rate;               // dR/dt
+  Scalar log_rate = 0;           // d log D_J/dt
 };
 RateSolution solveRates(const Mechanism& mechanism, const Postures& samples);
 

@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "report/embed.h"
+#include "model/embed.h"
 
 #define BIELLE_FILE BIELLE_EMBED
 #include "assets.inc"

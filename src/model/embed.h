@@ -1,5 +1,5 @@
 #pragma once
-// Files that a library or program contains. FILES is made by bielle_embed() (CMakeLists.txt): BIELLE_FILE(identifier, name, path) for
+// Files that a library or program contains. FILES is made by bielle_embed() (cmake/layers.cmake): BIELLE_FILE(identifier, name, path) for
 // each. To be included first with BIELLE_FILE as BIELLE_EMBED, then as BIELLE_ENTRY in the list of a map from names to texts.
 // The assembler copies each file between two symbols.
 #define BIELLE_EMBED(id, name, path)                                                        \
