@@ -1,17 +1,6 @@
 # The Python package, by pytest, one test of CTest per file.
 if(TARGET bielle_python)
   set(environment "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
-  if(BIELLE_SANITIZE)
-    # The interpreter has no sanitizer of its own and does not load the C++ library, whose exceptions the sanitizer watches;
-    # some of what it allocates it never frees. Freed memory is kept for a short time only, because tests measure memory.
-    foreach(library libasan.so libstdc++.so)
-      execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=${library}
-        OUTPUT_VARIABLE file OUTPUT_STRIP_TRAILING_WHITESPACE)
-      list(APPEND preloaded ${file})
-    endforeach()
-    string(REPLACE ";" ":" preloaded "${preloaded}")
-    list(APPEND environment "LD_PRELOAD=${preloaded}" "ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=1")
-  endif()
   # bielle_python_test(NAME LABEL): python/tests/test_NAME.py
   function(bielle_python_test name label)
     add_test(NAME python_${name} COMMAND ${Python3_EXECUTABLE} -m pytest -q -p no:cacheprovider
@@ -20,7 +9,7 @@ if(TARGET bielle_python)
       ENVIRONMENT "${environment};BIELLE_COMMAND=$<TARGET_FILE:bielle_command>")
   endfunction()
   bielle_python_test(model unit)
-  bielle_python_test(arguments "unit;memory")
+  bielle_python_test(arguments unit)
   bielle_python_test(values unit)
   bielle_python_test(names unit)
   bielle_python_test(motions system)

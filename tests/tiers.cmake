@@ -35,7 +35,7 @@ set(bielle_slow_tests
   place_long parallel_bipeds_long results_alone_long results_architectures check edge_feet_long place workers report_page
   interruptions mutated_robots reduced_long simulate_predictive check_sequence
   # Under the sanitizers.
-  reduced policy bielle_world mujoco_world ocp_problem python_arguments)
+  reduced policy bielle_world mujoco_world ocp_problem)
 
 # bielle_set_tiers(): at the end of each directory that adds tests.
 function(bielle_set_tiers)
