@@ -19,6 +19,7 @@ using namespace bielle::validation;
 
 namespace {
 
+constexpr double kStep = 0.03;  // s; Simbody takes milliseconds for a node
 constexpr const char* kClaims = "goals: reported vs. measured";
 
 const LoadedRobot& getBipetto() {
@@ -39,7 +40,8 @@ CheckedMotion solveBriefly(Motion motion) {
 CheckedMotion makeShortWalk() {
   static const CheckedMotion walk = [] {
     WalkOptions options;
-    options.steps = 4;
+    options.steps = 3;
+    options.gait.timing.time_step = kStep;
     return solveBriefly(makeWalk(getBipetto().model, options));
   }();
   return walk;
@@ -60,10 +62,15 @@ TEST_CASE("check: every kind of goal comes out of Simbody's kinematics as the su
   TurnOptions turn;
   turn.steps = 3;
   turn.angle = 0.4;
+  turn.gait.timing.time_step = kStep;
   StairsOptions stairs;
-  stairs.stairs = 2;
+  stairs.stairs = 1;
+  stairs.gait.timing.time_step = kStep;
+  jump.time_step = 0.004;
+  SquatOptions squat;
+  squat.time_step = kStep;
   std::vector<CheckedMotion> motions = {makeShortWalk()};
-  motions.push_back(solveBriefly(makeSquat(model)));
+  motions.push_back(solveBriefly(makeSquat(model, squat)));
   motions.push_back(solveBriefly(makeJump(model, jump)));
   motions.push_back(solveBriefly(makeTurn(model, turn)));
   motions.push_back(solveBriefly(makeStairs(model, stairs)));
