@@ -2,10 +2,14 @@
 #include <array>
 #include <catch2/catch.hpp>
 
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/run.h"
 #include "bielle/motion/solve.h"
 #include "bielle/motion/walk.h"
+#include "math/so3.h"
+#include "motion/half_cycle.h"
 #include "own_robots.h"
 
 using namespace bielle;
@@ -123,6 +127,106 @@ TEST_CASE("periodic side walk and run: their ends are their beginnings, moved", 
   run.periodic = true;
   const Solution ahead = solveCycle(makeRun(getBipetto(), run));
   CHECK(calcSeam(ahead.motion.problem->model(), ahead, {2 * run.speed * (run.stance + run.flight), 0, 0}) < 1e-7);
+}
+
+TEST_CASE("mirror image: twice is nothing, and its accelerations are mirrored") {
+  for (const char* name : {"leg_biped", "cleobot", "kangaroo", "spring_biped"}) {
+    CAPTURE(name);
+    const LoadedRobot robot = loadOwn(name);
+    const Model& model = robot.model;
+    const int nq = model.nq(), nv = model.nv();
+    std::string why;
+    const auto mirror =
+        MirroredRobot::find(model, model.findContact("foot_left"), model.findContact("foot_right"), why);
+    CAPTURE(why);
+    REQUIRE(mirror);
+    // In a vertical plane that is not one of the axes.
+    const Vector3d normal = Vector3d(0.3, 0.8, 0).normalized();
+    const SE3 G(Matrix3d::Identity() - 2 * normal * normal.transpose(), 0.4 * normal);
+
+    // A posture, a motion and torques without any symmetry.
+    VectorXd x(nq + nv), u(model.nu());
+    VectorXd dq(nv);
+    for (int i = 0; i < nv; ++i) dq[i] = 0.1 * std::sin(1 + 2.3 * i);
+    const AssemblyResult closed = closeConfiguration(model, model.integrate(makeStandingPosture(model), dq));
+    REQUIRE(closed.status == NumericalStatus::Ok);
+    const ConstraintSet loops = makeConstraintSet(model, {});
+    Workspace ws(model);
+    VectorXd v(nv);
+    for (int i = 0; i < nv; ++i) v[i] = std::sin(2 + 1.7 * i);
+    x << closed.q, projectVelocity(model, ws, loops, closed.q, v);
+    for (int i = 0; i < model.nu(); ++i) u[i] = 20 * std::sin(3 + 1.3 * i);
+
+    const VectorXd image = mirror->mapState(G, x), twice = mirror->mapState(G, image);
+    CHECK(model.difference(x.head(nq), twice.head(nq)).lpNorm<Eigen::Infinity>() < 1e-12);
+    CHECK((twice - x).tail(nv).lpNorm<Eigen::Infinity>() < 1e-12);
+    CHECK(mirror->mapTorques(mirror->mapTorques(u)) == u);
+    CHECK(model.difference(x.head(nq), image.head(nq)).lpNorm<Eigen::Infinity>() > 0.1);
+
+    const auto calcAcceleration = [&](const VectorXd& state, const VectorXd& torques) {
+      ConstrainedWorkspace cws;
+      REQUIRE(updateConstrainedDynamics(model, ws, cws, loops, state.head(nq), state.tail(nv),
+                                        calcMotorForces(model, torques)) == NumericalStatus::Ok);
+      return cws.a;
+    };
+    // Accelerations go as velocities do.
+    const VectorXd a = calcAcceleration(x, u), mirrored = calcAcceleration(image, mirror->mapTorques(u));
+    VectorXd moving(nq + nv);
+    moving << x.head(nq), a;
+    const double size = a.lpNorm<Eigen::Infinity>();
+    CHECK((mirror->mapState(G, moving).tail(nv) - mirrored).lpNorm<Eigen::Infinity>() < 1e-10 * size);
+    // Notices torques that are not mirrored.
+    const VectorXd other = calcAcceleration(image, u);
+    CHECK((mirror->mapState(G, moving).tail(nv) - other).lpNorm<Eigen::Infinity>() > 1e-3 * size);
+  }
+}
+
+TEST_CASE("periodic walk: of a robot that is its own mirror image, one step is solved") {
+  const LoadedRobot robot = loadOwn("leg_biped");
+  WalkOptions options;
+  options.periodic = true;
+  const Motion motion = makeWalk(robot.model, options);
+  std::string why;
+  const std::optional<HalfCycle> half = HalfCycle::find(motion, why);
+  CAPTURE(why);
+  REQUIRE(half);
+  const Solution cycle = solveCycle(motion);
+  const ShootingTrajectory& trajectory = cycle.trajectory;
+  const size_t h = trajectory.us.size() / 2;
+  for (size_t k = 1; k <= h; ++k) CHECK(trajectory.xs[k + h] == half->mapState(trajectory.xs[k]));
+
+  // With its multipliers it is an optimum of the whole cycle: nothing is left to be done.
+  const std::unique_ptr<PeriodicProblem> whole = makePeriodicProblem(motion);
+  FddpOptions options_of_whole = makeOneThread().solver;
+  const FddpResult again = bielle::solve(*whole, whole->wrap(trajectory), options_of_whole, {},
+                                         whole->wrap({cycle.multipliers.values, cycle.summary.penalty}));
+  CHECK(again.summary.termination == FddpTermination::Converged);
+  CHECK(again.summary.iterations <= 1);
+  CHECK(again.summary.cost == Approx(cycle.summary.cost).epsilon(1e-9));
+  // And a start of it, which takes up its multipliers.
+  SolveOptions start = makeOneThread();
+  start.start = StartingPoint{trajectory, {cycle.multipliers.values, cycle.summary.penalty}};
+  const Solution repeated = solve(motion, start);
+  CHECK(repeated.converged());
+  CHECK(repeated.summary.iterations < cycle.summary.iterations / 2);
+  CHECK(repeated.summary.cost == Approx(cycle.summary.cost).epsilon(1e-9));
+}
+
+TEST_CASE("periodic motions: what is not its own mirror image is solved whole, and says why") {
+  WalkOptions options;
+  options.periodic = true;
+  std::string why;
+  CHECK_FALSE(HalfCycle::find(makeWalk(getBipetto(), options), why));
+  CHECK(why == "trunk has no mirror image: it differs in its centre of mass by 0.00032 m");
+  const LoadedRobot robot = loadOwn("leg_biped");
+  TurnOptions turn;
+  turn.periodic = true;
+  CHECK_FALSE(HalfCycle::find(makeTurn(robot.model, turn), why));
+  CAPTURE(why);
+  CHECK(why.find(" stages of a step") != std::string::npos);
+  SideWalkOptions side;
+  side.periodic = true;
+  CHECK_FALSE(HalfCycle::find(makeSideWalk(robot.model, side), why));
 }
 
 TEST_CASE("periodic motions: what they cannot be is refused") {

@@ -7,6 +7,7 @@
 #include "model/number_text.h"
 #include "motion/applied_options.h"
 #include "motion/feasibility.h"
+#include "motion/half_cycle.h"
 #include "motion/join.h"
 #include "motion/periodic_motion.h"
 #include "motion/refinement.h"
@@ -26,14 +27,45 @@ bool haveRows(const ShootingProblem& problem, const Multipliers& multipliers) {
   return true;
 }
 
+// The half of a cycle that is solved, and the observer that sees the costs of the whole.
+FddpObserver makeWholeObserver(const FddpObserver& observer) {
+  FddpObserver whole = observer;
+  if (observer.callback)
+    whole.callback = [&observer](FddpIteration line, const ShootingTrajectory& iterate) {
+      line.cost *= 2;
+      return observer.callback(line, iterate);
+    };
+  return whole;
+}
+
+FddpResult solveCycle(const PeriodicProblem& problem, const StartingPoint& start, const FddpOptions& solver,
+                      const FddpObserver& observer) {
+  Multipliers first = problem.wrap(start.multipliers);
+  first = haveRows(problem, first) ? Multipliers{first.values, solver.constraints.initial_penalty} : Multipliers();
+  FddpResult result = bielle::solve(problem, problem.wrap(start.trajectory), solver, observer, first);
+  result.trajectory = problem.unwrap(result.trajectory);
+  result.multipliers = problem.unwrap(std::move(result.multipliers));
+  return result;
+}
+
 Solution attemptCycle(const Motion& motion, const FddpOptions& solver, const FddpObserver& observer,
                       const StartingPoint& start) {
-  const std::unique_ptr<PeriodicProblem> problem = makePeriodicProblem(motion);
-  Multipliers first = problem->wrap(start.multipliers);
-  first = haveRows(*problem, first) ? Multipliers{first.values, solver.constraints.initial_penalty} : Multipliers();
-  FddpResult result = bielle::solve(*problem, problem->wrap(start.trajectory), solver, observer, first);
-  Solution out{motion, problem->unwrap(result.trajectory), std::move(result.summary),
-               problem->unwrap(std::move(result.multipliers))};
+  std::string why;
+  Solution out{motion, {}, {}};
+  if (const std::optional<HalfCycle> half = HalfCycle::find(motion, why)) {
+    const PeriodicProblem problem(half->problem(), [&half](const VectorXd& x) { return half->mapState(x); });
+    FddpResult result = solveCycle(problem, half->take(start), solver, makeWholeObserver(observer));
+    out.trajectory = half->unfold(result.trajectory);
+    out.multipliers = half->unfold(result.trajectory, result.multipliers);
+    out.summary = std::move(result.summary);
+    out.summary.cost *= 2;
+    for (FddpIteration& line : out.summary.log) line.cost *= 2;
+  } else {
+    FddpResult result = solveCycle(*makePeriodicProblem(motion), start, solver, observer);
+    out.trajectory = std::move(result.trajectory);
+    out.multipliers = std::move(result.multipliers);
+    out.summary = std::move(result.summary);
+  }
   if (out.converged()) setCyclicFeedback(out);
   return out;
 }
@@ -159,6 +191,7 @@ class RequestSolver {
 
   Solution solve() {
     tellDeadPoints();
+    tellHalf();
     const bool from_parts = !options_.start && !motion_.request->parts.empty();
     const FddpOptions from_guess = dampGuess(options_.solver);
     FddpOptions again = options_.solver;
@@ -203,6 +236,13 @@ class RequestSolver {
                    " mm between nodes, in stages of " + formatNumber(step) + " s" + (is_given ? ", as given" : "") +
                    "; " + (is_given ? "leave time_step out, or " : "") +
                    (option ? "set time_step=" + formatNumber(0.5 * step) : "set a shorter time_step of its motions"));
+  }
+
+  void tellHalf() const {
+    if (!motion_.cycle || !observer_.tell) return;
+    std::string why;
+    tell(HalfCycle::find(motion_, why) ? "solving one step of the cycle, whose other step is its mirror image"
+                                       : "solving both steps of the cycle, which is not its own mirror image: " + why);
   }
 
   void tellDeadPoints() const {
