@@ -6,6 +6,7 @@
 
 #include "design/spec_parts.h"
 #include "formats/text_file.h"
+#include "model/number_text.h"
 #include "tasks/cells.h"
 
 namespace fs = std::filesystem;
