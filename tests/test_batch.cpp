@@ -7,6 +7,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/worlds/batch.h"
+#include "count_allocations.h"
 #include "own_robots.h"
 #include "world_trials.h"
 
@@ -180,6 +181,35 @@ TEST_CASE("batch: worlds are reset alone, and begin as the others did") {
   other.step(starts.u, starts.push, 2e-3);
   other.step(starts.u, starts.push, 2e-3);
   for (int i : {0, 2, 9}) CHECK(isEqual(batch.configurations().col(i), other.configurations().col(i)));
+}
+
+TEST_CASE("batch: nothing is allocated once worlds step and are reset, on flat ground or on steps") {
+  const Model& model = getBipetto();
+  const Start starts = makeStarts(model, 19, 3);
+  WorldBatchOptions options = makeOptions(1e-3, 2);
+  std::vector<char> where(19, 0);
+  where[3] = where[17] = 1;
+  for (const bool has_steps : {false, true}) {
+    GroundStep step;
+    step.top = {0.02, 0.05, 1e-3};
+    step.length = step.width = 0.15;
+    if (has_steps) options.world.world.ground.steps = {step};
+    WorldBatch batch(model, 19, options);
+    const auto run = [&] {
+      batch.reset(starts.q, starts.v);
+      bool is_ok = true;
+      for (int tick = 0; tick < 10; ++tick) {
+        is_ok = batch.step(starts.u, starts.push, 2e-3) && is_ok;
+        batch.reset(starts.q, starts.v, where);
+      }
+      return is_ok;
+    };
+    CHECK(run());  // starts the threads
+    const long before = num_allocations;
+    const bool is_ok = run();
+    CHECK(num_allocations == before);
+    CHECK(is_ok);
+  }
 }
 
 TEST_CASE("batch: what it cannot take is refused, and nothing is stepped") {

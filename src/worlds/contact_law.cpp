@@ -200,7 +200,10 @@ std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<
       areas.push_back({contact.body, contact.X_BF, contact.half_length, contact.half_width, i, {}, {}});
     areas.back().homes.push_back(contact.X_BF.inverse().act(points[i].p).head<2>());
   }
-  for (ContactArea& area : areas) area.places.resize(area.homes.size());
+  for (ContactArea& area : areas) {
+    area.places.resize(area.homes.size());
+    area.lane.resize(area.first + area.homes.size());
+  }
   return areas;
 }
 
@@ -238,7 +241,7 @@ void settle<Lanes>(const Terrain& terrain, const SE3Of<Lanes>& X_WF, ContactArea
   constexpr Vector3<Lanes> ContactPointOf<Lanes>::*kParts[] = {
       &ContactPointOf<Lanes>::p, &ContactPointOf<Lanes>::anchor, &ContactPointOf<Lanes>::from};
   constexpr Vector3d ContactPoint::*kOwn[] = {&ContactPoint::p, &ContactPoint::anchor, &ContactPoint::from};
-  std::vector<ContactPoint> one(points.size());
+  std::vector<ContactPoint>& one = area.lane;
   for (Eigen::Index l = 0; l < kLane; ++l) {
     SE3 X;
     for (int i = 0; i < 9; ++i) X.R.data()[i] = X_WF.R.data()[i][l];

@@ -65,6 +65,7 @@ struct ContactArea {
   size_t first = 0;                        ///< of its points
   std::vector<Eigen::Vector2d> homes;      ///< in the frame of the contact, m
   std::vector<Terrain::Place> places;      ///< as settle() found them
+  std::vector<ContactPoint> lane{};        ///< up to its last point, of one of several robots
 };
 
 /// The points of all contacts of a model on a ground, contact by contact; those of a sole share its stiffness.

@@ -105,7 +105,10 @@ MaskOf<T> LeapfrogOf<T>::start(const Vector& q, const Vector& v, const Mask& whi
   moment_before_ = moment_;
   points_before_ = contacts_.points;
   const Mask done = tree_.set(q, v, which);
-  command(Vector::Zero(model_.nu()), Vector3<T>::Zero());
+  u_.setZero();
+  tau_.setZero();
+  push_.setZero();
+  is_pushed_ = false;
   moment_.half_last.setZero();
   moment_.owed = moment_.length = 0;
   moment_.works = {};
