@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
+#include "bielle/model/builder.h"
 #include "bielle/worlds/batch.h"
 #include "count_allocations.h"
 #include "own_robots.h"
@@ -80,6 +81,67 @@ double compareStep(const Model& model, const WorldBatchOptions& options, const B
     }
   }
   return worst;
+}
+
+// Random parameters. \param loops_alike  all bodies and rotors within the loops of a world have the same factor
+WorldParameters makeParameters(const Model& model, int count, bool loops_alike) {
+  std::mt19937 generator(4);
+  std::uniform_real_distribution<double> any(0.8, 1.25);
+  std::vector<char> is_in_loop(static_cast<size_t>(model.numBodies()), 0);
+  for (const LoopCluster& cluster : model.clusters())
+    for (int dof : cluster.dofs) is_in_loop[model.dofs()[dof].joint] = 1;
+  WorldParameters out;
+  out.mass_factors.resize(model.numBodies(), count);
+  out.armatures.resize(model.nu(), count);
+  out.effort_limits.resize(model.nu(), count);
+  out.friction.resize(count);
+  for (int i = 0; i < count; ++i) {
+    const double alike = any(generator);
+    for (int b = 0; b < model.numBodies(); ++b)
+      out.mass_factors(b, i) = loops_alike && is_in_loop[b] ? alike : any(generator);
+    for (int m = 0; m < model.nu(); ++m) {
+      out.armatures(m, i) = (loops_alike ? alike : any(generator)) * model.motors()[m].armature;
+      out.effort_limits(m, i) = 5 * any(generator);
+    }
+    out.friction[i] = 0.3 * any(generator);
+  }
+  return out;
+}
+
+// Of the robot of a world with parameters, alone, with a model of its own.
+std::unique_ptr<World> makeAlone(const Model& model, const WorldParameters& parameters, int i, double time_step) {
+  ModelParts parts = takeParts(model);
+  for (int b = 0; b < model.numBodies(); ++b) {
+    parts.bodies[b].inertia.mass *= parameters.mass_factors(b, i);
+    parts.bodies[b].inertia.I_com *= parameters.mass_factors(b, i);
+  }
+  for (int m = 0; m < model.nu(); ++m) {
+    parts.motors[m].armature = parts.armature[model.motors()[m].dof] = parameters.armatures(m, i);
+    parts.motors[m].effort_limit = parameters.effort_limits(m, i);
+  }
+  BielleWorldOptions options = makeOptions(time_step).world;
+  options.world.ground.friction = parameters.friction[i];
+  return makeBielleWorld(ModelBuilder::restore(std::move(parts)), options);
+}
+
+// Velocities of all worlds less those of the same robots alone, maybe with other parameters, after a duration.
+MatrixXd calcDifference(const Model& model, const Start& starts, const WorldParameters& parameters,
+                        const WorldParameters& alone, double time_step, double duration) {
+  const auto count = static_cast<int>(starts.q.cols());
+  WorldBatch batch(model, count, makeOptions(time_step));
+  batch.set(parameters);
+  batch.reset(starts.q, starts.v);
+  CHECK(batch.step(starts.u, starts.push, duration));
+  MatrixXd out = batch.velocities();
+  for (int i = 0; i < count; ++i) {
+    const auto world = makeAlone(model, alone, i, time_step);
+    world->reset(starts.q.col(i), starts.v.col(i));
+    world->setTorques(starts.u.col(i));
+    world->setPush(starts.push.col(i));
+    REQUIRE(world->advance(duration));
+    out.col(i) -= world->velocity();
+  }
+  return out;
 }
 
 }  // namespace
@@ -158,6 +220,124 @@ TEST_CASE("batch: what becomes of a world does not depend on the others, to the 
   CHECK(together.times()[kBroken] == Approx(0.014));
 }
 
+TEST_CASE("batch: parameters of a world are those of a changed model") {
+  const Model& model = getBipetto();
+  const Start starts = makeStarts(model, 10, 9);
+  const WorldParameters parameters = makeParameters(model, 10, true);
+  const auto compare = [&](const WorldParameters& alone) {
+    return calcDifference(model, starts, parameters, alone, 1e-3, 2e-3).cwiseAbs().maxCoeff();
+  };
+  CHECK(compare(parameters) < 1e-11);
+  const auto sees = [&](auto part) {
+    WorldParameters other = parameters;
+    (other.*part).col(0) *= 1.001;
+    return compare(other) > 1e-6;
+  };
+  CHECK(sees(&WorldParameters::mass_factors));
+  CHECK(sees(&WorldParameters::armatures));
+  CHECK(sees(&WorldParameters::effort_limits));
+  CHECK(sees(&WorldParameters::friction));
+}
+
+// A batch closes its loops along the metric of one model (reduction.h), a changed model along its own: to second order in the step
+// both are the same, and extrapolation leaves nothing of the difference.
+TEST_CASE("batch: masses within loops are those of a changed model as steps become short") {
+  const Model& model = getBipetto();
+  Start starts = makeStarts(model, 4, 9);
+  starts.q.row(2).array() += 1;
+  const WorldParameters parameters = makeParameters(model, 4, false);
+  const auto extrapolate = [&](const WorldParameters& alone) {
+    const MatrixXd once = calcDifference(model, starts, parameters, alone, 2.5e-4, 0.01);
+    return ((4 * calcDifference(model, starts, parameters, alone, 1.25e-4, 0.01) - once) / 3).cwiseAbs().maxCoeff();
+  };
+  CHECK(extrapolate(parameters) < 2e-5);
+  WorldParameters other = parameters;
+  other.mass_factors *= 1.001;
+  CHECK(extrapolate(other) > 1e-4);
+}
+
+TEST_CASE("batch: parameters are kept over resets, told, and none of the neighbours' business") {
+  const Model& model = getBipetto();
+  constexpr int kCount = 11;
+  const Start starts = makeStarts(model, kCount, 2);
+  WorldParameters parameters = makeParameters(model, kCount, false);
+  for (int i = 0; i < kCount; i += 2) {  // nothing of their own
+    parameters.mass_factors.col(i).setOnes();
+    for (int m = 0; m < model.nu(); ++m) {
+      parameters.armatures(m, i) = model.armature()[model.motors()[m].dof];
+      parameters.effort_limits(m, i) = model.motors()[m].effort_limit;
+    }
+    parameters.friction[i] = Ground().friction;
+  }
+  const auto run = [&](WorldBatch& batch) {
+    batch.reset(starts.q, starts.v);
+    for (int k = 0; k < 4; ++k) batch.step(starts.u, starts.push, 2e-3);
+  };
+  WorldBatch batch(model, kCount, makeOptions(1e-3)), plain(model, kCount, makeOptions(1e-3));
+  run(plain);
+  batch.reset(starts.q, starts.v);
+  for (int k = 0; k < 2; ++k) CHECK(batch.step(starts.u, starts.push, 2e-3));
+  batch.set(parameters);  // on the way
+  for (int k = 0; k < 2; ++k) CHECK(batch.step(starts.u, starts.push, 2e-3));
+  for (int i = 0; i < kCount; i += 2) CHECK(isEqual(batch.velocities().col(i), plain.velocities().col(i)));
+  run(batch);
+  const MatrixXd v = batch.velocities();
+  run(batch);
+  CHECK(batch.velocities() == v);
+  for (int i = 0; i < kCount; ++i) {
+    WorldBatch alone(model, 1, makeOptions(1e-3));
+    WorldParameters own{parameters.mass_factors.col(i),
+                        parameters.armatures.col(i),
+                        parameters.effort_limits.col(i),
+                        parameters.friction.segment(i, 1),
+                        {}};
+    alone.set(own);
+    alone.reset(starts.q.col(i), starts.v.col(i));
+    for (int k = 0; k < 4; ++k) alone.step(starts.u.col(i), starts.push.col(i), 2e-3);
+    CHECK(isEqual(alone.velocities(), v.col(i)));
+    CHECK(isEqual(plain.velocities().col(i), v.col(i)) == (i % 2 == 0));
+  }
+  CHECK(batch.parameters().mass_factors == parameters.mass_factors);
+  CHECK(batch.parameters().friction == parameters.friction);
+  CHECK(plain.parameters().effort_limits(0, 1) == model.motors()[0].effort_limit);
+}
+
+TEST_CASE("batch: delayed torques act later, in each world by its own delay") {
+  const Model& model = getBipetto();
+  constexpr int kCount = 5, kTicks = 5;
+  const Start starts = makeStarts(model, kCount, 8);
+  WorldParameters parameters;
+  parameters.delays.resize(kCount);
+  parameters.delays << 0, 1e-3, 2e-3, 3e-3, 7e-3;
+  WorldBatch batch(model, kCount, makeOptions(1e-3));
+  batch.set(parameters);
+  const auto getTorques = [&](int tick, int i) { return VectorXd(starts.u.col(i) / (1 + std::max(0, tick))); };
+  for (int k = 0; k < 2; ++k) {  // nothing of the first time is left in the second one
+    batch.reset(starts.q, starts.v);
+    for (int tick = 0; tick < kTicks; ++tick) {
+      MatrixXd u = starts.u;
+      for (int i = 0; i < kCount; ++i) u.col(i) = getTorques(tick, i);
+      REQUIRE(batch.step(u, starts.push, 2e-3));
+    }
+  }
+  const auto world = makeBielleWorld(model, makeOptions(1e-3).world);
+  for (int i = 0; i < kCount; ++i) {
+    const int delay = static_cast<int>(std::lround(1e3 * parameters.delays[i]));
+    world->reset(starts.q.col(i), starts.v.col(i));
+    world->setPush(starts.push.col(i));
+    for (int t = 0; t < 2 * kTicks;) {                                      // ms
+      const bool changes = delay % 2 == 1 && t % 2 == 0 && t >= delay + 1;  // on the way
+      const int end = (t - t % 2) + (changes ? 1 : 2);
+      world->setTorques(getTorques(t < delay ? 0 : (t - delay) / 2, i));
+      REQUIRE(world->advance(1e-3 * (end - t)));
+      t = end;
+    }
+    CAPTURE(i);
+    CHECK(batch.times()[i] == Approx(world->time()));
+    CHECK((batch.velocities().col(i) - world->velocity()).cwiseAbs().maxCoeff() < 1e-9);
+  }
+}
+
 TEST_CASE("batch: worlds are reset alone, and begin as the others did") {
   const Model& model = getBipetto();
   const Start starts = makeStarts(model, 10, 3);
@@ -195,6 +375,10 @@ TEST_CASE("batch: nothing is allocated once worlds step and are reset, on flat g
     step.length = step.width = 0.15;
     if (has_steps) options.world.world.ground.steps = {step};
     WorldBatch batch(model, 19, options);
+    WorldParameters parameters;
+    parameters.delays.setConstant(19, 3e-3);
+    parameters.mass_factors.setConstant(model.numBodies(), 19, 1.1);
+    batch.set(parameters);
     const auto run = [&] {
       batch.reset(starts.q, starts.v);
       bool is_ok = true;
@@ -225,6 +409,18 @@ TEST_CASE("batch: what it cannot take is refused, and nothing is stepped") {
   CHECK_THROWS_WITH(batch.reset(starts.q, v), Catch::Contains("world 1"));
   CHECK_THROWS_WITH(batch.step(starts.u.topRows(2), starts.push, 1e-3), Catch::Contains("u is 2 x 3"));
   CHECK_THROWS_WITH(batch.step(starts.u, starts.push, 0), Catch::Contains("positive"));
+  const auto refuses = [&](const WorldParameters& parameters, const char* what) {
+    CHECK_THROWS_WITH(batch.set(parameters), Catch::Contains(what));
+  };
+  const VectorXd friction = Vector3d(0.5, -1, 0.5);
+  refuses({{}, {}, {}, friction, {}}, "friction of world 1 has a -1.000000; give numbers that are not negative");
+  refuses({{}, {}, {}, friction.head(2), {}}, "friction is 1 x 2; give 1 x 3");
+  refuses({{}, {}, {}, {}, Vector3d(0, v(0, 1), 0)}, "delays of world 1 has a inf");
+  MatrixXd factors = MatrixXd::Ones(model.numBodies(), 3);
+  factors(4, 2) = 0;
+  refuses({factors, {}, {}, {}, {}}, "mass_factors of world 2 has a 0");
+  refuses({{}, {}, starts.u.topRows(2), {}, {}}, "effort_limits is 2 x 3");
+  CHECK(batch.parameters().mass_factors.minCoeff() == 1);
   CHECK(batch.times().isZero(0));
   CHECK((batch.velocities() - starts.v).cwiseAbs().maxCoeff() < 1e-9);
 }

@@ -18,6 +18,7 @@ from .named import (
     Impact as Impact,
     ImpactDerivatives as ImpactDerivatives,
     InverseDynamicsDerivatives as InverseDynamicsDerivatives,
+    WorldParameters as WorldParameters,
     WorldState as WorldState,
 )
 from .residuals import Residual as Residual

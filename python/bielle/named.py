@@ -63,6 +63,16 @@ class WorldState(NamedTuple):
     ok: Array  #: bool; False: the integration failed, and the state is the last finite one
 
 
+class WorldParameters(NamedTuple):
+    """By which worlds differ from their model; each has an axis of worlds in front."""
+
+    mass_factors: Array  #: mass and inertia of bodies over those of the model (bodies,), the world first
+    armatures: Array  #: of motors (nu,), kg m^2 or kg
+    effort_limits: Array  #: (nu,), N m or N
+    friction: Array  #: of the ground
+    delays: Array  #: from step() until its torques act, s
+
+
 class Books(NamedTuple):
     """Energies of a world at present, and work and losses since its reset, J. Their changes balance:
     kinetic + potential + elastic = start + motor_work + push_work - contact_loss - stop_loss - other_loss."""

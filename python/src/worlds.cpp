@@ -41,15 +41,19 @@ MakeWorld findEngine(const std::string& engine) {
 class HeldWorlds {
  public:
   HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step,
-             double tolerance, const std::string& engine)
+             double tolerance, const std::string& engine, int threads)
       : model_(std::move(model)), many_(count), engine_(engine), time_step_(time_step) {
     if (count && *count < 1) throw py::value_error("count: at least one world");
+    for (const auto& [name, value] : {std::pair{"time_step", time_step}, std::pair{"tolerance", tolerance}})
+      if (!(value >= 0 && std::isfinite(value))) throw py::value_error(std::string(name) + ": 0 or a positive number");
+    if (threads < 0) throw py::value_error("threads: 0 or the number of threads");
+    threads_ = threads > 0 ? threads : omp_get_max_threads();
     const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngine(engine);
     worlds::WorldOptions options{ground, time_step};
     options.tolerance = tolerance;
     const py::gil_scoped_release release;
     if (count && engine == "bielle" && tolerance == 0) {
-      const worlds::WorldBatchOptions all{{options, {}}, omp_get_max_threads()};
+      const worlds::WorldBatchOptions all{{options, {}}, threads_};
       batch_ = std::make_unique<worlds::WorldBatch>(*model_, *count, all);
       return;
     }
@@ -63,6 +67,8 @@ class HeldWorlds {
     const MatrixXd q0 = readRows(q, model_->nq(), "q", true), v0 = readRows(v, model_->nv(), "v", true);
     const VectorXd chosen = where.is_none() ? VectorXd::Ones(numWorlds())
                                             : readVector(where, static_cast<Eigen::Index>(numWorlds()), "where");
+    if (!(chosen.array() == 0 || chosen.array() == 1).all())
+      throw py::value_error("where: expected True or False for each world");
     if (batch_) {
       std::vector<char> marks;
       for (const double mark : chosen) marks.push_back(mark != 0);
@@ -75,6 +81,39 @@ class HeldWorlds {
       ok_[i] = true;
     });
     return observe();
+  }
+
+  // Of all worlds (fields without an axis of them) or of each.
+  void set(const py::object& mass_factors, const py::object& armatures, const py::object& effort_limits,
+           const py::object& friction, const py::object& delays) {
+    if (!batch_)
+      throw py::value_error(
+          "set: expected worlds of Bielle's own engine at fixed steps, made with `count` (1 for one)");
+    const BusyGuard guard(is_busy_, "world");
+    worlds::WorldParameters parameters;
+    const auto read = [this](const py::object& given, Eigen::Index size, const char* name, MatrixXd& out) {
+      if (!given.is_none()) out = readRows(given, size, name, true, true);
+    };
+    const auto readEach = [this](const py::object& given, const char* name, VectorXd& out) {
+      if (!given.is_none()) out = readNumbers(given, name);
+    };
+    read(mass_factors, model_->numBodies(), "mass_factors", parameters.mass_factors);
+    read(armatures, model_->nu(), "armatures", parameters.armatures);
+    read(effort_limits, model_->nu(), "effort_limits", parameters.effort_limits);
+    readEach(friction, "friction", parameters.friction);
+    readEach(delays, "delays", parameters.delays);
+    const py::gil_scoped_release release;
+    batch_->set(parameters);
+  }
+  py::object parameters() {
+    if (!batch_)
+      throw py::value_error("parameters: expected worlds of Bielle's own engine at fixed steps, made with `count`");
+    const BusyGuard guard(is_busy_, "world");
+    const worlds::WorldParameters& now = batch_->parameters();
+    return makeNamed("WorldParameters",
+                     {makeRows(now.mass_factors, {model_->numBodies()}), makeRows(now.armatures, {model_->nu()}),
+                      makeRows(now.effort_limits, {model_->nu()}), makeRows(now.friction.transpose(), {}),
+                      makeRows(now.delays.transpose(), {})});
   }
 
   // Of a single world.
@@ -167,9 +206,11 @@ class HeldWorlds {
   size_t numWorlds() const { return batch_ ? static_cast<size_t>(batch_->count()) : worlds_.size(); }
 
   // One column per world.
-  MatrixXd readRows(py::handle value, Eigen::Index size, const std::string& what, bool shared) const {
+  MatrixXd readRows(py::handle value, Eigen::Index size, const std::string& what, bool shared,
+                    bool may_be_infinite = false) const {
     const Array array = readArray(value, what);
-    if (!std::all_of(array.data(), array.data() + array.size(), [](double x) { return std::isfinite(x); }))
+    if (!std::all_of(array.data(), array.data() + array.size(),
+                     [&](double x) { return std::isfinite(x) || (may_be_infinite && std::isinf(x)); }))
       throw py::value_error(what + ": expected finite numbers");
     const auto count = static_cast<Eigen::Index>(numWorlds());
     if (many_ && !(shared && array.ndim() == 1)) {
@@ -178,6 +219,13 @@ class HeldWorlds {
     }
     requireShape(array, {size}, what);
     return Eigen::Map<const VectorXd>(array.data(), size).replicate(1, count);
+  }
+
+  // One number per world, or the same for all.
+  VectorXd readNumbers(py::handle value, const std::string& what) const {
+    const auto count = static_cast<Eigen::Index>(numWorlds());
+    const Array array = readArray(value, what);
+    return array.ndim() == 0 ? VectorXd::Constant(count, *array.data()) : readVector(value, count, what);
   }
 
   py::array makeRows(const MatrixXd& columns, Shape shape) const {
@@ -209,7 +257,7 @@ class HeldWorlds {
   void run(const Task& task) {
     const py::gil_scoped_release release;
     std::vector<std::exception_ptr> errors(worlds_.size());
-#pragma omp parallel for schedule(dynamic) if (worlds_.size() > 1)
+#pragma omp parallel for schedule(dynamic) num_threads(threads_) if (worlds_.size() > 1)
     for (size_t i = 0; i < worlds_.size(); ++i) {
       try {
         task(*worlds_[i], static_cast<Eigen::Index>(i));
@@ -228,6 +276,7 @@ class HeldWorlds {
   std::optional<int> many_;
   std::string engine_;
   double time_step_ = 0;
+  int threads_ = 1;
   bool has_warned_ = false;
   std::atomic<bool> is_busy_{false};
 };
@@ -287,15 +336,15 @@ void bindWorlds(py::module_& module) {
       "warns.\n"
       "tolerance: error per step of 'bielle' and 'simbody', rad, m and relative in velocities; with it, 'bielle' takes "
       "steps of high order and controlled error, for mechanisms in motion; 0: fixed steps, the fastest on feet.\n"
-      "With `count`, that many worlds are stepped together on all cores: arguments and results have a leading axis of "
-      "worlds.")
+      "With `count`, that many worlds are stepped together on all cores, or on `threads`: arguments and results have a "
+      "leading axis of worlds.")
       .def(py::init([](std::shared_ptr<Model> model, const py::object& count, const Ground& ground, double time_step,
-                       double tolerance, const std::string& engine) {
+                       double tolerance, const std::string& engine, int threads) {
              return std::make_shared<HeldWorlds>(std::move(model), read<std::optional<int>>(count, "count"), ground,
-                                                 time_step, tolerance, engine);
+                                                 time_step, tolerance, engine, threads);
            }),
            py::arg("model"), py::arg("count") = py::none(), py::arg("ground") = Ground(), py::arg("time_step") = 0.0,
-           py::arg("tolerance") = 0.0, py::arg("engine") = "bielle")
+           py::arg("tolerance") = 0.0, py::arg("engine") = "bielle", py::arg("threads") = 0)
       .def_property_readonly("model", &HeldWorlds::model, "Model")
       .def_property_readonly(
           "count", [](const HeldWorlds& self) { return show(self.count(), {}); }, "number of worlds, or None")
@@ -309,6 +358,15 @@ void bindWorlds(py::module_& module) {
            "Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), "
            "N.\n\n"
            "Returns the WorldState; its `ok` is False where the integration failed.")
+      .def("set", &HeldWorlds::set, py::arg("mass_factors") = py::none(), py::arg("armatures") = py::none(),
+           py::arg("effort_limits") = py::none(), py::arg("friction") = py::none(), py::arg("delays") = py::none(),
+           "Sets parameters by which worlds differ from the model, from now on and over reset(), of worlds made with "
+           "`count`; each for all alike, or with a leading axis of worlds.\n\n"
+           "mass_factors: (bodies,), mass and inertia over those of the model, the world first; armatures: (nu,), of "
+           "the motors, kg m^2 or kg; effort_limits: (nu,), N m or N; friction: of the ground; delays: from step() "
+           "until "
+           "its torques act, to the nearest whole time step, s. Raises ValueError, and nothing changes.")
+      .def_property_readonly("parameters", &HeldWorlds::parameters, "WorldParameters, of worlds made with `count`")
       .def_property_readonly("books", &HeldWorlds::books,
                              "energies now, and work and losses since reset, of a single world (Books), J")
       .def_property_readonly(

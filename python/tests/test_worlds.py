@@ -123,15 +123,61 @@ def test_some_worlds_start_anew():
         world.reset(q, v, where=[True, False])
 
 
-def test_wrong_arguments(model):
+def test_wrong_arguments_are_refused_and_nothing_is_stepped(model):
     world = bielle.World(model, count=2)
-    world.reset(model.standing(), np.zeros(model.nv))
-    with pytest.raises(ValueError, match=rf"u: expected shape \(2, {model.nu}\), got \(3, {model.nu}\)"):
-        world.step(np.zeros((3, model.nu)), 0.01)
-    with pytest.raises(ValueError, match="duration"):
-        world.step(np.zeros(model.nu), -1)
-    with pytest.raises(ValueError, match="count: at least one"):
-        bielle.World(model, count=0)
+    q, v, u = model.standing(), np.zeros(model.nv), np.zeros(model.nu)
+    before = world.reset(q, v)
+    nan, three = np.full(model.nu, np.nan), (3, model.nu)
+    for arguments, told in [
+        ((np.zeros(three), 0.01), rf"u: expected shape \(2, {model.nu}\), got \(3, {model.nu}\)"),
+        ((nan, 0.01), "u: expected finite"), ((u, -1), "duration"), ((u, np.nan), "duration"),
+        ((u, 0.01, np.zeros((2, 2))), r"push: expected shape \(2, 3\)"), ((u, 0.01, [0, 0, np.inf]), "push: expected finite"),
+    ]:  # fmt: skip
+        with pytest.raises(ValueError, match=told):
+            world.step(*arguments)
+    for arguments, told in [
+        ((q[:3], v), "q: expected shape"), ((q, v + np.nan), "v: expected finite"), ((q, v, [True]), "where: expected shape"),
+        ((q, v, [0, np.nan]), "where: expected True or False"), ((q, v, [0, 2]), "where: expected True or False"),
+    ]:  # fmt: skip
+        with pytest.raises(ValueError, match=told):
+            world.reset(*arguments)
+    for arguments, told in [
+        ({"mass_factors": [1]}, "mass_factors: expected shape"), ({"friction": [0.5, -1]}, "friction of world 1 has a -1"),
+        ({"delays": np.nan}, "delays of world 0 has a nan"), ({"effort_limits": nan}, "effort_limits: expected finite"),
+        ({"friction": [1, 1, 1]}, r"friction: expected shape \(2,\)"), ({"armatures": -u - 1}, "armatures of world 0 has a -1"),
+    ]:  # fmt: skip
+        with pytest.raises(ValueError, match=told):
+            world.set(**arguments)
+    after = world.reset(q, v, where=[False, False])
+    assert all(np.array_equal(a, b) for a, b in zip(before, after)) and (world.parameters.friction == bielle.Ground().friction).all()
+    for arguments, told in [({"count": 0}, "count: at least one"), ({"count": -3}, "count: at least one"),
+                            ({"time_step": -1.0}, "time_step"), ({"tolerance": np.nan}, "tolerance"), ({"threads": -1}, "threads")]:
+        with pytest.raises(ValueError, match=told):
+            bielle.World(model, **arguments)
+
+
+def test_parameters_of_worlds(model):
+    """A robot of half the weight drops as fast, stands on half the force, slides without friction, and hears late."""
+    world = bielle.World(model, count=3, threads=2)
+    world.set(mass_factors=np.array([[1.0], [0.5], [1.0]]) * np.ones(len(model.bodies)), friction=[0.7, 0.7, 0.0])
+    q, u = model.standing(), np.zeros(model.nu)
+    world.reset(q, np.zeros(model.nv))
+    for _ in range(40):
+        state = world.step(u, 2e-3)
+    push = world.wrenches[:, :, 2].sum(axis=1)
+    assert state.ok.all() and push[1] == pytest.approx(0.5 * push[0], rel=0.2)
+    assert np.abs(world.wrenches[2, :, :2]).max() < 1e-2 and np.abs(world.wrenches[:2, :, :2]).max() > 0.1
+    now = world.parameters
+    assert now.mass_factors[1, 3] == 0.5 and list(now.friction) == [0.7, 0.7, 0.0] and (now.delays == 0).all()
+    assert np.array_equal(now.effort_limits[2], [motor.effort_limit for motor in model.motors])
+    world.set(mass_factors=np.ones(len(model.bodies)), friction=0.7, delays=[0, 0.004, 0.004])
+    world.reset(q, np.zeros(model.nv))
+    for k in range(3):
+        state = world.step(u + 3.0 * (k > 0), 2e-3)
+        assert np.array_equal(state.q[0], state.q[1]) == (k == 0) and np.array_equal(state.q[1], state.q[2])
+    for other in (bielle.World(model), bielle.World(model, count=2, tolerance=1e-6)):
+        with pytest.raises(ValueError, match="made with `count`"):
+            other.set(friction=1)
 
 
 def test_steps_that_cannot_be_met_are_told(model):

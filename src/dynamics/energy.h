@@ -35,7 +35,7 @@ T calcSpringEnergy(const PointSpring& spring, const WorkspaceOf<T>& ws) {
 /// Needs updateVelocities.
 template <typename T>
 T calcKineticEnergyOf(const Model& model, const WorkspaceOf<T>& ws) {
-  T energy = 0.5 * model.armature().cast<T>().dot(ws.v.cwiseProduct(ws.v));
+  T energy = 0.5 * ws.armature.dot(ws.v.cwiseProduct(ws.v));
   for (int i = 1; i < model.numBodies(); ++i) energy += 0.5 * ws.V[i].dot(ws.h[i]);
   return energy;
 }

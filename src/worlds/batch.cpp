@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "bielle/dynamics/assembly.h"
@@ -24,16 +25,65 @@ void requireShape(const MatrixView& x, Eigen::Index rows, Eigen::Index columns, 
                               std::to_string(columns) + ", a column per world");
 }
 
+// Takes over parameters of a name that are given. \param is_possible  tells whether a number may be one
+template <typename M, typename IsPossible>
+void takeParameters(const M& given, const char* name, const char* wanted, const IsPossible& is_possible, M& out) {
+  if (given.size() == 0) return;
+  for (Eigen::Index i = 0; i < given.size(); ++i)
+    if (!is_possible(given.data()[i])) {
+      const Eigen::Index size = M::ColsAtCompileTime == 1 ? 1 : given.rows();
+      throw std::invalid_argument("worlds: " + std::string(name) + " of world " + std::to_string(i / size) + " has a " +
+                                  std::to_string(given.data()[i]) + "; give numbers that are " + wanted);
+    }
+  out = given;
+}
+
+// Torques on their way to the motors of a world, from those that act on; grows to what a delay needs.
+class Pipe {
+ public:
+  void clear() { size_ = 0; }
+  // \param time  when they act; those that are overtaken never do
+  void send(double time, ConstVectorRef u) {
+    while (size_ > 1 && get(size_ - 1).time >= time) --size_;
+    if (size_ == ring_.size()) {
+      std::rotate(ring_.begin(), ring_.begin() + static_cast<std::ptrdiff_t>(first_), ring_.end());
+      first_ = 0;
+      ring_.emplace_back();
+    }
+    Torques& last = get(size_++);
+    last.time = time;
+    last.u = u;
+  }
+  // Those that act at a time.
+  const VectorXd& take(double time) {
+    for (; size_ > 1 && get(1).time <= time; --size_) first_ = (first_ + 1) % ring_.size();
+    return get(0).u;
+  }
+  // When others act, after take().
+  double getNext() { return size_ > 1 ? get(1).time : std::numeric_limits<double>::infinity(); }
+
+ private:
+  struct Torques {
+    double time = 0;
+    VectorXd u;
+  };
+  Torques& get(size_t age) { return ring_[(first_ + age) % ring_.size()]; }
+  std::vector<Torques> ring_;
+  size_t first_ = 0, size_ = 0;
+};
+
 // Of a thread: allocated once, since worlds step in loops.
 struct Worker {
   Worker(const Model& model, const BielleWorldOptions& options)
       : steps(model, options.world.ground, options.contact, options.world.pushed_body),
+        motors(model.motors()),
         q(model.nq()),
         v(model.nv()),
         efforts(model.nu()),
         wrenches(6 * static_cast<Eigen::Index>(model.contacts().size())) {}
 
   Steps steps;
+  std::vector<Motor> motors;
   VectorX<Lanes> q, v, efforts, wrenches;
   Steps::Courses courses;
 };
@@ -77,6 +127,8 @@ struct WorldBatch::Data {
     team.run(static_cast<int>(workers.size()), work);
   }
   void read(Worker& worker, size_t group, const LaneMask& which);
+  void vary(Worker& worker, size_t group, const WorldParameters& before);
+  void command(Worker& worker, int lane, int world, ConstVectorRef u);
   void takeSteps(Worker& worker, size_t group, const MatrixView& u, const MatrixView& push, double duration);
 
   Model model;
@@ -86,6 +138,8 @@ struct WorldBatch::Data {
   std::vector<std::unique_ptr<Worker>> workers;
   Team team;
   std::vector<Steps::State> groups;  // of kLane worlds
+  WorldParameters parameters;
+  std::vector<Pipe> pipes;  // empty where no torques are delayed
   MatrixXd q, v, wrenches;
   VectorXd times;
   std::vector<char> is_ok, marks;  // marks: of those that are reset
@@ -105,6 +159,15 @@ WorldBatch::Data::Data(const Model& model, int count, const WorldBatchOptions& a
     workers.push_back(std::make_unique<Worker>(model, options));
   groups.assign(size, workers.front()->steps.copyState());
   q = model.makeNeutral().replicate(1, count);
+  parameters.mass_factors.setOnes(model.numBodies(), count);
+  parameters.armatures.resize(model.nu(), count);
+  parameters.effort_limits.resize(model.nu(), count);
+  for (int m = 0; m < model.nu(); ++m) {
+    parameters.armatures.row(m).setConstant(model.armature()[model.motors()[m].dof]);
+    parameters.effort_limits.row(m).setConstant(model.motors()[m].effort_limit);
+  }
+  parameters.friction.setConstant(count, options.world.ground.friction);
+  parameters.delays.setZero(count);
   v.setZero(model.nv(), count);
   wrenches.setZero(6 * static_cast<Eigen::Index>(model.contacts().size()), count);
   times.setZero(count);
@@ -126,11 +189,21 @@ void WorldBatch::Data::read(Worker& worker, size_t group, const LaneMask& which)
   unpack(worker.wrenches, group, which, wrenches);
 }
 
+// Torques of a world that act now, cut at what its motors can give.
+void WorldBatch::Data::command(Worker& worker, int lane, int world, ConstVectorRef u) {
+  for (int m = 0; m < model.nu(); ++m) {
+    Motor& motor = worker.motors[m];
+    motor.effort_limit = parameters.effort_limits(m, world);
+    worker.efforts[m].set(lane, motor.clampEffort(u[m], v(motor.dof, world)));
+  }
+}
+
 void WorldBatch::Data::takeSteps(Worker& worker, size_t group, const MatrixView& u, const MatrixView& push,
                                  double duration) {
-  worker.efforts.setZero();
+  Steps::Courses& courses = worker.courses;
   Vector3<Lanes> force = Vector3<Lanes>::Zero();
   LaneMask which = choose(group, is_ok);
+  std::array<double, kLane> start{}, taken{};
   for (int l = 0; l < kLane; ++l) {
     if (!which[l]) continue;
     const int world = getFirst(group) + l;
@@ -140,28 +213,40 @@ void WorldBatch::Data::takeSteps(Worker& worker, size_t group, const MatrixView&
       which.set(l, false);
       continue;
     }
-    for (int m = 0; m < model.nu(); ++m) {
-      const Motor& motor = model.motors()[m];
-      worker.efforts[m].set(l, motor.clampEffort(u(m, world), v(motor.dof, world)));
-    }
+    if (!pipes.empty()) pipes[world].send(times[world] + parameters.delays[world], u.col(world));
     for (int i = 0; i < 3; ++i) force[i].set(l, push(i, world));
+    start[l] = times[world];
   }
-  if (!any(which)) return;
   const double count = World::countSteps(duration, time_step), h = duration / count;
-  Steps::Courses& courses = worker.courses;
-  for (int l = 0; l < kLane; ++l)
-    if (which[l]) courses[l].time = times[getFirst(group) + l];
-  worker.steps.command(worker.efforts, force);
-  worker.steps.advance(count, h, which, options.world.interrupt, courses);
-  for (int l = 0; l < kLane; ++l) {
-    if (!which[l]) continue;
-    const int world = getFirst(group) + l;
-    const bool is_done = courses[l].taken == count;
-    times[world] += is_done ? duration : courses[l].taken * h;
-    is_ok[world] = courses[l].message.empty();
-    messages[world] = courses[l].message;
+  // Where torques are delayed, once for those that act still and once for each that begin to.
+  while (any(which)) {
+    worker.efforts.setZero();
+    for (int l = 0; l < kLane; ++l) {
+      if (!which[l]) continue;
+      const int world = getFirst(group) + l;
+      courses[l].time = times[world];
+      courses[l].steps = count - taken[l];
+      if (pipes.empty()) {
+        command(worker, l, world, u.col(world));
+        continue;
+      }
+      command(worker, l, world, pipes[world].take(times[world] + 0.5 * h));
+      const double until = std::max(1.0, std::round((pipes[world].getNext() - times[world]) / h));
+      courses[l].steps = std::min(courses[l].steps, until);
+    }
+    worker.steps.command(worker.efforts, force);
+    worker.steps.advance(h, which, options.world.interrupt, courses);
+    read(worker, group, which);
+    for (int l = 0; l < kLane; ++l) {
+      if (!which[l]) continue;
+      const int world = getFirst(group) + l;
+      taken[l] += courses[l].taken;
+      times[world] = start[l] + (taken[l] == count ? duration : taken[l] * h);
+      is_ok[world] = courses[l].message.empty();
+      messages[world] = courses[l].message;
+      which.set(l, is_ok[world] && courses[l].taken == courses[l].steps && taken[l] < count);
+    }
   }
-  read(worker, group, which);
 }
 
 WorldBatch::WorldBatch(const Model& model, int count, const WorldBatchOptions& options)
@@ -193,11 +278,55 @@ void WorldBatch::reset(const MatrixView& q, const MatrixView& v, const std::vect
       if (!which[l]) continue;
       const int world = d.getFirst(group) + l;
       d.times[world] = 0;
+      if (!d.pipes.empty()) d.pipes[world].clear();
       d.is_ok[world] = done[l];
       d.messages[world] = done[l] ? "" : worker.steps.tree().failure(l);
     }
     d.read(worker, group, done);
   });
+}
+
+// Worlds whose parameters stay are not touched.
+void WorldBatch::Data::vary(Worker& worker, size_t group, const WorldParameters& before) {
+  LaneMask which = makeMask<Lanes>(false);
+  for (int l = 0; l < kLane && getFirst(group) + l < count; ++l) {
+    const int world = getFirst(group) + l;
+    which.set(l, parameters.mass_factors.col(world) != before.mass_factors.col(world) ||
+                     parameters.armatures.col(world) != before.armatures.col(world) ||
+                     parameters.friction[world] != before.friction[world]);
+  }
+  if (!any(which)) return;
+  VectorX<Lanes> factors(model.numBodies()), armatures(model.nu()), armature = model.armature().cast<Lanes>();
+  VectorX<Lanes> friction(1);
+  pack(parameters.mass_factors, group, factors);
+  pack(parameters.armatures, group, armatures);
+  pack(parameters.friction.transpose(), group, friction);
+  for (int m = 0; m < model.nu(); ++m) armature[model.motors()[m].dof] = armatures[m];
+  worker.steps.vary(factors, armature, friction[0], which);
+}
+
+void WorldBatch::set(const WorldParameters& parameters) {
+  Data& d = *data_;
+  WorldParameters all = d.parameters;
+  const auto check = [&](const MatrixView& given, Eigen::Index rows, const char* name) {
+    if (given.size() > 0) requireShape(given, rows, d.count, name);
+  };
+  check(parameters.mass_factors, d.model.numBodies(), "mass_factors");
+  check(parameters.armatures, d.model.nu(), "armatures");
+  check(parameters.effort_limits, d.model.nu(), "effort_limits");
+  check(parameters.friction.transpose(), 1, "friction");
+  check(parameters.delays.transpose(), 1, "delays");
+  const auto isPositive = [](double x) { return x > 0 && std::isfinite(x); };
+  const auto isNotNegative = [](double x) { return x >= 0 && std::isfinite(x); };
+  takeParameters(parameters.mass_factors, "mass_factors", "positive", isPositive, all.mass_factors);
+  takeParameters(parameters.armatures, "armatures", "not negative", isNotNegative, all.armatures);
+  takeParameters(
+      parameters.effort_limits, "effort_limits", "positive", [](double x) { return x > 0; }, all.effort_limits);
+  takeParameters(parameters.friction, "friction", "not negative", isNotNegative, all.friction);
+  takeParameters(parameters.delays, "delays", "not negative", isNotNegative, all.delays);
+  std::swap(d.parameters, all);
+  if (d.pipes.empty() && !d.parameters.delays.isZero(0)) d.pipes.resize(static_cast<size_t>(d.count));
+  d.visit([&](Worker& worker, size_t group) { d.vary(worker, group, all); });
 }
 
 bool WorldBatch::step(const MatrixView& u, const MatrixView& push, double duration) {
@@ -211,6 +340,7 @@ bool WorldBatch::step(const MatrixView& u, const MatrixView& push, double durati
   return std::all_of(d.is_ok.begin(), d.is_ok.end(), [](char ok) { return ok != 0; });
 }
 
+const WorldParameters& WorldBatch::parameters() const { return data_->parameters; }
 const Model& WorldBatch::model() const { return data_->model; }
 int WorldBatch::count() const { return data_->count; }
 MatrixView WorldBatch::configurations() const { return data_->q; }

@@ -39,7 +39,8 @@ class BielleWorld : public World {
     const double steps = countSteps(duration, time_step_), h = duration / steps;
     Course& course = course_[0];
     course.time = time_;
-    steps_.advance(steps, h, true, interrupt_, course_);
+    course.steps = steps;
+    steps_.advance(h, true, interrupt_, course_);
     message_ = course.message;
     const bool is_done = course.taken == steps && message_.empty();
     time_ += is_done ? duration : course.taken * h;

@@ -78,6 +78,7 @@ ClosedTreeOf<T>::ClosedTreeOf(const Model& model, ConstVectorRef q, const std::v
   for (Vector* x : {&state_.q, &q_next_, &q_kept_}) *x = model.makeNeutral().cast<T>();
   state_.turns.setZero(model.nq());
   for (Vector* x : {&state_.v, &v_next_, &v_foreseen_, &a_d_}) x->setZero(model.nv());
+  state_.armature = ws_.armature;
   for (Vector* x : {&state_.w, &w_next_, &loads_, &w_kept_}) x->setZero(size());
 }
 
@@ -104,6 +105,19 @@ MaskOf<T> ClosedTreeOf<T>::set(const Vector& q, const Vector& v, const Mask& whi
   assignLanes(which, w_next_, state_.w);
   updateTree(which);
   return done;
+}
+
+template <typename T>
+void ClosedTreeOf<T>::setInertias(const Vector& mass_factors, const Vector& armature, const Mask& which) {
+  Vector& factors = state_.mass_factors;
+  if (factors.size() == 0) factors.setOnes(model_.numBodies());
+  assignLanes(which, mass_factors, factors);
+  assignLanes(which, armature, state_.armature);
+  ws_.armature = state_.armature;
+  bool differ = false;
+  for (const T& factor : factors) differ = differ || any(factor < T(1) || factor > T(1));
+  if (!differ) factors.resize(0);
+  updateTree(which);
 }
 
 // The state of a cluster at q: its bases are the same however it is reached. \returns false where it is singular
@@ -218,6 +232,7 @@ template <typename T>
 void ClosedTreeOf<T>::updateTree(const Mask& which) {
   updatePlacements<T>(model_, ws_, state_.q);
   updateColumns<T>(model_, ws_);
+  for (Eigen::Index i = 0; i < state_.mass_factors.size(); ++i) ws_.Y[i] *= state_.mass_factors[i];
   v_next_.setZero();
   addReduced(state_.w, v_next_);
   if (!all(which)) assignLanes(!which, state_.v, v_next_);
@@ -225,8 +240,22 @@ void ClosedTreeOf<T>::updateTree(const Mask& which) {
 }
 
 template <typename T>
+T ClosedTreeOf<T>::calcMass() const {
+  T mass = model_.mass();
+  for (Eigen::Index i = 0; i < state_.mass_factors.size(); ++i)
+    mass += (state_.mass_factors[i] - 1) * model_.bodies()[i].inertia.mass;
+  return mass;
+}
+
+template <typename T>
 T ClosedTreeOf<T>::calcPotential() const {
-  return calcPotentialEnergyOf(model_, ws_);
+  T energy = calcPotentialEnergyOf(model_, ws_);
+  for (Eigen::Index i = 0; i < state_.mass_factors.size(); ++i) {
+    const Inertia& inertia = model_.bodies()[i].inertia;
+    const Vector3<T> weight = inertia.mass * model_.gravity().cast<T>();
+    energy -= (state_.mass_factors[i] - 1) * weight.dot(ws_.X_WB[i].act(inertia.com.cast<T>()));
+  }
+  return energy;
 }
 
 template <typename T>

@@ -34,6 +34,7 @@ class ClosedTreeOf {
     Vector q, turns, v, w;                    ///< nq, nq, nv, size
     std::vector<ClusterStateOf<T>> clusters;  ///< at q
     std::vector<Vector> drifts;               ///< rank: (J W^{-1} J^T)^{-1} times the drift of the closures
+    Vector mass_factors, armature;            ///< numBodies, empty where all are 1; nv
   };
 
   /// \param q  closed configuration at which ranks are determined   \param tips  bodies
@@ -46,6 +47,9 @@ class ClosedTreeOf {
   /// Sets closed configurations of the robots of the mask, and the velocities nearest to v that keep them closed.
   /// \returns false where the linkages are singular; failure() then names a closure, also below
   Mask set(const Vector& q, const Vector& v, const Mask& which);
+  /// Masses and inertias of bodies are those of the model times factors (numBodies), rotors have an armature (nv), from now on. W of
+  /// reduction.h stays that of the model.
+  void setInertias(const Vector& mass_factors, const Vector& armature, const Mask& which);
   /// Robots of the mask move with the present velocity for a duration h, not zero: where a loop does not close, by two halves, which
   /// are divided again up to kMostHalvings times. Those that do not are somewhere on the way: restore() them.
   Mask drift(const T& h, const Mask& which, int halvings = kMostHalvings);
@@ -60,9 +64,13 @@ class ClosedTreeOf {
   /// w <- w + dw
   void kick(const Vector& dw, const Mask& which);
   /// Exchanges the robots for others. Placements and all that is updated are those of the former until the next drift().
-  void swap(State& state) { std::swap(state_, state); }
+  void swap(State& state) {
+    std::swap(state_, state);
+    ws_.armature = state_.armature;
+  }
   const State& state() const { return state_; }
 
+  T calcMass() const;       ///< kg
   T calcPotential() const;  ///< of gravity and springs of the model, J
   T calcEnergy();           ///< that and the kinetic one, J
 

@@ -21,7 +21,7 @@ struct NormalForce {
   T force, rate;  // rate: d force / d d'
 };
 template <typename T>
-NormalForce<T> calcNormalForce(double stiffness, double damping, const T& depth, const T& depth_rate) {
+NormalForce<T> calcNormalForce(const T& stiffness, double damping, const T& depth, const T& depth_rate) {
   const T factor = 1 + damping * depth_rate;
   const auto pulls = factor <= T(0);
   return {select(pulls, T(0), T(stiffness * depth * factor)), select(pulls, T(0), T(stiffness * depth * damping))};
@@ -120,7 +120,7 @@ ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point,
 }
 
 template <typename T>
-ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, double mu, const ContactPointOf<T>& point,
+ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, const T& mu, const ContactPointOf<T>& point,
                                    const Vector3<T>& x, const Vector3<T>& velocity, bool with_damping,
                                    const ContactStepOf<T>& step) {
   ContactForceOf<T> out;
@@ -187,7 +187,7 @@ void updateAnchor(const Terrain& terrain, const Vector3<T>& x, const ContactForc
   point.touches = touch.depth > T(0);
   point.anchor = point.from = at;
   if (!any(point.touches)) return;
-  point.anchor = select(point.touches, Vector3<T>(at + force.spring / T(point.shear_stiffness)), at);
+  point.anchor = select(point.touches, Vector3<T>(at + force.spring / point.shear_stiffness), at);
   point.from = select(point.touches, Vector3<T>(at + touch.depth * touch.normal), at);
 }
 
@@ -284,7 +284,7 @@ StopForceOf<T> calcStopForce(const JointStop& stop, const T& q, const T& v, cons
   const MeanDepth<T> mean = calcMeanDepth<T>(depth - 0.5 * h * step.before, depth + 0.5 * h * (2 * v - step.before));
   const auto touches = mean.depth > T(0);
   if (!any(touches)) return {};
-  const NormalForce<T> normal = calcNormalForce<T>(stop.stiffness, stop.damping, mean.depth, sign * v);
+  const NormalForce<T> normal = calcNormalForce<T>(T(stop.stiffness), stop.damping, mean.depth, sign * v);
   return {select(touches, T(-sign * normal.force), T(0)),
           select(touches, T(0.5 * stop.stiffness * mean.depth * mean.depth), T(0)),
           select(touches, T(normal.rate + normal.force / mean.depth * mean.rate * step.h), T(0))};
@@ -292,9 +292,9 @@ StopForceOf<T> calcStopForce(const JointStop& stop, const T& q, const T& v, cons
 
 template TouchOf<double> findTouch(const Terrain&, const Vector3d&, const Vector3d&);
 template TouchOf<Lanes> findTouch(const Terrain&, const Vector3<Lanes>&, const Vector3<Lanes>&);
-template ContactForce calcContactForce(const TouchOf<double>&, double, const ContactPoint&, const Vector3d&,
+template ContactForce calcContactForce(const TouchOf<double>&, const double&, const ContactPoint&, const Vector3d&,
                                        const Vector3d&, bool, const ContactStep&);
-template ContactForceOf<Lanes> calcContactForce(const TouchOf<Lanes>&, double, const ContactPointOf<Lanes>&,
+template ContactForceOf<Lanes> calcContactForce(const TouchOf<Lanes>&, const Lanes&, const ContactPointOf<Lanes>&,
                                                 const Vector3<Lanes>&, const Vector3<Lanes>&, bool,
                                                 const ContactStepOf<Lanes>&);
 template void updateAnchor(const Terrain&, const Vector3d&, const ContactForce&, ContactPoint&);

@@ -45,13 +45,14 @@ namespace bielle::worlds {
 /// One point of a contact, with its coefficients.
 template <typename T>
 struct ContactPointOf {
-  int contact = 0;                                ///< index into Model::contacts()
-  int body = 0;                                   ///< that carries it
-  Vector3<T> p = Vector3<T>::Zero();              ///< in the frame of the body, m
-  double stiffness = 0, damping = 0;              ///< k, N/m; c, s/m
-  double shear_stiffness = 0, shear_damping = 0;  ///< k_t, N/m; c_t, N s/m
-  Vector3<T> anchor = Vector3<T>::Zero();         ///< a, m (world)
-  MaskOf<T> touches = makeMask<T>(false);         ///< as of the last update of the anchor
+  int contact = 0;                           ///< index into Model::contacts()
+  int body = 0;                              ///< that carries it
+  Vector3<T> p = Vector3<T>::Zero();         ///< in the frame of the body, m
+  T stiffness = 0;                           ///< k, N/m
+  double damping = 0;                        ///< c, s/m
+  T shear_stiffness = 0, shear_damping = 0;  ///< k_t, N/m; c_t, N s/m
+  Vector3<T> anchor = Vector3<T>::Zero();    ///< a, m (world)
+  MaskOf<T> touches = makeMask<T>(false);    ///< as of the last update of the anchor
   Vector3<T> from =
       Vector3<T>::Zero();  ///< outside of the ground: through which of its surfaces the point came, m (world)
 };
@@ -109,7 +110,7 @@ ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point,
                               const Vector3d& velocity, bool with_damping = false, const ContactStep& step = {});
 /// \param touch     findTouch(terrain, x, point.from), which does not depend on the velocity   \param mu  friction of the ground
 template <typename T>
-ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, double mu, const ContactPointOf<T>& point,
+ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, const T& mu, const ContactPointOf<T>& point,
                                    const Vector3<T>& x, const Vector3<T>& velocity, bool with_damping,
                                    const ContactStepOf<T>& step);
 /// Eq. (3), for the force at x, and where the point came from.
@@ -158,12 +159,24 @@ template <typename T>
 class ContactSetOf {
  public:
   ContactSetOf(const Model& model, const Ground& ground, const ContactOptions& options)
-      : terrain(ground), stops(makeJointStops(model)) {
-    const std::vector<ContactPoint> made = makeContactPoints(model, ground, options);
-    for (const ContactPoint& point : made)
-      points.push_back({point.contact, point.body, point.p.cast<T>(), point.stiffness, point.damping,
-                        point.shear_stiffness, point.shear_damping});
-    if (!ground.steps.empty()) areas_ = makeContactAreas(model, made);
+      : terrain(ground), stops(makeJointStops(model)), made_(makeContactPoints(model, ground, options)) {
+    for (const ContactPoint& point : made_) {
+      points.emplace_back();
+      points.back().contact = point.contact;
+      points.back().body = point.body;
+      points.back().p = point.p.cast<T>();
+      points.back().damping = point.damping;
+    }
+    setHardness(1);
+    if (!ground.steps.empty()) areas_ = makeContactAreas(model, made_);
+  }
+  /// Robots whose weight is `ratio` times that of the model sink as deep. Their stops are as much harder, too.
+  void setHardness(const T& ratio) {
+    for (size_t i = 0; i < points.size(); ++i) {
+      points[i].stiffness = ratio * made_[i].stiffness;
+      points[i].shear_stiffness = ratio * made_[i].shear_stiffness;
+      points[i].shear_damping = ratio * made_[i].shear_damping;
+    }
   }
 
   const Terrain terrain;
@@ -201,7 +214,8 @@ class ContactSetOf {
 
  private:
   static constexpr double kLift = 5e-3;  // soles that start so deep in a top stand on it, m
-  std::vector<ContactArea> areas_;       // on ground with steps
+  std::vector<ContactPoint> made_;
+  std::vector<ContactArea> areas_;  // on ground with steps
   struct Elastic {
     double all = 0, stops = 0;  // J; the latter a part of the former
   };

@@ -125,6 +125,15 @@ MaskOf<T> LeapfrogOf<T>::start(const Vector& q, const Vector& v, const Mask& whi
 }
 
 template <typename T>
+void LeapfrogOf<T>::vary(const Vector& mass_factors, const Vector& armature, const T& friction, const Mask& which) {
+  tree_.setInertias(mass_factors, armature, which);
+  assignLanes(which, friction, friction_);
+  assignLanes(which, T(tree_.calcMass() / T(model_.mass())), mass_ratio_);
+  contacts_.setHardness(mass_ratio_);
+  assignLanes(which, T(tree_.calcEnergy() - moment_.works.sum()), moment_.energy);
+}
+
+template <typename T>
 void LeapfrogOf<T>::command(const Vector& u, const Vector3<T>& push) {
   u_ = u;
   tau_.setZero();
@@ -139,6 +148,8 @@ void LeapfrogOf<T>::swap(State& state) {
   tree_.swap(state.tree);
   std::swap(moment_, state.moment);
   contacts_.points.swap(state.points);
+  std::swap(friction_, state.friction);
+  std::swap(mass_ratio_, state.mass_ratio);
 }
 
 // How one robot goes along. Where a step cannot be taken, all that led there, since the cause is often a kick some steps before, are
@@ -151,8 +162,7 @@ struct LeapfrogOf<T>::Pace {
 };
 
 template <typename T>
-void LeapfrogOf<T>::advance(double steps, double h, const Mask& which, const std::atomic<bool>* interrupt,
-                            Courses& courses) {
+void LeapfrogOf<T>::advance(double h, const Mask& which, const std::atomic<bool>* interrupt, Courses& courses) {
   const auto isInterrupted = [&] { return interrupt && *interrupt; };
   std::array<Pace, kLanesOf<T>> paces;
   for (int l = 0; l < kLanesOf<T>; ++l) {
@@ -167,7 +177,7 @@ void LeapfrogOf<T>::advance(double steps, double h, const Mask& which, const std
     for (int l = 0; l < kLanesOf<T>; ++l) {
       Pace& pace = paces[l];
       if (!pace.is_under_way) continue;
-      if (pace.begins) pace = {std::min(kSpan, steps - courses[l].taken), 0, 1, 1, 0, true, true, false};
+      if (pace.begins) pace = {std::min(kSpan, courses[l].steps - courses[l].taken), 0, 1, 1, 0, true, true, false};
       pace.ends = pace.taken == pace.span || (pace.taken > 0 && isInterrupted());
       setLaneOf(active, l, true);
       setLaneOf(begin, l, pace.begins);
@@ -185,7 +195,7 @@ void LeapfrogOf<T>::advance(double steps, double h, const Mask& which, const std
       if (getLane(done, l)) {
         if (pace.ends) {
           course.taken += pace.taken;
-          pace.begins = course.taken < steps && !isInterrupted();
+          pace.begins = course.taken < course.steps && !isInterrupted();
           pace.is_under_way = pace.begins;
           continue;
         }
@@ -401,7 +411,7 @@ MaskOf<T> LeapfrogOf<T>::balance(const T& kinetic, const T& energy, const Mask& 
   using std::abs;
   note(Trouble::Energy, which);
   assignLanes(which, T(abs(energy - moment_.energy)), amount_);
-  const Mask holds = which && amount_ <= kEnergyError * kinetic + kLeastEnergy * model_.mass();
+  const Mask holds = which && amount_ <= kEnergyError * kinetic + kLeastEnergy * model_.mass() * mass_ratio_;
   assignLanes(holds, energy, moment_.energy);
   return holds;
 }
@@ -479,7 +489,9 @@ void LeapfrogOf<T>::addStops(const Vector& w, Vector& loads, MatrixX<T>* damping
       before += entry * tree_.reducedVelocity()[k];
       v += entry * w[k];
     });
-    const StopForceOf<T> force = calcStopForce<T>(stop, q, v, {moment_.length, before});
+    StopForceOf<T> force = calcStopForce<T>(stop, q, v, {moment_.length, before});
+    for (T StopForceOf<T>::*part : {&StopForceOf<T>::force, &StopForceOf<T>::elastic, &StopForceOf<T>::damping})
+      force.*part *= mass_ratio_;
     stop_forces_[i] = force.force;
     if (!any(force.elastic > T(0))) continue;
     tree_.visitRow(stop.dof, [&](int k, const T& entry) {

@@ -22,9 +22,10 @@ struct WorksOf {
   T sum() const { return motor + push + contact + stop + joint; }
 };
 
-/// How far a robot has come in an advance(), and how long its steps were.
+/// How far a robot goes and has come in an advance(), and how long its steps were.
 struct Course {
   double time = 0;                             ///< s, at its start
+  double steps = 0;                            ///< to take
   double taken = 0;                            ///< steps up to which it has come
   double shortest_step = 0, longest_step = 0;  ///< s; 0: none
   std::string message;                         ///< why it broke off at `taken`, or empty
@@ -54,19 +55,22 @@ class LeapfrogOf {
     typename ClosedTreeOf<T>::State tree;
     Moment moment;
     Points points;
+    T friction, mass_ratio;  ///< of the ground; of the robot's mass to that of the model
   };
 
   /// Closed configurations of the robots of the mask, velocities that keep them closed, no torques and no push.
   /// \returns false where tree().failure() says why
   Mask start(const Vector& q, const Vector& v, const Mask& which);
+  /// Robots of the mask have masses, rotors (ClosedTreeOf::setInertias()) and a friction of the ground of their own, from now on.
+  void vary(const Vector& mass_factors, const Vector& armature, const T& friction, const Mask& which);
   /// Torques of the motors (nu), and a force at the centre of mass of the pushed body, N (world).
   void command(const Vector& u, const Vector3<T>& push);
-  /// Robots of the mask take `steps` steps of length h, or shorter ones. Their first and last drifts are half as long.
+  /// Robots of the mask take `steps` of their courses, of length h, or shorter ones. Their first and last drifts are half as long.
   /// \param interrupt  ends it after a step, or null
-  void advance(double steps, double h, const Mask& which, const std::atomic<bool>* interrupt, Courses& courses);
+  void advance(double h, const Mask& which, const std::atomic<bool>* interrupt, Courses& courses);
   /// Exchanges the robots for others.
   void swap(State& state);
-  State copyState() const { return {tree_.state(), moment_, contacts_.points}; }
+  State copyState() const { return {tree_.state(), moment_, contacts_.points, friction_, mass_ratio_}; }
 
   const ClosedTreeOf<T>& tree() const { return tree_; }
   ContactSetOf<T>& contacts() { return contacts_; }
@@ -101,7 +105,7 @@ class LeapfrogOf {
 
   const Model model_;
   const int pushed_body_;
-  const double friction_;
+  T friction_, mass_ratio_ = 1;
   ClosedTreeOf<T> tree_;
   ContactSetOf<T> contacts_;
   std::vector<ContactForceOf<T>> forces_;  // of the last step, per point

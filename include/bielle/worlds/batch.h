@@ -13,6 +13,15 @@
 
 namespace bielle::worlds {
 
+/// What sets each world apart from the model and the ground of all. Matrices have a column per world.
+struct WorldParameters {
+  MatrixXd mass_factors;   ///< numBodies x count: mass and inertia of a body over those of the model; positive
+  MatrixXd armatures;      ///< nu x count, Motor::armature, kg m^2 or kg; not negative
+  MatrixXd effort_limits;  ///< nu x count, Motor::effort_limit, N m or N; positive, maybe infinite
+  VectorXd friction;       ///< count, Ground::friction; not negative
+  VectorXd delays;  ///< count, from step() until its torques act, to the nearest whole time step, s; not negative
+};
+
 struct WorldBatchOptions {
   BielleWorldOptions world;
   int threads = 0;  ///< 0: all
@@ -36,6 +45,13 @@ class WorldBatch {
   /// mass of the pushed body (3 x count), N (world). Worlds that are not ok() stay as they are.
   /// \returns whether all are ok() \throws std::invalid_argument for a wrong shape, or a duration that is not positive
   bool step(const Eigen::Ref<const MatrixXd>& u, const Eigen::Ref<const MatrixXd>& push, double duration);
+
+  /// Changes those parameters that are not empty, of all worlds, from now on: at once, and over reset(). Soles sink, and stops give
+  /// way, as deep under another weight as under that of the model (ContactOptions). Torques that are under way still act when they
+  /// would have, unless later ones overtake them; the first ones after reset() act at once.
+  /// \throws std::invalid_argument for a wrong shape, or a number that cannot be; nothing has changed then
+  void set(const WorldParameters& parameters);
+  const WorldParameters& parameters() const;  ///< all of them
 
   const Model& model() const;
   int count() const;
