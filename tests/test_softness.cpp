@@ -342,3 +342,34 @@ TEST_CASE("The largest stable step is MuJoCo's", "[softness]") {
     CHECK(diverges(1.05 * stable));
   }
 }
+
+TEST_CASE("An arm that is balanced on its pivot falls in MuJoCo, at any step, where its loop is softer than its weight",
+          "[softness]") {
+  HeldPendulum pendulum;
+  pendulum.option = "timestep=\"0.001\" gravity=\"-9.81 0 0\"";
+  pendulum.solimp = "0.5 0.5";
+  const double about = pendulum.inertia + pendulum.mass * pendulum.centre * pendulum.centre;
+  const double A = pendulum.centre * pendulum.centre / about / 3;
+  // The stiffness of a row is k / (1 - d) / A.
+  const double least = pendulum.mass * 9.81 * pendulum.centre / std::pow(pendulum.radius, 2) * A * 0.5;
+  for (const double share : {0.3, 1.3, 3.0}) {
+    INFO(share);
+    pendulum.solref = std::to_string(-share * least) + " -0.1";
+    SoftFile file(pendulum.xml());
+    const SoftLoops loops = file.loops();
+    const MatrixXd Z = loops.makeDirections(file.start, {0});
+    const SoftRest rest = loops.findRest(file.start, Z, VectorXd::Zero(1));
+    REQUIRE(rest.status == NumericalStatus::Ok);
+    const SoftMotion motion = loops.calcMotion(file.start, rest, Z);
+    CHECK(motion.falls == (share < 1));
+    CHECK_FALSE(motion.diverges);
+    CHECK(motion.stable_step > 0.01);
+    for (const double step : {0.0002, 0.01}) {
+      file.mj->opt.timestep = step;
+      file.set(file.start);
+      file.data->qpos[0] = 1e-6;
+      file.step(5);
+      CHECK((std::abs(file.data->qpos[0]) > 1e-5) == (share < 1));
+    }
+  }
+}

@@ -115,6 +115,21 @@ TEST_CASE("Steps that are too long diverge, and loops that are too soft give way
   CHECK(state("direct", {"--solref", "-1e6", "-2000", "--timestep", "0.002"}) == "diverges");
   CHECK(state("short", {"--solref", "-1e6", "-2000", "--timestep", "0.0002"}) == "holds");
   CHECK(state("soft", {"--solref", "2", "1", "--solimp", "0.5", "0.5"}) == "gives way");
+
+  // A mast that stands on its pivot falls over, if slowly.
+  const std::string mast = directory.write(
+      "mast.xml",
+      "<mujoco><worldbody><body name=\"mast\"><joint name=\"pivot\" axis=\"0 1 0\"/><inertial pos=\"0 0 1\" mass=\"1\" "
+      "diaginertia=\"0.1 0.1 0.1\"/></body></worldbody><equality><connect name=\"stay\" body1=\"mast\" body2=\"world\" "
+      "anchor=\"0 0 1\"/></equality></mujoco>");
+  for (const std::string step : {"0.0001", "0.01"}) {
+    const std::string output = directory.path() + "/mast" + step;
+    const CommandResult result = run({"softness", mast, "--solref", "-0.1", "-0.1", "--solimp", "0.5", "0.5",
+                                      "--timestep", step, "--json", "-o", output});
+    REQUIRE(result.status == 0);
+    CHECK(nlohmann::json::parse(result.out)["loops"][0]["state"] == "falls");
+    CHECK(readRows(output).front()["stable_step"] > 0.01);
+  }
 }
 
 TEST_CASE("Softness refuses what has no soft loops", "[softness]") {

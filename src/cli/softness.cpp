@@ -5,7 +5,6 @@
 #include <iostream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
@@ -63,7 +62,7 @@ Json identify(const SoftnessArguments& arguments, const LoadedRobot& robot, cons
   for (const MjcfEquality& equality : softness.equalities)
     equalities.push_back({equality.name, equality.settings.solref, equality.settings.solimp});
   return {{"softness", getBuildInfo().bielle},
-          {"robot", calcFingerprint(formatRobot(robot.model))},
+          {"robot", calcFingerprint(makeRunInfo(arguments.robot.name, robot).mechanism)},
           {"timestep", softness.step.duration},
           {"refsafe", softness.step.is_safe},
           {"integrator", static_cast<int>(softness.step.integrator)},
@@ -114,12 +113,14 @@ Json summarize(const SoftnessStudy& study, const Model& model, const std::vector
     for (const std::string& loop : study.listLoops(static_cast<int>(c))) {
       const auto largest = [&](std::initializer_list<const char*> keys) { return getLargest(rows, loop, keys); };
       double stable = kLongestStep;
-      std::string state = "holds";
-      for (const Json& row : rows) {
-        if (row.at("loop") != loop) continue;
-        if (row.at("stable_step").is_number()) stable = std::min(stable, row.at("stable_step").get<double>());
-        if (row.at("state") != "holds" && state != "diverges") state = row.at("state");
-      }
+      std::string worst;
+      for (const Json& row : rows)
+        if (row.at("loop") == loop && row.at("stable_step").is_number())
+          stable = std::min(stable, row.at("stable_step").get<double>());
+      for (const char* state : kSoftnessStates)
+        if (std::any_of(rows.begin(), rows.end(),
+                        [&](const Json& row) { return row.at("loop") == loop && row.at("state") == state; }))
+          worst = state;
       loops.push_back({{"loop", loop},
                        {"gap", largest({"gap", "angle"})},
                        {"gap_at_limit", largest({"gap_at_limit", "angle_at_limit"})},
@@ -130,7 +131,7 @@ Json summarize(const SoftnessStudy& study, const Model& model, const std::vector
                        {"energy_loss", largest({"energy_loss"})},
                        {"stable_step", stable},
                        {"driven", study.listDriven(static_cast<int>(c))},
-                       {"state", state}});
+                       {"state", worst}});
     }
   return loops;
 }
@@ -227,8 +228,10 @@ void addSoftness(CLI::App& command, Action& action) {
       "                of the motors\n"
       "  frequency     largest relative error, of small motions with the motors' torques as they are\n"
       "  energy        share of the energy of such a motion that is lost a second more than with rigid loops\n"
-      "  stable step   the largest time step; diverges: the file's is longer; gives way: the loops do not bear the "
-      "load\n"
+      "  stable step   the largest time step\n"
+      "  and what a loop does: holds; falls: the loops let the mechanism fall at any step; gives way: they do not bear "
+      "the load;\n"
+      "                diverges: the time step is too long\n"
       "Rows are appended as they are found: after Ctrl-C the same command goes on. Plots are drawn by gnuplot, if\n"
       "installed. Exit status: 0 done, 1 interrupted, 2 bad input, or a file without loops.\n"
       "Examples:\n"

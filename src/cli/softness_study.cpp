@@ -243,9 +243,10 @@ std::vector<Json> SoftnessStudy::study(const SoftnessTask& task) const {
                     {"energy_loss", ifHolds(rests, motion.energy_loss)},
                     {"stable_step", ifHolds(rests, motion.stable_step)},
                     {"pull", makeNumber(pull)},
-                    {"state", motion.diverges ? "diverges"
-                              : holds         ? "holds"
-                                              : "gives way"}});
+                    {"state", kSoftnessStates[motion.diverges ? 3
+                                              : !holds        ? 2
+                                              : motion.falls  ? 1
+                                                              : 0]}});
   }
   return rows;
 }

@@ -13,6 +13,9 @@ struct SoftnessOptions {
   double torque = -1;  // of the motors, N m or N; negative: their limits
 };
 
+// What a loop does at a posture, the worst last; `diverges` depends on the time step.
+constexpr const char* kSoftnessStates[] = {"holds", "falls", "gives way", "diverges"};
+
 // One linkage at one posture: all else stands.
 struct SoftnessTask {
   int cluster = 0;

@@ -23,7 +23,7 @@ constexpr double kFarthest = 1;           // rad or m: loops that open so far do
 constexpr double kDifference = 1e-6;      // of coordinates, rad or m, and of speeds
 constexpr double kLeastFrequency = 1e-3;  // 1/s: slower motions have none
 constexpr double kLeastStep = 1e-5, kStepFactor = 1.25, kStepTolerance = 1e-3;
-constexpr double kGrowth = 1;  // 1/s, beyond that with rigid loops: what grows faster diverges
+constexpr double kGrowth = 1;  // 1/s, beyond what is compared with: what grows faster falls or diverges
 
 // y(x) of the documentation, for x from 0 to 1, and its slope.
 struct Sigmoid {
@@ -289,27 +289,35 @@ struct SmallMotions {
   MatrixXd row_mass, row_damping, row_stiffness;
   SoftIntegrator integrator;
 
-  // Rates s of the motions e^{s t}, from the eigenvalues e^{s h} of one step of the duration h.
-  Eigen::VectorXcd calcRates(double h) const {
+  // The matrix of (x / h, v) is that of Eq. (4) times h, so that all entries have the same size; or that of a step of the duration h.
+  enum class Time { Continuous, Step };
+  MatrixXd makeMatrix(double h, Time time) const {
     const Eigen::Index n = stiffness.rows();
     const MatrixXd one = MatrixXd::Identity(n, n);
     const Eigen::LLT<MatrixXd> factors(one + row_mass);
-    MatrixXd position = -MatrixXd(factors.solve(stiffness + row_stiffness));
-    MatrixXd velocity = -MatrixXd(factors.solve(damping + row_damping));
-    // Of (x / h, v), so that all entries have the same size.
-    MatrixXd step(2 * n, 2 * n);
-    if (integrator == SoftIntegrator::RungeKutta) {
-      step << MatrixXd::Zero(n, n), one, h * h * position, h * velocity;
-      Eigen::VectorXcd s = calcEigenvalues(step);
-      for (std::complex<double>& z : s) z = std::log(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))) / h;
-      return s;
+    MatrixXd position = -h * h * MatrixXd(factors.solve(stiffness + row_stiffness));
+    MatrixXd velocity = -h * MatrixXd(factors.solve(damping + row_damping));
+    MatrixXd out(2 * n, 2 * n);
+    if (time == Time::Continuous) {
+      out << MatrixXd::Zero(n, n), one, position, velocity;
+      return out;
     }
     const Eigen::PartialPivLU<MatrixXd> end(one + h * implicit);
-    position = h * h * end.solve(position).eval();
-    velocity = one + h * end.solve(velocity).eval();
-    step << one + position, velocity, position, velocity;
-    Eigen::VectorXcd s = calcEigenvalues(step);
-    for (std::complex<double>& z : s) z = std::log(z) / h;
+    position = end.solve(position).eval();
+    velocity = one + end.solve(velocity);
+    out << one + position, velocity, position, velocity;
+    return out;
+  }
+  // Rates s of the motions e^{s t}.
+  Eigen::VectorXcd calcRates(double h) const { return calcEigenvalues(makeMatrix(h, Time::Continuous)) / h; }
+  // Of steps of the duration h, from their eigenvalues e^{s h}.
+  Eigen::VectorXcd calcSteppedRates(double h) const {
+    const bool explicitly = integrator == SoftIntegrator::RungeKutta;
+    Eigen::VectorXcd s = calcEigenvalues(makeMatrix(h, explicitly ? Time::Continuous : Time::Step));
+    for (std::complex<double>& z : s) {
+      if (explicitly) z = 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)));
+      z = std::log(z) / h;
+    }
     return s;
   }
 };
@@ -349,7 +357,7 @@ SoftMotion SoftLoops::calcMotion(ConstVectorRef q, const SoftRest& rest, const M
       step_.integrator == SoftIntegrator::Implicit ? small.damping : MatrixXd(Z.transpose() * multiplyRows(dampers, Z));
   small.row_mass = rows.transpose() * multiplyRows(open.mass, rows);
   // Another duration of the step changes the time constant, and with it B and K of each equality.
-  const auto calcRates = [&](double h) {
+  const auto makeSteps = [&](double h) {
     VectorXd damping = open.damping;
     MatrixXd stiffness = open.stiffness;
     int row = 0;
@@ -364,11 +372,15 @@ SoftMotion SoftLoops::calcMotion(ConstVectorRef q, const SoftRest& rest, const M
     }
     small.row_damping = rows.transpose() * multiplyRows(damping, rows);
     small.row_stiffness = rows.transpose() * stiffness * rows;
-    return small.calcRates(h);
+    return small;
   };
 
-  const Eigen::VectorXcd rates = calcRates(step_.duration);
-  motion.diverges = getFastest(rates) > fastest + kGrowth;
+  const double softest = getFastest(makeSteps(kLeastStep).calcRates(kLeastStep));
+  motion.falls = softest > fastest + kGrowth;
+  const double most = std::max(fastest, softest) + kGrowth;
+  const auto diverges = [&](double h) { return getFastest(makeSteps(h).calcSteppedRates(h)) > most; };
+  const Eigen::VectorXcd rates = makeSteps(step_.duration).calcSteppedRates(step_.duration);
+  motion.diverges = getFastest(rates) > most;
   for (const Mode& mode : rigid) {
     if (std::abs(mode.eigenvalue) < kLeastFrequency) continue;
     const std::complex<double> nearest = *std::min_element(rates.begin(), rates.end(), [&](auto a, auto b) {
@@ -383,7 +395,7 @@ SoftMotion SoftLoops::calcMotion(ConstVectorRef q, const SoftRest& rest, const M
     if (swings && std::abs(loss) > std::abs(motion.energy_loss)) motion.energy_loss = loss;
   }
   double step = kLeastStep;
-  while (step < kLongestStep && getFastest(calcRates(step)) <= fastest + kGrowth) step *= kStepFactor;
+  while (step < kLongestStep && !diverges(step)) step *= kStepFactor;
   double stable = step / kStepFactor;
   if (step >= kLongestStep) {
     stable = step = kLongestStep;
@@ -392,7 +404,7 @@ SoftMotion SoftLoops::calcMotion(ConstVectorRef q, const SoftRest& rest, const M
   }
   while (step - stable > kStepTolerance * step) {
     const double middle = (step + stable) / 2;
-    (getFastest(calcRates(middle)) <= fastest + kGrowth ? stable : step) = middle;
+    (diverges(middle) ? step : stable) = middle;
   }
   motion.stable_step = stable;
   return motion;

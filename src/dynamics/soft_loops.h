@@ -72,7 +72,8 @@ struct SoftMotion {
   double frequency_error = 0;  ///< largest, over that with rigid loops; of a motion that falls over, of its rate
   double energy_loss = 0;  ///< 1/s: the share of its energy that the motion loses a second more than with rigid loops
   double frequency = 0;    ///< Hz, of that motion with rigid loops; 0: it has none
-  bool diverges = false;   ///< at the duration of the step
+  bool falls = false;      ///< a motion grows faster than with rigid loops, however short the step
+  bool diverges = false;   ///< steps of this duration make one grow that would not
   double stable_step = 0;  ///< s, the longest below which no step makes motions grow, at most kLongestStep
 };
 inline constexpr double kLongestStep = 1;

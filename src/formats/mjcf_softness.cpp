@@ -9,6 +9,8 @@
 namespace bielle {
 namespace {
 
+constexpr double kLeastWeight = 1e-15;  // mjMINVAL
+
 class WeightCalculator {
  public:
   WeightCalculator(const Model& model, const MjcfSoftness& file) : model_(model), file_(file), ws_(model) {
@@ -91,7 +93,7 @@ SoftLoops makeSoftLoops(const Model& model, const MjcfSoftness& file, MujocoVers
       closure.X_B1.p = closure.X_B1.act(equality.lever * closure.axis);
       closure.X_B2.p = closure.X_B2.act(equality.lever * closure.axis);
     }
-    soft.weight = weights.calc(equality, closure, version);
+    soft.weight = weights.calc(equality, closure, version).cwiseMax(kLeastWeight);
     soft.scale = VectorXd::Ones(soft.weight.size());
     if (closure.kind == ClosureKind::Weld6D) soft.scale.tail<3>().setConstant(0.5);
     equalities.push_back(std::move(soft));
