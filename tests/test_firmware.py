@@ -122,6 +122,111 @@ class Linkage:
         return status, at[0], at[1], at
 
 
+# What of ros2_control its transmissions need: our own words for its interfaces.
+ROS_STUBS = {
+    "hardware_interface/hardware_info.hpp": """
+#include <string>
+#include <vector>
+namespace hardware_interface {
+struct JointInfo { std::string name; double mechanical_reduction = 1, offset = 0; };
+using ActuatorInfo = JointInfo;
+struct TransmissionInfo { std::string name; std::vector<JointInfo> joints; std::vector<ActuatorInfo> actuators; };
+}
+""",
+    "hardware_interface/types/hardware_interface_type_values.hpp": """
+namespace hardware_interface {
+constexpr char HW_IF_POSITION[] = "position", HW_IF_VELOCITY[] = "velocity", HW_IF_EFFORT[] = "effort";
+}
+""",
+    "pluginlib/class_list_macros.hpp": """
+#define PLUGINLIB_EXPORT_CLASS(type, base) namespace { [[maybe_unused]] base* make() { return new type; } }
+""",
+    "transmission_interface/exception.hpp": """
+#include <stdexcept>
+namespace transmission_interface { using Exception = std::runtime_error; }
+""",
+    "transmission_interface/transmission.hpp": """
+#include <string>
+#include <vector>
+namespace transmission_interface {
+class Handle {
+ public:
+  Handle(const std::string& prefix, const std::string& interface, double* value) : prefix_(prefix), interface_(interface), value_(value) {}
+  const std::string& get_prefix_name() const { return prefix_; }
+  const std::string& get_interface_name() const { return interface_; }
+  double get_value() const { return *value_; }
+  bool set_value(double value) { *value_ = value; return true; }
+ private:
+  std::string prefix_, interface_;
+  double* value_;
+};
+struct JointHandle : Handle { using Handle::Handle; };
+struct ActuatorHandle : Handle { using Handle::Handle; };
+class Transmission {
+ public:
+  virtual ~Transmission() = default;
+  virtual void configure(const std::vector<JointHandle>&, const std::vector<ActuatorHandle>&) = 0;
+  virtual void actuator_to_joint() = 0;
+  virtual void joint_to_actuator() = 0;
+  virtual std::size_t num_actuators() const = 0;
+  virtual std::size_t num_joints() const = 0;
+};
+}
+""",
+    "transmission_interface/transmission_loader.hpp": """
+#include <memory>
+#include "hardware_interface/hardware_info.hpp"
+#include "transmission_interface/transmission.hpp"
+namespace transmission_interface {
+struct TransmissionLoader {
+  virtual ~TransmissionLoader() = default;
+  virtual std::shared_ptr<Transmission> load(const hardware_interface::TransmissionInfo&) = 0;
+};
+}
+""",
+}
+# main ACTUATOR OFFSET JOINT VELOCITY EFFORT: reads an actuator behind a gear of 50 that turns at 0.2 rad/s with 0.04 N m, commands a joint;
+# then does both again where positions are unknown; then tells errors.
+ROS_MAIN = r"""
+#include "ros2_control.cpp"
+#include <cstdio>
+#include <cstdlib>
+int main(int, char** argument) {
+  const char* kinds[] = {"position", "velocity", "effort"};
+  double actuator[3] = {std::atof(argument[1]), 0.2, 0.04}, joint[3] = {};
+  std::vector<transmission_interface::JointHandle> joints;
+  std::vector<transmission_interface::ActuatorHandle> actuators;
+  for (int k = 0; k < 3; ++k) joints.emplace_back("rocker_joint", kinds[k], joint + k), actuators.emplace_back("gearbox", kinds[k], actuator + k);
+  hardware_interface::TransmissionInfo info{"knee", {{"rocker_joint", 1, std::atof(argument[2])}}, {{"gearbox", 50, 0}}};
+  const auto transmission = fourbar_linkages::rocker_joint_loader().load(info);
+  transmission->configure(joints, actuators);
+  transmission->actuator_to_joint();
+  std::printf("%.17g %.17g %.17g ", joint[0], joint[1], joint[2]);
+  for (int k = 0; k < 3; ++k) joint[k] = std::atof(argument[3 + k]);
+  transmission->joint_to_actuator();
+  std::printf("%.17g %.17g %.17g\n", actuator[0], actuator[1], actuator[2]);
+  actuator[0] = joint[0] = NAN;
+  transmission->joint_to_actuator();
+  std::printf("%.17g ", actuator[0]);
+  const double effort = actuator[2];
+  transmission->actuator_to_joint();
+  std::printf("%.17g %.17g\n", joint[0], effort);
+  const auto say = [](const auto& work) {
+    try {
+      work();
+    } catch (const transmission_interface::Exception& error) {
+      std::printf("%s; ", error.what());
+    }
+  };
+  info.joints[0].name = "knee";
+  say([&] { fourbar_linkages::rocker_joint_loader().load(info); });
+  info.joints[0].name = "rocker_joint", info.actuators[0].mechanical_reduction = 0;
+  say([&] { fourbar_linkages::rocker_joint_loader().load(info); });
+  say([&] { transmission->configure({}, actuators); });
+  return 0;
+}
+"""
+
 GROUND, CRANK, COUPLER, ROCKER = 0.4, 0.15, 0.35, 0.3
 
 
@@ -331,6 +436,35 @@ class FirmwareTest(unittest.TestCase):
         with open(source, "w") as file:
             file.write(text.replace("0.166666552f", "0.166666567f"))
         self.assertNotEqual(run_on_arm(place, "ankley_left_anklex_left", 1000)[0], here)
+
+    def test_transmissions_of_ros2_control(self):
+        """Compiled against stubs of its interfaces, as published."""
+        place = os.path.join(self.place, "ros")
+        convert("fourbar", place, "--to", "ros2_control", "--postures", "200")
+        for name, text in ROS_STUBS.items():
+            path = os.path.join(place, "stubs", name)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with open(path, "w") as file:
+                file.write("#pragma once\n" + text)
+        with open(os.path.join(place, "main.cpp"), "w") as file:
+            file.write(ROS_MAIN)
+        program = os.path.join(place, "main")
+        run("g++", "-std=c++17", "-O1", *STRICT, "-Istubs", "main.cpp", "rocker_joint.cpp", "-o", program, cwd=place)
+        rocker, rate, torque, gear, offset, h = 2.0, 0.3, 5.0, 50.0, 0.1, 1e-5
+        crank = calc_fourbar(rocker)
+        R = (calc_fourbar(rocker + h) - calc_fourbar(rocker - h)) / (2 * h)
+        read, unread, said = run(program, repr(gear * crank), repr(offset), repr(rocker + offset), repr(rate), repr(torque)).stdout.strip().split("\n")
+        for found, wanted in zip(map(float, read.split()), (rocker + offset, 0.2 / gear / R, 0.04 * gear * R, gear * crank, gear * R * rate, torque / R / gear)):
+            self.assertLess(abs(found - wanted), 1e-8 * (1 + abs(wanted)))
+        # What nobody has measured or commanded is none; efforts are carried over where the robot was measured last.
+        unread = list(map(float, unread.split()))
+        self.assertTrue(all(map(math.isnan, unread[:2])))
+        self.assertLess(abs(unread[2] - torque / R / gear), 1e-8)
+        self.assertRegex(said, r"joint 'rocker_joint' is missing.*its reduction is zero.*no interface")
+        with open(os.path.join(place, "ros2_control_plugins.xml")) as file:
+            self.assertIn('type="fourbar_linkages::rocker_joint_loader"', file.read())
+        with open(os.path.join(place, "README.md")) as file:
+            self.assertIn("<plugin>fourbar_linkages/rocker_joint</plugin>", file.read())
 
     def test_bad_input_writes_nothing(self):
         place = os.path.join(self.place, "nothing")

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 
 #include "bielle/dynamics/assembly.h"
@@ -59,13 +60,15 @@ int writeBy(const std::string& name, const std::string& json, const std::string&
   return status;
 }
 
-bool isFirmware(const std::string& format) { return format == "c" || format == "cpp" || format == "numpy"; }
+const std::map<std::string, FirmwareLanguage> kFirmware = {{"c", FirmwareLanguage::C},
+                                                           {"cpp", FirmwareLanguage::Cpp},
+                                                           {"numpy", FirmwareLanguage::NumPy},
+                                                           {"ros2_control", FirmwareLanguage::Ros2Control}};
+bool isFirmware(const std::string& format) { return kFirmware.count(format) > 0; }
 
 void writeFirmware(const LoadedRobot& robot, const ConvertArguments& arguments) {
   FirmwareOptions options;
-  options.language = arguments.format == "c"     ? FirmwareLanguage::C
-                     : arguments.format == "cpp" ? FirmwareLanguage::Cpp
-                                                 : FirmwareLanguage::NumPy;
+  options.language = kFirmware.at(arguments.format);
   options.is_single = arguments.precision == "float";
   options.postures = arguments.postures;
   for (size_t i = 0; i + 2 < arguments.ranges.size(); i += 3) {
@@ -155,12 +158,13 @@ void addConvert(CLI::App& command, Action& action) {
           "bielle: a directory with URDF and YAML, without losses; c, cpp: a directory with the maps of its linkages "
           "between joints and motors, for firmware; drake: a URDF with loops and motors for "
           "Drake; dxf: plates of the plane links, for a workshop; mjcf: a MuJoCo file; sdf: a Gazebo file with "
-          "loops; numpy: those maps as modules for Python; sheet: an SVG drawing with distances, and a CSV file of "
+          "loops; numpy: those maps as modules for Python; ros2_control: them in C++, and transmissions around them; "
+          "sheet: an SVG drawing with distances, and a CSV file of "
           "lengths, masses and motors; step: "
           "solids for CAD "
           "(AP214), an assembly of links; urdf: a URDF alone; usd: a USD file with loops for Isaac and Newton")
-      ->check(
-          CLI::IsMember({"bielle", "c", "cpp", "drake", "dxf", "mjcf", "numpy", "sdf", "sheet", "step", "urdf", "usd"}))
+      ->check(CLI::IsMember({"bielle", "c", "cpp", "drake", "dxf", "mjcf", "numpy", "ros2_control", "sdf", "sheet",
+                             "step", "urdf", "usd"}))
       ->capture_default_str();
   command
       .add_option(
@@ -171,19 +175,19 @@ void addConvert(CLI::App& command, Action& action) {
   command.add_option("--hole", arguments->hole, "with --to dxf: diameter of the holes [mm]")
       ->check(isWithin(0.1, 1000))
       ->capture_default_str();
-  command.add_option("--precision", arguments->precision, "with --to c or cpp: of all numbers")
+  command.add_option("--precision", arguments->precision, "with --to c, cpp or ros2_control: of all numbers")
       ->check(CLI::IsMember({"double", "float"}))
       ->capture_default_str();
   command
       .add_option("--range", arguments->ranges,
-                  "with --to c, cpp or numpy: JOINT LOW HIGH [rad, m], instead of the limits of the robot's file, or "
+                  "with maps of linkages: JOINT LOW HIGH [rad, m], instead of the limits of the robot's file, or "
                   "where it has none the range around its posture that stays 0.1 rad away from dead points; again for "
                   "other joints")
       ->expected(3)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command
       .add_option("--postures", arguments->postures,
-                  "with --to c, cpp or numpy: at how many of each linkage errors are measured")
+                  "with maps of linkages: at how many of each linkage errors are measured")
       ->check(isWithin(100, 10000000))
       ->capture_default_str();
   addRobotFlags(command, arguments->robot);
@@ -197,7 +201,7 @@ void addConvert(CLI::App& command, Action& action) {
       ->needs(payload);
   command
       .add_option("-o,--output", arguments->output,
-                  "the file; for bielle the directory, whose last part names its files; for c, cpp and numpy a "
+                  "the file; for bielle the directory, whose last part names its files; for maps of linkages a "
                   "directory of its own")
       ->required();
   command.footer(

@@ -12,7 +12,7 @@ using namespace firmware;
 
 std::string writeReadme(const std::vector<Maps>& all, const FirmwareOptions& options) {
   const bool is_python = options.language == FirmwareLanguage::NumPy,
-             is_cpp = options.language == FirmwareLanguage::Cpp;
+             is_cpp = options.language == FirmwareLanguage::Cpp || options.language == FirmwareLanguage::Ros2Control;
   const std::string name = all.front().name, prefix = is_cpp ? name + "::" : name + "_";
   const std::string type = is_cpp ? "Posture" : "posture", ratio = is_cpp ? "Ratio" : "ratio",
                     real = options.is_single ? "float" : "double", size = std::to_string(all.front().size());
@@ -89,10 +89,12 @@ FirmwareText formatFirmware(const Model& model, ConstVectorRef q, const Firmware
   for (const Maps& maps : all) {
     const auto files = options.language == FirmwareLanguage::NumPy
                            ? writeNumPy(maps)
-                           : writeC(maps, options.is_single, options.language == FirmwareLanguage::Cpp);
+                           : writeC(maps, options.is_single, options.language != FirmwareLanguage::C);
     out.files.insert(files.begin(), files.end());
   }
-  out.files.emplace("README.md", writeReadme(all, options));
+  std::string readme = writeReadme(all, options);
+  if (options.language == FirmwareLanguage::Ros2Control) out.files.merge(writeRos2(all, readme));
+  out.files.emplace("README.md", readme);
   return out;
 }
 

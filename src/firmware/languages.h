@@ -9,6 +9,9 @@ std::map<std::string, std::string> writeC(const Maps& maps, bool is_single, bool
 // One module of functions over arrays of postures.
 std::map<std::string, std::string> writeNumPy(const Maps& maps);
 
+// Transmissions of ros2_control around what writeC() makes in C++; the readme receives how they are built.
+std::map<std::string, std::string> writeRos2(const std::vector<Maps>& all, std::string& readme);
+
 // What holds of the maps, line by line: ranges, ways to compute, operations, errors.
 std::vector<std::string> describe(const Maps& maps, bool is_single);
 

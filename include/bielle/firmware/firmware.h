@@ -15,7 +15,8 @@
 
 namespace bielle {
 
-enum class FirmwareLanguage { C, Cpp, NumPy };
+/// Ros2Control: C++, and plug-ins that are transmissions of ros2_control.
+enum class FirmwareLanguage { C, Cpp, NumPy, Ros2Control };
 
 struct FirmwareOptions {
   FirmwareLanguage language = FirmwareLanguage::C;
