@@ -238,3 +238,107 @@ TEST_CASE("a step that was prepared before its initial state was known is the sa
   Receding growing(problem);
   CHECK_THROWS_WITH(growing.prepare(t), Catch::Contains("constant penalty"));
 }
+
+namespace {
+
+constexpr int kForeseen = 4;  // stages
+
+struct Step {
+  FddpSummary summary;
+  Foresight foresight;
+  int uses = 0;
+};
+
+Step foresee(Receding& solver, ShootingTrajectory& t) {
+  Step out;
+  out.foresight.stages = kForeseen;
+  out.foresight.use = [&] { ++out.uses; };
+  out.summary = solver.step(t, {}, &out.foresight);
+  return out;
+}
+
+double calcDistance(const Foresight& foresight, const ShootingTrajectory& t) {
+  double distance = 0;
+  for (int k = 0; k <= kForeseen; ++k) distance = std::max(distance, (foresight.nodes.xs[k] - t.xs[k]).norm());
+  for (int k = 0; k < kForeseen; ++k) distance = std::max(distance, (foresight.nodes.us[k] - t.us[k]).norm());
+  return distance;
+}
+
+}  // namespace
+
+TEST_CASE("what a receding step foresees is what its rollout leads to: to first order, and where models are exact") {
+  auto linear = makeLinear();
+  ShootingTrajectory t = makeGuess(linear);
+  Receding exact(linear, makeOptions(1));
+  const ShootingTrajectory guess = t;
+  const Step step = foresee(exact, t);
+  CHECK(step.uses == 1);
+  CHECK((t.us[0] - guess.us[0]).norm() > 0.1);
+  CHECK(calcDistance(step.foresight, t) < 1e-12);
+
+  auto problem = makeCartPole();
+  problem.start << 0.3, 0.3, 0, 0;
+  const FddpResult solved = solve(problem, makeGuess(problem), makeTightOptions());
+  REQUIRE(solved.summary.termination == FddpTermination::Converged);
+  const VectorXd nominal = problem.start;
+  const auto calcError = [&](double moved) {
+    problem.start = nominal + VectorXd::Constant(nominal.size(), moved);
+    ShootingTrajectory near = solved.trajectory;
+    Receding solver(problem, makeOptions(1));
+    const Step foreseen = foresee(solver, near);
+    CHECK(foreseen.uses == 1);
+    CHECK(foreseen.foresight.nodes.xs[0] == problem.start);
+    if (moved > 0) {
+      CHECK(foreseen.summary.log.back().step == 1);
+      CHECK(foreseen.foresight.nodes.us[0] == near.us[0]);  // nothing has been rolled out before
+    }
+    return calcDistance(foreseen.foresight, near);
+  };
+  const double whole = calcError(0.02), half = calcError(0.01);
+  CAPTURE(whole, half);
+  CHECK(whole > 1e-7);
+  CHECK(half < 0.3 * whole);
+  CHECK(calcError(0) < 1e-6);
+
+  problem.start = nominal + VectorXd::Constant(nominal.size(), 0.02);
+  ShootingTrajectory once = solved.trajectory, twice = once;
+  Receding one(problem, makeOptions(1)), two(problem, makeOptions(2));
+  one.step(once);
+  const Step last = foresee(two, twice);
+  CHECK(last.uses == 1);
+  CHECK(last.summary.iterations == 2);
+  CHECK(calcDistance(last.foresight, twice) < 0.1 * calcDistance(last.foresight, once));  // of the last iteration
+}
+
+TEST_CASE("what a receding step foresees keeps to the bounds, and is told though the step is then rejected") {
+  auto problem = makeCartPole();
+  problem.bound = 0.5;
+  ShootingTrajectory t = makeGuess(problem);
+  problem.start[1] -= 0.5;
+  Receding solver(problem, makeOptions(1));
+  const Step bounded = foresee(solver, t);
+  CHECK(bounded.uses == 1);
+  int at_bound = 0;
+  for (const VectorXd& u : bounded.foresight.nodes.us) {
+    CHECK(std::abs(u[0]) <= problem.bound);
+    at_bound += std::abs(u[0]) == problem.bound;
+  }
+  CHECK(at_bound > 0);
+
+  struct Steep : PlantProblem<Linear> {
+    Steep() : PlantProblem<Linear>(makeLinear()) {}
+    using PlantProblem<Linear>::linearize;
+    void linearize(LinearizeTask& task, ProblemScratch* scratch) const override {
+      PlantProblem<Linear>::linearize(task, scratch);
+      task.out->lx *= 1000;
+      task.out->lu *= 1000;
+    }
+  } steep;
+  t = makeGuess(steep);
+  Receding overshooting(steep, makeOptions(2));
+  const ShootingTrajectory before = t;
+  const Step rejected = foresee(overshooting, t);
+  CHECK_THAT(rejected.summary.message, Catch::Contains("no step is acceptable"));
+  CHECK(rejected.uses == 1);
+  CHECK(t.us == before.us);
+}

@@ -20,6 +20,7 @@ struct FddpMemory {
   std::vector<ControlBox> bounds;  // of u, N or none
   std::vector<ControlBox> boxes;   // of du, N or none
   std::vector<char> open;          // N: whether the gap after a stage counts as open
+  std::vector<IntegrateTask> integrations;
   Team team;
 
   void resize(const ShootingProblem& problem, const IterationOptions& options, int threads);

@@ -1,5 +1,6 @@
 #include "solve/receding.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -25,7 +26,8 @@ class RecedingStep : private FddpIterations {
 
   /// \param regularization  of the first sweep, if the initial one is less; then what the next step starts with: more after a
   /// search in vain, else less
-  FddpSummary run(bool prepared, double& regularization) {
+  FddpSummary run(bool prepared, double& regularization, Foresight* foresight) {
+    foresight_ = foresight;
     if (prepared)
       resume();
     else
@@ -65,6 +67,8 @@ class RecedingStep : private FddpIterations {
   End findStep() {
     while (true) {
       if (const End end = updateStep()) return end;
+      if (foresight_ && summary_.iterations + rejected_ + 1 >= max_iterations_)
+        foresee(*std::exchange(foresight_, nullptr));
       if (isOptimal()) return FddpTermination::Converged;
       if (stalled_ && isClosed() && !memory_.lagrangian.isEmpty()) {
         if (!memory_.lagrangian.updateMultipliers(getIterate(), line_.cost)) return endViolated();
@@ -82,6 +86,22 @@ class RecedingStep : private FddpIterations {
         return FddpTermination::MaxIterations;
       }
     }
+  }
+
+  void foresee(Foresight& foresight) {
+    auto& [xs, us] = foresight.nodes;
+    xs.resize(foresight.stages + 1, VectorXd(problem_.stateSize()));
+    xs[0] = trajectory_.xs[0];
+    us.resize(foresight.stages);
+    std::vector<IntegrateTask>& tasks = memory_.integrations;
+    tasks.clear();
+    for (int k = 1; k <= foresight.stages; ++k) tasks.push_back({k, getIterate()[k].get(), &memory_.dx[k], &xs[k]});
+    problem_.integrate(tasks.data(), static_cast<int>(tasks.size()), memory_.evaluations.getScratch(0));
+    for (int k = 0; k < foresight.stages; ++k) {
+      us[k] = trajectory_.us[k] + memory_.du[k];
+      if (!memory_.bounds.empty()) us[k] = us[k].cwiseMax(memory_.bounds[k].lower).cwiseMin(memory_.bounds[k].upper);
+    }
+    if (std::all_of(xs.begin(), xs.end(), [](const VectorXd& x) { return x.allFinite(); })) foresight.use();
   }
 
   // There is no time for rollouts in one piece, except at the end.
@@ -105,7 +125,8 @@ class RecedingStep : private FddpIterations {
 
   static constexpr int kShortestSegment = 3;  // stages; 48 then make two full batches of segments
 
-  int rejected_ = 0;  // searches without an acceptable step
+  Foresight* foresight_ = nullptr;  // still to be filled
+  int rejected_ = 0;                // searches without an acceptable step
 };
 
 }  // namespace
@@ -118,10 +139,10 @@ Receding::~Receding() = default;
 Receding::Receding(Receding&&) noexcept = default;
 Receding& Receding::operator=(Receding&&) noexcept = default;
 
-FddpSummary Receding::step(ShootingTrajectory& trajectory, const FddpObserver& observer) {
+FddpSummary Receding::step(ShootingTrajectory& trajectory, const FddpObserver& observer, Foresight* foresight) {
   if (!std::exchange(advanced_, false)) regularization_ = 0;
   const bool prepared = std::exchange(prepared_, false);
-  return RecedingStep(options_, *problem_, trajectory, observer, *memory_).run(prepared, regularization_);
+  return RecedingStep(options_, *problem_, trajectory, observer, *memory_).run(prepared, regularization_, foresight);
 }
 
 void Receding::prepare(ShootingTrajectory& trajectory) {

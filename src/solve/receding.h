@@ -13,6 +13,7 @@
 ///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (14)
 /// With Eq. (10) alone a violated row moves inside by as much as it was violated. There it is free, since it is farther from
 /// its bound than y_k / rho, and is then violated again: in a walk's window, wrench cones by 0.5 in every other iteration.
+#include <functional>
 #include <memory>
 
 #include "bielle/solve/fddp.h"
@@ -35,6 +36,14 @@ struct NodeSource {
   bool same = false;  ///< its evaluation, too: problem, state and control are what they were
 };
 
+/// What the first stages of a window become by the full step of the models, which is known before it is rolled out.
+struct Foresight {
+  int stages = 0;            ///< at most those of the window
+  ShootingTrajectory nodes;  ///< xs_k (+) dx_k, stages + 1 of them, and us_k + du_k, within the bounds
+  std::function<void()>
+      use;  ///< called once they are there and finite: after the first sweep of the last iteration that step() may make
+};
+
 /// Keeps its memory and multipliers from step to step: an iteration after the first allocates nothing.
 class Receding {
  public:
@@ -48,7 +57,8 @@ class Receding {
   /// Improves the trajectory of the window: on entry, like the guess of solve(), then the last iterate. Multipliers start
   /// from zero unless advance() or setMultipliers() came after the last step. Exceptions of the problem leave it, with the
   /// current iterate in the trajectory. \throws std::invalid_argument like solve()
-  FddpSummary step(ShootingTrajectory& trajectory, const FddpObserver& observer = {});
+  /// \param foresight  if any, is filled on the way; getGains() and getLinearized() are then of the same sweep
+  FddpSummary step(ShootingTrajectory& trajectory, const FddpObserver& observer = {}, Foresight* foresight = nullptr);
 
   /// All of the next step() for which the initial state of the window need not be known: evaluations of all nodes but the first,
   /// their multipliers, models and sweep. The step does the rest, with the same result. Until then nothing but that state may
