@@ -20,6 +20,7 @@ namespace bielle::worlds {
 namespace {
 
 using bielle::testing::getBipetto;
+using bielle::testing::kLeadTicks;
 using bielle::testing::kStageTicks;
 
 // A squat, its solution, and the policy of its gains.
@@ -220,7 +221,7 @@ class Blinking : public Controller {
  public:
   explicit Blinking(PredictiveController& inner) : inner_(inner) {}
   void update(const Measurement& measurement, VectorRef u) override {
-    const bool solves = static_cast<int>(std::lround(1e3 * measurement.time)) % bielle::testing::kStageTicks == 0;
+    const bool solves = static_cast<int>(std::lround(1e3 * measurement.time)) % kStageTicks == kStageTicks - kLeadTicks;
     const auto feet = std::count(measurement.contacts.begin(), measurement.contacts.end(), char(1));
     if (solves) swing_ = feet == 1 ? swing_ + 1 : 0;
     Measurement seen = measurement;
@@ -286,10 +287,12 @@ class Gate {
 
 // A robot that stands until it is commanded otherwise, by a command that comes through a gate.
 struct Standing {
-  explicit Standing(bool own_thread, int solve_ticks = 0) : q(makeStandingPosture(getBipetto())) {
+  explicit Standing(bool own_thread, int solve_ticks = 0, int lead_ticks = kStageTicks)
+      : q(makeStandingPosture(getBipetto())) {
     PredictiveOptions options = makeShortWindow(1);
     options.own_thread = own_thread;
     options.solve_time = 1e-3 * solve_ticks;
+    options.lead = 1e-3 * lead_ticks;
     const CommandSource source = [this](double) {
       gate.pass();
       return VelocityCommand{};
@@ -458,6 +461,56 @@ TEST_CASE("predictive control: solves that are given more than a stage come late
   CHECK(counts.failed == 0);
   for (const PredictiveSolve& solve : counts.last) CHECK(solve.latency == Approx(1e-3 * kTicks));
   CHECK_THROWS_WITH(Standing(false, -1), Catch::Contains("solve_time"));
+}
+
+TEST_CASE("predictive control: a solve begins its lead before its stage, and knows what has happened until then") {
+  constexpr int kStages = 5;
+  constexpr int lead = kLeadTicks;
+  const int period = GENERATE(1, 5, 12);
+  // The last instant of each stage at which the lead is left.
+  const auto findInstant = [&](int stage) {
+    int tick = 0;
+    while (tick + period + lead <= (stage + 1) * kStageTicks) tick += period;
+    return stage == 0 ? 0 : tick;  // at the first instant, the next one is not known
+  };
+  const bool known = GENERATE(false, true);
+  CAPTURE(period, known);
+  Standing pushed(false, 0, lead), other(false, 0, lead);
+  const int last = findInstant(kStages - 1);
+  for (int tick = 0; tick <= kStages * kStageTicks; tick += period) {
+    if (tick == last + (known ? 0 : period)) pushed.at.v[0] += 0.1;
+    for (Standing* one : {&pushed, &other}) one->update(tick);
+  }
+  const std::vector<PredictiveSolve>& solves = other.controller->counts().last;
+  REQUIRE(solves.size() >= kStages);
+  for (int stage = 0; stage < kStages; ++stage) CHECK(solves[stage].time == Approx(1e-3 * findInstant(stage)));
+  const Policy::Stage &a = pushed.controller->policy().stages().front(),
+                      &b = other.controller->policy().stages().front();
+  CHECK(a.start == Approx(1e-3 * kStages * kStageTicks));
+  if (known)
+    CHECK(a.v[0] - b.v[0] > 0.02);
+  else
+    CHECK(a.v == b.v);
+}
+
+TEST_CASE("predictive control: a solve that ends before the next one begins is prepared for as if it were in time") {
+  Standing own(true, 0, kLeadTicks), other(false, 0, kLeadTicks);
+  for (int tick = 0; tick < 10 * kStageTicks; ++tick) {
+    own.update(tick);
+    own.controller->waitForSolve();
+    other.update(tick);
+    REQUIRE(own.u == other.u);
+  }
+  const PredictiveCounts& counts = own.controller->counts();
+  CHECK(counts.solves == 10);
+  CHECK(counts.missed == 0);
+  for (size_t i = 1; i + 1 < counts.last.size(); ++i) CHECK(counts.last[i].latency == Approx(1e-3 * kLeadTicks));
+  for (double lead : {0.0, -1e-3, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    PredictiveOptions options;
+    options.lead = lead;
+    CHECK_THROWS_WITH(makeController(planSquat, makeShortSquat(), getShortSquat(), options),
+                      Catch::Contains("lead must be finite and positive"));
+  }
 }
 
 namespace {

@@ -455,7 +455,7 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
   }
   for (const std::string number :
        {"friction", "duration", "hold", "time-step", "control-period", "record-period", "noise", "look-ahead",
-        "mass-error", "rod-error", "delay", "jitter", "solve-time", "speed"})
+        "mass-error", "rod-error", "delay", "jitter", "lead", "solve-time", "speed"})
     for (const std::string value : {"nan", "-nan", "inf", "-inf", "1e400", "1e300", "much"}) {
       const CommandResult result = simulate(output, {"--" + number, value, "--dry-run"});
       CAPTURE(number, value, result.err);

@@ -1,6 +1,7 @@
 #include "bielle/control/predictive_controller.h"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -12,7 +13,8 @@
 namespace bielle {
 namespace {
 
-constexpr size_t kSolves = 100000;  // that are kept
+constexpr size_t kSolves = 100000;    // that are kept
+constexpr double kPeriodShare = 0.9;  // after which the next instant of control may come
 
 }  // namespace
 
@@ -21,12 +23,15 @@ class PredictiveController::Loop {
  public:
   Loop(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options)
       : solve_time_(options.solve_time),
+        lead_(options.lead),
         planner_(std::move(horizon), options),
         solution_(planner_.makeEmpty()),
         next_(planner_.makeEmpty()),
         dead_point_stop_(planner_.model(), planner_.startPosture(), options.dead_point_stop) {
     if (!(solve_time_ >= 0 && std::isfinite(solve_time_)))
       throw std::invalid_argument("PredictiveOptions: solve_time must be finite and not negative");
+    if (!(lead_ > 0 && std::isfinite(lead_)))
+      throw std::invalid_argument("PredictiveOptions: lead must be finite and positive");
     const Model& model = planner_.model();
     WindowPlanner::Solution first = planner_.makeFirst();
     policy_ = std::make_unique<Policy>(model, std::move(first.stages), first.u_hold);
@@ -56,7 +61,8 @@ class PredictiveController::Loop {
       ++counts_.stages;
       waits_ = true;
     }
-    if (!solves_ && (waits_ || leavesTime(measurement))) solve(measurement, u);
+    if (!solves_ && (waits_ ? isDue(measurement) : leavesTime(measurement))) solve(measurement, u);
+    last_time_ = measurement.time;
   }
   double getPlanTime(double time) const { return awaited_ >= 0 ? awaited_ : time + advance_; }
   const PredictiveCounts& counts() const { return counts_; }
@@ -71,6 +77,12 @@ class PredictiveController::Loop {
 
   bool isDone(double time) const {
     return thread_ ? thread_->state() == SolvingThread::State::Done : time >= request_.measurement.time + solve_time_;
+  }
+
+  // Whether the next instant of control, about a period from now, would be too late for the solve of the present stage.
+  bool isDue(const Measurement& measurement) const {
+    const double period = measurement.time - last_time_;
+    return solve_time_ > 0 || measurement.actionTime() + kPeriodShare * period + lead_ >= getStart(stage_ + 1);
   }
 
   // Whether the present stage does, for another solve.
@@ -94,7 +106,8 @@ class PredictiveController::Loop {
     planner_.prepare();
     if (solve_time_ > 0) return;
     const PredictiveSolve& took = solution_.took;
-    counts_.missed += took.prepare + took.seconds > end - begin - measurement.delay;
+    const double left = std::min(end - measurement.actionTime(), lead_);
+    counts_.missed += took.seconds > left || took.prepare + took.seconds > end - begin - measurement.delay;
     receive();
   }
 
@@ -121,7 +134,7 @@ class PredictiveController::Loop {
     next_measured_ = request_.measurement.time;
   }
 
-  const double solve_time_;
+  const double solve_time_, lead_;
   WindowPlanner planner_;
   WindowPlanner::Request request_;
   WindowPlanner::Solution solution_;  // of the solve under way, or memory for the next one
@@ -129,10 +142,11 @@ class PredictiveController::Loop {
   DeadPointStop dead_point_stop_;
   std::unique_ptr<Policy> policy_;
   std::vector<PredictedFoothold> footholds_;
-  int stage_ = -1;       // the present one
-  bool waits_ = false;   // it has no solve yet
-  bool solves_ = false;  // a solve is under way
-  double advance_ = 0;   // of the clock of the motion, s
+  int stage_ = -1;                                               // the present one
+  double last_time_ = -std::numeric_limits<double>::infinity();  // of the measurement before, s
+  bool waits_ = false;                                           // it has no solve yet
+  bool solves_ = false;                                          // a solve is under way
+  double advance_ = 0;                                           // of the clock of the motion, s
   double awaited_ = -1;  // the landing of a late foot, s of the motion; negative: none is late
   PredictiveCounts counts_;
   size_t next_place_ = 0;                  // its place in the counts

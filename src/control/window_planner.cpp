@@ -104,8 +104,8 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
   solution.advance = advance_;
   solution.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;
   solution.took.seconds = calcSecondsSince(request.made);
-  const bool late = options_.own_thread &&
-                    request.measurement.time + solution.took.seconds >= horizon_->getStart(solution.target) - advance_;
+  const double next = horizon_->getStart(solution.target + 1) - advance_ - options_.lead;  // another one begins
+  const bool late = options_.own_thread && request.measurement.actionTime() + solution.took.seconds >= next;
   target_ = solution.solved && !late ? solution.target : -1;
 }
 

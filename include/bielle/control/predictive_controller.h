@@ -3,16 +3,15 @@
 ///
 /// The problem is the motion's, through a window of N nodes. The first nodes are stages of the motion. Later ones stand for up
 /// to two, then four stages that are alike, more where stages are short, with the costs and constraints of the first of them and
-/// a step as long as all of them (src/control/window_grid.h). Let stage k begin at t_k. From what is
-/// measured at t_k and the torques of that instant
-/// the model predicts the state at the next stage,
+/// a step as long as all of them (src/control/window_grid.h). Let stage k begin at t_k. From what is measured at t, shortly before
+/// the next stage (PredictiveOptions::lead), and the torques of that instant the model predicts the state when that begins,
 ///
-///     x_{k+1} = f_k(x(t_k) projected on the closures, u(t_k))                                                       (1)
+///     x_{k+1} = x(t) projected on the closures, + (t_{k+1} - t) / (t_{k+1} - t_k) of the step f_k(x(t), u(t)),       (1)
 ///
-/// and while stage k lasts, the window from k+1 on is solved from there, in one or a few iterations that start from the last
-/// solution and its multipliers. The window ends near the state that the motion passes at that time. From t_{k+1} on the
-/// first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes effect one stage later, however fast
-/// it is found. If none is found, the previous policy, which extends some stages farther, remains in force.
+/// with the acceleration of the whole step, and the window from k+1 on is solved from there until then, in one or a few iterations
+/// that start from the last solution and its multipliers. The window ends near the state that the motion passes at that time. From
+/// t_{k+1} on the first stages of the solution are a policy (policy.h, Eq. 1). If none is found, the previous policy, which extends
+/// some stages farther, remains in force.
 ///
 /// Most of a solve needs no measurement: the window moves on, and all nodes but the first are evaluated, linearized and
 /// swept. That is prepared after the solve before, and between a measurement and its policy there is only the rest (the
@@ -20,11 +19,10 @@
 /// a foot lands early or late, or a stage has several solves, it is not known in time at which stage the window will
 /// begin; after a late solve the next one begins at once. In these cases the solve does all of it.
 ///
-/// Either update() waits for the solve at the beginning of a stage: the same measurements then give the same torques, on any
-/// machine. Or, for a robot, solves run in a separate thread, and update() never waits: a solution found after t_{k+1}
-/// takes effect on arrival, and the next solve begins then, from what is measured in the middle of a stage. Eq. (1) is then
-/// for the rest of that stage, with the acceleration of the whole. If a stage leaves time for another solve
-/// (PredictiveOptions::solve_time), that begins likewise, and replaces the first one's solution.
+/// Either update() waits for the solve: the same measurements then give the same torques, on any machine. Or, for a robot, solves run
+/// in a separate thread, and update() never waits: a solution found after t_{k+1} takes effect on arrival, and where the next solve
+/// should have begun already, it begins then. With PredictiveOptions::solve_time solves begin with their stages; if a stage leaves
+/// time for another one, that begins likewise, and replaces the first one's solution.
 ///
 /// Early landing: a foot on the ground in the second half of its swing (Measurement::contacts) has landed. The motion
 /// continues with the stage of its landing, and stays ahead of the plan by the time saved. Late landing: a foot still
@@ -65,6 +63,10 @@ struct PredictiveOptions {
   /// separate thread policies come into force only when it has passed, as if solves took as long, on any machine. 0: there is
   /// one solve for each stage, and without a separate thread its policy is ready at once.
   double solve_time = 0;
+  /// Time from the measurement to the stage that is solved for, s, or a little more, as instants of control come; less where the stage
+  /// before is shorter. The longer it is, the later torques react; policies of solves that take longer come late. No effect with
+  /// solve_time.
+  double lead = 4e-3;
   /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the
   /// other coordinates, of the velocities; 1/m^2 or 1, s^2/m^2 or s^2.
   double end_place = 1, end_posture = 100, end_velocity = 10;
@@ -90,8 +92,8 @@ struct PredictiveCounts {
   int failed = 0;  ///< the last policy stayed in force
   int early = 0;   ///< feet that landed in the second half of their swing
   int late = 0;    ///< feet that had not landed when they should have stood
-  /// Without a separate thread, solves that took longer than their stage, preparation included: in real time, their policy
-  /// would be late. With one or with PredictiveOptions::solve_time, stages that had no solve, because an earlier one lasted
+  /// Without a separate thread, solves that took longer than their lead, or with their preparation longer than a stage: in real
+  /// time, their policy would be late. With one or with PredictiveOptions::solve_time, stages that had no solve, because an earlier one lasted
   /// until their end.
   int missed = 0;
   std::vector<PredictiveSolve> last;  ///< 100000 solves
@@ -116,7 +118,7 @@ class PredictiveController : public Controller {
   PredictiveController(CommandedWalk walk, const PredictiveOptions& options);
   ~PredictiveController() override;
 
-  /// At the first instant of each stage it solves, which takes its time and allocates memory; at others, and with
+  /// At one instant of each stage it solves, which takes its time and allocates memory; at others, and with
   /// PredictiveOptions::own_thread at all of them, it does neither.
   void update(const Measurement& measurement, VectorRef u) override;
   double getPlanTime(double time) const override;

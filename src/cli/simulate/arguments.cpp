@@ -119,6 +119,10 @@ void describeControl(OptionFields& fields, SimulateArguments& a) {
   fields.flag("real_time", a.execution.real_time,
               "run the world in real time while predictive control solves in a separate thread. Late policies take "
               "effect on arrival; results depend on the machine");
+  fields.number(
+      "lead", a.lead, "ms", {0.1, 1000},
+      "how long before a stage predictive control measures the state that it solves for; less where the stage "
+      "before is shorter");
   fields.number("solve_time", a.solve_time, "ms", {0, 1000},
                 "time that each solve of predictive control is given: within a stage another one begins while "
                 "there is that much left. Except with --real-time, policies come into force only when it has passed, "
@@ -293,6 +297,7 @@ std::vector<std::string> listIdleOptions(const SimulateArguments& a) {
         "the steps of world " + a.world + " are of a fixed length");
   const PlanControl control = a.wanted_control.value_or(a.control.control);
   check(control == PlanControl::Predictive, {"nodes", "fine_nodes", "iterations"}, "control is not predictive");
+  check(a.solve_time == 0, {"lead"}, "with --solve-time solves begin with their stages");
   check(control != PlanControl::Open, {"look_ahead"}, "open control has no gains");
   check(a.sensors == Sensing::Real, {"noise"}, "ideal sensors have none");
   check(a.execution.duration == 0, {"hold"}, "--duration ends the motion");
@@ -339,13 +344,14 @@ void parseOptions(SimulateArguments& arguments) {
   if (arguments.execution.real_time && arguments.live)
     throw InputError("", "--live", "writing files would delay the world in real time", "leave out --real-time");
   if (!is_predictive)
-    if (const auto flag = findGiven(arguments, {"real_time", "solve_time"}))
+    if (const auto flag = findGiven(arguments, {"real_time", "lead", "solve_time"}))
       throw InputError("", *flag, "only predictive control solves while the motion runs", "give --control mpc");
   if (arguments.jitter > arguments.delay)
     throw InputError("", "--jitter", "it is longer than the delay", "give at most --delay");
   const bool is_real = arguments.sensors == Sensing::Real;
   PredictiveOptions& predictive = arguments.control.predictive;
   predictive.own_thread = arguments.execution.real_time;
+  predictive.lead = 1e-3 * arguments.lead;
   predictive.solve_time = 1e-3 * arguments.solve_time;
   predictive.look_ahead = 1e-3 * arguments.look_ahead.value_or(is_real ? kRealLookAhead : 0);
   arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};

@@ -387,7 +387,7 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
                   c.missed, c.stages,
                   arguments.execution.real_time || arguments.solve_time > 0
                       ? "had no solve of their own"
-                      : "are shorter than their solve with its preparation");
+                      : "had a solve that would be late in real time");
     std::cout << text;
     if (arguments.execution.real_time) printTimes(c, e);
   }
