@@ -18,7 +18,9 @@ from .named import (
     Impact as Impact,
     ImpactDerivatives as ImpactDerivatives,
     InverseDynamicsDerivatives as InverseDynamicsDerivatives,
+    Readings as Readings,
     WorldParameters as WorldParameters,
     WorldState as WorldState,
 )
 from .residuals import Residual as Residual
+from .vector_env import StartStates as StartStates, VectorEnv as VectorEnv

@@ -63,6 +63,16 @@ class WorldState(NamedTuple):
     ok: Array  #: bool; False: the integration failed, and the state is the last finite one
 
 
+class Readings(NamedTuple):
+    """SensorReadings of many worlds; each has an axis of worlds in front."""
+
+    time: Array  #: s
+    motor_positions: Array  #: (nu,), rad or m
+    motor_torques: Array  #: (nu,), those that acted last, N m or N
+    angular_velocity: Array  #: of the IMU in its frame (3,), rad/s
+    specific_force: Array  #: acceleration minus gravity in its frame (3,), m/s^2
+
+
 class WorldParameters(NamedTuple):
     """By which worlds differ from their model; each has an axis of worlds in front."""
 

@@ -22,7 +22,7 @@ RESULTS = {
     "Model.inverse_dynamics_derivatives": "InverseDynamicsDerivatives", "Model.impact": "Impact",
     "Model.impact_derivatives": "ImpactDerivatives", "Model.mobility": "Dict[str, Any]", "Controller.counts": "Dict[str, int]",
     "Controller.reference": "Tuple[Array, Array]", "World.reset": "WorldState", "World.step": "WorldState",
-    "World.books": "Books", "World.parameters": "WorldParameters", "World.integration": "Dict[str, Any]",
+    "World.books": "Books", "World.parameters": "WorldParameters", "Sensors.read": "Any", "World.integration": "Dict[str, Any]",
     "World.count": "Optional[int]", "generators": "Dict[str, Dict[str, Dict[str, Any]]]", "motions": "Dict[str, Dict[str, Any]]",
     "Motion.goals": "Tuple[Goal, ...]", "Motion.options": "Dict[str, Union[bool, int, float, str]]",
     "Model.shape_pairs": "List[Tuple[int, int, bool]]", "Model.joint_forces": "Tuple[JointForce, ...]", "Model.point_springs": "Tuple[PointSpring, ...]",

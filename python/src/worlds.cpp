@@ -65,10 +65,7 @@ class HeldWorlds {
   py::object reset(const py::object& q, const py::object& v, const py::object& where) {
     const BusyGuard guard(is_busy_, "world");
     const MatrixXd q0 = readRows(q, model_->nq(), "q", true), v0 = readRows(v, model_->nv(), "v", true);
-    const VectorXd chosen = where.is_none() ? VectorXd::Ones(numWorlds())
-                                            : readVector(where, static_cast<Eigen::Index>(numWorlds()), "where");
-    if (!(chosen.array() == 0 || chosen.array() == 1).all())
-      throw py::value_error("where: expected True or False for each world");
+    const VectorXd chosen = readMask(where);
     if (batch_) {
       std::vector<char> marks;
       for (const double mark : chosen) marks.push_back(mark != 0);
@@ -175,12 +172,42 @@ class HeldWorlds {
   }
   const std::vector<std::string>& warnings() const { return batch_ ? batch_->warnings() : worlds_.front()->warnings(); }
 
+  // 1 for worlds that are chosen, else 0.
+  VectorXd readMask(const py::object& where) const {
+    const auto count = static_cast<Eigen::Index>(numWorlds());
+    const VectorXd chosen = where.is_none() ? VectorXd::Ones(count) : readVector(where, count, "where");
+    if (!(chosen.array() == 0 || chosen.array() == 1).all())
+      throw py::value_error("where: expected True or False for each world");
+    return chosen;
+  }
+
+  // Calls task(world, its state).
+  template <typename Task>
+  void visit(const Task& task) {
+    const BusyGuard guard(is_busy_, "world");
+    const py::gil_scoped_release release;
+    for (Eigen::Index i = 0; batch_ && i < batch_->count(); ++i)
+      task(i, worlds::SensedState{batch_->times()[i], batch_->configurations().col(i), batch_->velocities().col(i),
+                                  batch_->torques().col(i)});
+    for (size_t i = 0; i < worlds_.size(); ++i) {
+      const World& world = *worlds_[i];
+      task(i, worlds::SensedState{world.time(), world.configuration(), world.velocity(), world.torques()});
+    }
+  }
+
   const std::shared_ptr<Model>& model() const { return model_; }
   const std::optional<int>& count() const { return many_; }
   const std::string& engine() const { return engine_; }
 
   void requireSingle() const {
     if (many_) throw py::value_error("world: expected a single world, made without `count`");
+  }
+
+  py::array makeRows(const MatrixXd& columns, Shape shape) const {
+    if (many_) shape.insert(shape.begin(), columns.cols());
+    Array out(shape);
+    Eigen::Map<MatrixXd>(out.mutable_data(), columns.rows(), columns.cols()) = columns;
+    return std::move(out);
   }
 
   // Reads the state of a single world.
@@ -226,13 +253,6 @@ class HeldWorlds {
     const auto count = static_cast<Eigen::Index>(numWorlds());
     const Array array = readArray(value, what);
     return array.ndim() == 0 ? VectorXd::Constant(count, *array.data()) : readVector(value, count, what);
-  }
-
-  py::array makeRows(const MatrixXd& columns, Shape shape) const {
-    if (many_) shape.insert(shape.begin(), columns.cols());
-    Array out(shape);
-    Eigen::Map<MatrixXd>(out.mutable_data(), columns.rows(), columns.cols()) = columns;
-    return std::move(out);
   }
 
   py::object observe() const {
@@ -281,48 +301,72 @@ class HeldWorlds {
   std::atomic<bool> is_busy_{false};
 };
 
-// The sensors of a robot in one world.
-struct HeldSensors {
-  std::shared_ptr<HeldWorlds> world;
-  std::unique_ptr<worlds::Sensors> sensors;
-  bool is_reset = false;
+// The sensors of the robots in worlds, each with its own noise.
+class HeldSensors {
+ public:
+  HeldSensors(std::shared_ptr<HeldWorlds> world, double noise, unsigned seed, const SE3& imu)
+      : world_(std::move(world)) {
+    worlds::SensorOptions options;
+    options.noise = noise;
+    options.imu = imu;
+    for (int i = 0; i < world_->count().value_or(1); ++i) {
+      options.seed = seed + static_cast<unsigned>(i);
+      sensors_.emplace_back(*world_->model(), options);
+    }
+    readings_.resize(sensors_.size());
+  }
+
+  void reset(double time, const py::object& where) {
+    const VectorXd chosen = world_->readMask(where);
+    world_->visit([&](Eigen::Index i, const worlds::SensedState& state) {
+      if (chosen[i] != 0) sensors_[i].reset(state, time);
+    });
+    is_reset_ = is_reset_ || where.is_none();
+  }
+
+  py::object read() {
+    if (!is_reset_) throw std::runtime_error("sensors: reset them first, which sets the time of the first reading");
+    world_->visit([&](Eigen::Index i, const worlds::SensedState& state) { readings_[i] = sensors_[i].read(state); });
+    if (!world_->count()) return py::cast(readings_.front());
+    const Model& model = *world_->model();
+    const auto gather = [&](Eigen::Index size, const auto& get) {
+      MatrixXd out(size, readings_.size());
+      for (size_t i = 0; i < readings_.size(); ++i) out.col(i) = get(readings_[i]);
+      return out;
+    };
+    const auto makeRows = [&](auto member, Eigen::Index size) {
+      return world_->makeRows(gather(size, [&](const SensorReadings& r) { return r.*member; }), {size});
+    };
+    const MatrixXd time = gather(1, [](const SensorReadings& r) { return VectorXd::Constant(1, r.time); });
+    return makeNamed("Readings",
+                     {world_->makeRows(time, {}), makeRows(&SensorReadings::motor_positions, model.nu()),
+                      makeRows(&SensorReadings::motor_torques, model.nu()),
+                      makeRows(&SensorReadings::angular_velocity, 3), makeRows(&SensorReadings::specific_force, 3)});
+  }
+
+ private:
+  std::shared_ptr<HeldWorlds> world_;
+  std::vector<worlds::Sensors> sensors_;
+  std::vector<SensorReadings> readings_;
+  bool is_reset_ = false;
 };
-
-std::unique_ptr<HeldSensors> makeSensors(const std::shared_ptr<HeldWorlds>& world, double noise, unsigned seed,
-                                         const SE3& imu) {
-  world->requireSingle();
-  auto held = std::make_unique<HeldSensors>();
-  held->world = world;
-  worlds::SensorOptions options;
-  options.noise = noise;
-  options.seed = seed;
-  options.imu = imu;
-  held->sensors = std::make_unique<worlds::Sensors>(*world->model(), options);
-  return held;
-}
-
-SensorReadings readSensors(HeldSensors& self) {
-  if (!self.is_reset) throw std::runtime_error("sensors: reset them first, which sets the time of the first reading");
-  SensorReadings out;
-  self.world->observeOnly([&](const World& world) { out = self.sensors->read(world); });
-  return out;
-}
 
 void bindSensors(py::module_& module) {
   py::class_<HeldSensors>(
       module, "Sensors",
-      "Encoders of 14 bits on the motors and an IMU (Bosch BMI088) in the trunk of a robot in a World.")
-      .def(py::init(&makeSensors), py::arg("world"), py::arg("noise") = 1.0, py::arg("seed") = 1,
-           py::arg("imu") = SE3(), "noise: factor of the data-sheet noise, 0: exact; imu: its placement in the trunk.")
+      "Encoders of 14 bits on the motors and an IMU (Bosch BMI088) in the trunk of the robot of a World, or of each of "
+      "its many.")
       .def(
-          "reset",
-          [](HeldSensors& self, double time) {
-            self.world->observeOnly([&](const World& world) { self.sensors->reset(world, time); });
-            self.is_reset = true;
-          },
-          py::arg("time"), "Starts from the world's current state; the first readings come after a time, s.")
-      .def("read", &readSensors,
-           "SensorReadings at the time of the world; IMU readings are means since the last call.");
+          py::init<std::shared_ptr<HeldWorlds>, double, unsigned, const SE3&>(), py::arg("world"),
+          py::arg("noise") = 1.0, py::arg("seed") = 1, py::arg("imu") = SE3(),
+          "noise: factor of the data-sheet noise, 0: exact; seed: of the first world, the next ones count on; imu: its "
+          "placement in the trunk.")
+      .def(
+          "reset", &HeldSensors::reset, py::arg("time"), py::arg("where") = py::none(),
+          "Starts from the world's current state; the first readings come after a time, s. where: as in World.reset().")
+      .def("read", &HeldSensors::read,
+           "SensorReadings at the time of the world, or Readings with an axis of worlds; those of the IMU are means "
+           "since the last call.");
 }
 
 }  // namespace

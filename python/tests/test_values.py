@@ -24,7 +24,8 @@ VALUES = {
 
 
 # They hold what goes on.
-NOT_VALUES = {"ModelBuilder", "Node", "Controller", "Estimator", "World", "Sensors", "LoopCloser", "LinkageMap"}
+NOT_VALUES = {"ModelBuilder", "Node", "Controller", "Estimator", "World", "Sensors", "LoopCloser", "LinkageMap", "StartStates",
+              "VectorEnv"}
 
 
 def make_plan():

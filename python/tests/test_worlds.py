@@ -260,11 +260,110 @@ def test_estimator(controller, model):
     assert real[0] < 5e-3 and real[1] < 0.1 and real[0] > exact[0]
 
 
-def test_sensors_need_one_world_and_a_start(model):
-    with pytest.raises(ValueError, match="single"):
-        bielle.Sensors(bielle.World(model, count=2))
-    with pytest.raises(RuntimeError, match="reset"):
-        bielle.Sensors(bielle.World(model)).read()
+def test_sensors_need_a_start(model):
+    for world in (bielle.World(model), bielle.World(model, count=2)):
+        with pytest.raises(RuntimeError, match="reset"):
+            bielle.Sensors(world).read()
+
+
+def test_sensors_of_many_worlds_are_those_of_single_ones(model):
+    many, q, v = bielle.World(model, count=3), model.standing(), np.zeros(model.nv)
+    torques = np.arange(3)[:, None] * np.linspace(1, 9, model.nu)
+    many.reset(q, v)
+    for noise, near in ((0, 1e-6), (1, 1e-3)):
+        sensors = bielle.Sensors(many, noise=noise, seed=5)
+        many.reset(q, v)
+        sensors.reset(0)
+        for _ in range(3):
+            many.step(torques, 2e-3)
+            readings = sensors.read()
+        for i in range(3):
+            world = bielle.World(model)
+            world.reset(q, v)
+            own = bielle.Sensors(world, noise=noise, seed=5 + i)
+            own.reset(0)
+            for _ in range(3):
+                world.step(torques[i], 2e-3)
+                reading = own.read()
+            for name in ("time", "motor_positions", "motor_torques", "angular_velocity", "specific_force"):
+                assert getattr(readings, name)[i] == pytest.approx(getattr(reading, name), abs=near), name
+    before = sensors.read()
+    many.reset(q, v, where=[0, 1, 0])
+    sensors.reset(0, [0, 1, 0])
+    after = sensors.read()
+    assert after.time[1] == 0 and not np.array_equal(after.angular_velocity[1], before.angular_velocity[1])
+    assert np.array_equal(after.specific_force[[0, 2]], before.specific_force[[0, 2]])
+
+
+def learn(model, num_envs, steps=12, seed=4, **options):
+    """Observations, rewards and ends of limp robots, some of which have fallen before their episodes are over."""
+    env = bielle.VectorEnv(model, num_envs, lambda state, torques: state.q[:, 2] - 1e-3 * (torques**2).sum(axis=1),
+                           lambda state: state.v[:, 2] < -0.45, duration=0.05, **options)  # fmt: skip
+    first, _ = env.reset(seed=seed)
+    out = [env.step(np.full((num_envs, model.nu), 0.1 * k)) for k in range(steps)]
+    return env, np.array([first] + [step[0] for step in out]), *(np.array([step[k] for step in out]) for k in (1, 2, 3, 4))
+
+
+def test_vector_env_keeps_the_conventions(model):
+    env, observations, rewards, terminations, truncations, infos = learn(model, 5)
+    assert env.num_envs == 5 and env.metadata["autoreset_mode"] == "NextStep"
+    assert env.single_observation_space.shape == (3 * model.nu + 6,) and env.action_space.shape == (5, model.nu)
+    assert env.single_action_space.high[0] == model.motors[0].effort_limit and env.action_space.contains(env.action_space.sample())
+    assert observations.shape == (13, *env.observation_space.shape) and rewards.shape == truncations.shape == (12, 5)
+    over = terminations | truncations
+    assert truncations.any() and terminations.any() and not (terminations & truncations).any()
+    for k, i in np.argwhere(over[:-1]):  # the next step starts anew
+        assert rewards[k + 1, i] == 0 and infos[k + 1]["time"][i] == 0 and not over[k + 1, i]
+        assert (observations[k + 2, i, model.nu : 3 * model.nu] == 0).all()
+    going = np.argwhere(~over[:-1])
+    assert all(infos[k + 1]["time"][i] == pytest.approx(infos[k]["time"][i] + 0.01) for k, i in going)
+    assert all(np.isfinite(observations).ravel()) and (rewards[~np.roll(over, 1, axis=0)][5:] != 0).all()
+    position = infos[-1]["q"][:, list(model.q_names).index(model.u_names[3])]
+    assert observations[-1, :, 3] == pytest.approx(position, abs=2e-4)  # of 14 bits
+    assert (observations[-1, :, 3] != position).all()
+    with pytest.raises(ValueError, match="actions: expected finite"):
+        env.step(np.zeros((5, 3)))
+    with pytest.raises(ValueError, match="actions: expected finite"):
+        env.step(np.full(env.action_space.shape, np.nan))
+    state = env.reset(options={"reset_mask": [True, False, False, False, False]})[1]
+    assert state["time"][0] == 0 and np.array_equal(state["time"][1:], infos[-1]["time"][1:])
+
+
+def test_episodes_of_a_robot_depend_on_its_seed_alone(model):
+    _, first, rewards, *_ = learn(model, 3, threads=1)
+    for other in (learn(model, 3, threads=1), learn(model, 11, threads=2)):
+        assert np.array_equal(other[1][:, :3], first) and np.array_equal(other[2][:, :3], rewards)
+    assert not np.array_equal(learn(model, 3, seed=5)[1], first) and not np.array_equal(first[:, 0], first[:, 1])
+
+
+def test_vector_env_makes_torques_of_targets(model):
+    """Springs and dampers at 1 ms about targets, of which one action in 10 ms tells; the robot stays where it is told to."""
+    stand, at = model.standing(), [list(model.q_names).index(name) for name in model.u_names]
+    space = bielle.vector_env.Box(np.full(model.nu, -3.0), np.full(model.nu, 3.0))
+    start = lambda generator: (stand, np.zeros(model.nv))
+    calls = []
+
+    def track(actions, readings):
+        calls.append(readings.time[0])
+        return 300 * (actions - readings.motor_positions)
+
+    env = bielle.VectorEnv(model, 2, lambda state, torques: -np.abs(torques).max(axis=1), torques=track, action_space=space,
+                           start=start, period=1e-3, repeat=10, noise=0)  # fmt: skip
+    env.reset()
+    _, rewards, *_, state = env.step(np.tile(stand[at], (2, 1)))
+    assert calls == pytest.approx(1e-3 * np.arange(10), abs=1e-9) and state["time"][0] == pytest.approx(0.01)
+    assert (rewards < 0).all() and np.abs(state["q"][:, at] - stand[at]).max() < 0.05
+
+
+def test_start_states_are_closed_and_stand_on_the_ground(model):
+    starts, generator = bielle.StartStates(model, spread=0.2, speed=0.5, height=0.1), np.random.default_rng(1)
+    for _ in range(5):
+        q, v = starts.draw(generator)
+        assert np.abs(model.closure_residual(q)).max() < 1e-9 and 0.02 < np.abs(q - starts.q).max() < 1
+        assert np.abs(model.closure_jacobian(q) @ v).max() < 1e-9 and np.abs(v).max() > 0.1
+        corners = [(model.placement(q, c.name) @ [x * c.half_length, y * c.half_width, 0, 1])[2]
+                   for c in model.contacts for x in (-1, 1) for y in (-1, 1)]  # fmt: skip
+        assert min(corners) == pytest.approx(0.1, abs=1e-12)
 
 
 def test_simulate(solution, robot, tmp_path):

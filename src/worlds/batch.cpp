@@ -140,7 +140,7 @@ struct WorldBatch::Data {
   std::vector<Steps::State> groups;  // of kLane worlds
   WorldParameters parameters;
   std::vector<Pipe> pipes;  // empty where no torques are delayed
-  MatrixXd q, v, wrenches;
+  MatrixXd q, v, torques, wrenches;
   VectorXd times;
   std::vector<char> is_ok, marks;  // marks: of those that are reset
   std::vector<std::string> messages, warnings;
@@ -169,6 +169,7 @@ WorldBatch::Data::Data(const Model& model, int count, const WorldBatchOptions& a
   parameters.friction.setConstant(count, options.world.ground.friction);
   parameters.delays.setZero(count);
   v.setZero(model.nv(), count);
+  torques.setZero(model.nu(), count);
   wrenches.setZero(6 * static_cast<Eigen::Index>(model.contacts().size()), count);
   times.setZero(count);
   is_ok.assign(static_cast<size_t>(count), false);
@@ -194,7 +195,8 @@ void WorldBatch::Data::command(Worker& worker, int lane, int world, ConstVectorR
   for (int m = 0; m < model.nu(); ++m) {
     Motor& motor = worker.motors[m];
     motor.effort_limit = parameters.effort_limits(m, world);
-    worker.efforts[m].set(lane, motor.clampEffort(u[m], v(motor.dof, world)));
+    torques(m, world) = motor.clampEffort(u[m], v(motor.dof, world));
+    worker.efforts[m].set(lane, torques(m, world));
   }
 }
 
@@ -278,6 +280,7 @@ void WorldBatch::reset(const MatrixView& q, const MatrixView& v, const std::vect
       if (!which[l]) continue;
       const int world = d.getFirst(group) + l;
       d.times[world] = 0;
+      d.torques.col(world).setZero();
       if (!d.pipes.empty()) d.pipes[world].clear();
       d.is_ok[world] = done[l];
       d.messages[world] = done[l] ? "" : worker.steps.tree().failure(l);
@@ -345,6 +348,7 @@ const Model& WorldBatch::model() const { return data_->model; }
 int WorldBatch::count() const { return data_->count; }
 MatrixView WorldBatch::configurations() const { return data_->q; }
 MatrixView WorldBatch::velocities() const { return data_->v; }
+MatrixView WorldBatch::torques() const { return data_->torques; }
 MatrixView WorldBatch::wrenches() const { return data_->wrenches; }
 const VectorXd& WorldBatch::times() const { return data_->times; }
 bool WorldBatch::ok(int world) const { return data_->is_ok[world] != 0; }

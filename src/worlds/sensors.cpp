@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kGravity = 9.80665;
 
-SE3 getTrunk(const VectorXd& q) { return {Eigen::Quaterniond(q[6], q[3], q[4], q[5]).toRotationMatrix(), q.head<3>()}; }
+SE3 getTrunk(ConstVectorRef q) { return {Eigen::Quaterniond(q[6], q[3], q[4], q[5]).toRotationMatrix(), q.head<3>()}; }
 
 }  // namespace
 
@@ -40,23 +40,23 @@ Vector3d Sensors::drawNoise(const Vector3d& deviations) {
   return out;
 }
 
-void Sensors::readEncoders(const World& world) {
+void Sensors::readEncoders(const SensedState& state) {
   for (int m = 0; m < model_.nu(); ++m) {
     const Joint& joint = model_.joints()[model_.motors()[m].joint];
-    const double position = world.configuration()[joint.idx_q];
+    const double position = state.q[joint.idx_q];
     const double resolution = options_.noise * (joint.kind == JointKind::Prismatic ? options_.parts.encoder_length
                                                                                    : options_.parts.encoder_angle);
     readings_.motor_positions[m] = resolution > 0 ? resolution * std::round(position / resolution) : position;
   }
-  readings_.motor_torques = world.torques();
+  readings_.motor_torques = state.torques;
 }
 
-void Sensors::reset(const World& world, double time) {
+void Sensors::reset(const SensedState& state, double time) {
   readings_.time = time;
-  readEncoders(world);
+  readEncoders(state);
   if (!model_.hasFreeFlyer()) return;
-  X_WI_ = getTrunk(world.configuration()) * options_.imu;
-  const Vector6d twist = options_.imu.actInvMotion(world.velocity().head<6>());
+  X_WI_ = getTrunk(state.q) * options_.imu;
+  const Vector6d twist = options_.imu.actInvMotion(state.v.head<6>());
   v_ = X_WI_.R * twist.head<3>();
   readings_.angular_velocity = twist.tail<3>() + gyro_offset_;
   readings_.specific_force = -(X_WI_.R.transpose() * model_.gravity()) + accelerometer_offset_;
@@ -72,14 +72,14 @@ const SensorReadings& Sensors::readAtRest(double time, ConstVectorRef torques) {
   return readings_;
 }
 
-const SensorReadings& Sensors::read(const World& world) {
-  const double period = world.time() - readings_.time;
+const SensorReadings& Sensors::read(const SensedState& state) {
+  const double period = state.time - readings_.time;
   if (!(period > 0)) return readings_;
-  readings_.time = world.time();
-  readEncoders(world);
+  readings_.time = state.time;
+  readEncoders(state);
   if (!model_.hasFreeFlyer()) return readings_;
-  const SE3 X_WI = getTrunk(world.configuration()) * options_.imu;
-  const Vector3d v = X_WI.R * options_.imu.actInvMotion(world.velocity().head<6>()).head<3>();
+  const SE3 X_WI = getTrunk(state.q) * options_.imu;
+  const Vector3d v = X_WI.R * options_.imu.actInvMotion(state.v.head<6>()).head<3>();
   const Vector3d turn = log3(Matrix3d(X_WI_.R.transpose() * X_WI.R));
   const Matrix3d middle = X_WI_.R * exp3(Vector3d(0.5 * turn));
   const double bandwidth = std::sqrt(0.5 / period);

@@ -57,6 +57,7 @@ class WorldBatch {
   int count() const;
   Eigen::Ref<const MatrixXd> configurations() const;  ///< nq x count
   Eigen::Ref<const MatrixXd> velocities() const;      ///< nv x count
+  Eigen::Ref<const MatrixXd> torques() const;         ///< nu x count, those that acted last, as they were cut
   /// Of the ground on the feet in their contact frames, one after the other (6 contacts x count), N and N m.
   Eigen::Ref<const MatrixXd> wrenches() const;
   const VectorXd& times() const;  ///< count, since reset(), s

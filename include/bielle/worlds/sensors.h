@@ -26,23 +26,35 @@ struct SensorOptions {
   SE3 imu;  ///< placement of the IMU in the trunk
 };
 
+/// What sensors feel: a state of a robot, and the torques of its motors.
+struct SensedState {
+  double time;             ///< s
+  ConstVectorRef q, v;     ///< nq, nv
+  ConstVectorRef torques;  ///< nu, N m or N
+};
+
 /// Encoders round. A reading of the IMU is the mean since the reading before it, with an offset drawn once and white noise
 /// of the bandwidth 1 / (2 period).
 class Sensors {
  public:
   Sensors(const Model& model, const SensorOptions& options);
 
-  /// From the state in which the world is; the first readings come after a time, s.
-  void reset(const World& world, double time);
+  /// From a state, that in which a world is; the first readings come after a time, s.
+  void reset(const SensedState& state, double time);
+  void reset(const World& world, double time) { reset(sense(world), time); }
   /// While the robot stands still in the state of the world, under given torques of the motors (nu), at a time before that of
   /// the world, s.
   const SensorReadings& readAtRest(double time, ConstVectorRef torques);
-  /// At the time of the world. No allocation.
-  const SensorReadings& read(const World& world);
+  /// At the time of the state, that of the world. No allocation.
+  const SensorReadings& read(const SensedState& state);
+  const SensorReadings& read(const World& world) { return read(sense(world)); }
 
  private:
+  static SensedState sense(const World& world) {
+    return {world.time(), world.configuration(), world.velocity(), world.torques()};
+  }
   Vector3d drawNoise(const Vector3d& deviations);
-  void readEncoders(const World& world);
+  void readEncoders(const SensedState& state);
 
   Model model_;
   const SensorOptions options_;
