@@ -8,6 +8,7 @@
 
 #include "bielle/model/error.h"
 #include "design/run.h"
+#include "design/spec.h"
 #include "design_trials.h"
 #include "robot_directory.h"
 #include "run_command.h"
@@ -206,14 +207,22 @@ TEST_CASE("design goals: a start that misses its goal is told, and the best desi
   INFO(done.err << done.out);
   REQUIRE(done.status == 0);
   CHECK(done.err.empty());
-  CHECK_THAT(done.out, Contains("by the usual steps of `bielle solve`"));
-  const std::string solved = directory.path() + "/solved";
-  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", found + "/best", "--depth", "0.8", "--set",
-                      "duration=0.6", "--set", "settle=0.06", "--quiet", "--no-report", "--no-check", "-o", solved})
-              .status == 0);
-  double peak = 0;
-  const json summary = json::parse(readFile(solved + "/summary.json"));
-  for (const auto& [motor, torque] : summary["peak_torques"].items()) peak = std::max(peak, torque.get<double>());
+  const auto calcPeak = [&](const std::string& robot) {
+    const std::string solved = directory.path() + "/solved_" + robot;
+    REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", found + "/" + robot, "--depth", "0.8", "--set",
+                        "duration=0.6", "--set", "settle=0.06", "--quiet", "--no-report", "--no-check", "-o", solved})
+                .status == 0);
+    double peak = 0;
+    const json summary = json::parse(readFile(solved + "/summary.json"));
+    for (const auto& [motor, torque] : summary["peak_torques"].items()) peak = std::max(peak, torque.get<double>());
+    return peak;
+  };
+  const double peak = calcPeak("best"), before = calcPeak("start");
+  REQUIRE(peak < before);
+  const std::string headline = done.out.substr(done.out.find("by the usual steps of `bielle solve`: peak_torque "));
+  CHECK(std::stod(headline.substr(50)) == Approx(before).epsilon(1e-3));
+  CHECK(std::stod(headline.substr(headline.find("-> ") + 3)) == Approx(peak).epsilon(1e-3));
+  CHECK(std::stod(headline.substr(headline.find(" (") + 2)) == Approx(100 * (peak / before - 1)).margin(0.06));
   const std::string text = readFile(found + "/design.md"), table = text.substr(text.find("## By the usual steps"));
   const std::string row = table.substr(table.find("| peak_torque | ")), told = row.substr(row.find("| ", 16) + 2);
   CHECK(std::stod(told) == Approx(peak).epsilon(1e-3));  // of four digits
@@ -235,5 +244,24 @@ TEST_CASE("design goals: a start that misses its goal is told, and the best desi
     CHECK(refused.status == 2);
     CHECK_THAT(refused.err, Contains("search1.jsonl: line 2: it was changed or damaged: ") && Contains(problem) &&
                                 Contains("remove the file") && !Contains("json.exception"));
+  }
+}
+
+TEST_CASE("design goals: a walk that ends before it reaches its speed is warned of") {
+  const RobotDirectory directory;
+  const std::string spec = R"(generator: rsu_biped
+variables:
+  - {name: offset, parameter: hip_offset, bounds: [0.12, 0.13]}
+motions:
+  - {motion: walk, set: {speed: 0.4, STEPS, time_step: 0.03}}
+objective: [{measure: peak_torque}]
+search: {searches: 1, stages: [{algorithm: sbplx, evaluations: 1}]}
+)";
+  for (const char* steps : {"steps: 2", "steps: 4"}) {
+    const DesignSpec read = readDesignSpec(directory.write("spec.yaml", replaceOnce(spec, "STEPS", steps)));
+    const std::vector<std::string> warnings = listShortMotions(read, makeEvaluator(read).start().goals);
+    REQUIRE(warnings.size() == (steps[7] == '2' ? 1 : 0));
+    for (const std::string& warning : warnings)
+      CHECK_THAT(warning, Contains("the walk has too few steps to reach its speed"));
   }
 }

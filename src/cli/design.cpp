@@ -10,6 +10,7 @@
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "cli/task_options.h"
+#include "design/figures.h"
 #include "design/joint_reach.h"
 #include "design/marks.h"
 #include "design/page_data.h"
@@ -54,11 +55,20 @@ DesignRun runSearches(const DesignArguments& arguments, const DesignEvaluator& e
   return runDesign(evaluator, spec, options);
 }
 
-// By the usual steps of `bielle solve`.
-std::string describeUsual(const bielle::Evaluation& usual) {
-  if (usual.status == DesignStatus::Feasible)
-    return formatNumber(usual.value, "%.4f") + " by the usual steps of `bielle solve`";
-  return getName(usual.status) + std::string(" by the usual steps of `bielle solve`: ") + usual.message;
+// By the usual steps of `bielle solve`, with what becomes of each objective.
+std::string describeUsual(const DesignEvaluator& evaluator, const DesignRun& run) {
+  const bielle::Evaluation& usual = *run.usual;
+  const std::string steps = " by the usual steps of `bielle solve`";
+  if (usual.status != DesignStatus::Feasible) return getName(usual.status) + steps + ": " + usual.message;
+  std::string text = formatNumber(usual.value, "%.4f") + steps;
+  if (!run.usual_start || !isMeasured(run.usual_start->status)) return text;
+  for (size_t i = 0; i < evaluator.objective().size(); ++i) {
+    const double before = run.usual_start->terms[i], after = usual.terms[i];
+    text += (i == 0 ? ": " : ", ") + describeTerm(evaluator.objective()[i]) + " " + formatNumber(before, "%.4g") +
+            " -> " + formatNumber(after, "%.4g");
+    if (before != 0) text += " (" + formatNumber(100 * (after / before - 1), "%+.1f") + " %)";
+  }
+  return text;
 }
 
 // Of a design that does not make its motions, on the standard error.
@@ -72,7 +82,7 @@ void printRun(const DesignEvaluator& evaluator, const DesignSpec& spec, const De
   const int count = std::accumulate(run.counts.begin(), run.counts.end(), 0);
   std::vector<Row> rows = {
       {"value", formatNumber(evaluator.start().value, "%.4f") + " -> " + formatNumber(run.value, "%.4f")}};
-  if (run.usual) rows.push_back({"as solved", describeUsual(*run.usual)});
+  if (run.usual) rows.push_back({"as solved", describeUsual(evaluator, run)});
   rows.insert(
       rows.end(),
       {{"evaluations", std::to_string(count) + ", " + std::to_string(run.replayed) + " of them from the logs; " +
@@ -138,9 +148,14 @@ int run(const DesignArguments& arguments) {
   const DesignEvaluator evaluator = makeEvaluator(spec);
   if (request) return evaluateRequest(evaluator, *request, arguments.directory);
   warn("the start design", evaluator.start());
+  for (const std::string& warning : listShortMotions(spec, evaluator.start().goals))
+    std::cerr << "bielle: warning: " << warning << std::endl;
   DesignRun run = runSearches(arguments, evaluator, spec, engine.get());
   engine.reset();  // signals have their usual effect again
-  if (!spec.motions.empty()) run.usual = evaluator.solveUsually(run.best);
+  if (!spec.motions.empty()) {
+    run.usual = evaluator.solveUsually(run.best);
+    if (run.best != evaluator.robot().start()) run.usual_start = evaluator.solveUsually(evaluator.robot().start());
+  }
   std::vector<std::string> paths = writeDesign(arguments.directory, evaluator, spec, run);
   const std::vector<std::string> shown = writePage(arguments, evaluator, run);
   paths.insert(paths.end(), shown.begin(), shown.end());

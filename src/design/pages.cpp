@@ -118,6 +118,11 @@ void writeUsual(std::ostream& out, const DesignEvaluator& evaluator, const Desig
   for (size_t i = 0; i < std::min(search.goals.size(), usual.goals.size()); ++i)
     out << "| " << describeGoal(usual.goals[i]) << " | " << formatAchieved(search.goals[i].outcome) << " | "
         << formatAchieved(usual.goals[i].outcome) << " | |\n";
+  if (run.usual_start && isMeasured(run.usual_start->status)) {
+    out << "\n| `bielle solve` | before | after | change |\n|---|---|---|---|\n";
+    for (size_t i = 0; i < evaluator.objective().size(); ++i)
+      writeRow(out, describeTerm(evaluator.objective()[i]), run.usual_start->terms[i], usual.terms[i]);
+  }
 }
 
 void writeVariables(std::ostream& out, const Parametrization& robot, const VectorXd& best) {

@@ -77,8 +77,8 @@ struct DesignRun {
   VectorXd best;     ///< the feasible design with the least value; the start if none is better, or none is feasible
   double value = 0;  ///< its value
   Evaluation evaluation;  ///< of the best design, repeated
-  std::optional<Evaluation>
-      usual;  ///< of the best design, its motions by the usual steps of `bielle solve`, if that was asked for
+  /// Of the start and the best design, their motions by the usual steps of `bielle solve`, if that was asked for.
+  std::optional<Evaluation> usual_start, usual;
   std::array<int, kDesignStatuses> counts{};  ///< evaluations by status
   int replayed = 0;                           ///< evaluations found in the logs
   double seconds = 0;                         ///< processor time of all evaluations, including those of earlier runs

@@ -114,6 +114,9 @@ Parametrization makeParametrization(const DesignSpec& spec);
 
 /// With the motions of its start design. \throws InputError as makeParametrization() and DesignEvaluator do
 DesignEvaluator makeEvaluator(const DesignSpec& spec);
+/// Warnings of walks and runs that are over before they reach their speed: what they need is not what walking needs.
+/// \param goals  of the start design
+std::vector<std::string> listShortMotions(const DesignSpec& spec, const std::vector<DesignGoal>& goals);
 
 /// DesignSpec::starts, complete.
 std::vector<VectorXd> listStarts(const DesignSpec& spec, const Parametrization& robot);

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "bielle/model/names.h"
 #include "bielle/motion/registry.h"
 #include "design/motor_change.h"
@@ -35,6 +37,23 @@ DesignEvaluator makeEvaluator(const DesignSpec& spec) {
       if (findMotors(start, {name}).empty()) entry.failUnknown("motor", name, getNames(start.motors()));
   }
   return DesignEvaluator(robot, motions, spec.objective, options);
+}
+
+std::vector<std::string> listShortMotions(const DesignSpec& spec, const std::vector<DesignGoal>& goals) {
+  std::vector<std::string> warnings;
+  for (const MotionSpec& motion : spec.motions) {
+    const auto reaches = [&motion](const DesignGoal& goal) {
+      return goal.motion == motion.motion && goal.outcome.goal.kind == GoalKind::Speed;
+    };
+    const bool has_steps = std::any_of(motion.settings.begin(), motion.settings.end(),
+                                       [](const auto& setting) { return setting.first == "steps"; });
+    const bool moves = findMotion(spec.path, motion.motion).request.options.find("speed");
+    if (!goals.empty() && has_steps && moves && std::none_of(goals.begin(), goals.end(), reaches))
+      warnings.push_back(spec.path + ": the " + motion.motion +
+                         " has too few steps to reach its speed: it starts and stops, and what it needs may change "
+                         "otherwise than what a whole one needs; leave `steps` out");
+  }
+  return warnings;
 }
 
 }  // namespace bielle
