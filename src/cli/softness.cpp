@@ -13,6 +13,7 @@
 #include "cli/table.h"
 #include "formats/robot_files.h"
 #include "formats/text_file.h"
+#include "model/hash.h"
 #include "results/interrupt.h"
 #include "results/line_log.h"
 #include "results/number_option.h"
@@ -25,10 +26,10 @@ namespace {
 
 struct SoftnessArguments {
   RobotArgument robot;
-  std::string directory;
+  std::string directory, motion;
   double time_step = 0, within = 1e-4;
   std::vector<double> solref, solimp;
-  int mujoco = 3;
+  std::string mujoco = "3.7";
   bool json = false;
   SoftnessOptions options;
 };
@@ -58,7 +59,9 @@ MjcfSoftness readSoftness(const SoftnessArguments& arguments, const std::string&
 
 // What the rows depend on.
 Json identify(const SoftnessArguments& arguments, const LoadedRobot& robot, const MjcfSoftness& softness) {
-  Json equalities = Json::array();
+  Json equalities = Json::array(), motion;
+  if (!arguments.motion.empty())
+    motion = hashText(readTextFile((fs::path(arguments.motion) / "trajectory.npz").string()));
   for (const MjcfEquality& equality : softness.equalities)
     equalities.push_back({equality.name, equality.settings.solref, equality.settings.solimp});
   return {{"softness", getBuildInfo().bielle},
@@ -69,7 +72,8 @@ Json identify(const SoftnessArguments& arguments, const LoadedRobot& robot, cons
           {"equalities", equalities},
           {"mujoco", arguments.mujoco},
           {"postures", arguments.options.postures},
-          {"torque", arguments.options.torque}};
+          {"torque", arguments.options.torque},
+          {"motion", motion}};
 }
 
 // The rows of all tasks; those that the log has are not computed again. Empty if the user asked for the end.
@@ -102,7 +106,7 @@ Json getLargest(const std::vector<Json>& rows, const std::string& loop, std::ini
   Json largest;
   for (const Json& row : rows)
     for (const char* key : keys)
-      if (row.at("loop") == loop && row.at(key).is_number())
+      if (row.at("loop") == loop && row.contains(key) && row.at(key).is_number())
         largest = std::max(largest.is_null() ? 0 : largest.get<double>(), std::abs(row.at(key).get<double>()));
   return largest;
 }
@@ -112,11 +116,12 @@ Json summarize(const SoftnessStudy& study, const Model& model, const std::vector
   for (size_t c = 0; c < model.clusters().size(); ++c)
     for (const std::string& loop : study.listLoops(static_cast<int>(c))) {
       const auto largest = [&](std::initializer_list<const char*> keys) { return getLargest(rows, loop, keys); };
-      double stable = kLongestStep;
+      Json stable = nullptr;  // none along a motion
       std::string worst;
       for (const Json& row : rows)
-        if (row.at("loop") == loop && row.at("stable_step").is_number())
-          stable = std::min(stable, row.at("stable_step").get<double>());
+        if (row.at("loop") == loop && row.contains("stable_step") && row.at("stable_step").is_number())
+          stable =
+              std::min(stable.is_null() ? kLongestStep : stable.get<double>(), row.at("stable_step").get<double>());
       for (const char* state : kSoftnessStates)
         if (std::any_of(rows.begin(), rows.end(),
                         [&](const Json& row) { return row.at("loop") == loop && row.at("state") == state; }))
@@ -156,12 +161,20 @@ int run(const SoftnessArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
   const std::string file = findMjcf(robot);
   const MjcfSoftness softness = readSoftness(arguments, file);
-  const MujocoVersion version = arguments.mujoco == 2 ? MujocoVersion::Two : MujocoVersion::Three;
+  const MujocoVersion version = arguments.mujoco == "2"   ? MujocoVersion::Two
+                                : arguments.mujoco == "3" ? MujocoVersion::Three
+                                                          : MujocoVersion::ThreeSeven;
   const SoftLoops loops = makeSoftLoops(robot.model, softness, version);
-  requireApart(arguments.directory, listFiles(robot));
+  std::vector<std::string> inputs = listFiles(robot);
+  std::vector<SoftnessInstant> motion;
+  if (!arguments.motion.empty()) {
+    inputs.push_back(arguments.motion);
+    motion = readInstants(arguments.motion, robot.model, file);
+  }
+  requireApart(arguments.directory, inputs);
   makeOutputDirectory(arguments.directory);
   watchInterrupts();
-  const SoftnessStudy study(robot.model, loops, findClosedConfiguration(robot.model).q, arguments.options);
+  const SoftnessStudy study(robot.model, loops, findClosedConfiguration(robot.model).q, arguments.options, motion);
   const auto path = [&](const char* name) { return (fs::path(arguments.directory) / name).string(); };
   LineLog log(path("softness.jsonl"), identify(arguments, robot, softness).dump(),
               "its rows are of another file, of other settings or of another version of the program");
@@ -205,15 +218,22 @@ void addSoftness(CLI::App& command, Action& action) {
   command.add_option("--within", arguments->within, "largest gap that settings.xml shall allow [m, and rad of angles]")
       ->check(isPositive())
       ->capture_default_str();
+  command
+      .add_option("--motion", arguments->motion,
+                  "result of a motion of this mechanism, along which to look, instead of at postures of its range")
+      ->check(CLI::ExistingDirectory);
   command.add_option("--torque", arguments->options.torque, "of each motor, instead of its limit [N m or N]")
-      ->check(isPositive());
+      ->check(isPositive())
+      ->excludes("--motion");
   command.add_option("--postures", arguments->options.postures, "of the range of each motor")
       ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes("--motion");
   command
       .add_option("--mujoco", arguments->mujoco,
-                  "version: before 3, rotations of welds are scaled by the inertia of translations")
-      ->check(CLI::IsMember({2, 3}))
+                  "version: before 3, rotations of welds are scaled by the inertia of translations; before 3.7, the "
+                  "change of J is not known")
+      ->check(CLI::IsMember({"2", "3", "3.7"}))
       ->capture_default_str();
   command.add_flag("--json", arguments->json, "print JSON");
   command.footer(
@@ -232,11 +252,14 @@ void addSoftness(CLI::App& command, Action& action) {
       "  and what a loop does: holds; falls: the loops let the mechanism fall at any step; gives way: they do not bear "
       "the load;\n"
       "                diverges: the time step is too long\n"
+      "With --motion, the first three along it, with its speeds and forces; other motors and bodies move as they did.\n"
       "Rows are appended as they are found: after Ctrl-C the same command goes on. Plots are drawn by gnuplot, if\n"
       "installed. Exit status: 0 done, 1 interrupted, 2 bad input, or a file without loops.\n"
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
       "  bielle softness bipetto.xml --timestep 0.002 -o soft\n"
+      "  bielle solve squat --robot bipetto --depth 0.8 -o squat\n"
+      "  bielle softness bipetto.xml --motion squat -o soft_squat\n"
       "  bielle softness excavator.xml --solref 0.02 1 --solimp 0.9 0.95 --within 1e-3 -o soft");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
 }

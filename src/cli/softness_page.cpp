@@ -23,7 +23,9 @@ double roundDown(double x) {
   return *parseNumber(formatNumber(std::floor(x / unit + 1e-9) * unit, "%.2g"));
 }
 
-double read(const Json& row, const char* key) { return row.at(key).is_null() ? NAN : row.at(key).get<double>(); }
+double read(const Json& row, const char* key) {
+  return row.contains(key) && row.at(key).is_number() ? row.at(key).get<double>() : NAN;
+}
 
 std::string escape(const std::string& text) {
   std::string out;
@@ -37,6 +39,23 @@ std::vector<std::string> listLoops(const std::vector<Json>& rows) {
     if (const std::string loop = row.at("loop"); std::find(loops.begin(), loops.end(), loop) == loops.end())
       loops.push_back(loop);
   return loops;
+}
+
+// Over the time of a motion.
+Plot makeMotionPlot(const std::string& loop, const std::vector<Json>& rows, double within) {
+  Plot plot{loop, "time [s]", "gap and sag [m, rad]"};
+  plot.scale = PlotScale::Logarithmic;
+  Curve gap{"gap", getCurveColor(0)}, sag{"sag", getCurveColor(1)}, asked{"asked for", "#7f7f7f"};
+  asked.dashed = true;
+  for (const Json& row : rows) {
+    if (row.at("loop") != loop) continue;
+    const double time = row.at("time");
+    gap.points.emplace_back(time, std::max(read(row, "gap"), read(row, "angle")));
+    sag.points.emplace_back(time, read(row, "sag"));
+    asked.points.emplace_back(time, within);
+  }
+  plot.curves = {gap, sag, asked};
+  return plot;
 }
 
 Plot makePlot(const std::string& loop, const std::vector<Json>& rows, double within) {
@@ -69,7 +88,9 @@ Plot makePlot(const std::string& loop, const std::vector<Json>& rows, double wit
 struct Column {
   const char *key, *title, *format;
 };
-constexpr Column kColumns[] = {{"joint", "joint", ""},
+// Those that a study does not have are left out.
+constexpr Column kColumns[] = {{"time", "time [s]", "%.4g"},
+                               {"joint", "joint", ""},
                                {"position", "position [rad, m]", "%.4g"},
                                {"gap", "gap [m]", "%.2e"},
                                {"angle", "gap [rad]", "%.2e"},
@@ -86,12 +107,14 @@ constexpr Column kColumns[] = {{"joint", "joint", ""},
 
 std::string makeTable(const std::string& loop, const std::vector<Json>& rows) {
   std::string html = "<table><tr>";
-  for (const Column& column : kColumns) html += std::string("<th>") + column.title + "</th>";
+  for (const Column& column : kColumns)
+    if (rows.front().contains(column.key)) html += std::string("<th>") + column.title + "</th>";
   html += "</tr>\n";
   for (const Json& row : rows) {
     if (row.at("loop") != loop) continue;
     html += "<tr>";
     for (const Column& column : kColumns) {
+      if (!row.contains(column.key)) continue;
       const Json& value = row.at(column.key);
       html += "<td>" +
               (value.is_string() ? escape(value)
@@ -107,16 +130,19 @@ std::string makeTable(const std::string& loop, const std::vector<Json>& rows) {
 }  // namespace
 
 SoftnessAdvice advise(const std::vector<Json>& rows, double within, double time_step) {
-  double pull = 0;
-  for (const Json& row : rows) pull = std::max(pull, read(row, "pull"));
+  double opening = 0;  // over the square of the time constant
+  for (const Json& row : rows) {
+    const double bias = read(row, "bias");
+    opening = std::max(opening, (1 - kImpedance) * read(row, "pull") + (std::isnan(bias) ? 0 : bias));
+  }
   SoftnessAdvice advice;
   advice.within = within;
   advice.time_step = time_step;
-  if (const double needed = std::sqrt(kMargin * within / ((1 - kImpedance) * pull)) / 2; needed < time_step)
+  if (const double needed = std::sqrt(kMargin * within / opening) / 2; needed < time_step)
     advice.time_step = roundDown(needed);
   const double time = 2 * advice.time_step;
   advice.settings = {{time, 1}, {kImpedance, kImpedance, 0.001, 0.5, 2}};
-  advice.gap = (1 - kImpedance) * pull * time * time;
+  advice.gap = opening * time * time;
   return advice;
 }
 
@@ -140,12 +166,14 @@ void writeSoftnessPage(const std::string& directory, const std::string& title, c
       "6px;text-align:right}td{white-space:nowrap}pre{background:#f4f4f4;"
       "padding:1em}</style></head><body>\n<h1>" +
       escape(title) + "</h1>\n<p>Within " + formatNumber(advice.within, "%.2g") +
-      " m and rad, gravity and motors at their limits: a gap of " + formatNumber(advice.gap, "%.2g") +
-      " with</p>\n<pre>" + escape(formatMjcf(advice)) + "</pre>\n";
+      (rows.front().contains("time") ? " m and rad, along the motion: a gap of "
+                                     : " m and rad, gravity and motors at their limits: a gap of ") +
+      formatNumber(advice.gap, "%.2g") + " with</p>\n<pre>" + escape(formatMjcf(advice)) + "</pre>\n";
   const fs::path figure = fs::path(directory) / "softness.svg";
   for (const std::string& loop : listLoops(rows)) {
     html += "<h2>" + escape(loop) + "</h2>\n";
-    if (drawPlots(figure.string(), {makePlot(loop, rows, advice.within)})) {
+    if (drawPlots(figure.string(),
+                  {(rows.front().contains("time") ? makeMotionPlot : makePlot)(loop, rows, advice.within)})) {
       const std::string svg = readTextFile(figure.string());
       html += svg.substr(std::min(svg.size(), svg.find("<svg")));
       fs::remove(figure);

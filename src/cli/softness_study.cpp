@@ -58,12 +58,15 @@ struct SoftnessStudy::Worst {
 };
 
 SoftnessStudy::SoftnessStudy(const Model& model, const SoftLoops& loops, const VectorXd& q,
-                             const SoftnessOptions& options)
+                             const SoftnessOptions& options, const std::vector<SoftnessInstant>& motion)
     : model_(model), loops_(loops), options_(options) {
   for (size_t c = 0; c < model.clusters().size(); ++c) {
     driven_.push_back(findDriven(static_cast<int>(c), q));
-    if (!listLoops(static_cast<int>(c)).empty()) addTasks(static_cast<int>(c), q);
+    if (motion.empty() && !listLoops(static_cast<int>(c)).empty()) addTasks(static_cast<int>(c), q);
   }
+  for (const SoftnessInstant& instant : motion)
+    for (size_t c = 0; c < model.clusters().size(); ++c)
+      if (!listLoops(static_cast<int>(c)).empty()) tasks_.push_back({static_cast<int>(c), "", 0, instant.q, &instant});
 }
 
 std::vector<std::string> SoftnessStudy::listLoops(int cluster) const {
@@ -195,12 +198,60 @@ SoftnessStudy::Worst SoftnessStudy::calcMotors(const SoftnessTask& task) const {
   return worst;
 }
 
+std::vector<int> SoftnessStudy::listPassive(int cluster) const {
+  std::vector<int> passive;
+  for (const int k : model_.clusters()[cluster].dofs)
+    if (std::none_of(model_.motors().begin(), model_.motors().end(),
+                     [&](const Motor& motor) { return motor.dof == k; }))
+      passive.push_back(k);
+  return passive;
+}
+
+// The forces of the loops are those of the motion.
+std::vector<Json> SoftnessStudy::studyInstant(const SoftnessTask& task) const {
+  const SoftnessInstant& at = *task.instant;
+  Workspace ws(model_);
+  const VectorXd others = calcInverseDynamics(model_, ws, at.q, at.v, at.a) - at.force;
+  const std::vector<int> passive = listPassive(task.cluster);
+  const SoftRest rest = loops_.findRest(at.q, at.v, at.a, loops_.makeDirections(at.q, passive), others);
+  const bool holds = rest.status == NumericalStatus::Ok;
+  const auto ifHolds = [&](double x) { return holds ? makeNumber(x) : Json(nullptr); };
+  double error = 0;
+  for (const int motor : listMotors(task.cluster)) {
+    const int k = model_.motors()[motor].dof;
+    error = std::max(error, std::abs(rest.load[k] - rest.rigid_load[k]));
+  }
+  const std::vector<int>& driven = driven_[task.cluster];
+  std::vector<Json> rows;
+  for (const std::string& loop : listLoops(task.cluster)) {
+    ClosureGap gap;
+    double pull = 0, bias = 0;
+    for (size_t e = 0; e < loops_.equalities().size(); ++e) {
+      if (loops_.equalities()[e].closure.name != loop) continue;
+      gap.position = std::max(gap.position, rest.gap[e].position);
+      gap.angle = std::max(gap.angle, rest.gap[e].angle);
+      pull = std::max(pull, rest.pull[e]);
+      bias = std::max(bias, rest.bias[e]);
+    }
+    rows.push_back({{"loop", loop},
+                    {"time", at.time},
+                    {"gap", ifHolds(gap.position)},
+                    {"angle", ifHolds(gap.angle)},
+                    {"sag", ifHolds(getLargest(rest.displacement, driven.empty() ? passive : driven))},
+                    {"torque_error", ifHolds(error)},
+                    {"pull", makeNumber(pull)},
+                    {"bias", makeNumber(bias)},
+                    {"state", kSoftnessStates[holds ? 0 : 2]}});
+  }
+  return rows;
+}
+
 std::vector<Json> SoftnessStudy::study(const SoftnessTask& task) const {
+  if (task.instant) return studyInstant(task);
   const std::vector<int>& dofs = model_.clusters()[task.cluster].dofs;
-  std::vector<int> passive, motors;
+  const std::vector<int> passive = listPassive(task.cluster);
+  std::vector<int> motors;
   for (const int motor : listMotors(task.cluster)) motors.push_back(model_.motors()[motor].dof);
-  for (const int k : dofs)
-    if (std::find(motors.begin(), motors.end(), k) == motors.end()) passive.push_back(k);
   const SoftRest rest = loops_.findRest(task.q, loops_.makeDirections(task.q, passive), VectorXd::Zero(model_.nv()));
   const Worst pulled = calcMotors(task);
   const bool holds = rest.status == NumericalStatus::Ok && pulled.holds;

@@ -74,11 +74,12 @@ SoftRow calcSoftRow(const SoftSettings& settings, double gap, const SoftStep& st
 
 struct SoftLoops::State {
   MatrixXd M, H;           // nv x nv, rows x nv
-  VectorXd bias;           // nv
-  VectorXd force;          // rows, of the springs
+  VectorXd load;           // nv, of inverse dynamics without the rows
+  VectorXd force;          // rows, of the springs, and of Eq. (5)
   VectorXd mass, damping;  // rows
   MatrixXd stiffness;      // rows x rows, of the springs, by equality
   std::vector<ClosureGap> gap;
+  std::vector<double> bias;
 };
 
 SoftLoops::SoftLoops(const Model& model, std::vector<SoftEquality> equalities, const SoftStep& step)
@@ -90,16 +91,34 @@ SoftLoops::SoftLoops(const Model& model, std::vector<SoftEquality> equalities, c
       rigid_.push_back(closure);
 }
 
-// At rest.
 SoftLoops::State SoftLoops::evaluate(ConstVectorRef q) const {
+  const VectorXd rest = VectorXd::Zero(model_.nv());
+  return evaluate(q, rest, rest);
+}
+
+// dJ/dt v, by central differences; zero where MuJoCo knows it.
+VectorXd SoftLoops::calcBias(const SoftEquality& equality, ConstVectorRef q, ConstVectorRef v) const {
+  const int rows = getRows(equality.closure.kind);
+  const double speed = v.cwiseAbs().maxCoeff();
+  if (equality.has_bias || speed == 0) return VectorXd::Zero(rows);
+  const double time = kDifference / speed;
   Workspace ws(model_);
-  updatePositions(model_, ws, q);
-  updateVelocities(model_, ws, VectorXd::Zero(model_.nv()));
-  updateMassMatrix(model_, ws);
-  updateBias(model_, ws);
+  const auto calcVelocity = [&](double at) -> VectorXd {
+    updatePositions(model_, ws, model_.integrate(q, at * v));
+    MatrixXd H = MatrixXd::Zero(rows, model_.nv());
+    calcClosureResidualJacobian(ws, equality.closure, H);
+    return H * v;
+  };
+  return (calcVelocity(time) - calcVelocity(-time)) / (2 * time);
+}
+
+SoftLoops::State SoftLoops::evaluate(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a) const {
+  Workspace ws(model_);
   State state;
+  state.load = calcInverseDynamics(model_, ws, q, v, a);
+  updatePositions(model_, ws, q);
+  updateMassMatrix(model_, ws);
   state.M = ws.M;
-  state.bias = ws.b;
   state.H.setZero(rows_, model_.nv());
   for (VectorXd* x : {&state.force, &state.mass, &state.damping}) x->setZero(rows_);
   state.stiffness.setZero(rows_, rows_);
@@ -113,7 +132,9 @@ SoftLoops::State SoftLoops::evaluate(ConstVectorRef q) const {
     const double gap = equality.scale.cwiseProduct(residual).norm();
     const SoftRow row = calcSoftRow(equality.settings, gap, step_);
     const VectorXd pull = share.cwiseProduct(residual);
-    state.force.segment(at, rows) = -row.stiffness * pull;
+    const VectorXd bias = calcBias(equality, q, v);
+    state.bias.push_back(bias.norm());
+    state.force.segment(at, rows) = row.mass * share.cwiseProduct(bias) - row.stiffness * pull;
     state.mass.segment(at, rows) = row.mass * share;
     state.damping.segment(at, rows) = row.damping * share;
     MatrixXd block = (row.stiffness * share).asDiagonal();
@@ -218,8 +239,15 @@ MatrixXd SoftLoops::makeClosedMotions(ConstVectorRef q, const MatrixXd& directio
 }
 
 SoftRest SoftLoops::findRest(ConstVectorRef q, const MatrixXd& directions, ConstVectorRef tau) const {
+  const VectorXd none = VectorXd::Zero(model_.nv());
+  return findRest(q, none, none, directions, tau);
+}
+
+SoftRest SoftLoops::findRest(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, const MatrixXd& directions,
+                             ConstVectorRef tau) const {
   SoftRest rest;
-  State state = evaluate(q);
+  State state = evaluate(q, v, a);
+  rest.bias = state.bias;
   const MatrixXd T = splitDirections(state.M, state.H, state.stiffness, directions).opening;
   const auto solve = [&T](const State& at, const VectorXd& load) -> VectorXd {
     const MatrixXd rows = at.H * T;
@@ -228,8 +256,8 @@ SoftRest SoftLoops::findRest(ConstVectorRef q, const MatrixXd& directions, Const
   };
   // Rigid loops have the forces of the first, linear step.
   VectorXd rigid = VectorXd::Zero(rows_);
-  if (T.cols() > 0) rigid = -(state.stiffness * (state.H * (T * solve(state, tau - state.bias))));
-  rest.rigid_load = state.bias - state.H.transpose() * rigid;
+  if (T.cols() > 0) rigid = -(state.stiffness * (state.H * (T * solve(state, tau - state.load))));
+  rest.rigid_load = state.load - state.H.transpose() * rigid;
   int at = 0;
   for (const SoftEquality& equality : equalities_) {
     const int rows = getRows(equality.closure.kind);
@@ -241,16 +269,16 @@ SoftRest SoftLoops::findRest(ConstVectorRef q, const MatrixXd& directions, Const
   rest.status = T.cols() == 0 ? NumericalStatus::Ok : NumericalStatus::NotClosed;
   // Newton's method without the stiffness of other forces, which is small beside that of the springs.
   const auto measure = [&](const State& s) {
-    return VectorXd(T.transpose() * (tau - s.bias + s.H.transpose() * s.force));
+    return VectorXd(T.transpose() * (tau - s.load + s.H.transpose() * s.force));
   };
   for (int i = 0; i < kMostSteps && rest.status != NumericalStatus::Ok; ++i) {
     const double size = measure(state).norm();
-    VectorXd step = T * solve(state, tau - state.bias + state.H.transpose() * state.force);
+    VectorXd step = T * solve(state, tau - state.load + state.H.transpose() * state.force);
     if (!step.allFinite() || step.cwiseAbs().maxCoeff() > 10 * kFarthest) break;
     int halvings = 0;
     for (;; ++halvings, step /= 2) {
       const VectorXd next = model_.integrate(rest.q, step);
-      State there = evaluate(next);
+      State there = evaluate(next, v, a);
       if (measure(there).norm() < size || halvings == kMostHalvings) {
         rest.q = next;
         state = std::move(there);
@@ -263,7 +291,7 @@ SoftRest SoftLoops::findRest(ConstVectorRef q, const MatrixXd& directions, Const
       rest.status = NumericalStatus::Ok;
   }
   rest.displacement = model_.difference(q, rest.q);
-  rest.load = state.bias - state.H.transpose() * state.force;
+  rest.load = state.load - state.H.transpose() * state.force;
   rest.gap = state.gap;
   at = 0;
   for (const SoftEquality& equality : equalities_) {

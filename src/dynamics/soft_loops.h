@@ -11,6 +11,9 @@
 ///     r = -f / s = -(1 - d) A f / (K d^2)                                                                           (3)
 /// About a rest, with the stiffness K_0 of everything but the springs of the rows, small motions x follow
 ///     M' x'' + C x' + K' x = 0,   M' = M + J^T m J,  C = D + J^T c J,  K' = K_0 + J^T ds/dr J.                      (4)
+/// In a motion that opens the loops slowly beside their time constants, J a = -dJ/dt v, and the row stands open by
+///     r = -f / s + (dJ/dt v) / (K d)                                                                               (5)
+/// but where MuJoCo has -dJ/dt v in a_ref as well: there Eq. (3) holds.
 #include <array>
 #include <string>
 #include <vector>
@@ -51,6 +54,7 @@ struct SoftEquality {
   VectorXd
       scale;  ///< of MuJoCo's rows over ours: rotations of a weld are vector parts of quaternions, half of the angle
   SoftSettings settings;
+  bool has_bias = true;  ///< MuJoCo has -dJ/dt v in a_ref
 };
 
 /// A mechanism that rests under generalized forces, with its loops open as Eq. (3) says.
@@ -65,6 +69,8 @@ struct SoftRest {
   /// By equality, |A f| of the rigid loops, m/s^2 and rad/s^2: the gap is that times (1 - d) (time constant, damping ratio)^2, whatever
   /// the mass
   std::vector<double> pull;
+  /// By equality, |dJ/dt v| where Eq. (5) holds, m/s^2 and rad/s^2: at most, it adds (time constant, damping ratio)^2 times that
+  std::vector<double> bias;
 };
 
 /// Small motions about a rest, as MuJoCo's steps make them.
@@ -94,12 +100,17 @@ class SoftLoops {
   /// \param q  closed (nq)   \param tau  generalized forces (nv)
   /// \param directions  motions along which the equalities do not open are held
   SoftRest findRest(ConstVectorRef q, const MatrixXd& directions, ConstVectorRef tau) const;
+  /// The same in a motion with the velocities v and accelerations a (nv), Eq. (5): loads are those of inverse dynamics.
+  SoftRest findRest(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, const MatrixXd& directions,
+                    ConstVectorRef tau) const;
   /// About a rest under the forces that it needs, which stay as they are. \param q  closed (nq), where rigid loops stand
   SoftMotion calcMotion(ConstVectorRef q, const SoftRest& rest, const MatrixXd& directions) const;
 
  private:
   struct State;
+  State evaluate(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a) const;
   State evaluate(ConstVectorRef q) const;
+  VectorXd calcBias(const SoftEquality& equality, ConstVectorRef q, ConstVectorRef v) const;
   VectorXd calcLoad(ConstVectorRef q, const VectorXd& force) const;
   MatrixXd calcStiffness(ConstVectorRef q, const VectorXd& force, const MatrixXd& directions) const;
   MatrixXd calcDamping(ConstVectorRef q, const MatrixXd& directions) const;

@@ -94,6 +94,8 @@ SoftLoops makeSoftLoops(const Model& model, const MjcfSoftness& file, MujocoVers
       closure.X_B2.p = closure.X_B2.act(equality.lever * closure.axis);
     }
     soft.weight = weights.calc(equality, closure, version).cwiseMax(kLeastWeight);
+    soft.has_bias = version == MujocoVersion::ThreeSeven &&
+                    (closure.kind == ClosureKind::Ball3D || closure.kind == ClosureKind::Weld6D);
     soft.scale = VectorXd::Ones(soft.weight.size());
     if (closure.kind == ClosureKind::Weld6D) soft.scale.tail<3>().setConstant(0.5);
     equalities.push_back(std::move(soft));

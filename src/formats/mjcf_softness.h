@@ -30,12 +30,14 @@ struct MjcfSoftness {
 /// \throws InputError as loadRobot() does
 MjcfSoftness readMjcfSoftness(const std::string& path);
 
-/// Versions of MuJoCo, of which those before 3 scale rotations of welds by the inertia of translations.
-enum class MujocoVersion { Two, Three };
+/// Versions of MuJoCo: those before 3 scale rotations of welds by the inertia of translations, and those before 3.7 do not know
+/// dJ/dt v of connects and welds; that of joints and tendons none does.
+enum class MujocoVersion { Two, Three, ThreeSeven };
 
 /// The loops of the model of that file. A = A_1 + A_2 of each row sums inverse inertias of both sides in the posture of the file:
 /// of connects and welds those of the bodies at their centres of mass, the mean of three directions, J M^{-1} J^T; of joints and tendons
 /// those of their coordinates.
-SoftLoops makeSoftLoops(const Model& model, const MjcfSoftness& file, MujocoVersion version = MujocoVersion::Three);
+SoftLoops makeSoftLoops(const Model& model, const MjcfSoftness& file,
+                        MujocoVersion version = MujocoVersion::ThreeSeven);
 
 }  // namespace bielle
