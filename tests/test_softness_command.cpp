@@ -134,8 +134,8 @@ TEST_CASE("Steps that are too long diverge, and loops that are too soft give way
 
 TEST_CASE("Loops open along a motion by its forces", "[softness]") {
   const RobotDirectory directory;
-  const std::string file = convertToMjcf(directory, "leg_biped"), motion = directory.path() + "/squat";
-  REQUIRE(run({"solve", "squat", "--robot", "leg_biped", "--depth", "0.9", "--duration", "0.4", "--set", "settle=0",
+  const std::string file = convertToMjcf(directory, "fivebar_leg"), motion = directory.path() + "/squat";
+  REQUIRE(run({"solve", "squat", "--robot", "fivebar_leg", "--depth", "0.9", "--duration", "0.4", "--set", "settle=0",
                "--no-check", "--no-report", "-o", motion})
               .status == 0);
   const auto study = [&](const std::string& time, const std::string& version) {
@@ -143,23 +143,22 @@ TEST_CASE("Loops open along a motion by its forces", "[softness]") {
     const CommandResult result = run({"softness", file, "--motion", motion, "--timestep", "0.0005", "--solref", time,
                                       "1", "--solimp", "0.99", "0.99", "--mujoco", version, "--json", "-o", output});
     REQUIRE(result.status == 0);
-    CHECK(nlohmann::json::parse(result.out)["loops"].size() == 6);
+    CHECK(nlohmann::json::parse(result.out)["loops"].size() == 1);
     CHECK(nlohmann::json::parse(result.out)["gap"] <= 1e-4);
     CHECK_THAT(readFile(output + "/softness.html"), Catch::Contains("<th>time [s]</th>"));
     return readRows(output);
   };
   const std::vector<nlohmann::json> rows = study("0.004", "3.7"), stiff = study("0.002", "3.7"),
                                     old = study("0.004", "3");
-  REQUIRE(rows.size() % 6 == 0);
-  REQUIRE(rows.size() > 100);
+  REQUIRE(rows.size() > 20);
+  REQUIRE(old.size() == rows.size());
   double changed = 0;
   for (size_t k = 0; k < rows.size(); ++k) {
     CHECK(rows[k]["state"] == "holds");
     CHECK(rows[k]["time"] == old[k]["time"]);
-    if (rows[k]["gap"] < 1e-9) continue;
     CHECK(rows[k]["gap"].get<double>() == Approx(4 * stiff[k]["gap"].get<double>()).epsilon(0.02));
-    CHECK(rows[k]["bias"] <= old[k]["bias"]);
-    changed = std::max(changed, old[k]["bias"].get<double>() - rows[k]["bias"].get<double>());
+    CHECK(rows[k]["bias"] == 0);
+    changed = std::max(changed, old[k]["bias"].get<double>());
   }
   CHECK(changed > 1e-3);  // m/s^2
 
