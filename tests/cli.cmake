@@ -90,7 +90,8 @@ add_test(NAME mcap COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/tes
 add_test(NAME mcap_core COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mcap.py $<TARGET_FILE:bielle_command> core)
 # References for learning and robots, read by today's MuJoCo where it is found.
 add_test(NAME mujoco_3 COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mujoco_3.py $<TARGET_FILE:bielle_command>)
-set_tests_properties(mcap mcap_core mujoco_3 PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+add_test(NAME softness_3 COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_softness_3.py $<TARGET_FILE:bielle_command>)
+set_tests_properties(mcap mcap_core mujoco_3 softness_3 PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
 # Keys that no reader of YAML uses are refused, and those that they use are listed.
 add_test(NAME keys COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_keys.py $<TARGET_FILE:bielle_command>
