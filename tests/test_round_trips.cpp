@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <map>
+#include <optional>
 #include <regex>
 #include <sstream>
 
@@ -17,6 +18,7 @@
 #include "formats/drake.h"
 #include "formats/mjcf.h"
 #include "formats/sdf.h"
+#include "formats/usd.h"
 #include "math/so3.h"
 #include "mechanisms.h"
 #include "model/number_text.h"
@@ -192,4 +194,92 @@ TEST_CASE("four-bars in any plane come back from MJCF, Drake's URDF and SDF with
       CHECK(back.mass() == Approx(model.mass()).epsilon(1e-15));
     }
   }
+}
+
+namespace {
+
+// How far centres of mass and moments of inertia of two models are apart where joints of the same names are at the same coordinates,
+// over the size of the robot and over themselves: independent of the frames that a format gives to bodies. Masses are the same bits.
+struct Deviation {
+  double place = 0, inertia = 0;
+};
+
+// Where the file counts its coordinates from: ours, the posture that it is written in, or those of its keyframe.
+enum class Origin { Neutral, Posture, Keyframe };
+
+// Empty where a joint is several in the file, or has another name. A free base may stand elsewhere.
+std::optional<Deviation> compareBodies(const Model& a, ConstVectorRef q, const Model& b, Origin origin) {
+  VectorXd q_back = b.makeNeutral();
+  for (int i = 1; i < a.numBodies(); ++i) {
+    const Joint& from = a.joints()[static_cast<size_t>(i)];
+    const int j = b.findJoint(from.name);
+    if (j < 0 || b.joints()[static_cast<size_t>(j)].nq != from.nq) return {};
+    const Joint& to = b.joints()[static_cast<size_t>(j)];
+    if (origin == Origin::Neutral) q_back.segment(to.idx_q, to.nq) = q.segment(from.idx_q, from.nq);
+    if (origin != Origin::Keyframe) continue;
+    const std::vector<double>& given = b.references().front().joints.at(from.name);
+    q_back.segment(to.idx_q, to.nq) = VectorXd::Map(given.data(), to.nq);
+  }
+  Workspace own(a), back(b);
+  updatePositions(a, own, q);
+  updatePositions(b, back, q_back);
+  const auto get = [](const Model& model, const Workspace& ws, int body) {
+    return model.bodies()[static_cast<size_t>(body)].inertia.transformed(getPlacement(ws, body, SE3()));
+  };
+  SE3 moved;
+  if (a.hasFreeFlyer())
+    moved = getPlacement(own, 1, SE3()) * getPlacement(back, b.findJoint(a.joints()[1].name), SE3()).inverse();
+  double size = 0;
+  for (int i = 1; i < a.numBodies(); ++i) size = std::max(size, get(a, own, i).com.norm());
+  Deviation out;
+  for (int i = 1; i < a.numBodies(); ++i) {
+    const int j = b.findJoint(a.joints()[static_cast<size_t>(i)].name);
+    const Inertia x = get(a, own, i), y = get(b, back, j).transformed(moved);
+    CHECK(x.mass == y.mass);
+    out.place = std::max(out.place, (x.com - y.com).norm() / size);
+    out.inertia = std::max(out.inertia, (x.I_com - y.I_com).norm() / x.I_com.norm());
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("robots of any kind come back from MJCF, Drake's URDF, SDF and USD to rounding, and their masses to the bit",
+          "[sweep]") {
+  constexpr double kRounding =
+      2e-14;  // of frames and principal axes that are composed with others: a hundred units in the last place
+  const int count = std::getenv("BIELLE_SWEEP") ? 300 : 40;
+  std::map<std::string, int> compared;
+  for (int i = 0; i < count; ++i) {
+    std::mt19937 rng(static_cast<unsigned>(i));
+    const Mechanism mechanism = makeAny(rng, i);
+    const Model& model = mechanism.model;
+    const VectorXd& q = mechanism.q_closed;
+    const RobotDirectory directory;
+    const auto check = [&](const std::string& format, Origin origin, const auto& write) {
+      CAPTURE(i, format);
+      std::string file;
+      try {
+        file = write();
+      } catch (const InputError&) {  // a joint or closure that the format does not have
+        return;
+      }
+      const auto deviation = compareBodies(model, q, loadRobot(file).model, origin);
+      if (!deviation) return;
+      ++compared[format];
+      CHECK(deviation->place < kRounding);
+      CHECK(deviation->inertia < kRounding);
+    };
+    check("mjcf", Origin::Keyframe, [&] { return directory.write("mjcf/robot.xml", formatMjcf(model, q).xml); });
+    check("drake", Origin::Neutral, [&] { return directory.write("drake/robot.urdf", formatDrake(model).urdf); });
+    check("usd", Origin::Neutral, [&] { return directory.write("usd/robot.usda", formatUsd(model, q).usda); });
+#ifdef BIELLE_READS_SDF
+    check("sdf", Origin::Posture, [&] { return directory.write("sdf/robot.sdf", formatSdf(model, q).xml); });
+#endif
+  }
+  for (const auto& [format, robots] : compared) {
+    CAPTURE(format);
+    CHECK(robots > 0.6 * count);
+  }
+  CHECK(compared.size() >= 3);
 }
