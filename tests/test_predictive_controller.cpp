@@ -515,6 +515,99 @@ TEST_CASE("predictive control: a solve that ends before the next one begins is p
 
 namespace {
 
+// A cost without weight that asks at a gate for every evaluation of its node.
+struct Gated : Residual {
+  explicit Gated(Gate& asked) : gate(asked) {}
+  int size() const override { return 1; }
+  void calc(const NodeView&, VectorRef r) const override {
+    gate.pass();
+    r.setZero();
+  }
+  void calcJacobian(const NodeView&, ResidualRows) const override {}
+  Gate& gate;
+};
+
+}  // namespace
+
+TEST_CASE(
+    "predictive control: a policy acts as soon as its sweep has ended, and that of the rolled out step replaces it") {
+  const Model& model = getBipetto();
+  const int ticks = static_cast<int>(std::lround(1e3 * kStage));
+  Gate gate;
+  MotionPlan plan = planSquat(model, makeShortSquat(), makeStandingRobot(model));
+  plan.stages[20].costs.push_back(
+      {"gate", 1, Activation::makeQuadratic(VectorXd::Ones(1)), std::make_shared<Gated>(gate)});
+  const auto make = [&](bool own_thread) {
+    PredictiveOptions options = makeShortWindow(1);
+    options.own_thread = own_thread;
+    return std::make_unique<PredictiveController>(makePredictiveMotion(model, plan, ProblemOptions(), options),
+                                                  getShortSquat().solution.trajectory, options);
+  };
+  const auto own = make(true), other = make(false);
+  Measurement at{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  VectorXd u(model.nu());
+  const auto update = [&](PredictiveController& controller, int tick) {
+    at.time = 1e-3 * tick;
+    getShortSquat().gains->getReference(at.time, at.q, at.v);
+    at.v[0] += 0.02;  // off the plan
+    controller.update(at, u);
+  };
+  const PredictiveCounts& counts = own->counts();
+  const auto open = [](Gate* closed) { closed->open(); };
+  const std::unique_ptr<Gate, decltype(open)> opened(&gate, open);  // before the thread is waited for
+  // A solve that is prepared is held in its rollout. After one that came late, as on a busy machine, none is.
+  int tick = 0;
+  bool drafted_in_time = false;
+  for (int stage = 4; stage < 16 && !drafted_in_time; stage += 2) {
+    gate.open();
+    for (; tick < stage * ticks - kLeadTicks; ++tick) {
+      own->waitForSolve();
+      update(*own, tick);
+    }
+    own->waitForSolve();
+    gate.close();
+    for (; tick < stage * ticks; ++tick) update(*own, tick);
+    for (int i = 0; i < 20000 && !gate.holds(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    REQUIRE(gate.holds());
+    const long allocations = num_allocations_here;
+    update(*own, tick);
+    CHECK(num_allocations_here == allocations);
+    CHECK(counts.solves == stage - 1);
+    drafted_in_time = own->policy().stages().front().start == Approx(1e-3 * tick);
+  }
+  REQUIRE(drafted_in_time);
+  const Policy draft = own->policy();
+  CHECK(counts.last.back().latency == Approx(1e-3 * kLeadTicks));
+
+  gate.open();
+  own->waitForSolve();
+  update(*own, ++tick);
+  CHECK(counts.failed == 0);
+  CHECK(counts.last.back().latency == Approx(1e-3 * kLeadTicks));
+  CHECK(counts.last.back().step == 1);
+  for (int t = 0; t <= tick; ++t) update(*other, t);
+  const std::vector<Policy::Stage>&drafted = draft.stages(), &solved = own->policy().stages(),
+        &waited = other->policy().stages();
+  REQUIRE(drafted.size() == solved.size());
+  CHECK(drafted[0].q == solved[0].q);
+  CHECK(drafted[0].u == solved[0].u);  // nothing has been rolled out before
+  for (size_t k = 0; k < waited.size(); ++k) {
+    CHECK(solved[k].q == waited[k].q);
+    CHECK(solved[k].u == waited[k].u);
+    CHECK(solved[k].K == waited[k].K);
+  }
+  for (size_t k = 0; k < solved.size(); ++k) {
+    CAPTURE(k);
+    CHECK(drafted[k].start == solved[k].start);
+    CHECK(drafted[k].K == solved[k].K);
+    CHECK((drafted[k].u - solved[k].u).norm() < 1e-2 * solved[k].u.norm());
+    CHECK((drafted[k].v - solved[k].v).norm() < 1e-2);
+  }
+  CHECK(drafted[2].u != solved[2].u);
+}
+
+namespace {
+
 // Gains of a squat; a controller that is not beyond an instant of its plan.
 class HeldBack : public Controller {
  public:

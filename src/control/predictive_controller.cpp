@@ -27,6 +27,7 @@ class PredictiveController::Loop {
         planner_(std::move(horizon), options),
         solution_(planner_.makeEmpty()),
         next_(planner_.makeEmpty()),
+        preview_{planner_.makeEmpty(), {}},
         dead_point_stop_(planner_.model(), planner_.startPosture(), options.dead_point_stop) {
     if (!(solve_time_ >= 0 && std::isfinite(solve_time_)))
       throw std::invalid_argument("PredictiveOptions: solve_time must be finite and not negative");
@@ -41,16 +42,20 @@ class PredictiveController::Loop {
     request_.measurement.contacts.resize(model.contacts().size());
     request_.u.setZero(model.nu());
     counts_.last.reserve(kSolves);
-    if (options.own_thread) thread_ = std::make_unique<SolvingThread>(planner_, request_, solution_);
+    if (options.own_thread) thread_ = std::make_unique<SolvingThread>(planner_, request_, solution_, preview_);
   }
 
   void update(const Measurement& measurement, VectorRef u) {
     const double time = measurement.time + kClockTolerance;
-    if (solves_ && isDone(time)) receive();
+    if (solves_ && isDone(time))
+      receive();
+    else if (solves_ && !drafted_ && isDrafted())
+      adopt(preview_.draft);
     if (next_.solved && time + measurement.delay >= getStart(next_.target)) {
       policy_->exchange(next_.stages, next_.u_hold);
       next_.solved = false;
-      counts_.last[next_place_].latency = measurement.time - next_measured_;
+      PredictiveSolve& took = counts_.last[next_place_];
+      if (took.latency < 0) took.latency = measurement.time - took.time;
     }
     policy_->update(measurement, u);
     dead_point_stop_.add(measurement, u);
@@ -79,6 +84,8 @@ class PredictiveController::Loop {
     return thread_ ? thread_->state() == SolvingThread::State::Done : time >= request_.measurement.time + solve_time_;
   }
 
+  bool isDrafted() const { return thread_ && thread_->state() == SolvingThread::State::Drafted; }
+
   // Whether the next instant of control, about a period from now, would be too late for the solve of the present stage.
   bool isDue(const Measurement& measurement) const {
     const double period = measurement.time - last_time_;
@@ -101,6 +108,7 @@ class PredictiveController::Loop {
     request_.made = Clock::now();
     waits_ = false;
     solves_ = true;
+    drafted_ = false;
     if (thread_) return thread_->begin();
     planner_.solve(request_, solution_);
     planner_.prepare();
@@ -111,34 +119,49 @@ class PredictiveController::Loop {
     receive();
   }
 
+  // Of a draft, then of the solution: the policy awaits its stage, that of the solution instead of the draft's.
+  void adopt(WindowPlanner::Draft& draft) {
+    const size_t place = getPlace();
+    if (!drafted_) {
+      stage_ += draft.skipped;
+      advance_ = draft.advance;
+      awaited_ = draft.awaited;
+      if (counts_.last.size() < kSolves) counts_.last.emplace_back();
+      counts_.last[place] = {};
+      counts_.last[place].time = request_.measurement.time;
+      counts_.last[place].seconds = draft.seconds;
+    }
+    drafted_ = true;
+    if (!draft.solved) return;
+    std::swap(draft, next_);
+    next_place_ = place;
+  }
+
   void receive() {
     if (thread_) thread_->setIdle();
     solves_ = false;
-    stage_ += solution_.skipped;
-    advance_ = solution_.advance;
-    awaited_ = solution_.awaited;
-    solution_.took.time = request_.measurement.time;
-    counts_.failed += !solution_.solved;
+    const bool solved = solution_.solved;
+    adopt(solution_);
+    PredictiveSolve& took = counts_.last[getPlace()];
+    solution_.took.time = took.time;
+    solution_.took.latency = took.latency;
+    took = solution_.took;
+    counts_.failed += !solved;
     counts_.early += solution_.early;
     counts_.late += solution_.late;
-    const size_t place = static_cast<size_t>(counts_.solves) % kSolves;
-    if (counts_.last.size() < kSolves)
-      counts_.last.push_back(solution_.took);
-    else
-      counts_.last[place] = solution_.took;
     ++counts_.solves;
-    if (!solution_.solved) return;
-    footholds_ = solution_.footholds;  // there is room for those of all contacts
-    std::swap(solution_, next_);
-    next_place_ = place;
-    next_measured_ = request_.measurement.time;
+    if (solved) footholds_ = solution_.footholds;  // there is room for those of all contacts
   }
+
+  // Of the solve under way, in the counts.
+  size_t getPlace() const { return static_cast<size_t>(counts_.solves) % kSolves; }
 
   const double solve_time_, lead_;
   WindowPlanner planner_;
   WindowPlanner::Request request_;
   WindowPlanner::Solution solution_;  // of the solve under way, or memory for the next one
-  WindowPlanner::Solution next_;      // if solved, it awaits the stage from which on it is in force
+  WindowPlanner::Draft next_;         // if solved, it awaits the stage from which on it is in force
+  WindowPlanner::Preview preview_;    // of the solve under way
   DeadPointStop dead_point_stop_;
   std::unique_ptr<Policy> policy_;
   std::vector<PredictedFoothold> footholds_;
@@ -146,11 +169,11 @@ class PredictiveController::Loop {
   double last_time_ = -std::numeric_limits<double>::infinity();  // of the measurement before, s
   bool waits_ = false;                                           // it has no solve yet
   bool solves_ = false;                                          // a solve is under way
+  bool drafted_ = false;                                         // its draft has been taken
   double advance_ = 0;                                           // of the clock of the motion, s
   double awaited_ = -1;  // the landing of a late foot, s of the motion; negative: none is late
   PredictiveCounts counts_;
   size_t next_place_ = 0;                  // its place in the counts
-  double next_measured_ = 0;               // when the state was measured that it was solved for, s
   std::unique_ptr<SolvingThread> thread_;  // last: it ends first
 };
 

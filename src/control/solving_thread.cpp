@@ -5,8 +5,9 @@
 namespace bielle {
 
 SolvingThread::SolvingThread(WindowPlanner& planner, const WindowPlanner::Request& request,
-                             WindowPlanner::Solution& solution)
-    : planner_(planner), request_(request), solution_(solution) {
+                             WindowPlanner::Solution& solution, WindowPlanner::Preview& preview)
+    : planner_(planner), request_(request), solution_(solution), preview_(preview) {
+  preview_.publish = [this] { state_.store(State::Drafted, std::memory_order_release); };
   sem_init(&begins_, 0, 0);
   thread_ = std::thread([this] { run(); });
 }
@@ -24,7 +25,7 @@ void SolvingThread::begin() {
 }
 
 void SolvingThread::waitUntilDone() const {
-  while (state() == State::Busy || prepares_.load(std::memory_order_acquire))
+  while (state() == State::Busy || state() == State::Drafted || prepares_.load(std::memory_order_acquire))
     std::this_thread::sleep_for(std::chrono::microseconds(100));
 }
 
@@ -33,7 +34,7 @@ void SolvingThread::run() {
     while (sem_wait(&begins_) != 0) {  // a signal
     }
     if (ends_.load(std::memory_order_relaxed)) return;
-    planner_.solve(request_, solution_);
+    planner_.solve(request_, solution_, &preview_);
     prepares_.store(true, std::memory_order_relaxed);
     state_.store(State::Done, std::memory_order_release);
     planner_.prepare();

@@ -14,15 +14,17 @@ namespace bielle {
 class SolvingThread {
  public:
   // All of them must outlive it.
-  SolvingThread(WindowPlanner& planner, const WindowPlanner::Request& request, WindowPlanner::Solution& solution);
+  SolvingThread(WindowPlanner& planner, const WindowPlanner::Request& request, WindowPlanner::Solution& solution,
+                WindowPlanner::Preview& preview);
   // Waits for the solve under way.
   ~SolvingThread();
   SolvingThread(const SolvingThread&) = delete;
   SolvingThread& operator=(const SolvingThread&) = delete;
 
-  // Idle: request and solution are the caller's, who may begin() a solve. Busy: they are the thread's. Done: they are the
-  // caller's again, who takes the solution and calls setIdle(); the thread prepares the next solve, which may begin meanwhile.
-  enum class State { Idle, Busy, Done };
+  // Idle: request, draft and solution are the caller's, who may begin() a solve. Busy: they are the thread's. Drafted: the draft is the
+  // caller's, and all may read the request. Done: all are the caller's again, who takes the solution and calls setIdle(); the thread
+  // prepares the next solve, which may begin meanwhile.
+  enum class State { Idle, Busy, Drafted, Done };
   State state() const { return state_.load(std::memory_order_acquire); }
   void begin();
   void setIdle() { state_.store(State::Idle, std::memory_order_relaxed); }
@@ -34,6 +36,7 @@ class SolvingThread {
   WindowPlanner& planner_;
   const WindowPlanner::Request& request_;
   WindowPlanner::Solution& solution_;
+  WindowPlanner::Preview& preview_;
   std::atomic<State> state_{State::Idle};
   std::atomic<bool> ends_{false}, prepares_{false};
   sem_t begins_;

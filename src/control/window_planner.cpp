@@ -76,14 +76,14 @@ WindowPlanner::Solution WindowPlanner::makeFirst() {
   Receding first = makeSolver(kFirstIterations);
   first.step(trajectory_);
   Solution solution = makeEmpty();
-  makePolicy(first, 0, solution);
+  makePolicy(first, trajectory_, 0, solution);
   predictFootholds(0, solution);
   target_ = 0;
   prepare();
   return solution;
 }
 
-void WindowPlanner::solve(const Request& request, Solution& solution) {
+void WindowPlanner::solve(const Request& request, Solution& solution, Preview* preview) {
   solution.skipped = 0;
   solution.early = solution.late = false;
   solution.took = {};
@@ -92,7 +92,7 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
     const Clock::time_point begin = Clock::now();
     const bool predicted = predict(request, solution);
     solution.took.predict = calcSecondsSince(begin);
-    solution.solved = predicted && solveWindow(solution);
+    solution.solved = predicted && solveWindow(request, solution, preview);
   } catch (const std::exception&) {
     solution.solved = false;
   }
@@ -101,12 +101,17 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
     restart(request.stage + solution.skipped);
   }
   prepared_ = false;
-  solution.advance = advance_;
-  solution.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;
-  solution.took.seconds = calcSecondsSince(request.made);
+  tellTime(request, solution);
+  if (solution.took.seconds == 0) solution.took.seconds = solution.seconds;                // there was no draft
   const double next = horizon_->getStart(solution.target + 1) - advance_ - options_.lead;  // another one begins
-  const bool late = options_.own_thread && request.measurement.actionTime() + solution.took.seconds >= next;
+  const bool late = options_.own_thread && request.measurement.actionTime() + solution.seconds >= next;
   target_ = solution.solved && !late ? solution.target : -1;
+}
+
+void WindowPlanner::tellTime(const Request& request, Draft& out) const {
+  out.seconds = calcSecondsSince(request.made);
+  out.advance = advance_;
+  out.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;
 }
 
 // The stage that follows is the next one, unless a foot lands early or late; a stage with several solves has the same again. A late
@@ -199,7 +204,7 @@ VectorXd WindowPlanner::interpolate(int node, const NodeEvaluation& at, const Ve
   return moved;
 }
 
-bool WindowPlanner::solveWindow(Solution& solution) {
+bool WindowPlanner::solveWindow(const Request& request, Solution& solution, Preview* preview) {
   const int first = horizon_->getFirst(solution.target);
   if (isPrepared(first)) {
     window_.move(grid_.stages(), x_);
@@ -207,11 +212,24 @@ bool WindowPlanner::solveWindow(Solution& solution) {
     horizon_->prepare(first);
     if (!move(first)) return false;
   }
-  const FddpSummary summary = solver_.step(trajectory_);
+  if (preview) {
+    Draft& draft = preview->draft;
+    foresight_.stages = countNodes(solution.target, draft.stages.size());
+    foresight_.use = [&] {
+      makePolicy(solver_, foresight_.nodes, solution.target, draft);
+      draft.solved = true;
+      draft.target = solution.target;
+      draft.skipped = solution.skipped;
+      tellTime(request, draft);
+      solution.took.seconds = draft.seconds;
+      preview->publish();
+    };
+  }
+  const FddpSummary summary = solver_.step(trajectory_, {}, preview ? &foresight_ : nullptr);
   recordSolve(summary, solution.took);
   if (summary.termination == FddpTermination::Failed) return false;
   const Clock::time_point begin = Clock::now();
-  makePolicy(solver_, solution.target, solution);
+  makePolicy(solver_, trajectory_, solution.target, solution);
   predictFootholds(solution.target, solution);
   solution.took.policy = calcSecondsSince(begin);
   return true;
@@ -334,25 +352,33 @@ void WindowPlanner::keepGains(int phase, const RowMatrixXd& K) {
   kept_[0].K = K;
 }
 
-// The first stages of the window's solution.
-void WindowPlanner::makePolicy(const Receding& solver, int stage, Solution& solution) {
+// Of the window that begins with a stage, until so many are over that take time.
+int WindowPlanner::countNodes(int stage, size_t stages) const {
+  int node = 0;
+  for (size_t i = 0; i < stages; ++i, ++node)
+    while (isImpact(stage + node)) ++node;
+  return node;
+}
+
+// The first stages of a window with these nodes.
+void WindowPlanner::makePolicy(const Receding& solver, const ShootingTrajectory& nodes, int stage, Draft& out) {
   int node = 0;
   const Policy::Stage* before = nullptr;
-  for (Policy::Stage& out : solution.stages) {
+  for (Policy::Stage& next : out.stages) {
     while (isImpact(stage)) ++stage, ++node;
-    fillStage(problem_, grid_.stages()[node], horizon_->getStart(stage) - advance_, trajectory_.xs[node],
-              trajectory_.us[node], trajectory_.xs[node + 1], out);
-    out.phase = horizon_->getPhase(stage);
-    const RowMatrixXd* earlier = isNearEnd(stage) ? findEarlierGains(before, out.phase) : nullptr;
+    fillStage(problem_, grid_.stages()[node], horizon_->getStart(stage) - advance_, nodes.xs[node], nodes.us[node],
+              nodes.xs[node + 1], next);
+    next.phase = horizon_->getPhase(stage);
+    const RowMatrixXd* earlier = isNearEnd(stage) ? findEarlierGains(before, next.phase) : nullptr;
     if (earlier) {
-      out.K = *earlier;
+      next.K = *earlier;
     } else {
       const auto& linearized = static_cast<const RobotEvaluation&>(solver.getLinearized(node));
-      problem_.mapGains(linearized, solver.getGains(node).K, out.K);
-      if (out.phase == solution.stages.front().phase) keepGains(out.phase, out.K);
+      problem_.mapGains(linearized, solver.getGains(node).K, next.K);
+      if (next.phase == out.stages.front().phase) keepGains(next.phase, next.K);
     }
-    solution.u_hold = out.u;
-    before = &out;
+    out.u_hold = next.u;
+    before = &next;
     ++stage, ++node;
   }
 }

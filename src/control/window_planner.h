@@ -1,6 +1,7 @@
 #pragma once
 // What predictive control solves, window by window. One thread at a time may call it.
 #include <deque>
+#include <functional>
 
 #include "bielle/dynamics/impact.h"
 #include "control/window_grid.h"
@@ -22,18 +23,26 @@ class WindowPlanner {
     VectorXd u;              // nu, required at this instant
     Clock::time_point made;  // when
   };
-  // A policy for the stages that follow.
-  struct Solution {
-    bool solved = false;               // else the policy is none
-    int target = 0;                    // stage from which on it is in force
-    bool early = false, late = false;  // a foot stands early; a foot that should stand is waited for from now on
-    int skipped = 0;      // stages by which such a foot brings the motion ahead: the present stage is this much farther
+  // A policy for the stages that follow, and when it is due.
+  struct Draft {
+    bool solved = false;  // else the policy is none
+    int target = 0;       // stage from which on it is in force
+    int skipped = 0;      // stages by which an early or late foot brings the motion ahead, the present one with it
     double advance = 0;   // how far such feet have brought the motion ahead of its plan until now, s
     double awaited = -1;  // the instant of the plan with which a late foot is to stand, s; negative: none is late
-    PredictiveSolve took;
+    double seconds = 0;   // from its request until it was there
     std::vector<Policy::Stage> stages;
     VectorXd u_hold;
+  };
+  struct Solution : Draft {
+    bool early = false, late = false;  // a foot stands early; a foot that should stand is waited for from now on
+    PredictiveSolve took;
     std::vector<PredictedFoothold> footholds;
+  };
+  // Where a draft of the solution goes, by the full step of the solver's models before that is rolled out, and what is then called.
+  struct Preview {
+    Draft draft;
+    std::function<void()> publish;
   };
 
   WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options);
@@ -43,7 +52,7 @@ class WindowPlanner {
   // Memory for solve(), as large as it needs.
   Solution makeEmpty() const;
   // From the state that is predicted for the end of the stage.
-  void solve(const Request& request, Solution& solution);
+  void solve(const Request& request, Solution& solution, Preview* preview = nullptr);
   // What the solve in the stage that follows can do before its measurement. Without it, the solve does that, too.
   void prepare();
 
@@ -59,12 +68,13 @@ class WindowPlanner {
   void solveFromRest();
   VectorXd findRest(const Request& request, const RobotEvaluation& step);
   bool predict(const Request& request, Solution& solution);
-  bool solveWindow(Solution& solution);
+  bool solveWindow(const Request& request, Solution& solution, Preview* preview);
   bool isPrepared(int first) const;
   void restart(int stage);
   bool move(int first);
   VectorXd interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share);
   bool continueNode(const WindowGrid::Node& node);
+  void tellTime(const Request& request, Draft& out) const;
   void setWindow();
   void startFromGuess(int stage);
   struct KeptGains {
@@ -74,7 +84,8 @@ class WindowPlanner {
   bool isNearEnd(int stage) const;
   const RowMatrixXd* findEarlierGains(const Policy::Stage* before, int phase) const;
   void keepGains(int phase, const RowMatrixXd& K);
-  void makePolicy(const Receding& solver, int stage, Solution& solution);
+  int countNodes(int stage, size_t stages) const;
+  void makePolicy(const Receding& solver, const ShootingTrajectory& nodes, int stage, Draft& out);
 
   // window_aims.cpp
   struct AimedLanding {
@@ -113,9 +124,10 @@ class WindowPlanner {
   Workspace feet_;
   Receding solver_;
   ShootingTrajectory trajectory_, before_;  // of the window, and of that before it
-  std::deque<VectorXd> past_us_;            // of the stages before the window, as many as it may go back
-  double advance_ = 0;  // how far feet that landed early or late have brought the motion ahead of its plan, s
-  int checked_ = 0;     // the last stage whose feet were looked for
+  Foresight foresight_;
+  std::deque<VectorXd> past_us_;  // of the stages before the window, as many as it may go back
+  double advance_ = 0;            // how far feet that landed early or late have brought the motion ahead of its plan, s
+  int checked_ = 0;               // the last stage whose feet were looked for
   // A foot that is waited for, or -1; the stage with which it is to stand; for how long, s.
   struct Late {
     int foot = -1, landing = -1;

@@ -17,7 +17,9 @@
 /// swept. That is prepared after the solve before, and between a measurement and its policy there is only the rest (the
 /// preparation and the feedback phase of Diehl, Bock, Schloeder, SIAM Journal on Control and Optimization 43, 2005). Where
 /// a foot lands early or late, or a stage has several solves, it is not known in time at which stage the window will
-/// begin; after a late solve the next one begins at once. In these cases the solve does all of it.
+/// begin; after a late solve the next one begins at once. In these cases the solve does all of it. In a separate thread, the policy
+/// is first that of the full step of the sweep, xs_k (+) dx_k and us_k + du_k within the bounds, which nothing has been rolled out for.
+/// The rollout, which may shorten or reject that step, follows, and the policy of what has become of it replaces the first one.
 ///
 /// Either update() waits for the solve: the same measurements then give the same torques, on any machine. Or, for a robot, solves run
 /// in a separate thread, and update() never waits: a solution found after t_{k+1} takes effect on arrival, and where the next solve
@@ -75,7 +77,7 @@ struct PredictiveOptions {
 /// What one solve took.
 struct PredictiveSolve {
   double time = 0;     ///< of its measurement, s
-  double seconds = 0;  ///< from its measurement until its policy was ready
+  double seconds = 0;  ///< from its measurement until its policy was ready, in a separate thread the first one
   double prepare = 0;  ///< before its measurement: what needs none of it
   /// Parts of both, s: the state for which it solves, those of the solver (FddpSummary), summed over the threads, and the policy.
   double predict = 0, evaluate = 0, linearize = 0, sweep = 0, rollout = 0, policy = 0;
