@@ -23,6 +23,21 @@ BenchmarkWalkOptions makeShortBenchmark() {
 }
 }  // namespace
 
+TEST_CASE("bench: many worlds are measured on one thread and on two") {
+  BenchOptions options;
+  options.extent = BenchExtent::Quick;
+  const BenchReport report = runBatchBench(loadOwn("bipetto").model, options);
+  REQUIRE(report.batch.size() == 8);
+  for (size_t i = 0; i < report.batch.size(); ++i) {
+    const BatchTime& t = report.batch[i];
+    CHECK(t.falls == (i >= 4));
+    CHECK(t.time_step == (i % 4 < 2 ? 1e-3 : 2.5e-4));
+    CHECK(t.threads == 1 + static_cast<int>(i % 2));
+    CHECK((t.rate > 0 && t.rounds >= (t.falls ? 0 : 1) && t.rounds < 20 && t.broken == 0));
+  }
+  CHECK(report.nodes.empty());
+}
+
 TEST_CASE("bench: every work is measured, in both formulations") {
   BenchOptions options;
   options.extent = BenchExtent::Quick;

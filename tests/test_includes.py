@@ -20,9 +20,9 @@ ROOMS = {
     "report": ["results"],
     "design": ["results"],
     "tasks": ["design"],
-    "bench": ["results"],
+    "bench": ["worlds"],
     "cli": ["report", "tasks", "bench", "worlds", "firmware"],
-    "validation": ["worlds"],
+    "validation": ["bench"],
     "paper": ["tasks"],
     "workers": [],
 }

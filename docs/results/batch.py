@@ -40,6 +40,37 @@ def add_table(page, report):
                 "rounds of Newton", "closures open by at most [m]"], rows)
 
 
+def measure_overhead(command, worlds):
+    """By the package beside the command; None without it."""
+    package = os.path.join(os.path.dirname(os.path.dirname(os.path.realpath(command))), "python")
+    if not os.path.isdir(os.path.join(package, "bielle")):
+        return None
+    paths = os.environ | {"PYTHONPATH": package}
+    run = subprocess.run([sys.executable, str(common.HERE / "batch_overhead.py"), str(worlds)], capture_output=True, text=True,
+                         env=paths, check=True)
+    return json.loads(run.stdout)
+
+
+def add_overhead(page, report):
+    page.heading("From Python")
+    page.add(f"""{report['worlds']} limp robots begin in the standing posture and step for 0.1 s: processor time of a step, the least
+of five runs. The bindings are what `World.step` does beside physics, the environment is a `VectorEnv` with sensors, rewards and
+ends. The goal is less than 5 % of a step for what `World.step` adds.""")
+    page.table(["step [ms]", "`World.step` [ms]", "bindings in it", "`VectorEnv.step` [ms]", "more than `World.step`"],
+               [[f"{1e3 * row['period [s]']:g}", f"{1e3 * row['world [s]']:.2f}", f"{row['bindings [s]'] / row['world [s]']:.1%}",
+                 f"{1e3 * row['environment [s]']:.2f}", f"{row['environment [s]'] / row['world [s]'] - 1:.1%}"]
+                for row in report["rows"]])
+
+
+def add_threads(page, stands, falls):
+    page.heading("Two threads")
+    page.add("""Wall clock of one thread over that of two, of twice as many worlds as above, in turn; the goal is 1.9. It needs a
+machine that does nothing else.""")
+    page.table(["robots", "step [ms]", "two threads over one (least to most)"],
+               [[name, f"{1e3 * row['time step [s]']:g}", f"{row['median']:.2f} ({row['least']:.2f} to {row['most']:.2f})"]
+                for name, report in (("stand", stands), ("fall", falls)) for row in report["threads"]])
+
+
 def describe_goals(report):
     parts = []
     for step in dict.fromkeys(row["time step [s]"] for row in report["runs"]):
@@ -81,6 +112,9 @@ worlds differ. A round of Newton's method is one for all robots of a register, p
 slide, joints run into stops, and steps are halved, at other times in every world: a register goes as slowly as its slowest robot.
 MuJoCo's steps are never halved.""")
     add_table(page, falls)
+    add_threads(page, stands, falls)
+    if overhead := measure_overhead(command, 8 if arguments.quick else 256):
+        add_overhead(page, overhead)
     page.write(arguments.quick)
 
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "bench/batch_speed.h"
 #include "bench/receding_horizon.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/motion/locomotion.h"
@@ -159,10 +160,7 @@ class Bench {
       : model_(model), options_(options), whole_(options.extent == BenchExtent::Whole) {}
 
   BenchReport run() {
-    report_.robot = model_.name();
-    report_.processor = readProcessor();
-    report_.compiler = getBuildInfo().compiler;
-    report_.flags = BIELLE_FLAGS;
+    describe();
     measureUnit();
     for (Formulation formulation : kFormulations) measureWalk(formulation);
     for (Formulation formulation : kFormulations) measureSolves(formulation);
@@ -173,8 +171,20 @@ class Bench {
     measureUnit();
     return report_;
   }
+  BenchReport runBatch() {
+    describe();
+    measureUnit();
+    for (bool falls : {false, true}) measureWorlds(falls);
+    return report_;
+  }
 
  private:
+  void describe() {
+    report_.robot = model_.name();
+    report_.processor = readProcessor();
+    report_.compiler = getBuildInfo().compiler;
+    report_.flags = BIELLE_FLAGS;
+  }
   void tell(const std::string& what, Formulation formulation) const {
     if (options_.progress) options_.progress(what + ", " + getName(formulation) + " formulation");
   }
@@ -322,6 +332,24 @@ class Bench {
     }
   }
 
+  void measureWorlds(bool falls) {
+    if (options_.progress) options_.progress(falls ? "robots that fall" : "robots that stand");
+    const BatchTask task(model_, falls);
+    for (double time_step : {1e-3, 2.5e-4}) {
+      std::vector<BatchTime> times;
+      for (int threads : threads()) times.push_back({falls, time_step, threads});
+      for (int i = 0; i < (whole_ ? 5 : 1); ++i)
+        for (BatchTime& time : times) {
+          const BatchSpeed speed =
+              measureBatch(task, whole_ ? kBatchWorlds : 8, whole_ ? 0.2 : 0.01, time_step, time.threads);
+          time.rate = std::max(time.rate, speed.steps / speed.wall);
+          time.rounds = speed.rounds;
+          time.broken = speed.broken;
+        }
+      report_.batch.insert(report_.batch.end(), times.begin(), times.end());
+    }
+  }
+
   void measureHorizons(Formulation formulation) {
     tell("horizons", formulation);
     for (int nodes : whole_ ? std::vector<int>{50, 100, 200, 500, 1000} : std::vector<int>{20, 40}) {
@@ -348,5 +376,6 @@ class Bench {
 }  // namespace
 
 BenchReport runBench(const Model& model, const BenchOptions& options) { return Bench(model, options).run(); }
+BenchReport runBatchBench(const Model& model, const BenchOptions& options) { return Bench(model, options).runBatch(); }
 
 }  // namespace bielle

@@ -87,6 +87,17 @@ struct SizeTime {
   double seconds = 0;
 };
 
+/// Many worlds at once (batch_speed.h), the run of the least wall clock of several, in turn.
+struct BatchTime {
+  bool falls = false;
+  double time_step = 0;  ///< s
+  int threads = 1;
+  double rate = 0;    ///< steps of all worlds per second
+  int broken = 0;     ///< worlds that broke off
+  double rounds = 0;  ///< of Newton's method, of a register per step
+};
+inline constexpr int kBatchWorlds = 64;
+
 struct BenchReport {
   std::string robot, processor, compiler, flags;
   double unit = 0;  ///< s
@@ -94,11 +105,14 @@ struct BenchReport {
   std::vector<IterationTimes> iterations;
   std::vector<SolveTime> solves;
   std::vector<RecedingHorizon> receding;
-  std::vector<SizeTime> chains;    ///< dynamics with derivatives of fourbar_chain.h, all with motors, no costs
+  std::vector<SizeTime> chains;  ///< dynamics with derivatives of fourbar_chain.h, all with motors, no costs
+  std::vector<BatchTime> batch;
   std::vector<SizeTime> horizons;  ///< linearization, sweep and one rollout of a walk of this many nodes
 };
 
 /// \throws InputError when the robot has no feet
 BenchReport runBench(const Model& model, const BenchOptions& options = {});
+/// Fills `batch` alone. \throws InputError when the robot has no feet
+BenchReport runBatchBench(const Model& model, const BenchOptions& options = {});
 
 }  // namespace bielle

@@ -2,19 +2,14 @@
 // other, and MuJoCo on the file that we export, in turn.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <ctime>
 #include <fstream>
 #include <functional>
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <random>
 
+#include "bench/batch_speed.h"
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/closure.h"
-#include "bielle/dynamics/constrained.h"
-#include "bielle/dynamics/kinematics.h"
-#include "bielle/motion/motion.h"
 #include "bielle/robots/robot_loader.h"
 #include "bielle/worlds/batch.h"
 #include "math/lane_registers.h"
@@ -25,8 +20,7 @@ namespace {
 using namespace bielle;
 using namespace bielle::worlds;
 
-constexpr double kTick = 1e-3;                    // s, of control
-constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad, about the torques that hold the posture
+constexpr double kTick = BatchTask::kTick;
 
 struct Arguments {
   std::string robot = "bipetto";
@@ -36,96 +30,19 @@ struct Arguments {
   bool falls = false;
 };
 
-// Processor time of the program, s.
-double readClock() {
-  timespec t;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-// What a robot does: stand by springs about a posture while it is pushed for 50 ms, by up to 10 N in the first world, or fall.
-class Task {
- public:
-  Task(const Model& model, bool falls) : model_(model), falls_(falls), q_(makeStandingPosture(model)) {
-    std::vector<int> feet;
-    for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-    u_ = calcStaticTorques(model, makeConstraintSet(model, makeContactTargets(model, q_, feet, 0, 0)), q_).u;
-  }
-  VectorXd makeConfiguration() const {
-    VectorXd q = q_;
-    if (falls_) q[2] += 0.05;
-    return q;
-  }
-  VectorXd makeVelocity(int world) const {
-    VectorXd v = VectorXd::Zero(model_.nv());
-    std::mt19937 generator(static_cast<unsigned>(world));
-    std::uniform_real_distribution<double> any(-1, 1);
-    for (int i = 0; i < 6 && falls_; ++i) v[i] = any(generator);
-    return v;
-  }
-  VectorXd calcTorques(ConstVectorRef q, ConstVectorRef v) const {
-    if (falls_) return VectorXd::Zero(model_.nu());
-    VectorXd u = u_;
-    for (int m = 0; m < model_.nu(); ++m) {
-      const Motor& motor = model_.motors()[m];
-      const int at = model_.joints()[motor.joint].idx_q;
-      u[m] += kStiffness * (q_[at] - q[at]) - kDamping * v[motor.dof];
-    }
-    return u;
-  }
-  double calcPush(int tick, int world) const { return falls_ || tick >= 50 ? 0 : 10.0 / (1 + world); }
-
- private:
-  const Model& model_;
-  const bool falls_;
-  VectorXd q_, u_;
-};
-
 struct Speed {
   double rate = 0;  // steps per second of processor time
   double gap = 0;   // largest of the closures at the end, m
   double least_height = 0, rounds = 0;
 };
 
-double calcGap(const Model& model, ConstVectorRef q) {
-  Workspace ws(model);
-  updatePlacements<double>(model, ws, q);
-  double gap = 0;
-  for (const Closure& closure : model.closures()) gap = std::max(gap, calcClosureGap(ws, closure).position);
-  return gap;
+Speed runBatch(const BatchTask& task, const Arguments& arguments, double h) {
+  const BatchSpeed speed = measureBatch(task, arguments.worlds, arguments.seconds, h, 1);
+  if (speed.broken > 0) std::cerr << speed.broken << " worlds broke off\n";
+  return {speed.steps / speed.processor, speed.gap, speed.least_height, speed.rounds};
 }
 
-Speed runBatch(const Model& model, const Task& task, const Arguments& arguments, double h) {
-  WorldBatchOptions options;
-  options.world.world.time_step = h;
-  options.threads = 1;
-  const int n = arguments.worlds, ticks = static_cast<int>(arguments.seconds / kTick);
-  WorldBatch batch(model, n, options);
-  MatrixXd q = task.makeConfiguration().replicate(1, n), v(model.nv(), n), u(model.nu(), n), push(3, n);
-  for (int i = 0; i < n; ++i) v.col(i) = task.makeVelocity(i);
-  batch.reset(q, v);
-  push.setZero();
-  double spent = 0;
-  for (int t = 0; t < ticks; ++t) {
-    for (int i = 0; i < n; ++i) {
-      u.col(i) = task.calcTorques(batch.configurations().col(i), batch.velocities().col(i));
-      push(0, i) = task.calcPush(t, i);
-    }
-    const double start = readClock();
-    batch.step(u, push, kTick);
-    spent += readClock() - start;
-  }
-  const double steps = std::round(kTick / h) * ticks * n;
-  Speed out{steps / spent, 0, 1, batch.rounds() / (steps / static_cast<double>(kLane))};
-  for (int i = 0; i < n; ++i) {
-    if (!batch.ok(i)) std::cerr << "world " << i << ": " << batch.message(i) << "\n";
-    out.gap = std::max(out.gap, calcGap(model, batch.configurations().col(i)));
-    out.least_height = std::min(out.least_height, batch.configurations()(2, i));
-  }
-  return out;
-}
-
-Speed runSingle(const Model& model, const Task& task, const Arguments& arguments, double h) {
+Speed runSingle(const Model& model, const BatchTask& task, const Arguments& arguments, double h) {
   BielleWorldOptions options;
   options.world.time_step = h;
   const auto world = makeBielleWorld(model, options);
@@ -137,9 +54,9 @@ Speed runSingle(const Model& model, const Task& task, const Arguments& arguments
     for (int t = 0; t < ticks; ++t) {
       world->setTorques(task.calcTorques(world->configuration(), world->velocity()));
       world->setPush(Vector3d(task.calcPush(t, i), 0, 0));
-      const double start = readClock();
+      const double start = readProcessorClock();
       world->advance(kTick);
-      spent += readClock() - start;
+      spent += readProcessorClock() - start;
     }
     out.gap = std::max(out.gap, world->gap());
     out.least_height = std::min(out.least_height, world->configuration()[2]);
@@ -149,7 +66,7 @@ Speed runSingle(const Model& model, const Task& task, const Arguments& arguments
 }
 
 // Nothing but mj_step().
-Speed runMujoco(const Model& model, const Task& task, const Arguments& arguments, double h) {
+Speed runMujoco(const Model& model, const BatchTask& task, const Arguments& arguments, double h) {
   MjcfOptions options;
   options.time_step = h;
   MujocoModel mujoco(model, findClosedConfiguration(model).q, options);
@@ -167,12 +84,12 @@ Speed runMujoco(const Model& model, const Task& task, const Arguments& arguments
       for (int m = 0; m < model.nu(); ++m)
         data->ctrl[m] = model.motors()[m].clampEffort(u[m], v[model.motors()[m].dof]);
       data->xfrc_applied[6 * mujoco.getBody(1)] = task.calcPush(t, i);
-      const double start = readClock();
+      const double start = readProcessorClock();
       for (int k = 0; k < steps; ++k) mj_step(mujoco.get(), data.get());
-      spent += readClock() - start;
+      spent += readProcessorClock() - start;
       mujoco.getState(*data, q, v);
     }
-    out.gap = std::max(out.gap, calcGap(model, q));
+    out.gap = std::max(out.gap, calcLargestGap(model, q));
     out.least_height = std::min(out.least_height, q[2]);
   }
   out.rate = static_cast<double>(steps) * ticks * n / spent;
@@ -209,9 +126,9 @@ int main(int argc, char** argv) {
   app.add_flag("--falls", arguments.falls, "limp robots that are dropped");
   CLI11_PARSE(app, argc, argv);
   const Model model = loadRobot(arguments.robot).model;
-  const Task task(model, arguments.falls);
+  const BatchTask task(model, arguments.falls);
   using Run = std::function<Speed(double)>;
-  const std::map<std::string, Run> runs = {{"many", [&](double h) { return runBatch(model, task, arguments, h); }},
+  const std::map<std::string, Run> runs = {{"many", [&](double h) { return runBatch(task, arguments, h); }},
                                            {"single", [&](double h) { return runSingle(model, task, arguments, h); }},
                                            {"mujoco", [&](double h) { return runMujoco(model, task, arguments, h); }}};
   nlohmann::ordered_json out = {{"register", kRegister}, {"memory [kB]", measureMemory(model)}};
@@ -230,6 +147,20 @@ int main(int argc, char** argv) {
                              {"height [m]", all.front().least_height},
                              {"rounds", all.front().rounds}});
     }
+  }
+  // Two threads over one, by the wall clock, in turn.
+  for (const double h : arguments.time_steps) {
+    std::vector<double> ratios;
+    for (int round = 0; round < arguments.rounds; ++round) {
+      const int worlds = 2 * arguments.worlds;  // full registers for both
+      const double one = measureBatch(task, worlds, arguments.seconds, h, 1).wall;
+      ratios.push_back(one / measureBatch(task, worlds, arguments.seconds, h, 2).wall);
+    }
+    std::sort(ratios.begin(), ratios.end());
+    out["threads"].push_back({{"time step [s]", h},
+                              {"least", ratios.front()},
+                              {"median", ratios[ratios.size() / 2]},
+                              {"most", ratios.back()}});
   }
   std::cout << out.dump(2) << "\n";
   return 0;
