@@ -84,7 +84,10 @@ std::optional<HalfCycle> HalfCycle::find(const Motion& motion, std::string& why)
   std::optional<MirroredRobot> robot = MirroredRobot::find(whole.model(), feet[0], feet[1], why);
   if (!robot) return {};
   const std::optional<SE3> G = findReflection(motion, *robot, h);
-  if (!G) {
+  const auto is_same = [](const SE3& a, const SE3& b) {
+    return (a.R - b.R).norm() < kSameStep && (a.p - b.p).norm() < kSameStep;
+  };
+  if (!G || !is_same(*G * *G, *motion.cycle)) {
     why = "no step is the mirror image of the other";
     return {};
   }
@@ -98,7 +101,7 @@ bool HalfCycle::compare(const ShootingTrajectory& guess, std::string& why) {
   const int N = whole.numStages(), h = N / 2;
   RobotEvaluator evaluator(whole);
   const auto refuse = [&](int k, const std::string& what) {
-    why = what + " at " + formatNumber(k) + " of " + formatNumber(h) + " stages of a step";
+    why = what + " at stage " + formatNumber(k) + " of the " + formatNumber(h) + " of a step";
     return false;
   };
   const auto match = [&](const Rows& image, const std::vector<std::pair<int, Rows>>& sources, int at) {
