@@ -88,7 +88,7 @@ std::string formatCycle(const MotionResult& result) {
   const std::optional<double>& floquet = result.cycle->floquet_multiplier;
   std::string text = formatNumber(cycle[0], "%.4g") + " s, moves by " + formatNumber(cycle[1], "%.3f") + ", " +
                      formatNumber(cycle[2], "%.3f") + " m";
-  if (cycle[3] != 0) text += ", turns by " + formatNumber(cycle[3], "%.3f") + " rad";
+  if (std::abs(cycle[3]) > 1e-9) text += ", turns by " + formatNumber(cycle[3], "%.3f") + " rad";
   return text + "; closes to " + formatNumber(result.cycle->closing_error, "%.1e") +
          (floquet ? ", largest Floquet multiplier " + formatNumber(*floquet, "%.3f") : "");
 }
