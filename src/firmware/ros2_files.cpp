@@ -8,7 +8,7 @@ namespace {
 // Keys: LIBRARY, ROBOT and @..@.
 constexpr const char* kSourceText =
     R"(// Transmissions of ros2_control for the linkages of ROBOT. Written by `bielle convert --to ros2_control`, where there was no ROS:
-// it was compiled against the interfaces of transmission_interface as published for ROS 2 Humble to Kilted, not against ROS.
+// it is tested against stubs of the interfaces of transmission_interface, as published for ROS 2 Humble to Kilted.
 //
 // Positions, velocities and efforts, from motors to joints and back, by virtual work. What is no number, as commands that
 // nobody has given, stays none. Efforts are carried over in the posture that was measured last, velocities in the one that is
@@ -20,12 +20,6 @@ constexpr const char* kSourceText =
 #include <string>
 #include <vector>
 
-#include "hardware_interface/hardware_info.hpp"
-#include "hardware_interface/types/hardware_interface_type_values.hpp"
-#include "pluginlib/class_list_macros.hpp"
-#include "transmission_interface/exception.hpp"
-#include "transmission_interface/transmission.hpp"
-#include "transmission_interface/transmission_loader.hpp"
 @includes@
 namespace LIBRARY {
 
@@ -181,6 +175,11 @@ class Loader : public transmission_interface::TransmissionLoader {
 
 @exports@)";
 
+constexpr const char* kHeaders[] = {
+    "hardware_interface/hardware_info.hpp",    "hardware_interface/types/hardware_interface_type_values.hpp",
+    "pluginlib/class_list_macros.hpp",         "transmission_interface/exception.hpp",
+    "transmission_interface/transmission.hpp", "transmission_interface/transmission_loader.hpp"};
+
 // Keys: MAP and @..@.
 constexpr const char* kMapText = R"(struct MAP_map {
   static constexpr int kSize = ::MAP::kSize;
@@ -245,6 +244,8 @@ std::string nameLibrary(const std::string& robot) {
 std::map<std::string, std::string> writeRos2(const std::vector<Maps>& all, std::string& readme) {
   const std::string robot = all.front().robot, library = nameLibrary(robot);
   std::string includes, maps, exports, plugins, sources, example;
+  for (const char* header : kHeaders) includes += std::string("#include \"") + header + "\"\n";
+  includes += "\n";
   for (const Maps& each : all) {
     const std::string name = each.name, loader = library + "::" + name + "_loader";
     includes += "#include \"" + name + ".hpp\"\n";
