@@ -4,6 +4,6 @@
 namespace bielle::testing {
 
 inline constexpr int kStageTicks = 12;  // control steps of 1 ms in a stage of a walk by command
-inline constexpr int kLeadTicks = 4;    // that a solve begins before its stage, by default
+inline constexpr int kLeadTicks = 4;    // that a solve begins before its stage, where it is asked to
 
 }  // namespace bielle::testing

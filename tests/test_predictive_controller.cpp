@@ -221,7 +221,7 @@ class Blinking : public Controller {
  public:
   explicit Blinking(PredictiveController& inner) : inner_(inner) {}
   void update(const Measurement& measurement, VectorRef u) override {
-    const bool solves = static_cast<int>(std::lround(1e3 * measurement.time)) % kStageTicks == kStageTicks - kLeadTicks;
+    const bool solves = static_cast<int>(std::lround(1e3 * measurement.time)) % kStageTicks == 0;
     const auto feet = std::count(measurement.contacts.begin(), measurement.contacts.end(), char(1));
     if (solves) swing_ = feet == 1 ? swing_ + 1 : 0;
     Measurement seen = measurement;
@@ -505,11 +505,11 @@ TEST_CASE("predictive control: a solve that ends before the next one begins is p
   CHECK(counts.solves == 10);
   CHECK(counts.missed == 0);
   for (size_t i = 1; i + 1 < counts.last.size(); ++i) CHECK(counts.last[i].latency == Approx(1e-3 * kLeadTicks));
-  for (double lead : {0.0, -1e-3, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+  for (double lead : {-1e-3, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
     PredictiveOptions options;
     options.lead = lead;
     CHECK_THROWS_WITH(makeController(planSquat, makeShortSquat(), getShortSquat(), options),
-                      Catch::Contains("lead must be finite and positive"));
+                      Catch::Contains("lead must be finite and not negative"));
   }
 }
 
@@ -540,6 +540,7 @@ TEST_CASE(
   const auto make = [&](bool own_thread) {
     PredictiveOptions options = makeShortWindow(1);
     options.own_thread = own_thread;
+    options.lead = 1e-3 * kLeadTicks;
     return std::make_unique<PredictiveController>(makePredictiveMotion(model, plan, ProblemOptions(), options),
                                                   getShortSquat().solution.trajectory, options);
   };

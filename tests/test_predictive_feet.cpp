@@ -14,7 +14,7 @@ using bielle::testing::kStageTicks;
 
 // Lets a walk by command follow its own policy, while the contacts that it is told are scripted.
 struct Walking {
-  explicit Walking(double look_ahead = 0, double foothold_room = 0.4, double lead = PredictiveOptions().lead) {
+  explicit Walking(double look_ahead = 0, double foothold_room = 0.4) {
     LocomotionOptions gait;
     gait.contact_kp = 0;
     gait.foothold_room = foothold_room;
@@ -23,7 +23,6 @@ struct Walking {
     PredictiveOptions options;
     options.threads = 1;
     options.look_ahead = look_ahead;
-    options.lead = lead;
     const VectorXd q = makeStandingPosture(model);
     CommandedWalk walk(model, gait, {}, source, makeStandingRobot(model));
     CommandedWalk plan = walk;
@@ -71,9 +70,7 @@ struct Walking {
 }  // namespace
 
 TEST_CASE("predictive control: a foot that finds ground early stands from then on") {
-  // Measured where stages begin, as between them a robot that follows its policy may leave the dynamics: a short step of the solver
-  // leaves gaps there.
-  Walking walk(0, 0.4, 1e-3 * kStageTicks);
+  Walking walk;
   const int foot = walk.findChange(0, false) < walk.findChange(1, false) ? 0 : 1;
   const int begin = walk.findChange(foot, false), landing = walk.findChange(foot, true);
   const int touch = begin + 3 * (landing - begin) / 4;

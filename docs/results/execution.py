@@ -362,7 +362,7 @@ by phase of the plan and direction [°] (0: from behind, 90: to the left), with 
 5.1, 5.5 and 5.9 are early, half-way and late on the left foot, 6.5 on both feet. A push lasts 0.1 s; impulses are
 found by bisection to 0.25 N s."""),
     ("Pushes under predictive control", "pushes_predictive", lambda: f"""Pushes of 10 N s (0.39 N s per kg) from eight
-directions at ten instants [s] of one step, true state: {share("pushes_predictive")}."""),
+directions at ten instants [s] of one step, true state, measured 4 ms before each stage (`--lead 4`): {share("pushes_predictive")}."""),
     ("Pushes, real sensors and late torques", "pushes_felt", lambda: f"""The same pushes with real sensors and torques
 that are 5 ± 1 ms late: {share("pushes_felt")}."""),
     ("What a millisecond is worth", "solve_times", lambda: """Pushes of 5 to 20 N s (0.2 to 0.8 N s per kg) from the same

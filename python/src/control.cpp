@@ -84,7 +84,8 @@ void bindControllers(py::module_& module) {
              "time that a solve is given, s: another one begins in a stage that leaves so much; without own_thread, "
              "policies come into force only when it has passed; 0: one solve for each stage")
       .field("lead", &PredictiveOptions::lead,
-             "time from the measurement to the stage that is solved for, s; no effect with solve_time")
+             "time from the measurement to the stage that is solved for, s; 0: the whole stage before; no effect with "
+             "solve_time")
       .field("end_place", &PredictiveOptions::end_place,
              "weight of heading and place at the end of a window, 1/m^2 or 1")
       .field("end_posture", &PredictiveOptions::end_posture, "weight of the other coordinates")

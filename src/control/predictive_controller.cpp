@@ -23,7 +23,7 @@ class PredictiveController::Loop {
  public:
   Loop(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options)
       : solve_time_(options.solve_time),
-        lead_(options.lead),
+        lead_(WindowPlanner::getLead(options)),
         planner_(std::move(horizon), options),
         solution_(planner_.makeEmpty()),
         next_(planner_.makeEmpty()),
@@ -31,8 +31,8 @@ class PredictiveController::Loop {
         dead_point_stop_(planner_.model(), planner_.startPosture(), options.dead_point_stop) {
     if (!(solve_time_ >= 0 && std::isfinite(solve_time_)))
       throw std::invalid_argument("PredictiveOptions: solve_time must be finite and not negative");
-    if (!(lead_ > 0 && std::isfinite(lead_)))
-      throw std::invalid_argument("PredictiveOptions: lead must be finite and positive");
+    if (!(options.lead >= 0 && std::isfinite(options.lead)))
+      throw std::invalid_argument("PredictiveOptions: lead must be finite and not negative");
     const Model& model = planner_.model();
     WindowPlanner::Solution first = planner_.makeFirst();
     policy_ = std::make_unique<Policy>(model, std::move(first.stages), first.u_hold);

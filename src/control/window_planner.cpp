@@ -102,8 +102,10 @@ void WindowPlanner::solve(const Request& request, Solution& solution, Preview* p
   }
   prepared_ = false;
   tellTime(request, solution);
-  if (solution.took.seconds == 0) solution.took.seconds = solution.seconds;                // there was no draft
-  const double next = horizon_->getStart(solution.target + 1) - advance_ - options_.lead;  // another one begins
+  if (solution.took.seconds == 0) solution.took.seconds = solution.seconds;  // there was no draft
+  const double next =                                                        // another one begins
+      std::max(horizon_->getStart(solution.target), horizon_->getStart(solution.target + 1) - getLead(options_)) -
+      advance_;
   const bool late = options_.own_thread && request.measurement.actionTime() + solution.seconds >= next;
   target_ = solution.solved && !late ? solution.target : -1;
 }

@@ -2,6 +2,7 @@
 // What predictive control solves, window by window. One thread at a time may call it.
 #include <deque>
 #include <functional>
+#include <limits>
 
 #include "bielle/dynamics/impact.h"
 #include "control/window_grid.h"
@@ -49,6 +50,11 @@ class WindowPlanner {
 
   // For the start of the motion.
   Solution makeFirst();
+  // From a measurement to its stage, s; infinite where that is the whole stage before.
+  static double getLead(const PredictiveOptions& options) {
+    return options.lead == 0 ? std::numeric_limits<double>::infinity() : options.lead;
+  }
+
   // Memory for solve(), as large as it needs.
   Solution makeEmpty() const;
   // From the state that is predicted for the end of the stage.

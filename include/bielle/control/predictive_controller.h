@@ -3,8 +3,8 @@
 ///
 /// The problem is the motion's, through a window of N nodes. The first nodes are stages of the motion. Later ones stand for up
 /// to two, then four stages that are alike, more where stages are short, with the costs and constraints of the first of them and
-/// a step as long as all of them (src/control/window_grid.h). Let stage k begin at t_k. From what is measured at t, shortly before
-/// the next stage (PredictiveOptions::lead), and the torques of that instant the model predicts the state when that begins,
+/// a step as long as all of them (src/control/window_grid.h). Let stage k begin at t_k. From what is measured at t, at its
+/// beginning or later (PredictiveOptions::lead), and the torques of that instant the model predicts the state when that begins,
 ///
 ///     x_{k+1} = x(t) projected on the closures, + (t_{k+1} - t) / (t_{k+1} - t_k) of the step f_k(x(t), u(t)),       (1)
 ///
@@ -66,9 +66,9 @@ struct PredictiveOptions {
   /// one solve for each stage, and without a separate thread its policy is ready at once.
   double solve_time = 0;
   /// Time from the measurement to the stage that is solved for, s, or a little more, as instants of control come; less where the stage
-  /// before is shorter. The longer it is, the later torques react; policies of solves that take longer come late. No effect with
-  /// solve_time.
-  double lead = 4e-3;
+  /// before is shorter. 0: the whole stage before. The longer it is, the later torques react; policies of solves that take longer come
+  /// late. No effect with solve_time.
+  double lead = 0;
   /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the
   /// other coordinates, of the velocities; 1/m^2 or 1, s^2/m^2 or s^2.
   double end_place = 1, end_posture = 100, end_velocity = 10;

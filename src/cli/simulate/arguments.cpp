@@ -120,9 +120,9 @@ void describeControl(OptionFields& fields, SimulateArguments& a) {
               "run the world in real time while predictive control solves in a separate thread. Late policies take "
               "effect on arrival; results depend on the machine");
   fields.number(
-      "lead", a.lead, "ms", {0.1, 1000},
+      "lead", a.lead, "ms", {0, 1000},
       "how long before a stage predictive control measures the state that it solves for; less where the stage "
-      "before is shorter");
+      "before is shorter. 0: the whole stage before");
   fields.number("solve_time", a.solve_time, "ms", {0, 1000},
                 "time that each solve of predictive control is given: within a stage another one begins while "
                 "there is that much left. Except with --real-time, policies come into force only when it has passed, "
