@@ -178,13 +178,10 @@ def check_motion(where, way, make, motion, arguments, places, *options):
     return at_home, result
 
 
-PREDICTED = ("squat", "walk", "jump", "side-walk", "stairs", "hop")  # by predictive control, which rehearses their steps first
-
-
 def carry_out(motion, place, at_home, there, worlds):
-    """By predictive control or gains in Bielle's world, by gains in MuJoCo's, until the first foot is in the air."""
+    """By predictive control in Bielle's world, by gains in MuJoCo's, until the first foot is in the air."""
     for world in worlds:
-        control = "mpc" if world == "bielle" and motion in PREDICTED else "gains"
+        control = {"bielle": "mpc", "mujoco": "gains"}[world]
         carried = []
         for directory in (at_home, there):
             out = f"{directory}-{world}"
