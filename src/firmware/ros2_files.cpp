@@ -23,11 +23,11 @@ constexpr const char* kSourceText =
 @includes@
 namespace LIBRARY {
 
-// What a <transmission> says of a side, in the order of the maps.
+// What a <transmission> says, in the order of the maps: actuator = reduction * motor; joint of ROS = joint + offset.
 template <std::size_t N>
-struct Side {
-  std::array<std::string, N> names;
-  std::array<double, N> reductions, offsets;  // actuator = reduction * motor; joint of ROS = joint + offset
+struct Sides {
+  std::array<std::string, N> joints, actuators;
+  std::array<double, N> offsets, reductions;
 };
 
 template <typename Map>
@@ -37,20 +37,18 @@ class Linkage : public transmission_interface::Transmission {
   using Real = typename Map::Real;
   using Values = std::array<Real, N>;
 
-  Linkage(const Side<N>& joints, const Side<N>& actuators) : joints_(joints), actuators_(actuators) {
-    Map::reference(&at_);
-  }
+  explicit Linkage(const Sides<N>& sides) : sides_(sides) { Map::reference(&at_); }
 
   void configure(const std::vector<transmission_interface::JointHandle>& joint_handles,
                  const std::vector<transmission_interface::ActuatorHandle>& actuator_handles) override {
     bool is_used = false;
     for (std::size_t k = 0; k < 3; ++k) {
-      find(joint_handles, joints_.names, k, joint_[k]);
-      find(actuator_handles, actuators_.names, k, actuator_[k]);
+      find(joint_handles, sides_.joints, k, joint_[k]);
+      find(actuator_handles, sides_.actuators, k, actuator_[k]);
       is_used = is_used || has(k);
     }
     if (!is_used)
-      throw transmission_interface::Exception("no interface of " + joints_.names[0] + " is given on both sides");
+      throw transmission_interface::Exception("no interface of " + sides_.joints[0] + " is given on both sides");
   }
 
   void actuator_to_joint() override {
@@ -61,7 +59,7 @@ class Linkage : public transmission_interface::Transmission {
       if (is_known) Map::motor_to_joint(motor.data(), &at_, &at_);
       is_measured_ = is_measured_ || is_known;
       for (std::size_t i = 0; i < N; ++i)
-        joint_[kPosition][i].set_value(is_known ? at_.joint[i] + joints_.offsets[i] : NAN);
+        joint_[kPosition][i].set_value(is_known ? at_.joint[i] + sides_.offsets[i] : NAN);
     }
     typename Map::Ratio ratio;
     Map::update_ratio(&at_, &ratio);
@@ -82,25 +80,25 @@ class Linkage : public transmission_interface::Transmission {
     typename Map::Posture wanted = at_;
     if (has(kPosition)) {
       for (std::size_t i = 0; i < N; ++i)
-        joint[i] = static_cast<Real>(joint_[kPosition][i].get_value() - joints_.offsets[i]);
+        joint[i] = static_cast<Real>(joint_[kPosition][i].get_value() - sides_.offsets[i]);
       const bool is_known = areNumbers(joint);
       if (is_known) Map::joint_to_motor(joint.data(), &at_, &wanted);
       if (is_known && !is_measured_) at_ = wanted;
       for (std::size_t i = 0; i < N; ++i)
-        actuator_[kPosition][i].set_value(is_known ? wanted.motor[i] * actuators_.reductions[i] : NAN);
+        actuator_[kPosition][i].set_value(is_known ? wanted.motor[i] * sides_.reductions[i] : NAN);
     }
     typename Map::Ratio ratio;
     if (has(kVelocity)) {
       Map::update_ratio(&wanted, &ratio);
       getJoints(kVelocity, joint);
       Map::motor_velocity(&ratio, joint.data(), motor.data());
-      for (std::size_t i = 0; i < N; ++i) actuator_[kVelocity][i].set_value(motor[i] * actuators_.reductions[i]);
+      for (std::size_t i = 0; i < N; ++i) actuator_[kVelocity][i].set_value(motor[i] * sides_.reductions[i]);
     }
     if (has(kEffort)) {
       Map::update_ratio(&at_, &ratio);
       getJoints(kEffort, joint);
       Map::motor_torque(&ratio, joint.data(), nullptr, motor.data());
-      for (std::size_t i = 0; i < N; ++i) actuator_[kEffort][i].set_value(motor[i] / actuators_.reductions[i]);
+      for (std::size_t i = 0; i < N; ++i) actuator_[kEffort][i].set_value(motor[i] / sides_.reductions[i]);
     }
   }
 
@@ -132,7 +130,7 @@ class Linkage : public transmission_interface::Transmission {
   }
   void getMotors(std::size_t k, Values& x) const {
     for (std::size_t i = 0; i < N; ++i) {
-      const double reduction = actuators_.reductions[i], value = actuator_[k][i].get_value();
+      const double reduction = sides_.reductions[i], value = actuator_[k][i].get_value();
       x[i] = static_cast<Real>(k == kEffort ? value * reduction : value / reduction);
     }
   }
@@ -140,7 +138,7 @@ class Linkage : public transmission_interface::Transmission {
     for (std::size_t i = 0; i < N; ++i) x[i] = static_cast<Real>(joint_[k][i].get_value());
   }
 
-  Side<N> joints_, actuators_;
+  Sides<N> sides_;
   std::array<std::vector<transmission_interface::JointHandle>, 3> joint_;
   std::array<std::vector<transmission_interface::ActuatorHandle>, 3> actuator_;
   typename Map::Posture at_;  // measured last
@@ -153,7 +151,7 @@ class Loader : public transmission_interface::TransmissionLoader {
  public:
   std::shared_ptr<transmission_interface::Transmission> load(const hardware_interface::TransmissionInfo& info) override {
     constexpr std::size_t N = Map::kSize;
-    Side<N> joints, actuators;
+    Sides<N> sides;
     if (info.joints.size() != N || info.actuators.size() != N)
       throw transmission_interface::Exception(info.name + ": this linkage has " + std::to_string(N) + " joints and as many actuators");
     for (std::size_t i = 0; i < N; ++i) {
@@ -164,10 +162,10 @@ class Loader : public transmission_interface::TransmissionLoader {
       if (at->mechanical_reduction != 1) fail("joint '" + at->name + "': its reduction is in the linkage; leave it out");
       const auto& actuator = info.actuators[i];
       if (!(std::abs(actuator.mechanical_reduction) > 0)) fail("actuator '" + actuator.name + "': its reduction is zero");
-      joints.names[i] = at->name, joints.reductions[i] = 1, joints.offsets[i] = at->offset;
-      actuators.names[i] = actuator.name, actuators.reductions[i] = actuator.mechanical_reduction, actuators.offsets[i] = 0;
+      sides.joints[i] = at->name, sides.offsets[i] = at->offset;
+      sides.actuators[i] = actuator.name, sides.reductions[i] = actuator.mechanical_reduction;
     }
-    return std::make_shared<Linkage<Map>>(joints, actuators);
+    return std::make_shared<Linkage<Map>>(sides);
   }
 };
 

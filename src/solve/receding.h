@@ -40,8 +40,8 @@ struct NodeSource {
 struct Foresight {
   int stages = 0;            ///< at most those of the window
   ShootingTrajectory nodes;  ///< xs_k (+) dx_k, stages + 1 of them, and us_k + du_k, within the bounds
-  std::function<void()>
-      use;  ///< called once they are there and finite: after the first sweep of the last iteration that step() may make
+  /// Called once they are there and finite: after the first sweep of the last iteration that step() may make.
+  std::function<void()> use;
 };
 
 /// Keeps its memory and multipliers from step to step: an iteration after the first allocates nothing.
