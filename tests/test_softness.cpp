@@ -267,6 +267,39 @@ TEST_CASE("Equalities of every kind give way in MuJoCo as predicted", "[softness
   }
 }
 
+TEST_CASE("Inverse inertias of bodies are those that MuJoCo estimates", "[softness]") {
+  // Bodies without inertia, deep and turned, with an inertia of zero, fixed ones, and what only slides.
+  const std::vector<std::string> names = {"arm", "tip", "turned", "zero", "fixed", "last", "slider", "box"};
+  std::string ties;
+  for (const std::string& name : names)
+    ties += "<connect name=\"" + name + "\" body1=\"" + name + "\" body2=\"world\" anchor=\"0.1 0 0\"/>";
+  const std::string rod = "<inertial pos=\"0.2 0 0.1\" mass=\"2\" diaginertia=\"0.01 0.02 0.02\"/>";
+  SoftFile file(
+      "<mujoco><compiler angle=\"radian\"/><worldbody><body name=\"arm\" pos=\"0 1 0\"><joint axis=\"0 1 0\"/>" + rod +
+      "<body name=\"tip\" pos=\"0 0 -0.3\"/><body name=\"turned\" pos=\"0.1 0 0.2\" euler=\"0.2 0.5 0\">"
+      "<body name=\"last\" pos=\"0.3 0.1 0\"/></body>"
+      "<body name=\"zero\" pos=\"0.1 0 0.4\"><inertial pos=\"0.1 0 0\" mass=\"0\" diaginertia=\"0 0 0\"/></body>"
+      "<body name=\"fixed\" pos=\"0 0 0.2\">" +
+      rod +
+      "</body></body>"
+      "<body name=\"slider\"><joint type=\"slide\" axis=\"0 0.6 0.8\"/>" +
+      rod +
+      "</body>"
+      "<body name=\"box\"><joint type=\"slide\" axis=\"1 0 0\"/><geom type=\"box\" size=\"1 2 3\" mass=\"2\"/></body>"
+      "</worldbody><equality>" +
+      ties + "</equality></mujoco>");
+  const SoftLoops two = makeSoftLoops(file.robot.model, file.softness, MujocoVersion::Two),
+                  three = file.loops(MujocoVersion::Three);
+  REQUIRE(two.equalities().size() == names.size());
+  for (size_t i = 0; i < names.size(); ++i) {
+    INFO(names[i]);
+    const double expected = file.mj->body_invweight0[2 * mj_name2id(file.mj.get(), mjOBJ_BODY, names[i].c_str())];
+    CHECK(two.equalities()[i].weight[0] == Approx(expected).epsilon(1e-9));
+    // As npm's 3.14.0 has it: the body whose inertial frame is its own slides with all of 1/m.
+    CHECK(three.equalities()[i].weight[0] == Approx(names[i] == "box" ? 1 / 2. : expected).epsilon(1e-9));
+  }
+}
+
 TEST_CASE("A crank that turns opens the loop in MuJoCo as predicted", "[softness]") {
   // A connect, and a tendon of constant length: rods
   for (const char* tie : {"<connect name=\"pin\" body1=\"coupler\" body2=\"rocker\" anchor=\"0.35 0 0\"",

@@ -45,7 +45,7 @@ class WeightCalculator {
       for (const std::map<std::string, double>& sum : equality.sums) weight.array() += calcSum(sum);
     } else {
       for (const std::string& link : equality.links) {
-        const Eigen::Vector2d side = calcBody(link);
+        const Eigen::Vector2d side = calcBody(link, version);
         weight.head<3>().array() += side[0];
         if (weight.size() == 6) weight.tail<3>().array() += side[version == MujocoVersion::Two ? 0 : 1];
       }
@@ -55,12 +55,13 @@ class WeightCalculator {
 
  private:
   // Of translations and of rotations.
-  Eigen::Vector2d calcBody(const std::string& link) const {
-    const auto centre = file_.centres.find(link);
-    if (centre == file_.centres.end()) return {0, 0};  // the world
-    const int frame = model_.findFrame(link);
-    const SE3 X = model_.frames()[frame].X_BF * SE3(Matrix3d::Identity(), centre->second);
-    const MatrixXd J = calcFrameJacobian(model_, ws_, model_.frames()[frame].body, X);
+  Eigen::Vector2d calcBody(const std::string& link, MujocoVersion version) const {
+    const auto found = file_.bodies.find(link);
+    if (found == file_.bodies.end()) return {0, 0};  // the world
+    const Frame& frame = model_.frames()[model_.findFrame(link)];
+    const MatrixXd J =
+        calcFrameJacobian(model_, ws_, frame.body, frame.X_BF * SE3(Matrix3d::Identity(), found->second.centre));
+    if (found->second.slides && version != MujocoVersion::Two) return {1 / model_.bodies()[frame.body].inertia.mass, 0};
     const VectorXd diagonal = (J * inverse_ * J.transpose()).diagonal();
     return {diagonal.head<3>().mean(), diagonal.tail<3>().mean()};
   }

@@ -20,11 +20,18 @@ struct MjcfEquality {
   SoftSettings settings;
 };
 
+/// A body as MuJoCo estimates its inverse inertia.
+struct MjcfBody {
+  Vector3d centre = Vector3d::Zero();  ///< of mass, in its link
+  bool slides =
+      false;  ///< and does nothing else, on the ground, along axes of its inertia: 1/m for translations, from version 3 on
+};
+
 struct MjcfSoftness {
   SoftStep step;
   std::vector<MjcfEquality> equalities;
   std::map<std::string, std::vector<double>> start;  ///< coordinates of the joints as the file stands
-  std::map<std::string, Vector3d> centres;           ///< of mass of MuJoCo's bodies, in their links
+  std::map<std::string, MjcfBody> bodies;            ///< by link
 };
 
 /// \throws InputError as loadRobot() does

@@ -58,6 +58,8 @@ RobotFiles MjcfReader::read() {
   GeometryDecimals decimals;
   for (const XMLElement* root : settings_.files.listRoots()) decimals.add(*root, settings_.angle != 1);
   tree_.rounding = decimals.calcTolerance();
+  for (const Tie& tie : ties_)
+    if (tie.kind == ClosureKind::Hinge5D) tree_.rounding.levers[tie.name] = tie.lever;
   return {std::move(tree_), std::move(yaml_)};
 }
 
@@ -201,10 +203,17 @@ void MjcfReader::readBody(const Child& child, const BodyPlace& parent) {
   flatten(e, {}, body.getText("childclass", child.childclass), children);
   const size_t num_slots = slots_.size();
   BodyPlace place = {name, {}, parent.X_WB * X_PB};
+  place.parent = parent.link;
   place.X_LB = addJoints(body, name, children, parent, X_PB);
   place.is_static = parent.is_static && slots_.size() == num_slots;
-  const Inertia inertia = keepBounds(readInertia(children));
-  softness_.centres[name] = place.X_LB.act(inertia.mass > 0 ? inertia.com : Vector3d::Zero());
+  MjcfBody& soft = softness_.bodies[name];
+  soft.slides &=
+      parent.is_static && (parent.link == "world" || parent.parent == "world") &&
+      std::none_of(children.begin(), children.end(), [](const Child& c) { return getTag(*c.element) == "body"; });
+  // A body without inertia has its centre of mass, in its own frame, where it is in its parent's (MuJoCo 2.2.2 and 3.14).
+  soft.centre = body.getPose().p;
+  const Inertia inertia = keepBounds(readInertia(children, soft));
+  soft.centre = place.X_LB.act(soft.centre);
   tree_.links[name].inertia = inertia.transformed(place.X_LB);
   places_[name] = place;
   readContents(children, place);

@@ -37,6 +37,7 @@ class MjcfReader {
     std::string link;
     SE3 X_LB, X_WB;
     bool is_static = false;  // no joint carries it
+    std::string parent{};    // its link
   };
 
   // A joint of the file.
@@ -100,6 +101,7 @@ class MjcfReader {
     SE3 X_L1, X_L2;
     Vector3d axis = Vector3d::UnitZ();
     double length = 0;    // of a distance
+    double lever = 0;     // between the points that make a hinge
     std::string coupler;  // a coupler is a ClosureSpec already
     int line = 0;
     std::vector<size_t> equalities{};  // in softness_
@@ -163,9 +165,9 @@ class MjcfReader {
   // inertia: reader_mjcf_inertia.cpp
   void readInertiaSettings(MjcfElement& compiler);
   void readMesh(const XMLElement& e);
-  Inertia readInertia(const std::vector<Child>& children);
+  Inertia readInertia(const std::vector<Child>& children, MjcfBody& soft);
   Inertia readGivenInertia(MjcfElement& e) const;
-  Inertia readSolid(const Child& child);
+  Inertia readSolid(const Child& child, std::vector<SE3>& frames);
   static Inertia calcPrimitive(const MjcfElement& e, const Shape& shape);
   Inertia readMeshSolid(MjcfElement& e, const std::string& mesh) const;
   Inertia keepBounds(const Inertia& inertia) const;

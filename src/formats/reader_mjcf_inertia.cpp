@@ -52,7 +52,20 @@ void MjcfReader::readMesh(const XMLElement& e) {
   meshes_[name] = asset;
 }
 
-Inertia MjcfReader::readInertia(const std::vector<Child>& children) {
+namespace {
+
+// Whether MuJoCo's inertial frame is the body's own: by frames those of <inertial> or of geoms. Where there is not one alone, its
+// axes are the principal ones by falling moments.
+bool isOwnFrame(const std::vector<SE3>& frames, const Inertia& inertia) {
+  constexpr double kZero = 1e-14;  // mjEPS
+  if (frames.size() == 1) return frames[0].p.isZero(kZero) && frames[0].R.isIdentity(kZero);
+  const Matrix3d& I = inertia.I_com;
+  return inertia.com.isZero(kZero) && I.isDiagonal(kZero) && I(0, 0) >= I(1, 1) && I(1, 1) >= I(2, 2);
+}
+
+}  // namespace
+
+Inertia MjcfReader::readInertia(const std::vector<Child>& children, MjcfBody& soft) {
   const XMLElement* given = nullptr;
   SE3 X;
   for (const Child& child : children) {
@@ -63,13 +76,20 @@ Inertia MjcfReader::readInertia(const std::vector<Child>& children) {
   }
   if (given && inertia_from_geom_ != "true") {
     MjcfElement e(*given, "", settings_);
-    return readGivenInertia(e).transformed(X);
+    const Inertia inertia = readGivenInertia(e).transformed(X);
+    const std::vector<SE3> frames(e.find("fullinertia") ? 0 : 1, X * e.getPose());
+    soft.slides &= isOwnFrame(frames, inertia);
+    soft.centre = inertia.com;
+    return inertia;
   }
   if (given) noteElement(*given, "left out, because inertiafromgeom is true");
   if (inertia_from_geom_ == "false") return {};
   Inertia sum;
+  std::vector<SE3> frames;
   for (const Child& child : children)
-    if (getTag(*child.element) == "geom") sum = sum + readSolid(child);
+    if (getTag(*child.element) == "geom") sum = sum + readSolid(child, frames);
+  soft.slides &= isOwnFrame(frames, sum);
+  if (sum.mass > 0) soft.centre = sum.com;
   return sum;
 }
 
@@ -143,7 +163,7 @@ Inertia MjcfReader::readMeshSolid(MjcfElement& e, const std::string& mesh) const
   return {solid->mass, solid->com, solid->I_com / solid->mass};
 }
 
-Inertia MjcfReader::readSolid(const Child& child) {
+Inertia MjcfReader::readSolid(const Child& child, std::vector<SE3>& frames) {
   MjcfElement e(*child.element, child.childclass, settings_);
   const Shape shape = readShape(e, child.X_BF);
   for (const char* read : kGeomAttributes) e.find(read);
@@ -162,6 +182,7 @@ Inertia MjcfReader::readSolid(const Child& child) {
                                                : "shell") +
                " is not supported",
            "give the body an <inertial>, as MuJoCo does when it saves the model");
+  if (!is_mesh) frames.push_back(shape.X_BG);
   Inertia solid = is_mesh ? readMeshSolid(e, e.getText("mesh")) : calcPrimitive(e, shape);
   solid.mass = given ? *given : density * solid.mass;
   solid.I_com *= solid.mass;

@@ -21,6 +21,10 @@ SE3 MjcfReader::addJoints(const MjcfElement& body, const std::string& link, cons
   for (const Child& child : children)
     if (getTag(*child.element) == "joint" || getTag(*child.element) == "freejoint")
       elements.push_back(readJoint(child, link));
+  softness_.bodies[link].slides =
+      !elements.empty() && std::all_of(elements.begin(), elements.end(), [](const Element& e) {
+        return e.type == "slide" && e.pos.isZero(0) && (e.axis.array() != 0).count() == 1;
+      });
   const SE3 X_LP = parent.X_LB;
   if (elements.empty()) {
     addLink(link, parent.link, JointKind::Fixed, link + "_fixed", X_LP * X_PB);
