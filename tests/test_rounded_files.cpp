@@ -1,13 +1,17 @@
 // Files whose linkages move only because of numbers that are rounded: in every format, told once, and written so that they come back.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
+#include <random>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/decimals.h"
 #include "get_error.h"
+#include "model/number_text.h"
 #include "robot_directory.h"
+#include "rounded_families.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -66,6 +70,45 @@ double calcHalfUnit(const std::string& numbers) {
   Decimals decimals;
   decimals.add(numbers);
   return decimals.calcHalfUnit();
+}
+
+// MuJoCo's: bodies in the frames of their hinges, and two points, a lever apart, for each hinge that closes a loop.
+std::string makeMjcf(const HingeNet& net, int decimals, double lever) {
+  const auto write = [decimals](const auto& numbers) {
+    std::string text;
+    for (const double x : numbers) text += formatNumber(x, ("%." + std::to_string(decimals) + "f").c_str()) + " ";
+    return text;
+  };
+  std::vector<SE3> X_WB(net.bodies);
+  std::vector<std::string> bodies(net.bodies);
+  std::vector<int> parents(net.bodies, -1);
+  parents[0] = 0;
+  std::string closures;
+  for (size_t k = 0; k < net.hinges.size(); ++k) {
+    const auto& [body1, body2, X_W] = net.hinges[k];
+    const auto name = [](int body) { return body == 0 ? "world" : "body" + std::to_string(body); };
+    if (parents[body2] < 0) {
+      parents[body2] = body1;
+      X_WB[body2] = X_W;
+      const SE3 X = X_WB[body1].inverse() * X_W;
+      const Eigen::Quaterniond q(X.R);
+      bodies[body2] = "<body name=\"" + name(body2) + "\" pos=\"" + write(X.p) + "\" quat=\"" +
+                      write(Eigen::Vector4d(q.w(), q.x(), q.y(), q.z())) + "\"><joint name=\"hinge" +
+                      std::to_string(k + 1) + "\"/><geom size=\"0.02\"/>";
+      continue;
+    }
+    for (const double side : {-0.5, 0.5})
+      closures += "<connect body1=\"" + name(body2) + "\" body2=\"" + name(body1) + "\" anchor=\"" +
+                  write((X_WB[body2].inverse() * X_W).act({0, 0, side * lever})) + "\"/>";
+  }
+  const std::function<std::string(int)> writeChildren = [&](int parent) {
+    std::string text;
+    for (int body = 1; body < net.bodies; ++body)
+      if (parents[body] == parent) text += bodies[body] + writeChildren(body) + "</body>";
+    return text;
+  };
+  return "<mujoco><compiler angle=\"radian\"/><worldbody>" + writeChildren(0) + "</worldbody><equality>" + closures +
+         "</equality></mujoco>";
 }
 
 }  // namespace
@@ -166,4 +209,35 @@ TEST_CASE("MuJoCo's quaternions of six decimals, and its sites beside the plane"
     CHECK(countWarnings(robot, "as a plane linkage: axes of crank, rod, rocker made parallel") == 1);
     checkTurns(robot.model);
   }
+}
+
+TEST_CASE("hinges whose axes run through two points that are near to each other") {
+  std::mt19937 rng(7);
+  for (const Family family : kFamilies)
+    for (const int decimals : {5, 6, 8, 9}) {
+      const double lever = std::uniform_real_distribution<double>(0.01, 0.04)(rng);
+      CAPTURE(getName(family), decimals, lever);
+      const RobotDirectory directory;
+      const LoadedRobot robot =
+          loadRobot(directory.write("net.xml", makeMjcf(makeHingeNet(family, rng), decimals, lever)));
+      // Points that are one above another in a plane of the axes stay so.
+      const bool is_across = family == Family::Spherical || family == Family::Bennett || family == Family::PlaneInSpace;
+      CHECK(countWarnings(robot, "its numbers are rounded") == is_across);
+      AssemblyProblem problem;
+      problem.q_ref = robot.model.makeNeutral();
+      problem.q_ref[0] = 0.05;
+      problem.weights = VectorXd::Constant(robot.model.nv(), 1e-4);
+      problem.weights[0] = 1;
+      const AssemblyResult turned = assemble(robot.model, problem);
+      CHECK(turned.status == NumericalStatus::Ok);
+      CHECK(turned.q[0] == Approx(0.05).epsilon(0.1));
+    }
+}
+
+TEST_CASE("a linkage without motors that is locked by rounding is told, too") {
+  const RobotDirectory directory;
+  std::mt19937 rng(3);
+  directory.write("net.xml", makeMjcf(makeHingeNet(Family::PlaneInSpace, rng), 7, 0.02));
+  const LoadedRobot robot = loadRobot(directory.write("net.yaml", "model: net.xml\nrounding: 1e-9\n"));
+  CHECK(countWarnings(robot, "it is locked as it is written: axes of ") == 1);
 }

@@ -51,7 +51,7 @@ Motion calcMotion(const Model& model, const VectorXd& q) {
 
 RoundingTolerance halfUnit(int decimals) {
   const double half = 0.5 * std::pow(10, -decimals);
-  return {half, half};
+  return {half, half, {}};
 }
 
 // Whether nothing of it is changed, to the last bit.

@@ -25,13 +25,14 @@ constexpr double kFrameParts = 4;  // numbers that place a frame and may each be
 constexpr double kMoves = 0.2;     // what moves farther was meant to, rad or L
 constexpr int kFirst = 4, kPostures = 12, kOthers = 50;
 
-// Eq. (2). \param tolerance  rad; m   \returns whether all postures close
-bool mend(FollowedLinkage& linkage, std::vector<VectorXd>& postures, int m, const RoundingTolerance& tolerance) {
+// Eq. (2). \param tolerances  of the places   \returns whether all postures close
+bool mend(FollowedLinkage& linkage, std::vector<VectorXd>& postures, int m,
+          const std::vector<RoundingTolerance>& tolerances) {
   constexpr int kMost = 25;
-  const Eigen::Index places = static_cast<Eigen::Index>(linkage.changes().size());
+  const Eigen::Index places = static_cast<Eigen::Index>(tolerances.size());
   VectorXd units(6 * places);
   for (Eigen::Index i = 0; i < places; ++i)
-    units.segment<6>(6 * i) << Vector3d::Constant(tolerance.length), Vector3d::Constant(tolerance.angle);
+    units.segment<6>(6 * i) << Vector3d::Constant(tolerances[i].length), Vector3d::Constant(tolerances[i].angle);
   const Eigen::Index dropped = linkage.numRows() - m, count = static_cast<Eigen::Index>(postures.size());
   double last = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kMost; ++i) {
@@ -135,27 +136,50 @@ struct Finding {
   VectorXd q;       // a posture
 };
 
-bool isWithin(const FollowedLinkage& linkage, const RoundingTolerance& tolerance) {
-  for (const PlaceChange& change : linkage.changes())
-    if (!(change.change.p.norm() <= kFrameParts * tolerance.length &&
-          log3(change.change.R).norm() <= kFrameParts * tolerance.angle))
+bool isWithin(const FollowedLinkage& linkage, const std::vector<RoundingTolerance>& tolerances) {
+  for (size_t i = 0; i < tolerances.size(); ++i) {
+    const SE3& change = linkage.changes()[i].change;
+    if (!(change.p.norm() <= kFrameParts * tolerances[i].length &&
+          log3(change.R).norm() <= kFrameParts * tolerances[i].angle))
       return false;
+  }
   return true;
 }
 
 // The rows close over fifty other postures, and no placement has changed too much.
-bool isIdeal(FollowedLinkage& linkage, const Finding& found, const RoundingTolerance& tolerance) {
-  if (!isWithin(linkage, tolerance)) return false;
+bool isIdeal(FollowedLinkage& linkage, const Finding& found, const std::vector<RoundingTolerance>& tolerances) {
+  if (!isWithin(linkage, tolerances)) return false;
   const std::optional<LinkageFit> start = fitLinkage(linkage, found.q, found.rank);
   if (!start) return false;
   const LinkageWay others = followLinkage(linkage, *start, found.rank, kOthers, 2, kCloses);
   return others.gap <= kCloses && others.moved >= kMoves;
 }
 
+// Of the places of a linkage. Frames of hinges whose axis runs through two points turn as far as these may be off.
+std::vector<RoundingTolerance> makeTolerances(const FollowedLinkage& linkage, const RoundingTolerance& given) {
+  RoundingTolerance most;
+  if (given.angle > 0) most.angle = std::clamp(given.angle, kLeastRounding, kMostAngleRounding);
+  if (given.length > 0)
+    most.length =
+        std::clamp(given.length, kLeastRounding, std::max(kLeastRounding, kMostLengthRounding * linkage.length()));
+  std::vector<RoundingTolerance> out;
+  for (const PlaceChange& change : linkage.changes()) {
+    out.push_back(most);
+    if (change.place.kind == ModelPlace::Kind::Joint) continue;
+    const auto lever = given.levers.find(linkage.model().closures()[change.place.index].name);
+    if (lever == given.levers.end()) continue;
+    out.back().angle = std::max(most.angle, std::min(most.length / lever->second, kMostAngleRounding));
+  }
+  return out;
+}
+
 // Supposes ranks from the least upwards.
-Finding examine(FollowedLinkage& linkage, const std::vector<VectorXd>& starts, const RoundingTolerance& tolerance) {
-  const double size = std::max(tolerance.angle, tolerance.length / linkage.length()),
-               opening = std::max(kAdds * size, 10 * kCloses);
+Finding examine(FollowedLinkage& linkage, const std::vector<VectorXd>& starts,
+                const std::vector<RoundingTolerance>& tolerances) {
+  double size = 0;
+  for (const RoundingTolerance& tolerance : tolerances)
+    size = std::max({size, tolerance.angle, tolerance.length / linkage.length()});
+  const double opening = std::max(kAdds * size, 10 * kCloses);
   Finding found;
   std::optional<LinkageFit> start;
   for (size_t i = 0; i < starts.size() && !start; ++i) {
@@ -185,7 +209,7 @@ Finding examine(FollowedLinkage& linkage, const std::vector<VectorXd>& starts, c
     if (way.moved < kMoves || way.gap > opening || way.postures.empty()) continue;
     const FollowedLinkage written = linkage;
     linkage.findPlaneLoops(start->q, opening);
-    if (mend(linkage, way.postures, m, tolerance) && isIdeal(linkage, found, tolerance)) {
+    if (mend(linkage, way.postures, m, tolerances) && isIdeal(linkage, found, tolerances)) {
       found.mended = true;
       return found;
     }
@@ -251,12 +275,8 @@ RoundedLinkages findRoundedLinkages(const Model& model, const RoundingTolerance&
   for (const LoopCluster& cluster : model.clusters()) {
     FollowedLinkage linkage(model, cluster);
     const FollowedLinkage written = linkage;
-    RoundingTolerance own;
-    if (tolerance.angle > 0) own.angle = std::clamp(tolerance.angle, kLeastRounding, kMostAngleRounding);
-    if (tolerance.length > 0)
-      own.length = std::clamp(tolerance.length, kLeastRounding,
-                              std::max(kLeastRounding, kMostLengthRounding * linkage.length()));
-    Finding found = examine(linkage, starts, own);
+    const std::vector<RoundingTolerance> own = makeTolerances(linkage, tolerance);
+    const Finding found = examine(linkage, starts, own);
     if (found.mended) {
       out.mended.push_back(describe(model, cluster, linkage, found));
       const ModelParts changed = takeParts(linkage.model());
@@ -265,14 +285,15 @@ RoundedLinkages findRoundedLinkages(const Model& model, const RoundingTolerance&
     const auto motors = std::count_if(model.motors().begin(), model.motors().end(), [&](const Motor& motor) {
       return std::binary_search(cluster.dofs.begin(), cluster.dofs.end(), motor.dof);
     });
-    const bool is_open = found.rank < 0;
-    if (!is_open && motors <= linkage.numDofs() - found.rank) continue;
+    const bool is_open = found.rank < 0, is_short = !is_open && motors > linkage.numDofs() - found.rank;
+    if ((found.exact || found.mended) && !is_short) continue;
     linkage = written;
-    const Finding far = examine(linkage, starts, {kFar, kFar * linkage.length()});
+    const RoundingTolerance most = {kFar, kFar * linkage.length(), {}};
+    const Finding far = examine(linkage, starts, std::vector<RoundingTolerance>(own.size(), most));
     if (far.mended) {
       out.locked.push_back(describe(model, cluster, linkage, far));
       if (is_open) out.locked.back().written = -1;
-    } else if (!is_open) {
+    } else if (is_short) {
       out.short_of_freedoms.push_back(describe(model, cluster, linkage, found));
     }
   }

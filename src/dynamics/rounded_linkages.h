@@ -16,6 +16,7 @@
 ///    Since what was rounded is a solution of about the length of the tolerance, so is this one.
 /// 3. It is accepted if other postures close to 1e-12 with the rank m, and no placement has changed by more than rounding
 ///    can have changed it.
+#include <map>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,8 @@ namespace bielle {
 /// By how much numbers may be off, half a unit of their last decimals. 0: not at all.
 struct RoundingTolerance {
   double angle = 0, length = 0;  ///< rad; m
+  /// How far the two points are apart that the axis of a hinge runs through, m, by its closure: length / lever is its angle.
+  std::map<std::string, double> levers;
 };
 
 /// The least and the most that is taken for rounding: rad; m, and of the mechanism's size (L of loop_conflict.h).
@@ -48,7 +51,7 @@ struct RoundedLinkage {
 struct RoundedLinkages {
   Model model;                         ///< with the ideal linkages; a copy of the given one if there are none
   std::vector<RoundedLinkage> mended;  ///< changed within the tolerance
-  /// Not changed: these do not close, or have fewer freedoms than motors, and would with a change beyond the tolerance.
+  /// Not changed: these do not close, do not move, or have fewer freedoms than motors, but would with a change beyond the tolerance.
   std::vector<RoundedLinkage> locked;
   /// Not changed, fewer freedoms than motors, and no small change is known that helps.
   std::vector<RoundedLinkage> short_of_freedoms;

@@ -388,9 +388,11 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
 // Axes of closures are of another file, which rounds in its own way: few digits are exact ones.
 RoundingTolerance findTolerance(const UrdfFile& urdf, const YamlFile& yaml) {
   constexpr int kFewest = 4;
-  if (yaml.rounding) return {*yaml.rounding, *yaml.rounding};
   RoundingTolerance tolerance = urdf.rounding;
-  if (yaml.axes.most_digits() >= kFewest) tolerance.angle = std::max(tolerance.angle, yaml.axes.calcHalfUnit());
+  if (yaml.rounding)
+    tolerance.angle = tolerance.length = *yaml.rounding;
+  else if (yaml.axes.most_digits() >= kFewest)
+    tolerance.angle = std::max(tolerance.angle, yaml.axes.calcHalfUnit());
   return tolerance;
 }
 

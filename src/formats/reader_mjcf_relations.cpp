@@ -143,6 +143,7 @@ void MjcfReader::joinHinges() {
         settings_.notes.add(settings_.path, "<connect>", b.line,
                             "together with '" + a.name + "' it makes a hinge of their two bodies, read as such");
       a.kind = ClosureKind::Hinge5D;
+      a.lever = along.norm();
       a.axis = a.X_L1.R.transpose() * along.normalized();
       if (!along.isApprox(turned, kSameLength))  // its frames do not have the axis in common
         a.X_L2.R = Eigen::Quaterniond::FromTwoVectors(a.axis, along2).toRotationMatrix();
