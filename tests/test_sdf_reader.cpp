@@ -301,6 +301,13 @@ TEST_CASE("<mimic> of SDF 1.11 is a coupler, though libsdformat leaves it out; a
   const auto get = [&](const char* name) { return closed.q[robot.model.joints()[robot.model.findJoint(name)].idx_q]; };
   CHECK(get("jc") == Approx(-2 * (get("ja") - 0.1) + 0.3));
   CHECK_FALSE(warnsOf(loadSdf(makeFourBar("")), "is later than"));
+  // As by Gazebo's plugin.
+  const LoadedRobot plugged = loadSdf(replaceOnce(makeFourBar("", ""), "</model>",
+                                                  "<plugin name=\"p\" filename=\"p.so\"><joint>ja</joint><mimicJoint>jc"
+                                                  "</mimicJoint><multiplier>-2</multiplier></plugin></model>"));
+  REQUIRE(plugged.model.closures().size() == 1);
+  CHECK(plugged.model.closures()[0].kind == ClosureKind::Coupler);
+  CHECK_FALSE(warnsOf(plugged, "plugin"));
   const auto getSdfError = [&](const std::string& mimic) { return getError([&] { loadSdf(swing(mimic)); }); };
   CHECK_THAT(getSdfError("<mimic joint=\"none\"/>"),
              Catch::Contains("joint 'jc': <mimic> (line") && Catch::Contains("'none' is no joint with one coordinate"));

@@ -2,7 +2,9 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/reader.h"
 #include "get_error.h"
 #include "robot_directory.h"
@@ -130,6 +132,31 @@ TEST_CASE("URDF dialects: a joint of Gazebo closes a loop where the links stand"
   CHECK(says(loadUrdf(halves + "<gazebo reference=\"crank\"><springStiffness>3</springStiffness></gazebo>"),
              "<springStiffness> (line 11): it is left out"));
   CHECK(loadUrdf(halves + "<gazebo reference=\"crank\"><material>Gazebo/Orange</material></gazebo>").warnings.empty());
+}
+
+TEST_CASE("URDF dialects: a plugin of Gazebo that mimics is a coupler, others change no mechanism") {
+  const std::string open = writeFourBar();
+  const auto plug = [&](const std::string& more) {
+    return open + "<gazebo><plugin name=\"p\" filename=\"libplugin.so\">" + more + "</plugin></gazebo>";
+  };
+  const std::string pair = "<joint>crank</joint><mimicJoint>rocker</mimicJoint>";
+  const LoadedRobot robot = loadUrdf(plug(pair + "<multiplier>-2</multiplier><offset>0.3</offset><hasPID/>"));
+  REQUIRE(robot.model.closures().size() == 1);
+  const Closure& coupler = robot.model.closures()[0];
+  CHECK(coupler.kind == ClosureKind::Coupler);
+  VectorXd q = robot.model.makeNeutral();
+  q[robot.model.joints()[robot.model.findJoint("crank")].idx_q] = 0.2;
+  q[robot.model.joints()[robot.model.findJoint("rocker")].idx_q] = -2 * 0.2 + 0.3;
+  Workspace ws(robot.model);
+  updatePositions(robot.model, ws, q);
+  CHECK(calcClosureResidual(ws, coupler).norm() < 1e-15);
+  const LoadedRobot other = loadUrdf(plug("<robotNamespace>/r</robotNamespace>"));
+  CHECK(other.model.closures().empty());
+  CHECK(says(other, "what changes no mechanism is left out (1 kind"));
+  CHECK_THAT(getLoadError(plug("<joint>none</joint><mimicJoint>rocker</mimicJoint>")),
+             Catch::Contains("'none' is no joint with one coordinate; name one"));
+  CHECK_THAT(getLoadError(plug(pair + "<offset>nan</offset>")),
+             Catch::Contains("<offset> (line 9): it is not a finite number"));
 }
 
 TEST_CASE("URDF dialects: a coupling is between sums of coordinates from the nearest common ancestor") {

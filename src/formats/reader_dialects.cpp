@@ -78,6 +78,7 @@ class DialectReader {
     for (const auto& [tag, lines] : left_out_)
       tree_.warnings.push_back(tree_.path + ": <" + tag + ">" + formatLines(lines) +
                                ": it is left out: no such element is known here");
+    if (!plugins_.empty()) tree_.harmless.push_back(tree_.path + ": <gazebo> <plugin>" + formatLines(plugins_));
   }
 
  private:
@@ -175,6 +176,8 @@ class DialectReader {
     for (const XMLElement* e : getChildren(gazebo)) {
       if (getTag(*e) == "joint")
         readSdfJoint(*e);
+      else if (getTag(*e) == "plugin" && !readMimicPlugin(*e, tree_))
+        plugins_.insert(e->GetLineNum());
       else if (kChangingOfGazebo.count(getTag(*e)))
         warn(*e, "it is left out");
     }
@@ -363,6 +366,7 @@ class DialectReader {
   UrdfFile& tree_;
   YamlFile& settings_;
   std::map<std::string, SE3> X_WL_;                // of the links in the root, with all joints at zero
+  std::set<int> plugins_;                          // lines
   std::map<std::string, std::set<int>> left_out_;  // tag -> lines
 };
 
@@ -375,6 +379,35 @@ UrdfLink makeRotor(const std::string& name) {
 
 void readDialects(const XMLElement& robot, bool for_drake, UrdfFile& tree, YamlFile& settings) {
   DialectReader(for_drake, tree, settings).read(robot);
+}
+
+bool readMimicPlugin(const XMLElement& plugin, UrdfFile& tree) {
+  const XMLElement *leader = plugin.FirstChildElement("joint"), *follower = plugin.FirstChildElement("mimicJoint");
+  if (!leader || !follower) return false;
+  const auto find = [&](const XMLElement& e) -> UrdfJoint& {
+    const std::string name = getText(e);
+    const auto found = std::find_if(tree.joints.begin(), tree.joints.end(), [&](const UrdfJoint& joint) {
+      return joint.joint.name == name && getNv(joint.joint.kind) == 1;
+    });
+    if (found == tree.joints.end())
+      throw InputError(tree.path, "<plugin>: " + describe(e), "'" + name + "' is no joint with one coordinate",
+                       "name one");
+    return *found;
+  };
+  const auto get = [&](const char* tag, double usual) {
+    const XMLElement* e = plugin.FirstChildElement(tag);
+    std::vector<double> v;
+    if (e && (!parseNumbers(getText(*e), v) || v.size() != 1))
+      throw InputError(tree.path, "<plugin>: " + describe(*e), "it is not a finite number", "correct it");
+    return e ? v[0] : usual;
+  };
+  UrdfJoint& joint = find(*follower);
+  const UrdfJoint& other = find(*leader);
+  if (!joint.mimicked.empty()) return true;
+  joint.mimicked = other.joint.name;
+  joint.multiplier = get("multiplier", 1);
+  joint.offset = get("offset", 0);
+  return true;
 }
 
 void warnOfOpenLoops(UrdfFile& tree, const YamlFile& settings) {

@@ -10,6 +10,8 @@
 /// the first frame, or about <parent_axis> and <child_axis>. A `<joint>` inside `<gazebo>` is one of SDF: its links, at its
 /// <pose> in the child, are tied as they stand with all joints at zero.
 ///
+/// Mimics: `<plugin>` of Gazebo (mimic_joint_plugin of roboticsgroup_gazebo_plugins and its successors), by readMimicPlugin().
+///
 /// Couplers: `<coupling name>` (URDF+): the sum of the coordinates from the nearest common ancestor to <successor link> is <ratio
 /// value> times that to <predecessor link>.
 ///
@@ -27,6 +29,10 @@ namespace bielle {
 /// \param for_drake  its elements and transmissions are read by reader_drake.h
 /// \throws InputError naming the line for names that do not exist, other types and what is no number
 void readDialects(const XMLElement& robot, bool for_drake, UrdfFile& tree, YamlFile& settings);
+
+/// A plugin with <joint> and <mimicJoint>: the latter's coordinate is <multiplier> (1) times that of the former, plus <offset> (0),
+/// unless the file has a <mimic> of it. \returns whether it is one \throws InputError naming the line for names that do not exist
+bool readMimicPlugin(const XMLElement& plugin, UrdfFile& tree);
 
 /// onshape-to-robot marks the ends of loops by frames closing_NAME_1 and closing_NAME_2, and by nothing else: those that no closure
 /// names are told; and so are dependent joints of URDF+ without any closure.

@@ -302,7 +302,8 @@ void MjcfReader::readSpatialTendon(const XMLElement& element) {
     return;
   }
   if (spring.stiffness == 0 && spring.preload == 0 && spring.damping == 0)
-    return e.leaveOut("it has no spring or damper, and is left out");
+    return e.leaveOut(std::string("it has no spring or damper, and is left out") +
+                      (e.isLimited("limited", "range") ? ": nothing limits its length" : ""));
   if (e.isLimited("limited", "range")) e.note("the limits of its length are left out"), e.find("range");
   if (e.getNumber("frictionloss", 0) != 0) e.note("its frictionloss is left out");
   spring.name = given;

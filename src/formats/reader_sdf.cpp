@@ -7,6 +7,7 @@
 #include "bielle/model/error.h"
 #include "formats/decimals.h"
 #include "formats/log_capture.h"
+#include "formats/reader_dialects.h"
 #include "model/number_text.h"
 
 namespace fs = std::filesystem;
@@ -79,6 +80,7 @@ RobotFiles SdfReader::read() {
     for (const XMLElement* e : getChildren(*element_)) {
       if (getTag(*e) == "link") checkInertia(*e);
       if (getTag(*e) == "joint") readMimic(*e);
+      if (getTag(*e) == "plugin") readMimicPlugin(*e, tree_);
     }
     noteElements(*element_);
   }
@@ -346,6 +348,8 @@ void SdfReader::noteElements(const XMLElement& element) {
     if (own.rfind("drake:", 0) == 0 && tag == "model") continue;  // reader_sdf_drake.cpp
     if (harmless.count(own))
       notes_.addHarmless(path_, "<" + tag + "> <" + own + ">", e->GetLineNum());
+    else if (own == "plugin" && e->FirstChildElement("mimicJoint"))
+      continue;
     else if (!read.at(tag).count(own))
       notes_.add(path_, "<" + tag + "> <" + own + ">", e->GetLineNum(), "left out");
     else if (read.count(own))
