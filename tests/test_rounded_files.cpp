@@ -241,3 +241,40 @@ TEST_CASE("a linkage without motors that is locked by rounding is told, too") {
   const LoadedRobot robot = loadRobot(directory.write("net.yaml", "model: net.xml\nrounding: 1e-9\n"));
   CHECK(countWarnings(robot, "it is locked as it is written: axes of ") == 1);
 }
+
+TEST_CASE("left and right linkages that are mirror images stay so") {
+  const SE3 mirror(Matrix3d(Vector3d(1, -1, 1).asDiagonal()), Vector3d::Zero());
+  std::mt19937 rng(5);
+  for (const Family family : {Family::PlaneInSpace, Family::Spherical}) {
+    HingeNet net = makeHingeNet(family, rng);
+    const int links = net.bodies - 1, hinges = static_cast<int>(net.hinges.size());
+    for (int k = 0; k < hinges; ++k) {
+      HingeNet::Hinge right = net.hinges[k];
+      for (int* body : {&right.body1, &right.body2}) *body += *body > 0 ? links : 0;
+      right.X_W = mirror * right.X_W * mirror;
+      net.hinges.push_back(right);
+    }
+    net.bodies += links;
+    for (const int decimals : {5, 8}) {
+      CAPTURE(getName(family), decimals);
+      const RobotDirectory directory;
+      const LoadedRobot robot = loadRobot(directory.write("net.xml", makeMjcf(net, decimals, 0.02)));
+      CHECK(countWarnings(robot, "its numbers are rounded") == 1);
+      REQUIRE(robot.model.closures().size() == 2);
+      const auto check = [&](const SE3& left, const SE3& right) {
+        const SE3 image = mirror * left * mirror;
+        CHECK(image.R.isApprox(right.R, 1e-14));
+        CHECK((image.p - right.p).norm() < 1e-14);
+      };
+      const Closure &left = robot.model.closures()[0], &right = robot.model.closures()[1];
+      check(left.X_B1, right.X_B1);
+      check(left.X_B2, right.X_B2);
+      for (int k = 1; k < hinges; ++k) {
+        const auto place = [&](int number) {
+          return robot.model.joints()[robot.model.findJoint("hinge" + std::to_string(number))].X_PJ;
+        };
+        check(place(k), place(hinges + k));
+      }
+    }
+  }
+}

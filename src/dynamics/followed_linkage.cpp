@@ -227,6 +227,20 @@ std::optional<LinkageFit> fitLinkage(FollowedLinkage& linkage, VectorXd q, int m
   return {};
 }
 
+namespace {
+
+// Whether postures that way are less regular than those the other way: the same for mirror images, which so come out alike.
+bool leadsToLess(FollowedLinkage& linkage, const LinkageFit& start, int m, const VectorXd& heading) {
+  const auto measure = [&](double way) {
+    const VectorXd step = way / std::max(calcLargest(heading), 1e-300) * heading;
+    const std::optional<LinkageFit> there = fitLinkage(linkage, linkage.move(start.q, step), m);
+    return there && m > 0 ? there->sigma[m - 1] : 0;
+  };
+  return measure(kStride) < measure(-kStride);
+}
+
+}  // namespace
+
 LinkageWay followLinkage(FollowedLinkage& linkage, const LinkageFit& start, int m, int count, unsigned seed,
                          double opening) {
   std::mt19937 rng(seed);
@@ -241,6 +255,7 @@ LinkageWay followLinkage(FollowedLinkage& linkage, const LinkageFit& start, int 
     VectorXd heading = start.N * VectorXd::NullaryExpr(freedoms, [&](Eigen::Index) {
                          return static_cast<double>(rng()) / 4294967296.0 - 0.5;
                        });
+    if (freedoms == 1 && attempt == 0 && leadsToLess(linkage, start, m, heading)) heading = -heading;
     if (freedoms == 1 && attempt % 2 == 1) heading = -first;
     if (freedoms == 1 && attempt > 0 && attempt % 2 == 0) stride /= 3;
     first = heading;
