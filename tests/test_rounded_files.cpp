@@ -66,8 +66,8 @@ void checkTurns(const Model& model) {
   }
 }
 
-double calcHalfUnit(const std::string& numbers) {
-  Decimals decimals;
+double calcHalfUnit(const std::string& numbers, Decimals::Kind kind = Decimals::Kind::Lengths) {
+  Decimals decimals(kind);
   decimals.add(numbers);
   return decimals.calcHalfUnit();
 }
@@ -121,6 +121,12 @@ TEST_CASE("how far numbers may be off, from how they are written") {
   CHECK(calcHalfUnit("12.345678 1e-6") == Approx(5e-7));
   CHECK(calcHalfUnit("1.5708 0.0123457 -0.349066") == Approx(5e-6));  // %.6g
   CHECK(calcHalfUnit("1.5707963267948966 0.1") < 1e-15);              // a double
+  // A rounded constant beside exact numbers.
+  for (const char* constant : {"1.5708", "-0.7854", "3.1416", "0.7071", "-0.8660", "5.2360"})
+    CHECK(calcHalfUnit(constant + std::string(" 3.141592653589793"), Decimals::Kind::Angles) == Approx(5e-5));
+  for (const char* other : {"1.5707963267948966", "0.70710678118654757", "0.5", "1.57", "1.5709", "0.0001"})
+    CHECK(calcHalfUnit(other + std::string(" 3.141592653589793"), Decimals::Kind::Angles) < 1e-14);
+  CHECK(calcHalfUnit("1.5708 3.141592653589793") < 1e-14);
   CHECK(calcHalfUnit("1.57079637050628662 0.100000001490116119 0.5") == Approx(1.57 * std::pow(2, -24)).epsilon(0.01));
 }
 
@@ -163,6 +169,18 @@ TEST_CASE("a linkage is as it is written with all digits, or where rounding is 0
   directory.write("robot.yaml", makeYaml("3d", "rounding: 1\n"));
   CHECK_THAT(getError([&] { loadRobot(directory.path()); }),
              Catch::Contains("rounding") && Catch::Contains("0 .. 1e-3"));
+}
+
+TEST_CASE("a right angle of five digits beside angles that have all of theirs") {
+  const RobotDirectory directory;
+  directory.write("robot.urdf", replaceOnce(makeUrdf("1.5708"), "xyz=\"0.1 0.1 0\" rpy=\"0 0 0\"",
+                                            "xyz=\"0.1 0.1 0\" rpy=\"0 0 6.283185307179586\""));
+  for (const char* type : {"3d", "5d"}) {
+    directory.write("robot.yaml", makeYaml(type));
+    const LoadedRobot robot = loadRobot(directory.path());
+    CHECK(countWarnings(robot, "as a plane linkage") == 1);
+    checkTurns(robot.model);
+  }
 }
 
 TEST_CASE("a gap across the plane, however small, is none") {

@@ -22,6 +22,17 @@ bool isAside(const std::string& tag) {
   return false;
 }
 
+// Whether it is rounded from a multiple of 15 degrees in radians, or from its sine.
+bool isRoundedConstant(double value, double half) {
+  constexpr double kStep = kPi / 12, kExact = 1e-14;
+  if (std::abs(value) < kStep / 2) return false;
+  const double angle = kStep * std::round(value / kStep);
+  const double sine = std::abs(value) > 1 ? angle : std::sin(kStep * std::round(std::asin(value) / kStep));
+  for (const double constant : {angle, sine})
+    if (const double off = std::abs(value - constant); off > kExact && off <= 1.01 * half) return true;
+  return false;
+}
+
 std::string takeNumbers(const std::string& text, size_t from, size_t count) {
   std::istringstream stream(text);
   std::string word, out;
@@ -51,6 +62,8 @@ void Decimals::add(const std::string& text, double unit, bool are_floats) {
     }
     if (i < word.size() && (word[i] == 'e' || word[i] == 'E')) exponent = std::atoi(word.c_str() + i + 1);
     const double last = unit * std::pow(10, exponent - decimals);
+    if (kind_ == Kind::Angles && unit == 1 && digits >= kFewestDigits && isRoundedConstant(*value, last / 2))
+      constant_ = std::max(constant_, last / 2);
     finest_ = unit_ == 0 ? last : std::min(finest_, last);
     unit_ = unit;
     if (static_cast<int>(largest_.size()) <= digits) largest_.resize(digits + 1, 0);
@@ -66,7 +79,7 @@ void Decimals::add(const std::string& text, double unit, bool are_floats) {
 
 double Decimals::calcHalfUnit() const {
   if (most_digits_ == 0) return 0;
-  double half = 0.5 * finest_;
+  double half = std::max(0.5 * finest_, constant_);
   if (most_digits_ >= kFewestDigits) {
     // The largest of those that have nearly all of the digits; zeros at the end are left out by many.
     double largest = 0;

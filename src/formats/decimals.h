@@ -13,9 +13,13 @@ namespace bielle {
 
 /// Digits of numbers. Files have a number of decimals, or of significant digits (printf's %.6f and %.6g): half a unit is that of the
 /// last of the most decimals, or of the most significant digits (of four or more), whichever is larger. Numbers that are those of
-/// float, printed with more digits than it has, are off by half of its last bit.
+/// float, printed with more digits than it has, are off by half of its last bit. Angles and directions that are rounded from multiples
+/// of 15 degrees, their sines or cosines are off by half a unit of their own last digits, whatever the others have (1.5708 beside
+/// 3.141592653589793).
 class Decimals {
  public:
+  enum class Kind { Angles, Lengths };
+  explicit Decimals(Kind kind = Kind::Lengths) : kind_(kind) {}
   /// \param text  anything; what is no number is passed over   \param unit  of these numbers
   /// \param are_floats  whether they are floats by the format, however few digits they need
   void add(const std::string& text, double unit = 1, bool are_floats = false);
@@ -29,6 +33,8 @@ class Decimals {
   double finest_ = 1;            // unit of the last decimal
   std::vector<double> largest_;  // number by its significant digits, in their unit of measure
   double float_ = 0, unit_ = 0;
+  Kind kind_;
+  double constant_ = 0;  // the most that a rounded constant may be off
 };
 
 /// Of the placements and axes of joints, of bodies, sites and frames and of the loops in a document: in URDF, MJCF or SDF.
@@ -39,7 +45,7 @@ class GeometryDecimals {
   RoundingTolerance calcTolerance() const { return {angles_.calcHalfUnit(), lengths_.calcHalfUnit(), {}}; }
 
  private:
-  Decimals angles_, lengths_;
+  Decimals angles_{Decimals::Kind::Angles}, lengths_;
 };
 
 }  // namespace bielle

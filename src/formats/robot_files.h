@@ -125,9 +125,9 @@ struct YamlFile {
   std::vector<std::string> serial_joints;
   std::vector<std::pair<std::string, std::array<double, 2>>> importance;  ///< joint -> of its position, of its velocity
   std::optional<Vector3d> gravity;
-  std::vector<RobotName> names;    ///< all that this file uses, to be found in the robot
-  Decimals axes;                   ///< of closures
-  std::optional<double> rounding;  ///< instead of that of the numbers, rad and m
+  std::vector<RobotName> names;           ///< all that this file uses, to be found in the robot
+  Decimals axes{Decimals::Kind::Angles};  ///< of closures
+  std::optional<double> rounding;         ///< instead of that of the numbers, rad and m
   std::vector<std::string> warnings;
 };
 
