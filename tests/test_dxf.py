@@ -23,7 +23,7 @@ def run(*arguments, status=0, **options):
 
 
 class Plates:
-    """Centres of circles and vertices of outlines by layer, mm; texts."""
+    """Centres of circles and pieces of outlines (start, end, degrees of an arc) by layer, mm; texts."""
 
     def __init__(self, path):
         self.circles, self.outlines, self.texts = {}, {}, []
@@ -36,9 +36,11 @@ class Plates:
             if entity.dxftype() == "CIRCLE":
                 self.circles.setdefault(layer, []).append(entity.dxf.center)
                 self.diameter = 2 * entity.dxf.radius
-            elif entity.dxftype() == "POLYLINE":
-                assert entity.is_closed and layer not in self.outlines
-                self.outlines[layer] = [(vertex.dxf.location, vertex.dxf.bulge) for vertex in entity.vertices]
+            elif entity.dxftype() == "LINE":
+                self.outlines.setdefault(layer, []).append((entity.dxf.start, entity.dxf.end, 0))
+            elif entity.dxftype() == "ARC":
+                turn = (entity.dxf.end_angle - entity.dxf.start_angle) % 360
+                self.outlines.setdefault(layer, []).append((entity.start_point, entity.end_point, turn))
             else:
                 assert (entity.dxftype(), layer) == ("TEXT", "NOTES")
                 self.texts.append(entity.dxf.text)
@@ -81,17 +83,18 @@ class DxfTest(unittest.TestCase):
         with open(self.path) as file:
             self.assertEqual(file.read(16), "999\nmillimetres\n")
 
-    def test_outlines_stay_away_from_the_holes(self):
+    def test_outlines_are_closed_and_stay_away_from_the_holes(self):
         self.assertEqual(set(self.plates.outlines), set(self.plates.circles))
         for layer, outline in self.plates.outlines.items():
             holes = self.plates.circles[layer]
-            for vertex, _ in outline:
-                self.assertAlmostEqual(min(vertex.distance(hole) for hole in holes), 7.5, delta=1e-5, msg=layer)
+            for (start, end, _), (after, _, _) in zip(outline, outline[1:] + outline[:1]):
+                self.assertAlmostEqual(min(start.distance(hole) for hole in holes), 7.5, delta=1e-5, msg=layer)
+                self.assertLess(end.distance(after), 1e-9, msg=layer)
             # Arcs turn once about the whole, at its corners.
-            self.assertAlmostEqual(sum(4 * math.atan(bulge) for _, bulge in outline), 2 * math.pi, msg=layer)
+            self.assertAlmostEqual(sum(turn for _, _, turn in outline), 360, msg=layer)
 
     def test_nothing_of_one_plate_lies_on_another(self):
-        heights = [[vertex.y for vertex, _ in outline] for outline in self.plates.outlines.values()]
+        heights = [[start.y for start, _, _ in outline] for outline in self.plates.outlines.values()]
         rows = sorted((min(ys), max(ys)) for ys in heights)
         self.assertGreater(len(rows), 6)
         for (_, high), (low, _) in zip(rows, rows[1:]):

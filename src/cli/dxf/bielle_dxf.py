@@ -2,7 +2,7 @@
 """bielle-dxf FILE: writes the links that it reads from the standard input (results/workshop_solids.h) as plates.
 
 A plate is a link whose hinges are parallel, or a rod between two pivots, seen along its hinges: a layer with its holes,
-circles, and its outline, a closed polyline. The layer NOTES has names and distances. The file is DXF R12, in mm.
+circles, and its outline, lines and arcs. The layer NOTES has names and distances. The file is DXF R12, in mm.
 Debian's Python runs this, which has Debian's ezdxf.
 """
 
@@ -65,18 +65,17 @@ def flatten(pivots):
     return holes
 
 
-def draw_outline(centres, reach):
-    """Vertices and bulges of what is parallel to the hull, with arcs about its corners."""
+def draw_outline(space, centres, reach, attributes):
+    """What is parallel to the hull: lines, and arcs about its corners, each from where the last one ends.
+
+    Not polylines: OpenSCAD leaves those of R12 out, and others lose their arcs (findings/dxf-polylines.sh).
+    """
     corners = convex_hull_2d(centres)[:-1] if len(centres) > 2 else centres
-    vertices = []
-    for i, corner in enumerate(corners):
-        before, after = (corner - corners[i - 1]).normalize(), (corners[(i + 1) % len(corners)] - corner).normalize()
-        turn = math.atan2(before.det(after), before.dot(after))
-        if turn < -1:
-            turn += 2 * math.pi  # half a turn at the ends of a rod
-        for way, bulge in ((before, math.tan(turn / 4)), (after, 0)):
-            vertices.append((*(corner + way.orthogonal(ccw=False) * reach), bulge))
-    return vertices
+    edges = list(zip(corners, corners[1:] + corners[:1]))
+    sides = [(end - start).orthogonal(ccw=False).normalize(reach) for start, end in edges]
+    for i, (start, end) in enumerate(edges):
+        space.add_arc(start, reach, sides[i - 1].angle_deg % 360, sides[i].angle_deg % 360, dxfattribs=attributes)
+        space.add_line(start + sides[i], end + sides[i], dxfattribs=attributes)
 
 
 def draw_plate(space, layer, name, holes, top, diameter):
@@ -88,8 +87,7 @@ def draw_plate(space, layer, name, holes, top, diameter):
         space.add_text(text, dxfattribs={"layer": NOTES, "height": height, "insert": at})
 
     write(Vec2(-reach, top - TEXT), name)
-    outline = [(origin.x + x, origin.y + y, bulge) for x, y, bulge in draw_outline(centres, reach)]
-    space.add_polyline2d(outline, format="xyb", close=True, dxfattribs={"layer": layer})
+    draw_outline(space, [origin + centre for centre in centres], reach, {"layer": layer})
     for of, centre in holes:
         space.add_circle(origin + centre, diameter / 2, dxfattribs={"layer": layer})
         write(origin + centre + Vec2(0.6, 0.6) * diameter, of, 0.6 * TEXT)
