@@ -198,10 +198,12 @@ TEST_CASE("stages of a given length are kept, and a warning says how far soles m
   };
   const char* const kTold = "warning: corners of standing soles move by up to ";
   const CommandResult coarse = solve("0.06");
-  CHECK_THAT(coarse.out, Catch::Contains(kTold) && Catch::Contains(" mm between nodes, in stages of 0.06 s, as given; "
-                                                                   "leave time_step out, or set time_step=0.03"));
+  const std::string kRemedy = "leave time_step out, or set time_step=";
+  REQUIRE_THAT(coarse.out, Catch::Contains(kTold) &&
+                               Catch::Contains(" mm between nodes, in stages of 0.06 s, as given; " + kRemedy));
   CHECK(directory.readSummary()["options"]["time_step"] == 0.06);
-  CHECK_THAT(solve("0.03").out, !Catch::Contains(kTold));  // the remedy
+  const std::string shorter = coarse.out.substr(coarse.out.find(kRemedy) + kRemedy.size());
+  CHECK_THAT(solve(shorter.substr(0, shorter.find('\n'))).out, !Catch::Contains(kTold));
   const CommandResult sequence = run({"solve", "sequence", "--motions", "squat", "--robot", "bipetto", "--set",
                                       "squat.depth=0.9", "--set", "squat.duration=0.6", "--set", "squat.time_step=0.06",
                                       "--quiet", "--no-check", "--no-report", "-o", directory.str()});

@@ -189,6 +189,12 @@ TEST_CASE("feasibility: a stone under a foot where it stands is refused, and may
   const double away = std::stod(error.substr(error.find("move it ") + 8));
   CHECK(away == Approx(0.011));  // the stone begins at 11 - 5 - 2 cm, the sole ends at 5 cm; and a millimetre
   CHECK_NOTHROW(make(0.11 + away));
+  // Under the sole of another step.
+  CHECK_THAT(getError([&] {
+               makeStones({makeFoothold(Side::Right, 0.18, -0.12, 0.03), makeFoothold(Side::Left, 0.36, 0.13, 0.02),
+                           makeFoothold(Side::Right, 0.25, -0.12, 0.05)});
+             }),
+             Catch::Contains("step 1") && Catch::Contains("in the stone of step 3, by 0.02 m"));
   // Under the other foot.
   CHECK_THAT(getError([&] {
                makeStones({makeFoothold(Side::Left, 0.2, 0.125, 0.02), makeFoothold(Side::Right, 0.1, -0.125, 0.02),
@@ -250,6 +256,19 @@ TEST_CASE("feasibility: angles in degrees and lengths in millimetres are told") 
              Catch::Contains("half a turn per step") && Catch::Contains("radians"));
   CHECK_THAT(getError([&] { makeStones({makeFoothold(Side::Right, 150, -120)}); }),
              Catch::Contains("out of reach") && Catch::Contains("metres") && Catch::Contains("these legs bridge"));
+  // Heights alone, and turns until the feet collide.
+  CHECK_THAT(getError([&] {
+               makeStones({makeFoothold(Side::Right, 0.18, -0.12, 30), makeFoothold(Side::Left, 0.36, 0.13, 20)});
+             }),
+             Catch::Contains("out of reach") && Catch::Contains("metres"));
+  CHECK_THAT(getError([&] {
+               makeStones({makeFoothold(Side::Right, 0.18, -0.12, 0, 3), makeFoothold(Side::Left, 0.36, 0.13, 0, 2)});
+             }),
+             Catch::Contains("collide") && Catch::Contains("give radians if degrees were meant"));
+  WalkOptions slow;
+  slow.gait.timing.single = 360;  // ms
+  CHECK_THAT(getError([&] { makeWalk(getRsuBiped(), slow); }),
+             Catch::Contains("'single_support'") && Catch::Contains("give seconds"));
   WalkOptions walk;
   walk.gait.swing.height = 40;
   CHECK_THAT(getError([&] { makeWalk(getRsuBiped(), walk); }),
@@ -272,6 +291,7 @@ TEST_CASE("feasibility: gravity has to press feet on the ground, in m/s^2") {
       CHECK_THAT(error, Catch::Contains("gravity") && Catch::Contains(words) && Catch::Contains("[0, 0, -9.81]"));
   }
   CHECK_THAT(listDoubts(makeSquat(make({0, 0, -98.1}), {})), Catch::Contains("gravity is 98.1 m/s^2"));
+  CHECK_THAT(listDoubts(makeSquat(make({0, 0, -1}), {})), Catch::Contains("a tenth of the Earth's"));
   CHECK_THAT(listDoubts(makeSquat(make({1, 0, -9.76}), {})), Catch::Contains("beside down"));
   CHECK(listDoubts(makeSquat(make({0, 0, -1.62}), {})) == "");
 }
@@ -291,6 +311,7 @@ TEST_CASE("feasibility: a robot that falls over where it starts, and soles one i
   });
   CHECK_THAT(getError([&] { listDoubts(makeSquat(wide, {})); }),
              Catch::Contains("foot_left") && Catch::Contains("foot_right") && Catch::Contains("overlap"));
+  CHECK_THAT(getError([&] { makeWalk(wide, {}); }), Catch::Contains("overlap") && Catch::Contains("in the reference"));
 }
 
 TEST_CASE(
@@ -374,6 +395,32 @@ TEST_CASE("feasibility: a foothold too steep for the ground's friction is doubtf
   CHECK_THAT(listDoubts(makeFootholds(getRsuBiped(), options)), !Catch::Contains("would slip"));
 }
 
+TEST_CASE("feasibility: a walk on a ground with too little friction is doubtful, and not with what it needs") {
+  WalkOptions walk;
+  walk.gait.friction = 0.05;
+  const std::string doubts = listDoubts(makeWalk(getRsuBiped(), walk)), told = "needs a friction of ";
+  REQUIRE_THAT(doubts,
+               Catch::Contains("would slip") && Catch::Contains(told) && Catch::Contains("the ground has 0.05"));
+  walk.gait.friction = 1.1 * std::stod(doubts.substr(doubts.find(told) + told.size()));
+  CHECK(walk.gait.friction > 0.1);
+  CHECK(walk.gait.friction < 0.4);
+  CHECK_THAT(listDoubts(makeWalk(getRsuBiped(), walk)), !Catch::Contains("would slip"));
+}
+
+TEST_CASE("feasibility: a walk whose steps are out of reach is offered a speed at which it converges") {
+  WalkOptions walk;
+  walk.gait.timing.time_step = 0.02;
+  walk.steps = 4;
+  walk.speed = -5;
+  const std::string error = getError([&] { makeWalk(getRsuBiped(), walk); }), told = "by a speed of e.g. ";
+  REQUIRE_THAT(error, Catch::Contains(told));
+  walk.speed = std::stod(error.substr(error.find(told) + told.size()));
+  CHECK(walk.speed < -0.5);
+  const Motion slower = makeWalk(getRsuBiped(), walk);
+  CHECK(listDoubts(slower) == "");
+  CHECK(solveQuietly(slower).converged());
+}
+
 TEST_CASE("feasibility: a walk beyond the speed of walks is doubtful") {
   WalkOptions walk;
   walk.speed = 2.5;
@@ -393,6 +440,10 @@ TEST_CASE("feasibility: a robot in other units, and a box too narrow for both fe
     for (Body& body : parts.bodies) body.inertia.mass *= 1000;
   });
   CHECK_THAT(listDoubts(makeSquat(heavy, {})), Catch::Contains("a mass of") && Catch::Contains("kg"));
+  const Model light = changeModel(getRsuBiped(), [](ModelParts& parts) {  // of 4 kg, in g
+    for (Body& body : parts.bodies) body.inertia.mass *= 160;
+  });
+  CHECK_THAT(listDoubts(makeSquat(light, {})), Catch::Contains("a mass of") && Catch::Contains("in g"));
   BoxOptions box;
   box.width = 0.1;
   const std::string error = getError([&] { makeBox(getRsuBiped(), box); });

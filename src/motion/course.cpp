@@ -55,43 +55,38 @@ double calcOverlap(const ContactFrame& sole, const SE3& X_WF, const GroundStep& 
   return -calcSoleDistance(sole, X_WF, top, {makeAxisRotation(Vector3d::UnitZ(), step.yaw), step.top});
 }
 
+// The step that goes to a stone or box.
+int findStepOn(const Course& course, const GroundStep& stone) {
+  const auto getDistance = [&stone](const Footstep& taken) { return (taken.X_WF.p - stone.top).head<2>().norm(); };
+  const auto nearest = std::min_element(course.steps.begin(), course.steps.end(),
+                                        [&](const auto& a, const auto& b) { return getDistance(a) < getDistance(b); });
+  return static_cast<int>(nearest - course.steps.begin());
+}
+
+// The ground that is only a stone or box.
+Ground leaveAlone(const GroundStep& stone) {
+  Ground alone;
+  alone.height = -std::numeric_limits<double>::infinity();
+  alone.steps = {stone};
+  return alone;
+}
+
 // The steps of a course may be so near that their ground lies under a foot before it has moved.
 void checkStart(const Model& model, const Stance& stance, const Course& course, Side side) {
   constexpr double kRoom = 1e-3;  // beside the sole, m
   const SE3& X_WF = stance.feet[static_cast<int>(side)];
   const ContactFrame& sole = getSole(model, stance, side);
   for (const GroundStep& step : course.ground.steps) {
-    Ground alone;
-    alone.height = -std::numeric_limits<double>::infinity();
-    alone.steps = {step};
-    if (!(calcSoleHeights(alone, sole, X_WF).least < -kLevel)) continue;
+    if (!(calcSoleHeights(leaveAlone(step), sole, X_WF).least < -kLevel)) continue;
     const std::string where = std::string("lies under the ") + getName(side) + " where it stands at the start";
     const std::string overlap = formatNumber(calcOverlap(sole, X_WF, step) + kRoom, "%.3f") + " m";
-    const auto getDistance = [&step](const Footstep& taken) { return (taken.X_WF.p - step.top).head<2>().norm(); };
-    const auto own = std::min_element(course.steps.begin(), course.steps.end(),
-                                      [&](const auto& a, const auto& b) { return getDistance(a) < getDistance(b); });
-    refuse(model, course, static_cast<int>(own - course.steps.begin()), "its stone or box " + where,
+    refuse(model, course, findStepOn(course, step), "its stone or box " + where,
            "move it " + overlap + " away from there, or let it end that much earlier");
   }
   if (calcSoleHeights(course.ground, sole, X_WF).most > kLevel)
     throw InputError(model.name(), course.name,
                      std::string("part of the ") + getName(side) + " has no ground below it at the start",
                      "start with both feet beside each other, or give more ground");
-}
-
-void checkSwings(const Model& model, const Stance& stance, const Course& course, const SwingShape& shape) {
-  constexpr int kSamples = 40;  // of a swing
-  const FootstepPlan plan{stance.feet, course.steps};
-  for (size_t i = 0; i < course.steps.size(); ++i) {
-    const Footstep& step = course.steps[i];
-    const SE3 before = plan.getStance(static_cast<int>(i))[static_cast<int>(step.side)];
-    for (int k = kSamples / 4; k <= 3 * kSamples / 4; ++k)
-      if (calcSoleHeights(course.ground, getSole(model, stance, step.side),
-                          calcSwing(shape, before, step.X_WF, static_cast<double>(k) / kSamples))
-              .least < kClearance)
-        refuse(model, course, static_cast<int>(i), "the swing foot would touch the ground on its way",
-               "raise swing_height, or move horizontally later (swing_leave) or earlier (swing_arrive)");
-  }
 }
 
 }  // namespace
@@ -129,20 +124,45 @@ void checkSoles(const Model& model, const Stance& stance, const Course& course) 
       refuse(model, course, static_cast<int>(i),
              "part of its sole would have no ground below it, down to " + formatNumber(heights.most) + " m",
              "move the foothold");
-    if (heights.least < -kLevel)
-      refuse(model, course, static_cast<int>(i),
-             "part of its sole would be in the ground, by " + formatNumber(-heights.least) + " m", "move the foothold");
+    if (!(heights.least < -kLevel)) continue;
+    std::string where = "the ground";
+    for (const GroundStep& stone : course.ground.steps) {
+      const size_t other = static_cast<size_t>(findStepOn(course, stone));
+      const bool is_its_own = (course.steps[other].X_WF.p - stone.top).norm() < kLevel;
+      if (other != i && is_its_own &&
+          calcSoleHeights(leaveAlone(stone), getSole(model, stance, step.side), step.X_WF).least < -kLevel)
+        where = "the stone of step " + std::to_string(other + 1);
+    }
+    refuse(model, course, static_cast<int>(i),
+           "part of its sole would be in " + where + ", by " + formatNumber(-heights.least) + " m",
+           "move the foothold");
+  }
+}
+
+void checkSwings(const Model& model, const Stance& stance, const Course& course, const SwingShape& shape) {
+  constexpr int kSamples = 40;  // of a swing
+  const FootstepPlan plan{stance.feet, course.steps};
+  for (size_t i = 0; i < course.steps.size(); ++i) {
+    const Footstep& step = course.steps[i];
+    const SE3 before = plan.getStance(static_cast<int>(i))[static_cast<int>(step.side)];
+    for (int k = kSamples / 4; k <= 3 * kSamples / 4; ++k)
+      if (calcSoleHeights(course.ground, getSole(model, stance, step.side),
+                          calcSwing(shape, before, step.X_WF, static_cast<double>(k) / kSamples))
+              .least < kClearance)
+        refuse(model, course, static_cast<int>(i), "the swing foot would touch the ground on its way",
+               "raise swing_height, or move horizontally later (swing_leave) or earlier (swing_arrive)");
   }
 }
 
 MotionPlan planCourse(const Model& model, const Stance& stance, const Course& course, const LocomotionOptions& gait) {
   checkSoles(model, stance, course);
-  checkSwings(model, stance, course, gait.swing);
   LocomotionTask task;
   task.name = course.name;
   task.plan = {stance.feet, course.steps};
   task.ground = course.ground;
-  return planLocomotion(model, stance, task, gait);
+  MotionPlan plan = planLocomotion(model, stance, task, gait);
+  checkSwings(model, stance, course, gait.swing);
+  return plan;
 }
 
 Goal makeCourseGoal(const Model& model, const Stance& stance, const std::string& name, double requested,

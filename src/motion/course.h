@@ -20,6 +20,9 @@ void checkTreadWidth(const Model& model, const Stance& stance, const std::string
 // \throws InputError naming the step whose sole does not, or whose ground lies under a foot at the start
 void checkSoles(const Model& model, const Stance& stance, const Course& course);
 
+// That no swing leads through ground, in the middle half of its way. \throws InputError naming the step
+void checkSwings(const Model& model, const Stance& stance, const Course& course, const SwingShape& shape);
+
 // Steps of a locomotion on the footholds of the course; the last one brings the feet together.
 // \throws InputError naming the first step whose sole does not lie on the ground or whose swing leads through it, besides
 // the errors of planLocomotion()

@@ -28,6 +28,9 @@ constexpr double kTooWeak = 1.5;
 // Velocities are those between postures that are so far apart, since the guess goes from one to the next in small jumps, s.
 constexpr double kApart = 0.1;
 
+// Of the friction that a force along an axis of a sole needs, over its slope: pyramids are in the cones, with a margin.
+const double kPyramid = std::sqrt(2) / (1 - kConeMargin);
+
 std::string quote(const std::string& kind, const std::string& name) { return kind + " '" + name + "'"; }
 
 // A posture of the plan that is compared.
@@ -66,7 +69,7 @@ class FeasibilityCheck {
 
   void check(const StartingPoint* given) {
     checkTrajectory(given ? given->trajectory : motion_.guess, given ? "start" : "guess");
-    checkSolesApart();
+    requireSolesApart(model_, start_.phase->contacts);
     checkHeights();
     if (!motion_.cycle) checkStartingMotors();  // a cycle starts in motion
     if (!warn_) return;
@@ -155,26 +158,10 @@ class FeasibilityCheck {
     }
   }
 
-  // Two feet cannot stand in the same place.
-  void checkSolesApart() const {
-    constexpr double kTouching = 1e-6, kLevel = 1e-3;  // m
-    const std::vector<ContactTarget>& feet = start_.phase->contacts;
-    for (size_t i = 0; i < feet.size(); ++i)
-      for (size_t j = 0; j < i; ++j) {
-        const ContactFrame &a = getContact(feet[j]), &b = getContact(feet[i]);
-        if (a.body == b.body || std::abs(feet[i].X_WT.p.z() - feet[j].X_WT.p.z()) > kLevel) continue;
-        const double distance = calcSoleDistance(a, feet[j].X_WT, b, feet[i].X_WT);
-        if (distance < -kTouching)
-          throw InputError(model_.name(), "contacts '" + a.name + "' and '" + b.name + "'",
-                           "their soles overlap by " + formatNumber(-distance, "%.3g") + " m where the robot starts",
-                           "place the feet farther apart in the reference, by as much, or give narrower soles");
-      }
-  }
-
   // Whether standing legs are long enough, and fold far enough, for the height of the centre of mass.
   void checkHeights() const {
     for (const Goal& goal : motion_.goals) {
-      if (goal.kind != GoalKind::Height || !model_.hasFreeFlyer()) continue;
+      if (goal.kind != GoalKind::Height) continue;
       double level = 0;
       std::vector<FrameTarget> feet;
       for (const ContactTarget& target : start_.phase->contacts) {
@@ -197,9 +184,9 @@ class FeasibilityCheck {
     }
   }
 
-  // Torques that hold a posture of the plan; of single support, while the weight falls past a sole that is not under it as the
-  // linear inverted pendulum does, from the nearest place of the sole.
-  HoldingShare calcShare(const Moment& moment, ConstVectorRef q, const Vector3d& com, const VectorXd& limits) const {
+  // Acceleration of the centre of mass beyond that at rest; in single support, while the weight falls past a sole that is not under
+  // it as the linear inverted pendulum does, from the nearest place of the sole.
+  Vector3d calcFall(const Moment& moment, const Vector3d& com) const {
     Vector3d a = (moment.load - 1) * gravity_ * Vector3d::UnitZ();
     const std::vector<ContactTarget>& feet = moment.phase->contacts;
     if (feet.size() == 1 && model_.hasFreeFlyer()) {
@@ -210,7 +197,13 @@ class FeasibilityCheck {
                                     std::clamp(p.y(), -sole.half_width, sole.half_width), 0));
       if (height > 0) a.head<2>() = moment.load * gravity_ / height * (com - p).head<2>();
     }
-    return calcHoldingShare(model_, makeConstraintSet(model_, feet), q, a, limits, motion_.ground.friction);
+    return a;
+  }
+
+  // Torques that hold a posture of the plan.
+  HoldingShare calcShare(const Moment& moment, ConstVectorRef q, const Vector3d& com, const VectorXd& limits) const {
+    return calcHoldingShare(model_, makeConstraintSet(model_, moment.phase->contacts), q, calcFall(moment, com), limits,
+                            motion_.ground.friction);
   }
 
   // With the voltage of the supply, at standstill.
@@ -263,6 +256,8 @@ class FeasibilityCheck {
   void doubtUnits() const {
     constexpr double kLowest = 0.02, kHighest = 10, kLightest = 0.02, kHeaviest = 5000;  // m, kg
     constexpr double kWeakest = 0.5, kStrongest = 30, kTilted = 0.01;                    // m/s^2, rad
+    constexpr double kEarths = 0.05;  // from 1 m/s^2, which no planet or large moon has
+    constexpr double kDensest = 5e4;  // mass over the cube of the height, kg/m^3: robots have 100 to 1000
     double ground = com_.z();
     for (const ContactTarget& foot : start_.phase->contacts) ground = std::min(ground, foot.X_WT.p.z());
     const double height = com_.z() - ground;
@@ -272,8 +267,15 @@ class FeasibilityCheck {
     if (model_.mass() < kLightest || model_.mass() > kHeaviest)
       tell("the robot has a mass of " + formatNumber(model_.mass()) + " kg",
            "give masses in kg if they are in other units");
+    else if (height > 0 && model_.mass() > kDensest * height * height * height)
+      tell("the robot has a mass of " + formatNumber(model_.mass()) + " kg, and its centre of mass is " +
+               formatNumber(height, "%.3g") + " m high",
+           "give masses in kg if they are in g");
     if (gravity_ < kWeakest || gravity_ > kStrongest)
       tell("gravity is " + formatNumber(gravity_) + " m/s^2", "give it in m/s^2 if it is not meant so");
+    else if (std::abs(gravity_ - 1) < kEarths)
+      tell("gravity is " + formatNumber(gravity_) + " m/s^2, a tenth of the Earth's",
+           "give [0, 0, -9.81] if it is meant as a multiple of that");
     const double tilt = std::acos(std::clamp(-model_.gravity().z() / gravity_, -1.0, 1.0));
     if (tilt > kTilted)
       tell("gravity points " + formatNumber(tilt, "%.3g") + " rad beside down",
@@ -314,7 +316,7 @@ class FeasibilityCheck {
     for (const ContactPhase& phase : motion_.schedule.phases) {
       if (phase.contacts.size() != 1 || getContact(phase.contacts[0]).kind != ContactKind::Surface6D) continue;
       const Vector3d f = phase.contacts[0].X_WT.R.transpose() * up;
-      const double needed = std::sqrt(2) * std::max(std::abs(f.x()), std::abs(f.y())) / f.z() / (1 - kConeMargin);
+      const double needed = kPyramid * std::max(std::abs(f.x()), std::abs(f.y())) / f.z();
       if (needed <= most) continue;
       most = needed;
       steepest = &phase;
@@ -330,7 +332,6 @@ class FeasibilityCheck {
 
   // Feet that turn far against each other, or in a step: angles may have been meant as degrees.
   void doubtTurns() const {
-    constexpr double kFar = 1;       // rad
     std::map<int, double> headings;  // by contact, where each stood last
     double most = 0;
     std::string turned;
@@ -347,7 +348,7 @@ class FeasibilityCheck {
         }
         headings[target.contact] = heading;
       }
-    if (most > kFar)
+    if (most > kLargeTurn)
       tell(turned + " turns by " + formatNumber(most, "%.3g") + " rad",
            "give radians if degrees were meant, or turn less at a time");
   }
@@ -375,7 +376,7 @@ class FeasibilityCheck {
     const VectorXd velocity_limits = motion_.problem_options.limits.enforced
                                          ? getVelocityLimits(model_, motion_.problem_options.limits)
                                          : VectorXd::Constant(model_.nv(), std::numeric_limits<double>::infinity());
-    Need reach;
+    Need reach, friction{0, motion_.ground.friction, {}};
     std::string foot;
     const Moment* before = nullptr;
     for (const Moment& moment : moments_) {
@@ -385,6 +386,7 @@ class FeasibilityCheck {
         before = nullptr;  // such a posture says nothing of motors
         continue;
       }
+      needFriction(moment, friction);
       if (moment.middle && !held_) needEfforts(moment, q, efforts);
       if (before && moment.time - before->time < kApart) continue;
       if (before) needSpeeds(*before, moment, velocity_limits, speeds);
@@ -394,8 +396,23 @@ class FeasibilityCheck {
       tell("no posture was found in which the legs reach: " + foot + " stays " + formatNumber(reach.needed, "%.2g") +
                " m (or rad) off its place " + reach.moment.describe(),
            "request shorter, lower or less turned steps");
+    if (friction.needed > friction.allowed)
+      tell(getContact(friction.moment.phase->contacts[0]).name + " would slip: the weight, as planned " +
+               friction.moment.describe() + ", needs a friction of " + formatNumber(friction.needed, "%.2g") +
+               " at least, the ground has " + formatNumber(friction.allowed),
+           "request a slower motion or shorter steps, or give `friction` if the ground has more");
     tellEfforts(efforts);
     tellSpeeds(speeds);
+  }
+
+  // Of a level foot that stands alone; doubtSlopes() sees the others.
+  void needFriction(const Moment& moment, Need& friction) const {
+    constexpr double kLevel = 1e-3;  // rad
+    const std::vector<ContactTarget>& feet = moment.phase->contacts;
+    if (feet.size() != 1 || !(feet[0].X_WT.R.row(2).head<2>().norm() < kLevel)) return;
+    const Vector3d a = feet[0].X_WT.R.transpose() * calcFall(moment, calcCom(model_, ws_));
+    const double needed = kPyramid * std::max(std::abs(a.x()), std::abs(a.y())) / (moment.load * gravity_);
+    if (needed > friction.needed) friction.needed = needed, friction.moment = moment;
   }
 
   // Whether feet of the guess are off their places.
@@ -507,6 +524,20 @@ void requireGravity(const Model& model, double friction) {
     refuse(g.z() < 0 ? "it points aside: on level ground feet need a friction of " + formatNumber(slope, "%.3g") +
                            ", the ground has " + formatNumber(friction)
                      : std::string("it does not point down"));
+}
+
+void requireSolesApart(const Model& model, const std::vector<ContactTarget>& soles) {
+  constexpr double kTouching = 1e-6, kLevel = 1e-3;  // m
+  for (size_t i = 0; i < soles.size(); ++i)
+    for (size_t j = 0; j < i; ++j) {
+      const ContactFrame &a = model.contacts()[soles[j].contact], &b = model.contacts()[soles[i].contact];
+      if (a.body == b.body || std::abs(soles[i].X_WT.p.z() - soles[j].X_WT.p.z()) > kLevel) continue;
+      const double distance = calcSoleDistance(a, soles[j].X_WT, b, soles[i].X_WT);
+      if (distance < -kTouching)
+        throw InputError(model.name(), "contacts '" + a.name + "' and '" + b.name + "'",
+                         "their soles overlap by " + formatNumber(-distance, "%.3g") + " m where the robot starts",
+                         "place the feet farther apart in the reference, by as much, or give narrower soles");
+    }
 }
 
 void checkFeasibility(const Motion& motion, const StartingPoint* given,

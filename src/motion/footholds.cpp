@@ -10,6 +10,7 @@
 #include "formats/yaml_entry.h"
 #include "math/constants.h"
 #include "math/so3.h"
+#include "model/number_text.h"
 #include "motion/course.h"
 #include "motion/standing_ground.h"
 
@@ -34,7 +35,7 @@ Footstep readFoothold(const YamlEntry& entry) {
   constexpr double kSteepest = 0.7;  // rad
   for (const char* key : {"pitch", "roll"})
     if (std::abs(get(key)) > kSteepest)
-      find(fields, key)->fail("the foothold is steeper than " + std::to_string(kSteepest) + " rad", "give radians");
+      find(fields, key)->fail("the foothold is steeper than " + formatNumber(kSteepest) + " rad", "give radians");
   if (std::abs(get("yaw")) > kPi)
     find(fields, "yaw")->fail("the foothold is turned by more than half a turn", "give radians, from -pi to pi");
   Footstep step;

@@ -21,11 +21,11 @@ double ease(double s) {
 void check(const GaitTiming& t, size_t steps) {
   const double h = t.time_step;
   requireOption(h > 0 && h <= 0.1, "time_step", "it is outside 0 .. 0.1 s", "give seconds, e.g. 0.02");
-  requireStages(t.start + steps * t.stepDuration() + t.end, h);
   for (const auto& [name, value] : {std::pair("start_support", t.start), std::pair("single_support", t.single),
                                     std::pair("double_support", t.both), std::pair("end_support", t.end)})
     requireOption(value < 60 && countNodes(value, h) >= 1, name,
                   "it is shorter than a time step, or longer than a minute", "give seconds");
+  requireStages(t.start + steps * t.stepDuration() + t.end, h);
   requireOption(t.flight == 0 || (countNodes(t.flight, h) >= 2 && t.flight <= 1), "flight",
                 "it is outside two time steps .. 1 s", "give seconds, e.g. 0.1");
   requireOption(countNodes(t.single, h) >= 4, "single_support", "it is shorter than four time steps",

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "bielle/model/error.h"
+#include "math/constants.h"
 #include "math/so3.h"
 #include "model/number_text.h"
 #include "motion/cycle.h"
@@ -47,6 +48,14 @@ Stance putDown(const Stance& stance) {
   throw InputError(scene.model.name(), "step " + std::to_string(step) + " of the " + scene.task.name, problem, remedy);
 }
 
+// A speed that robots reach, for a remedy: with steps half as long as legs bridge, and walks at half of the speed at which weight
+// no longer holds a body on the arc about a straight leg. \param ratio  of what legs bridge over the steps that were requested
+double calcModerateSpeed(const Scene& scene, double ratio, double height) {
+  double most = 0.5 * ratio * std::abs(scene.task.speed);
+  if (scene.options.timing.flight == 0) most = std::min(most, 0.5 * std::sqrt(scene.model.gravity().norm() * height));
+  return std::copysign(most, scene.task.speed);
+}
+
 // Legs as struts from the middle of the hips' plane, half way between two consecutive footholds at touchdown.
 // \param strut, height  of the centre of mass over the feet, at the start
 void checkReach(const Scene& scene, double strut, double height) {
@@ -64,7 +73,8 @@ void checkReach(const Scene& scene, double strut, double height) {
   }
   if (refused == 0) return;
   const double bridged = 2 * std::sqrt(std::pow(kStretch * strut, 2) - std::pow(kCrouch * height, 2));
-  const double speed = up > 1e-3 ? 0 : 0.8 * bridged / widest * scene.task.speed;  // that of stairs changes no step
+  // That of stairs changes no step.
+  const double speed = up > 1e-3 ? 0 : calcModerateSpeed(scene, bridged / widest, height);
   refuseStep(scene, refused,
              "its foothold is out of reach: the feet would be " + formatNumber(across, "%.3g") + " m apart" +
                  (up > 1e-3 ? ", and " + formatNumber(up, "%.3g") + " m in height" : "") + "; these legs bridge " +
@@ -74,18 +84,32 @@ void checkReach(const Scene& scene, double strut, double height) {
                  (speed != 0 ? ", by a speed of e.g. " + formatNumber(speed, "%.2g") + " m/s" : ""));
 }
 
+// Of a foot in one of the steps up to `last`, rad.
+double calcLargestTurn(const FootstepPlan& plan, int last) {
+  double most = 0;
+  for (int i = 0; i <= std::min(last, static_cast<int>(plan.steps.size()) - 1); ++i) {
+    const Footstep& step = plan.steps[i];
+    const SE3 before = plan.getStance(i)[static_cast<int>(step.side)];
+    most = std::max(most, std::abs(std::remainder(calcHeading(step.X_WF) - calcHeading(before), 2 * kPi)));
+  }
+  return most;
+}
+
 // Rejects requests that no motor torques can satisfy.
 void check(const Scene& scene) {
   constexpr double kLowest = 0.4, kHighest = 1.5;  // of the centre of mass over the feet, over its height at the start
   const Model& model = scene.model;
   const ContactFrame& left = model.contacts()[scene.stance.contacts[0]];
   const ContactFrame& right = model.contacts()[scene.stance.contacts[1]];
+  requireSolesApart(model, listSoles(scene.stance));
   for (const GaitNode& node : scene.gait.nodes) {
     const std::array<SE3, 2> feet = getFeet(scene, node);
-    if (calcSoleDistance(left, feet[0], right, feet[1]) <= 0)
-      refuseStep(scene, scene.gait.phases[node.phase].steps_done + 1,
-                 "the feet would collide: the stance is too narrow for the soles on this path",
-                 "turn or step less at a time, with more steps");
+    if (calcSoleDistance(left, feet[0], right, feet[1]) > 0) continue;
+    const double turn = calcLargestTurn(scene.task.plan, scene.gait.phases[node.phase].steps_done);
+    refuseStep(scene, scene.gait.phases[node.phase].steps_done + 1,
+               "the feet would collide: the stance is too narrow for the soles on this path",
+               std::string(turn > kLargeTurn ? "give radians if degrees were meant; " : "") +
+                   "turn or step less at a time, with more steps");
   }
   const Vector3d strut_of_stance = scene.stance.com - getLowerFoot(scene.stance).p;
   const double strut = strut_of_stance.norm(), height = strut_of_stance.z();

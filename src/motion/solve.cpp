@@ -1,6 +1,7 @@
 #include "bielle/motion/solve.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "bielle/dynamics/linkage.h"
@@ -232,10 +233,13 @@ class RequestSolver {
     const Option* option = motion_.request->options.find("time_step");
     const bool is_given = option && std::get<double>(option->value) != 0;
     const double step = solution.motion.schedule.phases.front().dt;
-    observer_.warn("warning: corners of standing soles move by up to " + formatNumber(1e3 * moved, "%.2g") +
-                   " mm between nodes, in stages of " + formatNumber(step) + " s" + (is_given ? ", as given" : "") +
-                   "; " + (is_given ? "leave time_step out, or " : "") +
-                   (option ? "set time_step=" + formatNumber(0.5 * step) : "set a shorter time_step of its motions"));
+    // Soles move by the square of the step; a swing may come lower than they do.
+    const double shorter = step * std::min(0.5, 0.75 * std::sqrt(kLargestSlip / moved));
+    observer_.warn(
+        "warning: corners of standing soles move by up to " + formatNumber(1e3 * moved, "%.2g") +
+        " mm between nodes, in stages of " + formatNumber(step) + " s" + (is_given ? ", as given" : "") + "; " +
+        (is_given ? "leave time_step out, or " : "") +
+        (option ? "set time_step=" + formatNumber(shorter, "%.2g") : "set a shorter time_step of its motions"));
   }
 
   void tellHalf() const {

@@ -55,19 +55,24 @@ Ground makeGroundUnder(const Model& model, const std::vector<ContactTarget>& sol
   return ground;
 }
 
-void requireLevel(const Model& model, const std::vector<ContactTarget>& soles, const std::string& motion) {
+void requireLevel(const Model& model, const std::vector<ContactTarget>& soles, const std::string& motion,
+                  const std::string& remedy) {
   if (areLevel(soles)) return;
   const auto [lowest, highest] =
       std::minmax_element(soles.begin(), soles.end(),
                           [](const ContactTarget& a, const ContactTarget& b) { return a.X_WT.p.z() < b.X_WT.p.z(); });
   const auto describe = [&](const ContactTarget& sole) {
-    return model.contacts()[sole.contact].name + "' at " + formatNumber(1e-6 * std::round(1e6 * sole.X_WT.p.z()) + 0.0) +
-           " m";
+    return model.contacts()[sole.contact].name + "' at " +
+           formatNumber(1e-6 * std::round(1e6 * sole.X_WT.p.z()) + 0.0) + " m";
   };
   throw InputError(model.name(), "feet",
                    "they stand on two levels, '" + describe(*lowest) + " and '" + describe(*highest) + ", but a " +
                        motion + " starts from one",
-                   "give them the same height in the reference, or step down first, by a walk");
+                   remedy);
+}
+
+void requireLevel(const Model& model, const std::vector<ContactTarget>& soles, const std::string& motion) {
+  requireLevel(model, soles, motion, "give them the same height in the reference, or step down first, by a walk");
 }
 
 }  // namespace bielle

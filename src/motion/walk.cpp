@@ -5,6 +5,9 @@
 #include <string>
 
 #include "math/constants.h"
+#include "model/number_text.h"
+#include "motion/course.h"
+#include "motion/standing_ground.h"
 
 namespace bielle {
 namespace {
@@ -15,9 +18,14 @@ struct StepsPlan {
   SE3 start;  // middle of the feet
 };
 
-// Whether a sole on the plane would be in a box.
-bool isOnBox(const ContactFrame& sole, const SE3& X_WF, const Ground& ground) {
+// Beside the box that a foot steps down from, m: a foot that comes nearer may land on its edge.
+constexpr double kBesideBox = 0.01;
+
+// Whether a sole on the plane would be in a box, or too near to it.
+bool isOnBox(const ContactFrame& contact, const SE3& X_WF, const Ground& ground) {
   constexpr int kPoints = 10;  // in each direction, edges besides
+  ContactFrame sole = contact;
+  sole.half_length += kBesideBox, sole.half_width += kBesideBox;
   for (int i = 0; i <= kPoints; ++i)
     for (int j = 0; j <= kPoints; ++j) {
       const Vector3d p =
@@ -45,11 +53,17 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
     for (Footstep& step : task.plan.steps) {
       step.X_WF.p.z() = task.ground.height;
       if (isOnBox(model.contacts()[stance.contacts[static_cast<int>(step.side)]], step.X_WF, task.ground))
-        requireLevel(model, listSoles(stance), std::string(name) + " with a foothold on its higher level");
+        requireLevel(
+            model, listSoles(stance),
+            std::string(name) + " with a foothold on its higher level, or within " + formatNumber(kBesideBox) +
+                " m of it,",
+            "give them the same height in the reference, or take longer steps, by a larger speed or angle, away from "
+            "where the higher one stands");
     }
   task.direction = stance.middle.R * direction;
   task.speed = speed;
   MotionPlan plan = planLocomotion(model, stance, task, options.gait);
+  if (!task.ground.steps.empty()) checkSwings(model, stance, {name, task.plan.steps, task.ground}, options.gait.swing);
   plan.options = listOptions(options).listValues();
   return {std::move(plan), stance.middle};
 }
