@@ -145,7 +145,7 @@ def compare(name, place, was, now):
     turned = np.array([turn(place[3], q[6], q[3], q[4], q[5]) for q in a])[:, [1, 2, 3, 0]]
     turned *= np.sign(np.sum(turned * b[:, 3:7], axis=1))[:, None]
     places = max(np.abs(moved - b[:, :3]).max(), np.abs(turned - b[:, 3:7]).max(), np.abs(a[:, 7:] - b[:, 7:]).max())
-    return places, np.abs(was["u"] - now["u"]).max() / np.abs(was["u"]).max()
+    return places, np.abs(was["u"] - now["u"]).max() / (np.abs(was["u"]).max() or 1)
 
 
 def solve(directory, robot, motion, arguments, *options):
@@ -228,6 +228,33 @@ def check_levels(where):
     assert read(f"{where}/level/squat")[0]["ground"]["steps"] == []
 
 
+    # The other foot is higher: the first step goes down, and not onto the edge.
+    robot = make_two_levels(f"{where}/levels-right", PLACE, step=-0.05)
+    told = run("solve", "walk", "--speed", "0.3", "--robot", robot, "-o", f"{where}/refused", status=(2,))
+    assert "within 0.01 m of it" in told and "longer steps" in told, told
+    result = f"{where}/levels-right-walk"
+    run("solve", "walk", "--speed", "0.35", "--robot", robot, "--threads", 1, "--no-report", "-o", result)
+    told = run("simulate", result, "--no-report", "-o", f"{result}-done")
+    assert "it stood" in told and "turned from the ground" not in told, told
+
+
+def check_free(where):
+    """Without a plan, too, a robot has its ground where it stands."""
+    done = []
+    for name, robot in (("home", make_feet(f"{where}/free", (0, 0, 0, 0))), ("there", make_feet(f"{where}/free-there", PLACE)),
+                        ("levels", make_two_levels(f"{where}/free-levels", PLACE))):
+        told = run("simulate", robot, "--duration", 0.1, "--no-report", "-o", f"{where}/free-{name}")
+        assert "starts" not in told, told
+        done.append(read(f"{where}/free-{name}"))
+    (home, at_home), (there, moved), (levels, _) = done
+    off, _ = compare("free motion", PLACE, at_home, moved)
+    assert off < 1e-7, off  # its error of 1e-9 a step adds up to a hundred times as much
+    assert home["ground"]["height"] == 0 and abs(there["ground"]["height"] - PLACE[2]) < 1e-9
+    assert len(levels["ground"]["steps"]) == 1 and home["books"]["contact_loss_J"] > 0
+    told = run("simulate", robot, "--duration", 0.01, "--terrain", "flat", "--no-report", "-o", f"{where}/free-flat")
+    assert "'foot_left' starts 0.04 m over the ground" in told and "'foot_right' starts" not in told, told
+
+
 def check_yaws(where):
     """Toes stay out as they are given, and written robots are the same."""
     for way in ("toes out", "toes out by yaws"):
@@ -286,6 +313,7 @@ def main():
         if not REST:
             check_yaws(where)
             check_levels(where)
+            check_free(where)
             check_terrain(where)
 
 

@@ -240,6 +240,16 @@ void printDifferences(const Model& model, const std::vector<FreeRun>& runs) {
   }
 }
 
+// Where the motions of the robot start: under the soles of its reference. The neutral posture is put on the plane at 0, which is also
+// that of a robot without a reference.
+Ground makeStandingGround(const Model& model, const std::string& posture) {
+  constexpr double kRounding = 1e-9;  // m
+  if (posture == "neutral" || model.references().empty() || model.contacts().empty()) return {};
+  Ground ground = makeGroundUnder(model, makeContactTargets(makeStandingRobot(model), 0, 0));
+  if (std::abs(ground.height) < kRounding) ground.height = 0;
+  return ground;
+}
+
 }  // namespace
 
 bool isFree(const SimulateArguments& arguments) {
@@ -272,9 +282,10 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
   for (const std::string& spring : arguments.springs) addSprings(robot.model, spring, start.q, springs);
   const Model model = addMotorSprings(robot.model, springs);
   const std::vector<ContactTarget> soles = makeContactTargets(makeStandingRobot(model, start.q), 0, 0);
+  const Ground standing = makeStandingGround(model, arguments.posture);
   StandingPlace place = findPlace(model, soles);
-  place.X_WP.p.z() = 0;  // it may start in the air
-  const Ground ground = makeGround(arguments, {}, place).ground;
+  place.X_WP.p.z() = standing.height;  // it may start in the air
+  const Ground ground = makeGround(arguments, standing, place).ground;
   const int pushed_body = findPushedBody(model, arguments.push_body);
   FreeMotionOptions options;
   options.duration = execution.duration;
@@ -284,8 +295,9 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
 
   std::vector<std::string> idle = listIdleOptions(arguments);
   for (const std::string& each : listIdleInFree(arguments, model, options)) idle.push_back(each);
+  const bool is_on_other_ground = arguments.terrain != "planned" && arguments.state.empty();
   for (const ContactTarget& sole : soles)
-    if (sole.X_WT.p.z() < ground.calcHeight(sole.X_WT.p.x(), sole.X_WT.p.y()))
+    if (is_on_other_ground || sole.X_WT.p.z() < ground.calcHeight(sole.X_WT.p.x(), sole.X_WT.p.y()))
       for (const std::string& each : describeSoles(model, ground, {sole})) idle.push_back(each);
   tell(idle);
 
