@@ -91,6 +91,11 @@ def check_cycle():
         assert walked["outcome"] == "stood" and walked["largest_deviation"] < 2e-3, told
         planned = cycle["offset"]["x_m"] / cycle["period_s"]
         assert abs(walked["distance"] / walked["duration"] / planned - 1) < 0.01, (told, planned)
+        # The goal's speed is that of all whole cycles.
+        goal = list_goals(walked)["speed"]
+        speed, first, last = measure_speed(os.path.join(place, "walked"), goal)
+        assert abs(speed - goal["achieved"]) < 1e-9 and abs(speed / planned - 1) < 0.005, (speed, planned)
+        assert first == 0 and 4 - cycle["period_s"] < last <= 4, (first, last)
 
 
 main()

@@ -86,8 +86,11 @@ std::string formatDeadPoints(const MotionResult& result) {
 std::string formatCycle(const MotionResult& result) {
   const VectorXd& cycle = result.record.cycle;
   const std::optional<double>& floquet = result.cycle->floquet_multiplier;
-  std::string text = formatNumber(cycle[0], "%.4g") + " s, moves by " + formatNumber(cycle[1], "%.3f") + ", " +
-                     formatNumber(cycle[2], "%.3f") + " m";
+  // Of the base; x and y of a cycle that turns are about the world's origin.
+  const Eigen::Vector2d base = result.record.q.row(0).head<2>().transpose(),
+                        moved = Eigen::Rotation2Dd(cycle[3]) * base + cycle.segment<2>(1) - base;
+  std::string text = formatNumber(cycle[0], "%.4g") + " s, moves by " + formatNumber(moved.x(), "%.3f") + ", " +
+                     formatNumber(moved.y(), "%.3f") + " m";
   if (std::abs(cycle[3]) > 1e-9) text += ", turns by " + formatNumber(cycle[3], "%.3f") + " rad";
   return text + "; closes to " + formatNumber(result.cycle->closing_error, "%.1e") +
          (floquet ? ", largest Floquet multiplier " + formatNumber(*floquet, "%.3f") : "");
