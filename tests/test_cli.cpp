@@ -267,6 +267,9 @@ TEST_CASE("info lists the joints of references as given and as assembled, and te
   CHECK((*joint)["given"] == 0.2);
   CHECK((*joint)["assembled"].get<double>() > 0.21);
 
+  CHECK_THAT(inform("", "  turned: {joints: {crank_joint: 60}}\n").err,
+             Catch::Contains("reference 'turned': 'crank_joint' at 60 rad is more than a turn; give radians"));
+
   // Out of its range and not reached it is a mistake; reached, a warning.
   checkRefused(
       inform("lower=\"0.5\" upper=\"3\" ", bent),

@@ -484,6 +484,8 @@ TEST_CASE("expressions: numbers, points by component, and what is not one") {
   CHECK(symbols.calcNumber("a^3 + p.z/2") == 9.5);
   CHECK(symbols.calcNumber("a > 1 && a < 3 ? sqrt(16) : 0") == 4);
   CHECK(symbols.calcPoint("2*p - a*z") == Vector3d(2, 4, 4));
+  CHECK(symbols.calcPoint("a - 2") == Vector3d::Zero());
+  CHECK_THROWS_AS(symbols.calcPoint("a"), ExpressionError);  // as `gravity: -9.81`
   CHECK(symbols.usesPoints("a*p"));
   CHECK_FALSE(symbols.usesPoints("a*p.x"));
   const auto refuse = [&](const std::string& expression, const std::string& problem) {

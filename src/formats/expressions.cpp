@@ -136,6 +136,8 @@ Vector3d Symbols::calcPoint(const std::string& expression) const {
   }
   data_->setComponents(-1);
   if (!point.allFinite()) data_->explain(expression, true);
+  if (!point.isZero(0) && !usesPoints(expression))
+    throw ExpressionError{"it is a number, not three", "write it as [a, b, c], or with points such as x"};
   return point;
 }
 

@@ -15,6 +15,7 @@
 #include "dynamics/idle_spins.h"
 #include "dynamics/point_spring.h"
 #include "dynamics/regular_mobility.h"
+#include "math/constants.h"
 #include "model/frame_name.h"
 #include "model/number_text.h"
 #include "results/json_text.h"
@@ -274,6 +275,11 @@ std::string describeMissedRange(const Model& model, const ReferenceJoint& of) {
   return "its range of " + format(lower) + " to " + format(upper);
 }
 
+// Whether an angle may have been meant as degrees.
+bool isTurnedFar(const Joint& joint, const VectorXd& given) {
+  return (joint.kind == JointKind::Revolute || joint.kind == JointKind::Continuous) && std::abs(given[0]) > 2 * kPi;
+}
+
 }  // namespace
 
 std::vector<std::string> checkReferences(const LoadedRobot& robot) {
@@ -285,7 +291,7 @@ std::vector<std::string> checkReferences(const LoadedRobot& robot) {
     const AssemblyResult result = assembleReference(model, reference.name);
     const bool closed = result.status == NumericalStatus::Ok;
     const std::string element = "reference '" + reference.name + "'";
-    std::string moved, outside;
+    std::string moved, outside, turned;
     for (const ReferenceJoint& of : listReferenceJoints(model, reference, result.q)) {
       const std::string joint = "'" + model.joints()[of.joint].name + "'", range = describeMissedRange(model, of);
       const bool is_met = closed && of.moved <= kReferenceTolerance;
@@ -294,6 +300,8 @@ std::vector<std::string> checkReferences(const LoadedRobot& robot) {
                          "joint " + joint + " cannot be at " + format(of.given) + ", outside " + range,
                          "give a value that it can have, or correct the range");
       if (!range.empty()) outside += (outside.empty() ? "" : ", ") + joint + " is outside " + range;
+      if (isTurnedFar(model.joints()[of.joint], of.given))
+        turned += (turned.empty() ? "" : ", ") + joint + " at " + format(of.given);
       if (closed && !is_met)
         moved +=
             (moved.empty() ? "" : ", ") + joint + " at " + format(of.assembled) + " instead of " + format(of.given);
@@ -301,6 +309,9 @@ std::vector<std::string> checkReferences(const LoadedRobot& robot) {
     if (!outside.empty())
       warnings.push_back(file.string() + ": " + element + ": " + outside +
                          "; motions that start there need --no-limits");
+    if (!turned.empty())
+      warnings.push_back(file.string() + ": " + element + ": " + turned +
+                         " rad is more than a turn; give radians if degrees were meant");
     if (!moved.empty())
       warnings.push_back(file.string() + ": " + element + ": it is assembled with " + moved +
                          ", because loops, height and feet come before given angles; give angles that the robot can "
