@@ -21,7 +21,8 @@ KNEE = "motor_knee_right"
 REFUSED = {
     "formulation full": "without --formulation", "step euler": "without --formulation and --step",
     "serial": "without --model serial", "free timings": "without --free-timings",
-    "peak torque": "for effort or energy", "serial midpoint": "without --model serial"}
+    "peak torque": "for effort or energy", "serial midpoint": "without --model serial",
+    "cycle": "without --periodic", "cycle of a run": "without --periodic"}
 
 OPTIONS = {
     "footholds": FOOTHOLDS,
@@ -54,6 +55,8 @@ MOTIONS = {
     "stairs": ["stairs", "--height", "0.04", "--stairs", "1", *COARSE],
     "box": ["box", "--height", "0.06", "--down", *COARSE],
     "gap": ["gap", "--width", "0.1", *COARSE],
+    "cycle": ["walk", "--speed", "0.3", "--periodic", *COARSE],
+    "cycle of a run": ["run", "--speed", "0.5", "--periodic", "--set", "cycles=2", "--set", "time_step=0.02"],
     "jump": ["jump", "--flight", "0.15", "--length", "0.05"],
     "run": ["run", "--speed", "0.5", "--steps", "3", "--set", "time_step=0.02"],
     "hop": ["hop", "--foot", "left", "--flight", "0.1"],
@@ -92,7 +95,7 @@ def check_refusal(result, where, name):
     """A remedy names options of `bielle solve` alone."""
     told = run("export", result, "--format", "problem", "-o", "refused.json", where=where, statuses=(2,)).stderr
     assert REFUSED[name] in told, told
-    known = run("solve", "squat", "--help", where=where).stdout
+    known = run("solve", "walk", "--help", where=where).stdout
     assert all(option in known for option in re.findall(r"--[a-z-]+", told)), told
 
 
