@@ -226,8 +226,6 @@ def check_levels(where):
     robot = make_two_levels(f"{where}/level", (0, 0, 0, 0), step=9e-5)
     run("solve", "squat", "--robot", robot, "--threads", 1, "--no-report", "-o", f"{where}/level/squat")
     assert read(f"{where}/level/squat")[0]["ground"]["steps"] == []
-
-
     # The other foot is higher: the first step goes down, and not onto the edge.
     robot = make_two_levels(f"{where}/levels-right", PLACE, step=-0.05)
     told = run("solve", "walk", "--speed", "0.3", "--robot", robot, "-o", f"{where}/refused", status=(2,))
