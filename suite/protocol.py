@@ -14,6 +14,7 @@ import os
 import pathlib
 import re
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -75,7 +76,7 @@ def write_guess(directory, solved, guess):
         arrays = {name: archive[name] for name in archive.files if not name.startswith("multiplier")}
     for key in ("q", "v", "u"):
         assert arrays[key].shape == guess[key].shape, key
-    directory.mkdir()
+    shutil.copytree(solved, directory, ignore=shutil.ignore_patterns("trajectory.*"))
     np.savez(directory / "trajectory.npz", **{**arrays, **guess})
 
 

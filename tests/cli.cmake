@@ -81,8 +81,9 @@ add_test(NAME problem COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(problem PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
-# The protocol of the suite: what is left of a run that was cut off.
-add_test(NAME protocol COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_protocol.py ${PROJECT_SOURCE_DIR})
+# The protocol of the suite: a run of a short problem, and what is left of one that was cut off.
+add_test(NAME protocol COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_protocol.py $<TARGET_FILE:bielle_command>
+                                ${PROJECT_SOURCE_DIR})
 set_tests_properties(protocol PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
 # Motions as MCAP files, read by a reader of our own and, where it is found, by @mcap/core.

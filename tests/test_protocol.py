@@ -1,4 +1,5 @@
-"""test_protocol.py SOURCE: suite/protocol.py goes on after a line that was cut off, and refuses what it cannot do before any run.
+"""test_protocol.py BIELLE SOURCE: suite/protocol.py starts problems from guesses, goes on after a line that was cut off, and refuses
+what it cannot do before any run.
 
 Exit status 77: there is no NumPy."""
 import importlib.util
@@ -10,7 +11,8 @@ import tempfile
 
 if not importlib.util.find_spec("numpy"):
     sys.exit(77)
-program = pathlib.Path(sys.argv[1]) / "suite/protocol.py"
+BIELLE = str(pathlib.Path(sys.argv[1]).absolute())
+program = pathlib.Path(sys.argv[2]) / "suite/protocol.py"
 RUN = json.dumps({"problem": "walk", "variant": "exact loops", "seed": 0, "guess": 0}) + "\n"
 
 with tempfile.TemporaryDirectory() as directory:
@@ -37,3 +39,17 @@ with tempfile.TemporaryDirectory() as directory:
     check(call("", "--guesses", "3"), 2, "FIRST:END")
     check(call("", "--until", "25:99"), 2, "23:30")
     check(call("", "--until", "23:59"), 0)
+
+# One problem from one guess: it is solved again, to the same optimum, and not repeated.
+with tempfile.TemporaryDirectory() as directory:
+    place = pathlib.Path(directory)
+    (place / "short.yaml").write_text("formats: [problem]\nmotions: [{solve: squat, robot: rsu_biped, set: {depth: 0.9, duration: 0.6, "
+                                      "settle: 0, time_step: 0.02}}]\n")
+    subprocess.run([BIELLE, "dataset", "short.yaml", "-o", "short"], cwd=place, check=True, capture_output=True)
+    for times in range(2):
+        subprocess.run([sys.executable, program, "short", "runs.jsonl", "--bielle", BIELLE, "--guesses", "0:1", "--variants", "exact loops"],
+                       cwd=place, check=True, capture_output=True)
+        line, = map(json.loads, (place / "runs.jsonl").read_text().splitlines())
+    entry, = map(json.loads, (place / "short/index.jsonl").read_text().splitlines())
+    cost = json.loads((place / "short/motions" / entry["name"] / "motion/summary.json").read_text())["cost"]
+    assert line["converged"] and line["iterations"] > 0 and abs(line["cost"] / cost - 1) < 1e-6, (line, cost)
