@@ -18,6 +18,9 @@ FOLLOWED = [  # command, what it refuses, the remedy, and what follows it: {} is
     (SOLVE.format("box"), "--set length=0.1", r"give ([\d.]+) ", "--set length={}"),
     (SOLVE.format("gap"), "--set width=1.5", r"e\.g\. ([\d.]+)", "--set width={}"),
     (SOLVE.format("walk"), "--set speed=3", r"e\.g\. ([\d.]+) m/s", "--set speed={}"),
+    (SOLVE.format("walk"), "--set speed=500", r"e\.g\. ([\d.]+) m/s", "--set speed={}"),
+    (SOLVE.format("side-walk"), "--set speed=2", r"e\.g\. ([\d.]+) m/s", "--set speed={}"),
+    (SOLVE.format("side-walk").replace("bipetto", "rsu_biped"), "--set speed=-2", r"e\.g\. (-[\d.]+) m/s", "--set speed={}"),
     (SOLVE.format("run"), "--set speed=-6", r"e\.g\. (-[\d.]+) m/s", "--set speed={}"),
     (SOLVE.format("walk"), "--set swing_height=2", r"e\.g\. ([\d.]+)", "--set swing_height={}"),
     (SOLVE.format("walk"), "--set time_step=0.2", r"e\.g\. ([\d.]+)", "--set time_step={}"),
@@ -56,6 +59,7 @@ def test_following():
         assert remedy, f"{command + refused}: no {told} in\n{first.stderr}"
         second = run(command + followed.format(remedy[1]))
         assert second.returncode == 0, f"{command + refused}: {remedy[0]!r} leads to\n{second.stderr}"
+        assert "no posture was found" not in second.stdout, f"{command + refused}: {remedy[0]!r} leads to\n{second.stdout}"
     assert not os.path.exists("nowhere"), "a dry run wrote something"
 
 

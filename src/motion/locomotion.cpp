@@ -48,38 +48,50 @@ Stance putDown(const Stance& stance) {
   throw InputError(scene.model.name(), "step " + std::to_string(step) + " of the " + scene.task.name, problem, remedy);
 }
 
-// A speed that robots reach, for a remedy: with steps half as long as legs bridge, and walks at half of the speed at which weight
-// no longer holds a body on the arc about a straight leg. \param ratio  of what legs bridge over the steps that were requested
-double calcModerateSpeed(const Scene& scene, double ratio, double height) {
-  double most = 0.5 * ratio * std::abs(scene.task.speed);
+// A speed that robots reach, for a remedy: with a share of the steps' length, and walks at half of the speed at which weight no longer
+// holds a body on the arc about a straight leg.
+double calcModerateSpeed(const Scene& scene, double share, double height) {
+  double most = share * std::abs(scene.task.speed);
   if (scene.options.timing.flight == 0) most = std::min(most, 0.5 * std::sqrt(scene.model.gravity().norm() * height));
   return std::copysign(most, scene.task.speed);
+}
+
+// The share of a step's length and turn at which feet that would be `apart`, and stand `still` apart, are `wanted` apart.
+double calcShare(const Eigen::Vector2d& still, const Eigen::Vector2d& apart, double wanted) {
+  const Eigen::Vector2d moved = apart - still;
+  const double a = moved.squaredNorm(), b = still.dot(moved), c = still.squaredNorm() - wanted * wanted;
+  if (c >= 0) return 0;
+  return a > 0 ? (std::sqrt(b * b - a * c) - b) / a : std::numeric_limits<double>::infinity();
 }
 
 // Legs as struts from the middle of the hips' plane, half way between two consecutive footholds at touchdown.
 // \param strut, height  of the centre of mass over the feet, at the start
 void checkReach(const Scene& scene, double strut, double height) {
   constexpr double kStretch = 1.15, kCrouch = 0.6;  // of the legs, over their length in the standing posture
-  int refused = 0;                                  // the first step, the way to which is too far
-  double widest = 0, across = 0, up = 0;
+  constexpr double kEasy = 0.45;                    // of what legs bridge: steps for which postures are found
+  const double bridged = 2 * std::sqrt(std::pow(kStretch * strut, 2) - std::pow(kCrouch * height, 2));
+  int refused = 0;  // the first step, the way to which is too far
+  double share = std::numeric_limits<double>::infinity(), across = 0, up = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     if (phase.isDoubleSupport() || phase.flies()) continue;
     const int side = phase.stands(Side::Left) ? 0 : 1, i = phase.steps_done;
     const Vector3d apart = scene.task.plan.steps[i].X_WF.p - scene.task.plan.getStance(i)[side].p;
     const double level = apart.head<2>().norm(), height_apart = std::abs(apart.z());
-    widest = std::max(widest, level);
+    const Vector3d still = scene.stance.feet[1 - side].p - scene.stance.feet[side].p;
+    share = std::min(share, calcShare(still.head<2>(), apart.head<2>(), kEasy * bridged));
     if (refused > 0 || std::hypot(level / 2, kCrouch * height + height_apart / 2) <= kStretch * strut) continue;
     refused = i + 1, across = level, up = height_apart;
   }
   if (refused == 0) return;
-  const double bridged = 2 * std::sqrt(std::pow(kStretch * strut, 2) - std::pow(kCrouch * height, 2));
+  const double slack = std::pow(kStretch * strut, 2) - std::pow(across / 2, 2);
+  const double climb = up > 1e-3 && slack > 0 ? 2 * (std::sqrt(slack) - kCrouch * height) : 0;
   // That of stairs changes no step.
-  const double speed = up > 1e-3 ? 0 : calcModerateSpeed(scene, bridged / widest, height);
+  const double speed = up > 1e-3 ? 0 : calcModerateSpeed(scene, share, height);
   refuseStep(scene, refused,
              "its foothold is out of reach: the feet would be " + formatNumber(across, "%.3g") + " m apart" +
                  (up > 1e-3 ? ", and " + formatNumber(up, "%.3g") + " m in height" : "") + "; these legs bridge " +
-                 formatNumber(bridged, "%.2g") + " m on the level, or climb " +
-                 formatNumber(2 * (kStretch * strut - kCrouch * height), "%.2g") + " m",
+                 formatNumber(bridged, "%.3g") + " m on the level" +
+                 (climb > 0 ? ", or climb " + formatNumber(0.99 * climb, "%.3g") + " m with feet that far apart" : ""),
              "give lengths in metres; request shorter or lower steps" +
                  (speed != 0 ? ", by a speed of e.g. " + formatNumber(speed, "%.2g") + " m/s" : ""));
 }
