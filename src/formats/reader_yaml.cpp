@@ -205,10 +205,13 @@ double readCrossInertia(const Entry& entry) {
 }
 
 void readMotors(const Fields& fields, YamlFile& file) {
-  const Entry *names = find(fields, "name_mot"), *motors = find(fields, "motors");
+  const Entry *names = find(fields, "name_mot"), *motors = find(fields, "motors"),
+              *catalogue = find(fields, "motor_catalogue");
+  if (catalogue && !motors && !find(fields, "roles"))
+    catalogue->fail("no motor is taken from it", "give `motors` with a `type`, or remove it");
   if (motors) {
     if (names) file.warnings.push_back(file.path + ": key 'name_mot': it is ignored, 'motors' lists the motors");
-    file.motors = readMotorSpecs(*motors, file.path, find(fields, "motor_catalogue"));
+    file.motors = readMotorSpecs(*motors, file.path, catalogue);
     addKeys(RobotName::Kind::Joint, *motors, file);
   } else if (names) {
     for (const std::string& joint : names->getTexts()) file.motors.push_back({joint, {}, {}, {}, {}, {}, {}});

@@ -164,7 +164,12 @@ void readYamlDocument(const std::string& path, const std::string& text,
                       const std::function<void(const YamlEntry&)>& read) {
   requireUtf8(text, path);
   try {
-    read(YamlEntry(path, "", YAML::Load(text)));
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    for (size_t i = 1; i < documents.size(); ++i)
+      if (!documents[i].IsNull())
+        YamlEntry(path, "", documents[i])
+            .fail("it is a further document, behind a line '---' or '...'", "put it into a file of its own");
+    read(YamlEntry(path, "", documents.empty() ? YAML::Node() : documents.front()));
   } catch (const YAML::Exception& error) {
     throw InputError(path, "line " + std::to_string(error.mark.line + 1), "it is not well-formed YAML: " + error.msg,
                      "correct the syntax");

@@ -186,6 +186,8 @@ class PartComposer {
     for (const std::string& key : listSharedKeys())
       if (const YamlEntry* entry = findScoped(key)) fields.emplace(key, *entry);
     if (fields.empty()) return;
+    if (const YamlEntry* roles = findScoped("roles"))
+      fields.emplace("roles", *roles);  // applied once all motors are there
     YamlFile own;
     own.path = file_.path;
     readSharedKeys(fields, own);
