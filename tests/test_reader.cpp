@@ -408,6 +408,12 @@ TEST_CASE("robots are found by name, directory and file; the error for an unknow
   CHECK(loadRobot(second.path() + "/toy/").model.nu() == 1);
   CHECK(loadRobot(second.path() + "/toy/toy.urdf").model.nu() == 1);
   CHECK(loadRobot(second.path() + "/lonely").model.name() == "toy");
+  // The settings beside a URDF stand for both.
+  CHECK(loadRobot(second.path() + "/toy/toy.yaml").model.nu() == 1);
+  CHECK(loadRobot(second.path() + "/toy/toy.yaml").file == second.path() + "/toy/toy.urdf");
+  second.write("other/other.yaml", "model: ../toy\n");
+  second.write("other/other.urdf", "<broken>");
+  CHECK(loadRobot(second.path() + "/other/other.yaml").model.nu() == 1);
 
   using Catch::Contains;
   const auto say = [](const std::string& name) { return getError([&] { loadRobot(name); }); };

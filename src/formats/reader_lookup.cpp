@@ -57,6 +57,14 @@ std::string findInDirectory(const fs::path& directory) {
                    found.empty() ? "put robot.urdf there" : "give one of them by its path");
 }
 
+// The URDF beside settings that name no other robot; else the file itself.
+std::string findTreeOf(const fs::path& settings) {
+  const fs::path urdf = fs::path(settings).replace_extension(".urdf");
+  if (settings.extension() != ".yaml" || !isFile(urdf)) return settings.string();
+  const YamlFile yaml = readYaml(settings.string());
+  return yaml.models.empty() && !yaml.generator && !yaml.composed ? urdf.string() : settings.string();
+}
+
 // In the directories of robots; empty when there is none.
 std::string findByName(const std::string& name) {
   std::vector<std::string> files = {name + ".urdf", "robot.urdf", name + ".yaml"};
@@ -160,7 +168,7 @@ std::string findRobotFile(const std::string& name_or_path) {
   if (is_name)
     if (const std::string file = findByName(name_or_path); !file.empty()) return file;
   if (isDirectory(path)) return findInDirectory(path);
-  if (isFile(path)) return name_or_path;
+  if (isFile(path)) return findTreeOf(path);
   throw InputError("", "robot '" + name_or_path + "'",
                    is_name
                        ? "there is no robot of this name in " + listItems(getRobotDirectories()) + ", and no such path"
