@@ -254,6 +254,8 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
       {head + "options: {friction: [0.5, 0.5]}\n", {"friction", "given twice"}},
       {head + "options: {help: true}\n", {"key 'help' (line 2)", "would not execute anything"}},
       {head + "options: {dry-run: true}\n", {"key 'dry-run' (line 2)", "would not execute anything"}},
+      {head + "options: {robot: no_such_robot}\n", {"key 'robot' (line 2)", "no_such_robot"}},
+      {head + "options: {robot: rsu_biped}\n", {"key 'robot' (line 2)", "other joints, motors or contacts"}},
       {head + "options: {live: true}\n", {"key 'live' (line 2)", "summary-only"}},
       {head + "options: {push: t=1}\n", {"key 'push' (line 2)", "next to `options`"}},
       {head + "push: {time: 1, phase: 1, impulse: 1}\n", {"key 'push' (line 2)", "give one of them"}},

@@ -147,4 +147,6 @@ TEST_CASE("compare: errors are reported with their places and remedies") {
   check("motor_constant: 1.5", "motor_constant: 0", "not positive");
   check("regeneration: 1", "regeneration: 2", "0 .. 1");
   check("reference:", "../reference:", "cannot be the name");
+  check("[hip]", "[hipp]",
+        "key 'groups': key 'hips' (line 8): no motor has 'hipp' in its name; the motors are hipz_left");
 }

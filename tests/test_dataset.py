@@ -160,6 +160,8 @@ def main():
         for change, problem in ((("solve: squat", "solve: sqat"), "sqat"), (("amp]", "bvh]"), "no format 'bvh'"),
                                 (("payload: [0, 3]", "payload: [0, -3]"), "'-3' is no mass"),
                                 (("depth: 0.9,", "deepness: 0.9,"), "deepness"), (("fps: 30", "fps: 0"), "no rate"),
+                                (("amp]", "mcap]"), "key 'isaac_lab' (line 4): none of the formats depends on it"),
+                                (("[mjlab, amp]\nfps: 30\nisaac_lab: 3", "[mcap]\nfps: 30"), "key 'fps' (line 3): none"),
                                 (("payload: [0, 3]", "payload: [3, 3]"), "again"), (("licence", "license"), "license"),
                                 (("set: {depth: 0.85, com_weight: 1, " + SHORT + "}", "options: {max-iteratoins: 1}"),
                                  "key 'max-iteratoins' (line 7): `bielle solve squat` rejects it"),

@@ -1,5 +1,6 @@
 #include "tasks/architectures.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bielle/formats/robot_writer.h"
@@ -8,6 +9,7 @@
 #include "design/draft.h"
 #include "design/spec_parts.h"
 #include "formats/text_file.h"
+#include "model/listing.h"
 #include "model/number_text.h"
 #include "results/output_place.h"
 
@@ -72,7 +74,7 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
   if (spec.motions.empty()) motions.fail("there are none", "name at least one");
   if (const Entry* speeds = find(fields, "speeds")) readSpeeds(*speeds, spec);
   if (const Entry* groups = find(fields, "groups"))
-    for (const auto& [name, words] : groups->getMap()) spec.groups.push_back({name, words.getTexts()});
+    for (const auto& [name, words] : groups->getMap()) spec.groups.push_back({name, words.getTexts(), words});
   spec.groups.push_back({"all", {}});
   if (const Entry* drives = find(fields, "drives")) {
     const Fields drive = drives->getFields(kComparedDriveKeys);
@@ -86,6 +88,19 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
         share->fail("it is outside 0 .. 1", "give the share that is regenerated");
     }
   }
+}
+
+// Words that are in the name of no motor.
+void checkGroups(const ArchitectureSpec& spec, const std::vector<Contender>& contenders) {
+  std::vector<std::string> motors;
+  for (const Contender& contender : contenders)
+    for (const Motor& motor : contender.robot.model.motors())
+      if (!contains(motors, motor.name)) motors.push_back(motor.name);
+  for (const MotorGroup& group : spec.groups)
+    for (const std::string& word : group.words)
+      if (std::none_of(motors.begin(), motors.end(),
+                       [&word](const std::string& motor) { return motor.find(word) != std::string::npos; }))
+        group.entry->fail("no motor has '" + word + "' in its name", "the motors are " + listItems(motors));
 }
 
 // The factor of the trunk's mass that gives the required total mass.
@@ -132,6 +147,7 @@ std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::s
     contender.robot = loadRobot(contender.directory);
     contenders.push_back(std::move(contender));
   }
+  checkGroups(spec, contenders);
   return contenders;
 }
 

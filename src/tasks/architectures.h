@@ -11,6 +11,7 @@
 //   speeds: {motion: walk, option: speed, from: 0.3, to: 1.0, step: 0.1}     # the largest that passes
 //   groups: {hips: [hip], "knees and ankles": [knee, ankle]}     # motors by parts of their names, the first that fits
 //   drives: {motor_constant: 2, regeneration: 0}                 # of all motors (design/measures.h); omitted: each robot's own
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,7 @@ std::string makeName(const MotionSpec& motion);
 struct MotorGroup {
   std::string name;
   std::vector<std::string> words;
+  std::optional<YamlEntry> entry = {};  // the list of words
 };
 
 struct ArchitectureSpec {

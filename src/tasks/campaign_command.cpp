@@ -8,7 +8,9 @@
 #include <set>
 
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "bielle/results/result.h"
+#include "bielle/robots/robot_loader.h"
 #include "model/number_text.h"
 #include "tasks/cells.h"
 #include "tasks/dry_run.h"
@@ -181,6 +183,24 @@ void checkPushTimes(const CampaignSpec& spec, const std::vector<MotionLength>& l
   }
 }
 
+// What carries out a motion has the joints, motors and contacts of the robot that it is planned for.
+void checkRobots(const CampaignSpec& spec) {
+  const auto listParts = [](const Model& model) {
+    return std::vector{makeVelocityNames(model), getNames(model.motors()), getNames(model.contacts())};
+  };
+  for (const CampaignAxis& axis : spec.axes) {
+    if (axis.kind != Kind::Option || axis.name != "robot") continue;
+    for (const CampaignMotion& motion : spec.motions) {
+      const LoadedRobot planned = motion.solve.empty() ? loadRobotOf(motion.directory) : loadRobot(motion.robot);
+      for (const std::string& value : axis.values)
+        if (listParts(loadRobot(value).model) != listParts(planned.model))
+          axis.entry.fail(
+              "'" + value + "' has other joints, motors or contacts than the robot of motion '" + motion.name + "'",
+              "give a robot of the same, as another file of it");
+    }
+  }
+}
+
 }  // namespace
 
 bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const std::string& simulate,
@@ -220,6 +240,7 @@ bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const st
       cell[i] = value;
       if (!check(cell, spec.axes[i])) return false;
     }
+  checkRobots(spec);
   checkPushPhases(spec, lengths);
   checkPushTimes(spec, lengths, warnings);
   return true;

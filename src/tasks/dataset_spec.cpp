@@ -201,6 +201,14 @@ DatasetSpec readDatasetSpec(const std::string& path) {
         if (std::find(kFormats.begin(), kFormats.end(), format) == kFormats.end())
           formats->fail("there is no format '" + format + "'", "give some of " + listItems(kFormats));
     }
+    const auto requireFormat = [&](const char* key, const std::vector<std::string>& formats) {
+      const YamlEntry* entry = find(fields, key);
+      if (entry && std::none_of(formats.begin(), formats.end(),
+                                [&spec](const std::string& format) { return contains(spec.formats, format); }))
+        entry->fail("none of the formats depends on it", "add one of " + listItems(formats) + ", or remove it");
+    };
+    requireFormat("fps", {"mjlab", "amp", "beyondmimic"});
+    requireFormat("isaac_lab", {"amp", "beyondmimic"});
     const YamlEntry& motions = require(fields, "motions", document);
     DatasetNames names;
     for (const YamlEntry& entry : motions.isList() ? motions.getList() : std::vector<YamlEntry>{motions})

@@ -135,7 +135,7 @@ void requireSameParts(const Model& planned, const LoadedRobot& robot) {
   const auto compare = [&robot](const char* what, const std::vector<std::string>& wanted,
                                 const std::vector<std::string>& there) {
     if (wanted == there) return;
-    throw InputError(robot.file, what,
+    throw InputError(robot.path(), what,
                      "they are " + listItems(there) + ", but those of the plan's robot " + listItems(wanted),
                      "give a robot of the same joints, motors and contacts");
   };
@@ -194,6 +194,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   if (!isFree(arguments) || (arguments.dry_run && !std::filesystem::exists(arguments.directory)))
     requireShortSteps(arguments, "--control-period", arguments.execution.control_period);
   if (arguments.dry_run) {
+    if (!arguments.robot.empty()) loadRobot(arguments.robot);
     tell(listIdleOptions(arguments));
     return kStood;
   }
