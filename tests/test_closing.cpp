@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ctime>
 #include <iostream>
+#include <sstream>
 
 #include "bielle/dynamics/closing.h"
 #include "bielle/dynamics/kinematics.h"
@@ -155,6 +156,47 @@ TEST_CASE("closing: a rocker beyond its dead point is refused with the gap and t
   CHECK(std::abs(refused.q[rocker]) == Approx(upper).margin(1e-8));
   joint[0] = std::nan("");
   CHECK(map.calcMotors(joint, motor).status == NumericalStatus::NotFinite);
+}
+
+namespace {
+
+// The values in reach that a message tells, as they are told.
+std::vector<double> readReach(const std::string& message) {
+  const std::string one = "the nearest value in reach is ", several = "the nearest values in reach are ";
+  const bool is_one = message.find(one) != std::string::npos;
+  std::stringstream text(message.substr(message.find(is_one ? one : several) + (is_one ? one : several).size()));
+  std::vector<double> values;
+  for (double value; text >> value; text.ignore(1)) values.push_back(value);
+  if (is_one) values.resize(1);  // its distance follows
+  return values;
+}
+
+}  // namespace
+
+TEST_CASE("closing: values in reach can be held as they are told, with few digits") {
+  const Model fourbar = loadOwn("fourbar").model, biped = loadOwn("bipetto").model, ankles = loadOwn("rsu_biped").model;
+  const auto follow = [](const Model& model, const std::string& reference, const std::vector<std::string>& held,
+                         const std::vector<double>& asked) {
+    VectorXd q = assembleReference(model, reference).q;
+    for (size_t i = 0; i < held.size(); ++i) q[getEntry(model, held[i])] = asked[i];
+    const AssemblyResult refused = closeConfiguration(model, q, held);
+    CAPTURE(asked, refused.message);
+    REQUIRE(refused.status == NumericalStatus::NotClosed);
+    const std::vector<double> told = readReach(refused.message);
+    REQUIRE(told.size() == held.size());
+    for (size_t i = 0; i < held.size(); ++i) {
+      CHECK(told[i] == Approx(refused.q[getEntry(model, held[i])]).margin(1e-3));
+      q[getEntry(model, held[i])] = told[i];
+    }
+    CHECK(closeConfiguration(model, q, held).status != NumericalStatus::NotClosed);
+  };
+  for (const double angle : {1.5, 1.57, 2.7, 3.0})
+    follow(fourbar, fourbar.references()[0].name, {kRockerJoint}, {angle});
+  const std::vector<std::string> ankle = {"ankley_left", "anklex_left"};
+  for (const std::vector<double>& angles : std::vector<std::vector<double>>{{0, 2}, {0.9, 0}, {1.5, 0}, {0, -0.8}})
+    follow(biped, "half_sitting", ankle, angles);
+  for (const std::vector<double>& angles : std::vector<std::vector<double>>{{0.1, 0.5}, {0, 2}, {0, -0.8}})
+    follow(ankles, "half_sitting", ankle, angles);
 }
 
 TEST_CASE("closing: motors of an ankle on two rods for its joints and back, against the closed form") {

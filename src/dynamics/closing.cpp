@@ -19,6 +19,7 @@ constexpr double kShortestMove = 1e-11;  // likewise
 constexpr double kLeastDamping = 1e-13, kFirstDamping = 1e-6, kMostDamping = 1e6;  // lambda; N is orthonormal
 constexpr double kLeastMotion = 0.02;  // the least that held coordinates move in a unit motion of a regular linkage
 constexpr double kOpen = 1e-8;         // m or rad
+constexpr double kWithin = 2e-5;       // of the largest value, or rad or m: several of the last digits that are told
 
 // Coordinates of one linkage.
 struct Coordinates {
@@ -344,7 +345,8 @@ bool LinkageMap::reset(ConstVectorRef q) {
 
 namespace {
 
-// Of the linkage that is farthest from what is asked of it. \param nearest  with the values in reach   \param start  closed
+// Of the linkage that is farthest from what is asked of it. Values in reach are told from a little within, so that they can be held
+// although they are rounded. \param nearest  with the values in reach   \param start  closed
 std::string describeUnheld(const Model& model, ConstVectorRef q, const VectorXd& nearest,
                            const std::vector<std::string>& held, const VectorXd& start, const HeldResult& closed) {
   const auto getLinkage = [&model](const Joint& joint) {
@@ -352,17 +354,28 @@ std::string describeUnheld(const Model& model, ConstVectorRef q, const VectorXd&
     return std::find_if(model.clusters().begin(), model.clusters().end(), has) - model.clusters().begin();
   };
   const auto linkage = getLinkage(model.joints()[static_cast<size_t>(closed.joint)]);
-  std::vector<std::string> names, alone;
-  std::string asked, found;
+  std::vector<const Joint*> joints;
+  double squares = 0, largest = 1;
   for (const std::string& name : held) {
     const Joint& joint = model.joints()[static_cast<size_t>(model.findJoint(name))];
-    if (getLinkage(joint) != linkage || std::abs(nearest[joint.idx_q] - q[joint.idx_q]) <= kMet) continue;
-    asked += (names.empty() ? "" : ", ") + formatNumber(q[joint.idx_q]);
-    found += (names.empty() ? "" : ", ") + formatNumber(nearest[joint.idx_q]);
-    names.push_back(name);
+    const double value = nearest[joint.idx_q], gap = value - q[joint.idx_q];
+    if (getLinkage(joint) != linkage || std::abs(gap) <= kMet) continue;
+    joints.push_back(&joint);
+    squares += gap * gap;
+    largest = std::max(largest, std::abs(value));
+  }
+  std::vector<std::string> names, alone;
+  std::string asked, found;
+  for (const Joint* joint : joints) {
+    const double value = nearest[joint->idx_q],
+                 within = kWithin * largest * (value - q[joint->idx_q]) / std::sqrt(squares);
+    asked += (names.empty() ? "" : ", ") + formatNumber(q[joint->idx_q]);
+    found += (names.empty() ? "" : ", ") + formatNumber(value + within);
+    names.push_back(joint->name);
     VectorXd only = start;
-    only[joint.idx_q] = q[joint.idx_q];
-    if (LoopCloser(model, start, {name}).close(only).status != NumericalStatus::NotClosed) alone.push_back(name);
+    only[joint->idx_q] = q[joint->idx_q];
+    if (LoopCloser(model, start, {joint->name}).close(only).status != NumericalStatus::NotClosed)
+      alone.push_back(joint->name);
   }
   if (names.size() == 1)
     return "joint '" + names[0] + "' cannot be held at " + asked + ": the nearest value in reach is " + found + ", " +
