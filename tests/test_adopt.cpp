@@ -235,6 +235,15 @@ TEST_CASE("a frame that is named like a foot is no sole where its shapes reach b
   }
 }
 
+TEST_CASE("a robot that cannot be adopted is named as in all other messages") {
+  const RobotDirectory directory;
+  const std::string path = directory.write(
+      "arm.xml",
+      "<mujoco><worldbody><body name='arm'><joint name='turn' axis='0 1 0'/><inertial pos='0 0 1' mass='1' "
+      "diaginertia='1 1 1'/></body></worldbody></mujoco>");
+  CHECK(getError([&] { adoptRobot(loadRobot(path), "../../arm.xml"); }).rfind(path + ": robot ", 0) == 0);
+}
+
 TEST_CASE("an adopted robot says where the dead points of its linkages are") {
   // A four-bar at the knee whose crank turns wholly (robots/parts/knee/four_bar.yaml): the knee turns back where crank and rod are in
   // line, l +- c from the motor to the end of the arm, which is at the angle psi from the thigh, cos psi = sin(knee - middle).

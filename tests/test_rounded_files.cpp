@@ -166,6 +166,12 @@ TEST_CASE("a linkage is as it is written with all digits, or where rounding is 0
   const LoadedRobot locked = loadRobot(directory.path());
   CHECK(countWarnings(locked, "loops: read") == 0);
   CHECK(countWarnings(locked, "mobility 0 is less than the 1 motor in its loops (crank_joint)") == 1);
+  // Too many motors are those of the file that names them.
+  directory.write("robot.yaml", makeYaml("3d"));
+  directory.write("robot.urdf", makeUrdf("1.5707963267948966"));
+  const LoadedRobot driven =
+      loadRobot(directory.write("driven.yaml", "model: ./robot.urdf\nmotors: {crank_joint: {}, rod_joint: {}}\n"));
+  CHECK(countWarnings(driven, directory.path() + "/driven.yaml: closure ") == 1);
   directory.write("robot.yaml", makeYaml("3d", "rounding: 1\n"));
   CHECK_THAT(getError([&] { loadRobot(directory.path()); }),
              Catch::Contains("rounding") && Catch::Contains("0 .. 1e-3"));

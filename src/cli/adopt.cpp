@@ -18,7 +18,7 @@ namespace {
 int adopt(const RobotArgument& argument, const std::string& directory) {
   const LoadedRobot robot = argument.load();
   if (fs::path(robot.file).extension() == ".yaml" && !readYaml(robot.file).models.empty())
-    throw InputError(robot.file, "robot", "it already completes another robot", "edit it");
+    throw InputError(robot.path(), "robot", "it already completes another robot", "edit it");
   const fs::path place = fs::absolute(directory).lexically_normal();
   const std::string name = (place.has_filename() ? place : place.parent_path()).filename().string();
   const Adoption adoption = adoptRobot(robot, fs::path(robot.file).lexically_relative(place).string());

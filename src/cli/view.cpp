@@ -55,7 +55,7 @@ int view(const ViewArguments& arguments) {
   if (!arguments.parameters.empty()) {
     const std::optional<GeneratorEntry> entry = readGeneratorOf(robot.file);
     if (!entry)
-      throw InputError(robot.file, "option --parameter", "the robot is given by its figures and has no parameters",
+      throw InputError(robot.path(), "option --parameter", "the robot is given by its figures and has no parameters",
                        "give a robot of a generator, or one composed of parts");
     for (const std::string& text : arguments.parameters) parameters.push_back(makeParameter(text, robot, *entry));
   }

@@ -31,7 +31,8 @@ double round(double length) { return std::round(length * 1e4) / 1e4; }
 
 class Adopter {
  public:
-  Adopter(const LoadedRobot& robot, const std::string& path) : model_(robot.model), path_(path), ws_(robot.model) {
+  Adopter(const LoadedRobot& robot, const std::string& path)
+      : model_(robot.model), file_(robot.path()), path_(path), ws_(robot.model) {
     if (!model_.hasFreeFlyer())
       fail("it has a fixed base",
            "only robots that stand on feet can be adopted; complete others by hand, with a YAML file that has the key "
@@ -57,7 +58,7 @@ class Adopter {
 
  private:
   [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
-    throw InputError(path_, "robot '" + model_.name() + "'", problem, remedy);
+    throw InputError(file_, "robot '" + model_.name() + "'", problem, remedy);
   }
 
   // A guess as a comment, before what it explains.
@@ -373,9 +374,9 @@ class Adopter {
   }
 
   const Model& model_;
-  const std::string path_;
-  VectorXd q_;        // closed
-  VectorXd posture_;  // in which it stands; empty if there is none
+  const std::string file_, path_;  // of the robot: as messages name it, and from the new file
+  VectorXd q_;                     // closed
+  VectorXd posture_;               // in which it stands; empty if there is none
   std::vector<std::string> serial_joints_;
   Workspace ws_;
   std::vector<FoundFoot> feet_;

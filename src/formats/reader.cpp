@@ -426,7 +426,7 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, std::ve
                           " --verbose` lists them)");
   }
   RoundedLinkages linkages = findRoundedLinkages(builder.build(warnings), findTolerance(urdf, yaml));
-  if (warnings) warnOfRounding(linkages, urdf.path, *warnings);
+  if (warnings) warnOfRounding(linkages, urdf.path, yaml.path.empty() ? urdf.path : yaml.path, *warnings);
   return std::move(linkages.model);
 }
 

@@ -37,7 +37,8 @@ std::string describeMended(const Model& model, const RoundedLinkage& linkage) {
 
 }  // namespace
 
-void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, std::vector<std::string>& warnings) {
+void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, const std::string& loops,
+                    std::vector<std::string>& warnings) {
   const Model& model = linkages.model;
   std::string mended;
   for (const RoundedLinkage& linkage : linkages.mended)
@@ -46,15 +47,15 @@ void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, st
     warnings.push_back(path + ": loops: read " + mended +
                        ": its numbers are rounded; write them with all their digits (a right angle as "
                        "1.5707963267948966), or what `bielle convert` makes of the file");
-  const auto describe = [&](const RoundedLinkage& linkage) {
-    const std::string loops = path + ": " + listClosures(model, linkage) + ": ";
-    if (linkage.written < 0) return loops + "its linkage does not close: ";
+  const auto describe = [&](const std::string& file, const RoundedLinkage& linkage) {
+    const std::string about = file + ": " + listClosures(model, linkage) + ": ";
+    if (linkage.written < 0) return about + "its linkage does not close: ";
     std::vector<std::string> motors;
     for (const Motor& motor : model.motors())
       if (contains(linkage.joints, motor.joint)) motors.push_back(motor.name);
     if (static_cast<int>(motors.size()) <= linkage.written || motors.empty())
-      return loops + "it is locked as it is written: ";
-    return loops + "mobility " + std::to_string(linkage.written) + " is less than the " +
+      return about + "it is locked as it is written: ";
+    return about + "mobility " + std::to_string(linkage.written) + " is less than the " +
            std::to_string(motors.size()) + (motors.size() > 1 ? " motors" : " motor") + " in its loops (" +
            listItems(motors) + "): ";
   };
@@ -65,12 +66,12 @@ void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, st
                                   : "axes of " + linkage.axes[0] + " and " + linkage.axes[1] + " are " +
                                         formatNumber(linkage.apart, "%.2g") + " rad from parallel";
     warnings.push_back(
-        describe(linkage) + apart + ", more than its numbers are rounded; with placements that differ by " +
+        describe(path, linkage) + apart + ", more than its numbers are rounded; with placements that differ by " +
         describeChange(linkage) + " at most, mobility would be " + std::to_string(linkage.meant) + ": correct them");
   }
   for (const RoundedLinkage& linkage : linkages.short_of_freedoms)
     warnings.push_back(
-        describe(linkage) +
+        describe(loops, linkage) +
         "they work against each other; remove motors, or use closures of fewer rows where joints had more "
         "freedom");
 }

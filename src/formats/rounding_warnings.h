@@ -7,7 +7,9 @@
 
 namespace bielle {
 
-/// Adds one warning for all linkages that were mended, and one for each that has fewer freedoms than motors.
-void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, std::vector<std::string>& warnings);
+/// Adds one warning for all linkages that were mended, and one for each that is locked or has fewer freedoms than motors.
+/// \param path   of the file of its placements   \param loops  of that of its closures and motors
+void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, const std::string& loops,
+                    std::vector<std::string>& warnings);
 
 }  // namespace bielle

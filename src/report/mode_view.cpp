@@ -63,7 +63,7 @@ Json describeSwing(const Model& model, ConstVectorRef q, const std::vector<Frame
 std::string makeModeView(const LoadedRobot& robot, ConstVectorRef q, const std::vector<int>& contacts,
                          const std::vector<Mode>& modes) {
   const Model& model = robot.model;
-  if (modes.empty()) throw InputError(robot.file, "modes", "there are none, because nothing can move", "lock less");
+  if (modes.empty()) throw InputError(robot.path(), "modes", "there are none, because nothing can move", "lock less");
   const std::vector<FrameTarget> held = holdContacts(model, q, contacts);
   const ReportRun still = makeStillRun(robot, q, "modes");
   Json swings = Json::array(), list = Json::array(), parents = Json::array();

@@ -284,7 +284,7 @@ bool isTurnedFar(const Joint& joint, const VectorXd& given) {
 
 std::vector<std::string> checkReferences(const LoadedRobot& robot) {
   const Model& model = robot.model;
-  std::filesystem::path file = robot.file;
+  std::filesystem::path file = robot.path();
   if (file.extension() == ".urdf") file.replace_extension(".yaml");
   std::vector<std::string> warnings;
   for (const Reference& reference : model.references()) {
