@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "results/setting.h"
+#include "robots/generator_entry.h"
 
 namespace bielle::cli {
 namespace {
@@ -41,6 +42,8 @@ int generate(const GenerateArguments& arguments) {
   OptionSet parameters = generator.parameters;
   for (const auto& [name, value] : values) parameters.set(name, value);
   const Model model = generator.make(parameters);
+  for (const std::string& name : listUnused(arguments.robot, values))
+    printWarnings({"--set " + name + ": it changes nothing: it is of a part that is not chosen"});
   writeRobot(model, arguments.directory, "Written by `bielle generate " + arguments.robot + "`" + changes + ".");
   std::cout << model.name() << ": " << formatNumber(model.mass()) << " kg, nv " << model.nv() << ", " << model.nu()
             << " motors, " << model.closures().size() << " closures\n  " << arguments.directory << "\n";

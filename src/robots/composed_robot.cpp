@@ -56,6 +56,19 @@ ComposedRobot::ComposedRobot(const std::string& path, const std::map<std::string
   }
 }
 
+std::vector<std::string> ComposedRobot::listUsed(const OptionSet& parameters) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<std::string> names;
+  PartChoices chosen;
+  for (const Option& option : parameters)
+    if (const std::string* choice = std::get_if<std::string>(&option.value)) {
+      chosen[option.name] = *choice;
+      names.push_back(option.name);
+    }
+  for (const PartParameter& p : listParameters(library_, *file_, chosen)) names.push_back(p.option.name);
+  return names;
+}
+
 RobotFiles ComposedRobot::make(const OptionSet& parameters) const {
   OptionSet own = parameters_;
   for (const Option& option : parameters) own.set(option.name, option.value);

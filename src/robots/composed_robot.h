@@ -28,6 +28,9 @@ class ComposedRobot {
   /// \throws InputError for parameters that are possible one by one, but not together
   RobotFiles make(const OptionSet& parameters) const;
 
+  /// Names of those that the parts have which they choose; the others change nothing.
+  std::vector<std::string> listUsed(const OptionSet& parameters) const;
+
  private:
   mutable std::mutex mutex_;
   mutable PartLibrary library_;

@@ -25,6 +25,9 @@ std::string locateBeside(const YamlEntry& entry);
 /// \throws InputError naming file, line, parameter and remedy
 GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settings);
 
+/// Parameters among `settings` of parts that are not chosen, which change nothing.
+std::vector<std::string> listUnused(const std::string& generator, const OptionValues& settings);
+
 /// That of a robot's file: one that names a generator, or composes a robot of parts; none for any other.
 std::optional<GeneratorEntry> readGeneratorOf(const std::string& file);
 

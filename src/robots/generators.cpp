@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -10,6 +11,7 @@
 #include "robots/composed_robot.h"
 #include "robots/delta.h"
 #include "robots/fivebar_leg.h"
+#include "robots/generator_entry.h"
 #include "robots/kangaroo.h"
 #include "robots/spring_biped.h"
 #include "robots/spring_leg.h"
@@ -80,12 +82,16 @@ std::string findComposition(const std::string& name) {
   return "";
 }
 
-Generator makeComposedGenerator(const std::string& path, const OptionValues& settings) {
+std::shared_ptr<const ComposedRobot> makeComposed(const std::string& path, const OptionValues& settings) {
   std::map<std::string, std::string> parts;
   for (const auto& [name, value] : settings)
     if (const std::string* text = std::get_if<std::string>(&value))
       if (fs::path(*text).extension() == ".yaml") parts[name] = *text;
-  const auto robot = std::make_shared<const ComposedRobot>(path, parts);
+  return std::make_shared<const ComposedRobot>(path, parts);
+}
+
+Generator makeComposedGenerator(const std::string& path, const OptionValues& settings) {
+  const auto robot = makeComposed(path, settings);
   return {fs::path(path).stem().string(), robot->help(), robot->parameters(),
           [robot](const OptionSet& parameters) { return combineFiles(robot->make(parameters), {}, nullptr); }};
 }
@@ -98,7 +104,33 @@ std::map<std::string, std::string> listCompositions() {
   return files;
 }
 
+// Of a generator that is not compiled; empty if there is none.
+std::string findComposedFile(const std::string& name) {
+  if (fs::path(name).extension() == ".yaml" && fs::exists(name)) {
+    if (!readYaml(name).composed) throw InputError(name, "file", "it composes no robot", "give a file with a `tree`");
+    return name;
+  }
+  return name.find('/') == std::string::npos ? findComposition(name) : "";
+}
+
+bool isCompiled(const std::string& name) {
+  const std::vector<Generator>& generators = getCompiledGenerators();
+  return std::any_of(generators.begin(), generators.end(), [&name](const Generator& g) { return g.name == name; });
+}
+
 }  // namespace
+
+std::vector<std::string> listUnused(const std::string& generator, const OptionValues& settings) {
+  if (isCompiled(generator)) return {};
+  const auto robot = makeComposed(findComposedFile(generator), settings);
+  OptionSet parameters = robot->parameters();
+  for (const auto& [name, value] : settings) parameters.set(name, value);
+  const std::vector<std::string> used = robot->listUsed(parameters);
+  std::vector<std::string> unused;
+  for (const auto& [name, value] : settings)
+    if (!contains(used, name)) unused.push_back(name);
+  return unused;
+}
 
 std::vector<Generator> listGenerators() {
   std::vector<Generator> out = getCompiledGenerators();
@@ -109,12 +141,7 @@ std::vector<Generator> listGenerators() {
 Generator findGenerator(const std::string& name, const OptionValues& settings) {
   for (const Generator& generator : getCompiledGenerators())
     if (generator.name == name) return generator;
-  if (fs::path(name).extension() == ".yaml" && fs::exists(name)) {
-    if (!readYaml(name).composed) throw InputError(name, "file", "it composes no robot", "give a file with a `tree`");
-    return makeComposedGenerator(name, settings);
-  }
-  if (name.find('/') == std::string::npos)
-    if (const std::string file = findComposition(name); !file.empty()) return makeComposedGenerator(file, settings);
+  if (const std::string file = findComposedFile(name); !file.empty()) return makeComposedGenerator(file, settings);
   std::vector<std::string> known;
   for (const Generator& generator : listGenerators()) known.push_back(generator.name);
   throw InputError("", "robot '" + name + "'", "there is no such generator as '" + name + "'",
