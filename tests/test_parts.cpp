@@ -7,6 +7,7 @@
 
 #include "bielle/design/parametrization.h"
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/closing.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/results/robot_info.h"
@@ -215,6 +216,66 @@ tree:
       if (angle == 0.3) CHECK(std::abs(getCoordinate(model, q, "motor_flap_left")) < 1e-7);  // as drawn
     }
   }
+}
+
+TEST_CASE("parts: a linkage of a slide that is drawn off its zero, in every plane and mirrored") {
+  const std::string car = R"(mounts: {base: link}
+tree:
+  car: {parent: base, joint: slide, type: prismatic, place: [0.02, 0.1, 0.03], axis: AXIS, range: [-0.2, 0.2],
+        solids: [{box: [0.05, 0.04, 0.03], at: [0.01, 0.02, 0.03], mass: 0.5}]}
+linkage:
+  base: base
+  normal: NORMAL
+  through: [0.02, 0.1, 0.03]
+  density: 1
+  points: {motor: MOTOR, crank: CRANK, arm: ARM}
+  fixed: {base: [motor], car: {points: [arm], angles: {slide: 0.03}}}
+  bars: {crank: {points: [motor, crank], radius: 0.005}, rod: [crank, arm]}
+  hinges: {motor: motor_slide}
+motors: {motor_slide: {armature: 0.001}}
+)";
+  const std::string cart = R"(base: fixed
+tree:
+  body: {parent: world, joint: fix, type: fixed, solids: [{box: [0.1, 0.1, 0.1], mass: 1}]}
+  c: {part: car.yaml, sides: [_left, _right], mounts: {base: body}}
+)";
+  const std::string axes = "xyz";
+  for (const char normal : axes)
+    for (const char axis : axes) {
+      if (axis == normal) continue;
+      CAPTURE(normal, axis);
+      // Coordinates of the plane are the other axes in their order; the rod holds the middle of the car.
+      const bool is_first = axes.find(axis) == (normal == 'x' ? 1u : 0u);
+      std::string text = replaceOnce(replaceOnce(car, "AXIS", {axis}), "NORMAL", {normal});
+      text = replaceOnce(text, "ARM", is_first ? "[0.03, 0]" : "[0, 0.03]");
+      text = replaceOnce(text, "CRANK", is_first ? "[-0.1, 0.05]" : "[0.05, -0.1]");
+      text = replaceOnce(text, "MOTOR", is_first ? "[-0.15, 0.02]" : "[0.02, -0.15]");
+      const RobotDirectory files;
+      files.write("cart/car.yaml", text);
+      const Model model = loadRobot(files.write("cart/cart.yaml", cart)).model;
+      const double sign = axis == 'y' ? -1 : 1, spin = normal == 'y' ? 1 : -1;
+      for (const double way : {0.03, 0.02}) {
+        VectorXd q = findClosedConfiguration(model).q;
+        getCoordinate(model, q, "slide_left") = way;
+        getCoordinate(model, q, "slide_right") = sign * way;
+        const AssemblyResult closed = closeConfiguration(model, q, {"slide_left", "slide_right"});
+        REQUIRE(closed.status == NumericalStatus::Ok);
+        q = closed.q;
+        const double motor = getCoordinate(model, q, "motor_slide_left");
+        CHECK(getCoordinate(model, q, "motor_slide_right") == Approx(spin * motor).margin(1e-9));
+        CHECK((std::abs(motor) < 1e-9) == (way == 0.03));  // as drawn
+        Workspace ws(model);
+        updatePlacements(model, ws, q);
+        for (const char* body : {"car", "crank", "rod"}) {
+          const auto place = [&](const std::string& side) {
+            size_t i = 0;
+            while (model.bodies()[i].name != body + side) ++i;
+            return Vector3d(ws.X_WB[i].act(model.bodies()[i].inertia.com));
+          };
+          CHECK((place("_left") - Vector3d(1, -1, 1).cwiseProduct(place("_right"))).norm() < 1e-9);
+        }
+      }
+    }
 }
 
 TEST_CASE("parts: six-bars by circles that meet") {
@@ -473,8 +534,25 @@ TEST_CASE("parts: errors give the file, the line, the name and what to do") {
   refuse(kSlider, "type: prismatic", "type: sliding", {"joint type 'sliding' is unknown"});
   refuse(kSlider, "end: [crank, 0]", "end: [0, 0]", {"are in one place"});
   refuse(kSlider, "tree:", "trees: {}\ntree:", {"'trees'", "known keys are"});
+  refuse(kRobotOfRods, "tree:", "motor_catalogue: none.yaml\ntree:", {"key 'motor_catalogue'", "no motor is taken from it"});
   CHECK_THROWS_WITH(loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/parts/knee/belt.yaml"),
                     Contains("it is a part of a robot"));
+}
+
+TEST_CASE("parts: parameters of parts that are not chosen are told") {
+  const RobotDirectory files;
+  const auto getWarnings = [&](const std::string& set) {
+    std::string all;
+    for (const std::string& warning :
+         loadRobot(files.write("legs/legs.yaml", "generator: leg_biped\nset: {" + set + "}\n")).warnings)
+      all += warning;
+    return all;
+  };
+  CHECK(getWarnings("knee: belt, knee_ratio: 3, thigh_length: 0.25, hip_height: 0.5").empty());
+  CHECK(getWarnings("hip: three_rrs, hip_middle: -0.5").empty());
+  CHECK_THAT(getWarnings("knee: belt, knee_crank: 0.04"),
+             Contains(files.path() + "/legs/legs.yaml: key 'set': key 'knee_crank': it changes nothing"));
+  CHECK_THAT(getWarnings("hip_middle: -0.5"), Contains("key 'hip_middle': it changes nothing"));
 }
 
 TEST_CASE("expressions: numbers, points by component, and what is not one") {

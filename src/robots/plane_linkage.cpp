@@ -65,10 +65,15 @@ class PlaneLinkage {
   // Angles are those of joints between the base and a link.
   void checkAngles() const {
     for (const Body& body : bodies_)
-      for (const auto& [joint, angle] : body.given)
-        if (const std::vector<std::string> way = listWay(body); !contains(way, joint))
-          angle.fail("joint '" + joint + "' is not between link '" + base_ + "' and link '" + body.name + "'",
+      for (const auto& [name, angle] : body.given) {
+        const std::vector<std::string> way = listWay(body);
+        if (!contains(way, name))
+          angle.fail("joint '" + name + "' is not between link '" + base_ + "' and link '" + body.name + "'",
                      "known are " + listItems(way));
+        for (const UrdfJoint& joint : place_.files.urdf.joints)
+          if (joint.joint.name == name && getNv(joint.joint.kind) != 1)
+            angle.fail("joint '" + name + "' has not one coordinate", "draw the linkage where it is at 0");
+      }
   }
 
   std::vector<std::string> listWay(const Body& body) const {
@@ -141,6 +146,15 @@ class PlaneLinkage {
     }
   }
 
+  // A joint in the posture of the drawing. In a mirror image, angles about an axis that is the image of itself, as y is not, have the
+  // other sign, and so have ways along y, which is not its own image.
+  SE3 calcDrawn(const Joint& joint, double coordinate) const {
+    if (joint.kind == JointKind::Prismatic)
+      return {Matrix3d::Identity(), (isAcross(joint.axis) ? place_.side : 1) * coordinate * joint.axis};
+    const double angle = (isAcross(joint.axis) ? 1 : place_.side) * coordinate;
+    return {Eigen::AngleAxisd(angle, joint.axis).toRotationMatrix(), Vector3d::Zero()};
+  }
+
   // In the base, in the posture of the drawing; none for a link that is not there yet, or does not hang on the base.
   std::optional<SE3> findPlacement(const Body& body) const {
     if (body.is_bar) return body.X;
@@ -150,13 +164,8 @@ class PlaneLinkage {
       const auto it =
           std::find_if(joints.begin(), joints.end(), [&link](const UrdfJoint& j) { return j.child == link; });
       if (it == joints.end()) return {};
-      const auto angle = body.angles.find(it->joint.name);
-      // Of a mirror image the angle about an axis that is the image of itself, as y is not, has the other sign.
-      const double sign = isAcross(it->joint.axis) ? 1 : place_.side;
-      const Matrix3d R = angle == body.angles.end()
-                             ? Matrix3d::Identity()
-                             : Eigen::AngleAxisd(sign * angle->second, it->joint.axis).toRotationMatrix();
-      X = it->joint.X_PJ * SE3{R, Vector3d::Zero()} * X;
+      const auto drawn = body.angles.find(it->joint.name);
+      X = it->joint.X_PJ * (drawn == body.angles.end() ? X : calcDrawn(it->joint, drawn->second) * X);
       link = it->parent;
     }
     return X;
