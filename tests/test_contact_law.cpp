@@ -142,7 +142,9 @@ TEST_CASE("contact law: so is that of a step, whose springs take the work that t
     const StopForce force = calcStopForce(stop, q, mean, {kStep, before});
     const double held = calcHeld(q + 0.5 * kStep * after) - calcHeld(q - 0.5 * kStep * before);
     CHECK(-force.force * mean * kStep == Approx(held).epsilon(1e-9));
-    const auto calc = [&](double v) { return calcStopForce(stop, q, v, {kStep, before}).force; };
+    const auto calc = [&, q = q, before = before](double v) {
+      return calcStopForce(stop, q, v, {kStep, before}).force;
+    };
     CHECK(force.damping == Approx(-(calc(mean + h) - calc(mean - h)) / (2 * h)).epsilon(1e-5));
   }
 }

@@ -433,7 +433,8 @@ TEST_CASE("feet of a reference keep their places and yaws in YAML; what is no ya
                                       {"{place: [0, 0, 0], yaw: 20}", "half a turn"},
                                       {"{place: [0, 0, 0], turn: 1}", "turn"}}) {
     CAPTURE(foot);
-    const std::string error = getError([&] { loadRobot(directory.write("wrong/wrong.yaml", head + foot + "}}\n")); });
+    const std::string error =
+        getError([&, foot = foot] { loadRobot(directory.write("wrong/wrong.yaml", head + foot + "}}\n")); });
     CHECK(error.find(problem) != std::string::npos);
     CHECK(error.find("wrong.yaml") != std::string::npos);
   }

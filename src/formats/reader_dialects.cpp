@@ -423,7 +423,10 @@ void warnOfOpenLoops(UrdfFile& tree, const YamlFile& settings) {
   for (const auto& [name, link] : tree.links) {
     if (name.rfind(prefix, 0) != 0 || name.size() < prefix.size() + 3 || name.substr(name.size() - 2) != "_1") continue;
     const std::string base = name.substr(0, name.size() - 2), other = base + "_2";
-    const auto is_named = [&](const ClosureSpec& closure) { return closure.frame1 == name || closure.frame2 == name; };
+    const auto is_named =
+        [&name = name](const ClosureSpec& closure) {  // clang 14 does not capture a structured binding by itself
+          return closure.frame1 == name || closure.frame2 == name;
+        };
     if (!tree.links.count(other) || std::any_of(settings.closures.begin(), settings.closures.end(), is_named)) continue;
     tree.warnings.push_back(
         tree.path + ": links '" + name + "' and '" + other +
