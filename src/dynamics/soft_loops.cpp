@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/modes.h"
@@ -303,11 +304,14 @@ SoftRest SoftLoops::findRest(ConstVectorRef q, ConstVectorRef v, ConstVectorRef 
 
 namespace {
 
-// The solver of real matrices gives up now and then.
+// The solver gives up now and then. In another order of the coordinates, or transposed, it iterates otherwise to the same
+// eigenvalues, and unlike one of complex matrices it is compiled already.
 Eigen::VectorXcd calcEigenvalues(const MatrixXd& A) {
-  const Eigen::EigenSolver<MatrixXd> solver(A, false);
+  Eigen::EigenSolver<MatrixXd> solver(A, false);
+  if (solver.info() != Eigen::Success) solver.compute(MatrixXd(A.reverse()), false);
+  if (solver.info() != Eigen::Success) solver.compute(MatrixXd(A.transpose()), false);
   if (solver.info() == Eigen::Success) return solver.eigenvalues();
-  return Eigen::ComplexEigenSolver<Eigen::MatrixXcd>(A.cast<std::complex<double>>(), false).eigenvalues();
+  return Eigen::VectorXcd::Constant(A.rows(), std::numeric_limits<double>::infinity());  // as if unstable
 }
 
 // Eq. (4) in directions that are orthonormal in the mass matrix.
