@@ -40,8 +40,7 @@ int adopt(const RobotArgument& argument, const std::string& directory) {
 void addAdopt(CLI::App& command, Action& action) {
   const auto robot = std::make_shared<RobotArgument>();
   const auto directory = std::make_shared<std::string>();
-  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
-      ->required();
+  addRobot(command, *robot);
   command.add_option("-o,--output", *directory, "directory of the new robot; its last part names the robot's file")
       ->required();
   addVerbose(command);

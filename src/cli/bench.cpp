@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/table.h"
+#include "results/option_flags.h"
 #include "solve/fddp_checks.h"
 
 namespace bielle::cli {
@@ -156,32 +157,30 @@ void printReport(const Json& json) {
   }
 }
 
+struct BenchArguments {
+  RobotArgument robot;
+  BenchOptions options;
+  bool as_json = false, quick = false, batch = false;
+};
+
+void describe(OptionFields& f, BenchArguments& a) {
+  f.integer("threads", a.options.threads, {1, kMostThreads}, "number of threads to compare with one");
+  f.integer("shifts", a.options.shifts, {1, 10000000},
+            "shifts of the receding horizon; the full formulation makes a thirtieth of them");
+  f.flag("batch", a.batch,
+         "instead of solving: steps of 64 robots in worlds of their own, on one thread and on --threads");
+  f.flag("quick", a.quick, "small sizes, measured once, to see that everything works");
+  f.flag("json", a.as_json, "print JSON");
+}
+
 }  // namespace
 
 void addBench(CLI::App& command, Action& action) {
-  struct Arguments {
-    RobotArgument robot;
-    BenchOptions options;
-    bool as_json = false, quick = false, batch = false;
-  };
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<BenchArguments>();
   arguments->robot.name = "bipetto";
-  command
-      .add_option("--robot", arguments->robot.name,
-                  "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file of a robot with two feet")
+  command.add_option("--robot", arguments->robot.name, std::string(kRobotHelp) + " of a robot with two feet")
       ->capture_default_str();
-  command.add_option("--threads", arguments->options.threads, "number of threads to compare with one")
-      ->check(CLI::Range(1, kMostThreads))
-      ->capture_default_str();
-  command
-      .add_option("--shifts", arguments->options.shifts,
-                  "shifts of the receding horizon; the full formulation makes a thirtieth of them")
-      ->check(CLI::Range(1, 10000000))
-      ->capture_default_str();
-  command.add_flag("--batch", arguments->batch,
-                   "instead of solving: steps of 64 robots in worlds of their own, on one thread and on --threads");
-  command.add_flag("--quick", arguments->quick, "small sizes, measured once, to see that everything works");
-  command.add_flag("--json", arguments->as_json, "print JSON");
+  addFlags(*arguments, command);
   addVerbose(command);
   command.footer(
       "A unit is one product of two 108 x 108 matrices by Eigen, on one thread, in the same run. Times are the\n"

@@ -50,6 +50,9 @@ struct RobotArgument {
   // Loads the robot and prints its warnings to the standard error, and with --verbose what is harmless.
   LoadedRobot load() const;
 };
+inline constexpr const char* kRobotHelp = "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file";
+// The robot, which is required: the first argument, or the one of this name.
+void addRobot(CLI::App& command, RobotArgument& robot, const char* name = "ROBOT");
 void addVerbose(CLI::App& command);
 // The directory of a robot and its files, which no output may replace.
 std::vector<std::string> listFiles(const LoadedRobot& robot);

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <filesystem>
 #include <iostream>
 
@@ -7,18 +6,13 @@
 #include "cli/commands.h"
 #include "dynamics/loop_conflict.h"
 #include "formats/robot_files.h"
+#include "results/option_flags.h"
 
 namespace bielle::cli {
 namespace {
 
 std::vector<std::string> command_line;
 bool is_verbose = false;
-
-// Flags are written with hyphens.
-std::string makeFlag(std::string option) {
-  std::replace(option.begin(), option.end(), '_', '-');
-  return "--" + option;
-}
 
 }  // namespace
 
@@ -43,6 +37,10 @@ LoadedRobot RobotArgument::load() const {
 std::vector<std::string> listFiles(const LoadedRobot& robot) {
   const std::filesystem::path file = robot.file;
   return {robot.directory, robot.file, std::filesystem::path(file).replace_extension(".yaml").string()};
+}
+
+void addRobot(CLI::App& command, RobotArgument& robot, const char* name) {
+  command.add_option(name, robot.name, kRobotHelp)->required();
 }
 
 void addVerbose(CLI::App& command) {

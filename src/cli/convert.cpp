@@ -20,7 +20,7 @@
 #include "formats/usd.h"
 #include "model/number_text.h"
 #include "model/payload.h"
-#include "results/number_option.h"
+#include "results/option_flags.h"
 #include "results/output_place.h"
 #include "results/workshop_sheet.h"
 #include "results/workshop_solids.h"
@@ -33,10 +33,18 @@ struct ConvertArguments {
   std::string format = "bielle", joints, output;
   double payload = 0, hole = 8;
   std::vector<double> payload_at;
-  std::string precision = "double";
+  bool is_single = false;
   int postures = FirmwareOptions().postures;
   std::vector<std::string> ranges;  // joint, low, high, ..
 };
+
+void describe(OptionFields& f, ConvertArguments& a) {
+  f.number("hole", a.hole, "mm", {0.1, 1000}, "diameter of the holes of --to dxf");
+  f.choice("precision", a.is_single, {"double", "float"}, "with --to c, cpp or ros2_control: of all numbers");
+  f.integer("postures", a.postures, {100, 10000000},
+            "with maps of linkages: at how many of each linkage errors are measured");
+  f.number("payload", a.payload, "kg", {0, 1e6}, "mass fixed to the trunk");
+}
 
 void warn(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) std::cerr << "bielle: warning: " << warning << "\n";
@@ -69,7 +77,7 @@ bool isFirmware(const std::string& format) { return kFirmware.count(format) > 0;
 void writeFirmware(const LoadedRobot& robot, const ConvertArguments& arguments) {
   FirmwareOptions options;
   options.language = kFirmware.at(arguments.format);
-  options.is_single = arguments.precision == "float";
+  options.is_single = arguments.is_single;
   options.postures = arguments.postures;
   for (size_t i = 0; i + 2 < arguments.ranges.size(); i += 3) {
     const std::string& joint = arguments.ranges[i];
@@ -86,7 +94,7 @@ void writeFirmware(const LoadedRobot& robot, const ConvertArguments& arguments) 
 }
 
 int convert(const ConvertArguments& arguments) {
-  if (!isFirmware(arguments.format) && (!arguments.ranges.empty() || arguments.precision != "double"))
+  if (!isFirmware(arguments.format) && (!arguments.ranges.empty() || arguments.is_single))
     throw InputError("", arguments.ranges.empty() ? "--precision" : "--range",
                      "it says how maps of linkages are computed", "add --to c, or leave it out");
   if (!arguments.joints.empty() && arguments.format != "mjcf")
@@ -150,8 +158,7 @@ int convert(const ConvertArguments& arguments) {
 
 void addConvert(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ConvertArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
-      ->required();
+  addRobot(command, arguments->robot);
   command
       .add_option(
           "--to", arguments->format,
@@ -172,12 +179,7 @@ void addConvert(CLI::App& command, Action& action) {
           "with --to mjcf: rotations about three axes as balls (default), or as three hinges each, for trainers "
           "without balls")
       ->check(CLI::IsMember({"balls", "hinges"}));
-  command.add_option("--hole", arguments->hole, "with --to dxf: diameter of the holes [mm]")
-      ->check(isWithin(0.1, 1000))
-      ->capture_default_str();
-  command.add_option("--precision", arguments->precision, "with --to c, cpp or ros2_control: of all numbers")
-      ->check(CLI::IsMember({"double", "float"}))
-      ->capture_default_str();
+  addFlags(*arguments, command);
   command
       .add_option("--range", arguments->ranges,
                   "with maps of linkages: JOINT LOW HIGH [rad, m], instead of the limits of the robot's file, or "
@@ -185,20 +187,12 @@ void addConvert(CLI::App& command, Action& action) {
                   "other joints")
       ->expected(3)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command
-      .add_option("--postures", arguments->postures,
-                  "with maps of linkages: at how many of each linkage errors are measured")
-      ->check(isWithin(100, 10000000))
-      ->capture_default_str();
   addRobotFlags(command, arguments->robot);
-  CLI::Option* payload = command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg]")
-                             ->check(isWithin(0, 1e6))
-                             ->capture_default_str();
   command
       .add_option("--payload-at", arguments->payload_at,
                   "x y z [m] in the frame of the trunk; default: the trunk's centre of mass")
       ->expected(3)
-      ->needs(payload);
+      ->needs("--payload");
   command
       .add_option("-o,--output", arguments->output,
                   "the file; for bielle the directory, whose last part names its files; for maps of linkages a "

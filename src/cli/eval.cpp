@@ -128,8 +128,7 @@ int evaluate(const EvalArguments& arguments) {
 
 void addEval(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<EvalArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
-      ->required();
+  addRobot(command, arguments->robot);
   command.add_option("--state", arguments->state, "JSON file with the state; - for the standard input")->required();
   command.add_flag("--derivatives", arguments->derivatives, "add the derivatives with respect to q, v and u");
   command.add_flag("--close", arguments->close,

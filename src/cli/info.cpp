@@ -65,8 +65,7 @@ void printInfo(const Json& robot) {
 void addInfo(CLI::App& command, Action& action) {
   const auto robot = std::make_shared<RobotArgument>();
   const auto as_json = std::make_shared<bool>(false);
-  command.add_option("ROBOT", robot->name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
-      ->required();
+  addRobot(command, *robot);
   addRobotFlags(command, *robot);
   command.add_flag("--json", *as_json, "print JSON");
   command.footer(

@@ -11,7 +11,8 @@
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "motion/applied_options.h"
-#include "results/number_option.h"
+#include "motion/described_options.h"
+#include "results/option_flags.h"
 #include "results/output_place.h"
 
 namespace bielle::cli {
@@ -103,29 +104,7 @@ void addLift(CLI::App& command, Action& action) {
       .add_option("-o,--output", arguments->directory,
                   "directory for lift.json, trajectory.csv, trajectory.npz and summary.json; created if necessary")
       ->required();
-  command
-      .add_option_function<std::string>(
-          "--method",
-          [arguments](const std::string& name) {
-            arguments->options.method = name == "nlopt" ? LiftMethod::Nlopt : LiftMethod::Newton;
-          },
-          "newton: each node separately, torques from inverse dynamics; nlopt: one step of the closed dynamics after "
-          "the other, torques by SLSQP, as in the paper's appendix")
-      ->check(CLI::IsMember({"newton", "nlopt"}))
-      ->default_str("newton");
-  command.add_option("--singular", arguments->options.singular, "margin below which a linkage is at a dead point [1]")
-      ->check(isWithin(0, 1))
-      ->capture_default_str();
-  command
-      .add_option("--position-tolerance", arguments->options.position_tolerance,
-                  "tolerance of nlopt's positions [rad, m]")
-      ->check(isPositive())
-      ->capture_default_str();
-  command
-      .add_option("--velocity-tolerance", arguments->options.velocity_tolerance,
-                  "tolerance of nlopt's velocities [rad/s, m/s]")
-      ->check(isPositive())
-      ->capture_default_str();
+  addFlags(arguments->options, command);
   command.footer(
       "The closed robot takes on the serial model's postures, velocities and accelerations wherever its linkages "
       "allow;\n"

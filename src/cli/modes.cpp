@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iostream>
+#include <optional>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/error.h"
@@ -11,7 +12,7 @@
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "report/mode_view.h"
-#include "results/number_option.h"
+#include "results/option_flags.h"
 #include "results/output_place.h"
 
 namespace bielle::cli {
@@ -28,9 +29,18 @@ struct ModesArguments {
   std::string reference;
   std::vector<std::string> locked;
   std::string output;
-  double contact_stiffness = 0;
+  std::optional<double> contact_stiffness;  // N/m
   bool lock_motors = false, in_the_air = false, json = false;
 };
+
+void describe(OptionFields& f, ModesArguments& a) {
+  f.text("reference", a.reference, "at this reference of the robot; default: its starting posture, or one that closes");
+  f.flag("lock_motors", a.lock_motors, "joints with motors stand still");
+  f.number("contact_stiffness", a.contact_stiffness, "N/m", kPositive,
+           "of every sole in all directions, shared by its corners; by default soles stand still");
+  f.flag("in_the_air", a.in_the_air, "the robot does not stand on its contacts");
+  f.flag("json", a.json, "print JSON, with all of the shapes");
+}
 
 struct ModesReport {
   std::string posture;
@@ -90,9 +100,9 @@ ModesReport analyse(const LoadedRobot& robot, const ModesArguments& arguments) {
   report.standing = contacts;
   const VectorXd tau = calcMotorForces(model, report.u);
   report.modes = calcModes(model, constraints, report.q, tau);
-  if (arguments.contact_stiffness > 0 && !contacts.empty() && report.modes.status == NumericalStatus::Ok) {
+  if (arguments.contact_stiffness && !contacts.empty() && report.modes.status == NumericalStatus::Ok) {
     const Model compliant =
-        makeCompliantContacts(model, constraints, report.q, report.modes.lambda, arguments.contact_stiffness);
+        makeCompliantContacts(model, constraints, report.q, report.modes.lambda, *arguments.contact_stiffness);
     ConstraintSet loops = makeConstraintSet(compliant);
     for (const int joint : locked) addLock(compliant, report.q, joint, loops);
     report.standing.clear();
@@ -186,18 +196,10 @@ int run(const ModesArguments& arguments) {
 
 void addModes(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ModesArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .yaml or MuJoCo .xml file")->required();
-  command.add_option("--reference", arguments->reference,
-                     "at this reference of the robot; default: its starting posture, or one that closes");
+  addRobot(command, arguments->robot);
   command.add_option("--lock", arguments->locked, "joints that stand still");
-  command.add_flag("--lock-motors", arguments->lock_motors, "joints with motors stand still");
-  command
-      .add_option("--contact-stiffness", arguments->contact_stiffness,
-                  "of every sole in all directions, shared by its corners [N/m]; by default soles stand still")
-      ->check(isPositive());
-  command.add_flag("--in-the-air", arguments->in_the_air, "the robot does not stand on its contacts");
   command.add_option("-o,--output", arguments->output, "a page on which the robot swings in its modes");
-  command.add_flag("--json", arguments->json, "print JSON, with all of the shapes");
+  addFlags(*arguments, command);
   addRobotFlags(command, arguments->robot);
   command.footer(
       "Motors that are not locked keep the torques that hold the posture, as far as they can. Springs, dampers, "

@@ -9,7 +9,7 @@
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/ratio_report.h"
-#include "results/number_option.h"
+#include "results/option_flags.h"
 
 namespace fs = std::filesystem;
 
@@ -27,6 +27,13 @@ struct RatioArguments {
   SweepOptions sweep;
   bool json = false;
 };
+
+void describe(OptionFields& f, RatioArguments& a) {
+  f.text("reference", a.reference, "start from this reference of the robot; default: the first");
+  f.number("step", a.sweep.step, "rad", {1e-4, 0.2}, "largest step along the linkage, all its joints together");
+  f.integer("grid", a.grid, {2, 500}, "number of angles of the first joint in the map of a linkage with two motors");
+  f.flag("json", a.json, "print JSON");
+}
 
 VectorXd findStart(const LoadedRobot& robot, const std::string& reference) {
   if (reference.empty()) return findClosedConfiguration(robot.model).q;
@@ -74,24 +81,14 @@ int run(const RatioArguments& arguments) {
 
 void addRatio(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<RatioArguments>();
-  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
-      ->required();
+  addRobot(command, arguments->robot);
   command
       .add_option("--joint", arguments->joints,
                   "joint to sweep; then the other joints of its linkage, unless the robot's serial joints name them")
       ->required();
-  command.add_option("--reference", arguments->reference, "start from this reference of the robot; default: the first");
   command.add_option("-o,--output", arguments->directory,
                      "directory for ratio.csv, ratio.json, ratio.svg (and map.csv)");
-  command.add_option("--step", arguments->sweep.step, "largest step along the linkage, all its joints together [rad]")
-      ->check(isWithin(1e-4, 0.2))
-      ->capture_default_str();
-  command
-      .add_option("--grid", arguments->grid,
-                  "number of angles of the first joint in the map of a linkage with two motors")
-      ->check(CLI::Range(2, 500))
-      ->capture_default_str();
-  command.add_flag("--json", arguments->json, "print JSON");
+  addFlags(*arguments, command);
   addRobotFlags(command, arguments->robot);
   command.footer(
       "The ratio R is the speed of a motor over that of a joint [rad/rad], v_motor = R v_joint; motor torques u give "

@@ -10,7 +10,7 @@
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/film.h"
-#include "results/number_option.h"
+#include "results/option_flags.h"
 #include "results/output_place.h"
 #include "results/result_files.h"
 
@@ -78,10 +78,22 @@ int writePages(const ReportArguments& arguments) {
   return kOk;
 }
 
+void describe(OptionFields& f, ReportArguments& a) {
+  f.text("png", a.png, "also draw still pictures, side by side in this file; needs chromium");
+  f.text("mp4", a.mp4, "also make a film in real time; needs chromium and ffmpeg");
+  f.number("rate", a.rate, "1/s", {1, 240}, "frame rate of the film");
+  f.text("size", a.size, "size of one picture [pixels]");
+  f.text("view", a.film.view, "direction of view");
+  f.flag("ghosts", a.ghosts, "show several robots in one place, not side by side");
+  f.flag("see_through", a.film.see_through, "make bodies transparent");
+  f.text("show", a.film.show,
+         "layers to show (locks, contactForces, closureForces, com, traces, footprints, plan, push; separated by "
+         "commas)");
+  f.text("hide", a.film.hide, "layers to hide");
+}
+
 void addFilmOptions(CLI::App& command, ReportArguments& arguments) {
-  const std::string layers =
-      " (locks, contactForces, closureForces, com, traces, footprints, plan, push; separated by commas)";
-  command.add_option("--png", arguments.png, "also draw still pictures, side by side in this file; needs chromium");
+  addFlags(arguments, command);
   command
       .add_option("--times", arguments.film.times,
                   "times of the pictures [s], separated by commas; default: six over the motion")
@@ -89,18 +101,7 @@ void addFilmOptions(CLI::App& command, ReportArguments& arguments) {
       ->check(isNotNegative());
   command.add_option("--columns", arguments.film.columns, "pictures in a row; default: all, at most six")
       ->check(CLI::Range(1, 100));
-  command.add_option("--mp4", arguments.mp4, "also make a film in real time; needs chromium and ffmpeg");
-  command.add_option("--rate", arguments.rate, "frame rate of the film [1/s]")
-      ->check(isWithin(1, 240))
-      ->capture_default_str();
-  command.add_option("--size", arguments.size, "size of one picture [pixels]")->capture_default_str();
-  command.add_option("--view", arguments.film.view, "direction of view")
-      ->check(CLI::IsMember({"oblique", "front", "side", "top"}))
-      ->capture_default_str();
-  command.add_flag("--ghosts", arguments.ghosts, "show several robots in one place, not side by side");
-  command.add_flag("--see-through", arguments.film.see_through, "make bodies transparent");
-  command.add_option("--show", arguments.film.show, "layers to show" + layers);
-  command.add_option("--hide", arguments.film.hide, "layers to hide");
+  command.get_option("--view")->check(CLI::IsMember({"oblique", "front", "side", "top"}));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/error.h"
@@ -16,7 +17,7 @@
 #include "model/hash.h"
 #include "results/interrupt.h"
 #include "results/line_log.h"
-#include "results/number_option.h"
+#include "results/option_flags.h"
 #include "results/output_place.h"
 
 namespace fs = std::filesystem;
@@ -24,15 +25,31 @@ namespace fs = std::filesystem;
 namespace bielle::cli {
 namespace {
 
+const std::vector<std::string> kVersions = {"2", "3", "3.7"};  // MujocoVersion
+
 struct SoftnessArguments {
   RobotArgument robot;
   std::string directory, motion;
-  double time_step = 0, within = 1e-4;
+  std::optional<double> time_step;  // s, instead of the file's
+  double within = 1e-4;
   std::vector<double> solref, solimp;
-  std::string mujoco = "3.7";
+  MujocoVersion mujoco = MujocoVersion::ThreeSeven;
   bool json = false;
   SoftnessOptions options;
 };
+
+void describe(OptionFields& f, SoftnessArguments& a) {
+  f.number("timestep", a.time_step, "s", kPositive, "instead of the file's");
+  f.number("within", a.within, "m, and rad of angles", kPositive, "largest gap that settings.xml shall allow");
+  f.text("motion", a.motion,
+         "result of a motion of this mechanism, along which to look, instead of at postures of its range");
+  f.number("torque", a.options.torque, "N m or N", kPositive, "of each motor, instead of its limit");
+  f.integer("postures", a.options.postures, {1, 1000}, "of the range of each motor");
+  f.choice("mujoco", a.mujoco, kVersions,
+           "version: before 3, rotations of welds are scaled by the inertia of translations; before 3.7, the change of "
+           "J is not known");
+  f.flag("json", a.json, "print JSON");
+}
 
 // The file of MuJoCo that was loaded, or that a YAML file completes.
 std::string findMjcf(const LoadedRobot& robot) {
@@ -48,7 +65,7 @@ MjcfSoftness readSoftness(const SoftnessArguments& arguments, const std::string&
   if (softness.equalities.empty())
     throw InputError(file, "equality", "the file has no equalities, and so no loops that could be soft",
                      "close its loops by connect, weld, joint or tendon in <equality>");
-  if (arguments.time_step > 0) softness.step.duration = arguments.time_step;
+  softness.step.duration = arguments.time_step.value_or(softness.step.duration);
   for (MjcfEquality& equality : softness.equalities) {
     SoftSettings& settings = equality.settings;
     std::copy(arguments.solref.begin(), arguments.solref.end(), settings.solref.begin());
@@ -70,9 +87,9 @@ Json identify(const SoftnessArguments& arguments, const LoadedRobot& robot, cons
           {"refsafe", softness.step.is_safe},
           {"integrator", static_cast<int>(softness.step.integrator)},
           {"equalities", equalities},
-          {"mujoco", arguments.mujoco},
+          {"mujoco", kVersions.at(static_cast<size_t>(arguments.mujoco))},
           {"postures", arguments.options.postures},
-          {"torque", arguments.options.torque},
+          {"torque", arguments.options.torque.value_or(-1)},
           {"motion", motion}};
 }
 
@@ -161,10 +178,7 @@ int run(const SoftnessArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
   const std::string file = findMjcf(robot);
   const MjcfSoftness softness = readSoftness(arguments, file);
-  const MujocoVersion version = arguments.mujoco == "2"   ? MujocoVersion::Two
-                                : arguments.mujoco == "3" ? MujocoVersion::Three
-                                                          : MujocoVersion::ThreeSeven;
-  const SoftLoops loops = makeSoftLoops(robot.model, softness, version);
+  const SoftLoops loops = makeSoftLoops(robot.model, softness, arguments.mujoco);
   std::vector<std::string> inputs = listFiles(robot);
   std::vector<SoftnessInstant> motion;
   if (!arguments.motion.empty()) {
@@ -212,30 +226,11 @@ void addSoftness(CLI::App& command, Action& action) {
       .add_option("-o,--output", arguments->directory,
                   "directory for the rows softness.jsonl, the page softness.html and settings.xml")
       ->required();
-  command.add_option("--timestep", arguments->time_step, "instead of the file's [s]")->check(isPositive());
+  addFlags(*arguments, command);
   command.add_option("--solref", arguments->solref, "of all equalities, instead of the file's")->expected(2);
   command.add_option("--solimp", arguments->solimp, "likewise")->expected(1, 5);
-  command.add_option("--within", arguments->within, "largest gap that settings.xml shall allow [m, and rad of angles]")
-      ->check(isPositive())
-      ->capture_default_str();
-  command
-      .add_option("--motion", arguments->motion,
-                  "result of a motion of this mechanism, along which to look, instead of at postures of its range")
-      ->check(CLI::ExistingDirectory);
-  command.add_option("--torque", arguments->options.torque, "of each motor, instead of its limit [N m or N]")
-      ->check(isPositive())
-      ->excludes("--motion");
-  command.add_option("--postures", arguments->options.postures, "of the range of each motor")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str()
-      ->excludes("--motion");
-  command
-      .add_option("--mujoco", arguments->mujoco,
-                  "version: before 3, rotations of welds are scaled by the inertia of translations; before 3.7, the "
-                  "change of J is not known")
-      ->check(CLI::IsMember({"2", "3", "3.7"}))
-      ->capture_default_str();
-  command.add_flag("--json", arguments->json, "print JSON");
+  command.get_option("--motion")->check(CLI::ExistingDirectory);
+  for (const char* name : {"--torque", "--postures"}) command.get_option(name)->excludes("--motion");
   command.footer(
       "MuJoCo's equalities are springs, dampers and masses; this predicts what they do, one linkage at a time while "
       "all\n"

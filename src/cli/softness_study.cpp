@@ -167,7 +167,7 @@ SoftnessStudy::Worst SoftnessStudy::calcMotors(const SoftnessTask& task) const {
   Worst worst;
   std::vector<int> motors, dofs;
   for (const int motor : listMotors(task.cluster))
-    if (options_.torque > 0 || std::isfinite(model_.motors()[motor].effort_limit)) motors.push_back(motor);
+    if (options_.torque || std::isfinite(model_.motors()[motor].effort_limit)) motors.push_back(motor);
   if (motors.empty()) return worst;
   worst.is_loaded = true;
   for (const int k : model_.clusters()[task.cluster].dofs)
@@ -180,7 +180,7 @@ SoftnessStudy::Worst SoftnessStudy::calcMotors(const SoftnessTask& task) const {
     for (size_t i = 0; i < motors.size(); ++i) {
       const Motor& motor = model_.motors()[motors[i]];
       const double sign = pattern >> i & 1 ? -1 : 1;
-      tau[motor.dof] = sign * (options_.torque > 0 ? options_.torque : motor.effort_limit);
+      tau[motor.dof] = sign * options_.torque.value_or(motor.effort_limit);
     }
     const SoftRest rest = loops_.findRest(task.q, Z, tau);
     worst.holds &= rest.status == NumericalStatus::Ok;

@@ -1,5 +1,6 @@
 #pragma once
 // How soft the loops of a mechanism are over their ranges.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,8 +10,8 @@
 namespace bielle::cli {
 
 struct SoftnessOptions {
-  int postures = 9;    // of each coordinate's range
-  double torque = -1;  // of the motors, N m or N; negative: their limits
+  int postures = 9;              // of each coordinate's range
+  std::optional<double> torque;  // of the motors, N m or N, instead of their limits
 };
 
 // What a loop does at a posture, the worst last; `diverges` depends on the time step.

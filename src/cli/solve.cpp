@@ -13,15 +13,15 @@
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/free_timings.h"
-#include "cli/objective.h"
 #include "cli/table.h"
 #include "motion/applied_options.h"
+#include "motion/described_options.h"
 #include "motion/feasibility.h"
 #include "results/interrupt.h"
+#include "results/option_flags.h"
 #include "results/other_robot.h"
 #include "results/output_place.h"
 #include "results/setting.h"
-#include "solve/fddp_checks.h"
 
 namespace bielle::cli {
 namespace {
@@ -71,6 +71,17 @@ std::string formatConstraints(const FddpSummary& solver) {
   return (solver.violation > 0 ? "violated by at most " + violation : std::string("satisfied")) +
          ", largest multiplier " + formatNumber(solver.multiplier, "%.3g") + " after " +
          std::to_string(solver.multiplier_updates) + " updates";
+}
+
+// E.g. "35.2 J, cost of transport 0.81 (losses of 12 motors assumed: 0.25 W/(N m)^2)".
+std::string formatEnergy(const ElectricalEnergy& energy) {
+  std::string text = formatNumber(energy.total, "%.2f") + " J";
+  if (std::isfinite(energy.cost_of_transport))
+    text += ", cost of transport " + formatNumber(energy.cost_of_transport, "%.3f");
+  if (energy.num_assumed > 0)
+    text += " (losses of " + std::to_string(energy.num_assumed) +
+            " motors assumed: " + formatNumber(kDefaultTorqueLoss) + " W/(N m)^2)";
+  return text;
 }
 
 // Of linkages that come near one, rad or m.
@@ -275,30 +286,8 @@ void addFiles(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
         ->required();
 }
 
-void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
-  LimitOptions& limits = arguments->problem.limits;
-  sub.add_flag_callback(
-      "--no-limits", [&limits] { limits.enforced = false; },
-      "ignore the robot's limits of torque, joint range and velocity, which motions otherwise respect");
-  sub.add_option("--dead-point-margin", limits.dead_point_margin,
-                 "least transmission of a linkage (joint speed over motor speed), relative to that at the start; the "
-                 "largest is its inverse; 0: no bounds. A motion within 0.1 rad of a dead point is solved again with a "
-                 "larger one, unless less than the default is given")
-      ->capture_default_str();
-  sub.add_option("--limit", arguments->effort_limits,
-                 "motor=largest torque [N m], instead of the robot's; may be repeated")
-      ->allow_extra_args(false);
-  sub.add_option("--velocity-limit", arguments->velocity_limits,
-                 "motor=largest velocity [rad/s], instead of the robot's; may be repeated")
-      ->allow_extra_args(false);
-  sub.add_option("--power-limit", arguments->power_limits,
-                 "motor=largest mechanical power [W], driving or braking; may be repeated")
-      ->allow_extra_args(false);
-}
-
 void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
-  sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
-      ->required();
+  addRobot(sub, arguments->robot, "--robot");
   addVerbose(sub);
   sub.add_option("-o,--output", arguments->directory,
                  "directory for trajectory.csv, trajectory.npz, summary.json, the robot (mechanism.urdf, .yaml) and "
@@ -312,41 +301,38 @@ void requireOutput(const SolveArguments& arguments) {
 }
 
 // Options common to all motions.
+void describe(OptionFields& f, SolveArguments& a) {
+  f.texts("set", a.settings, "name=value of one of the options below; may be repeated");
+  describe(f, a.problem);
+  f.texts("limit", a.effort_limits, "motor=largest torque [N m], instead of the robot's; may be repeated");
+  f.texts("velocity_limit", a.velocity_limits,
+          "motor=largest velocity [rad/s], instead of the robot's; may be repeated");
+  f.texts("power_limit", a.power_limits, "motor=largest mechanical power [W], driving or braking; may be repeated");
+  f.choice(
+      "step", a.step, {"euler", "midpoint"},
+      "midpoint: second-order steps; euler: first-order steps, as in the paper, which --model serial uses unless a "
+      "rule is given (default: midpoint)");
+  f.choice("model", a.serial, {"closed", "serial"},
+           "closed: with linkages; serial: linkages frozen at the standing posture, motors on the serial joints");
+  f.text("serial_armature", a.serial_armature,
+         "armature of the motors on serial joints [kg m^2], or `reflected`: the rotors' inertia seen there at the "
+         "standing posture");
+  describe(f, a.solver);
+  f.text("warm_start", a.warm_start,
+         "directory of another result of this robot as the initial guess, resampled if its length differs");
+  f.flag("quiet", a.quiet, "do not print a line per iteration");
+  f.flag("no_report", a.no_report, "do not write report.html");
+  f.flag("no_check", a.no_check, "do not run `bielle check` on the result");
+  f.flag("dry_run", a.dry_run,
+         "plan the motion and check it as before the first iteration: solve nothing, write nothing");
+}
+
 void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
-  sub.add_option("--set", arguments->settings, "name=value of one of the options below; may be repeated")
-      ->allow_extra_args(false);
-  sub.add_option_function<std::string>(
-         "--formulation",
-         [arguments](const std::string& name) {
-           arguments->problem.formulation =
-               name == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
-         },
-         "reduced: loops are closed at every node; full: all joints of the spanning tree, loops closed by "
-         "accelerations")
-      ->check(CLI::IsMember({getName(Formulation::Full), getName(Formulation::Reduced)}))
-      ->default_str(getName(arguments->problem.formulation));
-  sub.add_option_function<std::string>(
-         "--step",
-         [arguments](const std::string& name) {
-           arguments->step = name == getName(StepRule::Euler) ? StepRule::Euler : StepRule::Midpoint;
-         },
-         "midpoint: second-order steps; euler: first-order steps, as in the paper, which --model serial uses unless a "
-         "rule "
-         "is given")
-      ->check(CLI::IsMember({getName(StepRule::Euler), getName(StepRule::Midpoint)}))
-      ->default_str(getName(StepRule::Midpoint));
-  sub.add_option_function<std::string>(
-         "--model", [arguments](const std::string& name) { arguments->serial = name == "serial"; },
-         "closed: with linkages; serial: linkages frozen at the standing posture, motors on the serial joints")
-      ->check(CLI::IsMember({"closed", "serial"}))
-      ->default_str("closed");
-  sub.add_option("--serial-armature", arguments->serial_armature,
-                 "armature of the motors on serial joints [kg m^2], or `reflected`: the rotors' inertia seen there at "
-                 "the standing posture")
-      ->capture_default_str();
-  addLimitOptions(sub, arguments);
+  addFlags(*arguments, sub);
   addTimingOptions(sub, arguments->timings);
-  addObjectiveOptions(sub, arguments->problem.objective);
+  sub.add_flag_callback(
+      "--no-limits", [arguments] { arguments->problem.limits.enforced = false; },
+      "ignore the robot's limits of torque, joint range and velocity, which motions otherwise respect");
   sub.add_flag_callback(
       "--no-multipliers",
       [arguments] {
@@ -354,19 +340,6 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
         arguments->solver.constraints.max_penalty = 1e14;
       },
       "hold constraints by a growing quadratic penalty alone, for comparisons");
-  sub.add_option("--max-iterations", arguments->solver.max_iterations, "largest number of iterations")
-      ->check(CLI::Range(1, kMostIterations))
-      ->capture_default_str();
-  sub.add_option("--threads", arguments->solver.threads, "number of threads; 0: all; results do not depend on it")
-      ->check(CLI::Range(0, kMostThreads))
-      ->capture_default_str();
-  sub.add_option("--warm-start", arguments->warm_start,
-                 "directory of another result of this robot as the initial guess, resampled if its length differs");
-  sub.add_flag("--quiet", arguments->quiet, "do not print a line per iteration");
-  sub.add_flag("--no-report", arguments->no_report, "do not write report.html");
-  sub.add_flag("--no-check", arguments->no_check, "do not run `bielle check` on the result");
-  sub.add_flag("--dry-run", arguments->dry_run,
-               "plan the motion and check it as before the first iteration: solve nothing, write nothing");
 }
 
 constexpr const char* kOutcome =

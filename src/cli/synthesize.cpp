@@ -19,8 +19,9 @@
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "report/run.h"
-#include "results/number_option.h"
+#include "results/option_flags.h"
 #include "robots/generator_entry.h"
+#include "solve/fddp_checks.h"
 
 namespace fs = std::filesystem;
 
@@ -43,6 +44,23 @@ struct SynthesizeArguments {
   unsigned seed = 1;
   double margin = 0.3, clearance = 0.01, distance = 0.2;
 };
+
+void describe(OptionFields& f, SynthesizeArguments& a) {
+  f.number("ratio", a.ratio, "1", kPositive,
+           "requested turns of the motor per turn of the joint, over the whole range, in either direction");
+  f.text("joint", a.joint, "joint of --like, --motion and --parameter, of the same name in all");
+  f.text("like", a.like, "robot whose linkage has the requested ratios");
+  f.text("motion", a.motion, "result of a motion whose motor is on the joint: the least heat of the motor");
+  f.text("motor", a.motor, "motor of the catalogue, whose speed must not be exceeded");
+  f.number("distance", a.distance, "rad", {0, 10},
+           "least way from the range to a dead point, of linkages by --parameter");
+  f.number("margin", a.margin, "1", {0, 1},
+           "least sine of the angles between rod, crank and arm of four-bars; 0 at dead points");
+  f.number("clearance", a.clearance, "m", {}, "least distance of the rod of four-bars from the joint's axis");
+  f.integer("count", a.count, {1, kMostKept}, "linkages kept");
+  f.integer("seed", a.seed, "of the random numbers");
+  f.integer("threads", a.threads, {0, kMostThreads}, "threads; 0: one per core");
+}
 
 // Angle, torque and speed of a joint that its motor drives, at the stages of a motion.
 JointDemand readDemand(const ReportRun& run, const SynthesizeArguments& arguments) {
@@ -217,47 +235,25 @@ void addSynthesize(CLI::App& command, Action& action) {
   };
   command.add_option("robot", a->robot,
                      "generated robot whose linkage is looked for; default: that of --motion, or leg_biped");
-  CLI::Option* range = add_pair("--range", a->range, "angles of the joint [rad]");
-  CLI::Option* ratio = command.add_option("--ratio", a->ratio,
-                                          "requested turns of the motor per turn of the joint, over the whole range, "
-                                          "in either direction");
-  ratio->check(isPositive());
-  CLI::Option* joint =
-      command.add_option("--joint", a->joint, "joint of --like, --motion and --parameter, of the same name in all");
-  CLI::Option* like = command.add_option("--like", a->like, "robot whose linkage has the requested ratios");
-  CLI::Option* motion = command.add_option(
-      "--motion", a->motion, "result of a motion whose motor is on the joint: the least heat of the motor");
-  command.add_option("--motor", a->motor, "motor of the catalogue, whose speed must not be exceeded")->needs(motion);
-  like->needs(joint)->excludes(ratio);
-  motion->needs(joint)->excludes(range)->excludes(ratio)->excludes(like);
+  add_pair("--range", a->range, "angles of the joint [rad]");
+  addFlags(*a, command);
+  command.get_option("--motor")->needs("--motion");
+  command.get_option("--like")->needs("--joint")->excludes("--ratio");
+  CLI::Option* motion = command.get_option("--motion")->needs("--joint");
+  for (const char* other : {"--range", "--ratio", "--like"}) motion->excludes(other);
   command
       .add_option("--parameter", a->parameters,
                   "this parameter of the robot varies, 30 % about its value or over a range; may be repeated. "
                   "Without: four-bars by their drawing")
       ->type_name(kParameterRange);
-  command
-      .add_option("--distance", a->distance,
-                  "least way from the range to a dead point, of linkages by --parameter [rad]")
-      ->check(CLI::Range(0.0, 10.0))
-      ->capture_default_str();
   add_pair("--motor-x", a->motor_x, "four-bars: place of the motor in front of the joint [m]")->capture_default_str();
   add_pair("--motor-z", a->motor_z, "four-bars: place of the motor above the joint [m]")->capture_default_str();
   add_pair("--crank", a->crank, "four-bars: length of the crank [m]")->capture_default_str();
   add_pair("--arm", a->arm, "four-bars: length of the joint's arm [m]")->capture_default_str();
   command
-      .add_option("--margin", a->margin,
-                  "four-bars: least sine of the angles between rod, crank and arm; 0 at dead points")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command.add_option("--clearance", a->clearance, "four-bars: least distance of the rod from the joint's axis [m]")
-      ->capture_default_str();
-  command
       .add_option("--samples", a->samples,
                   "linkages at random; default: 1000000 by their drawing, 10000 by --parameter")
       ->check(CLI::Range(1L, 1000000000L));
-  command.add_option("--count", a->count, "linkages kept")->check(CLI::Range(1, kMostKept))->capture_default_str();
-  command.add_option("--seed", a->seed, "of the random numbers")->capture_default_str();
-  command.add_option("--threads", a->threads, "threads; 0: one per core")->capture_default_str();
   command.add_option("-o,--output", a->directory, "directory of the robots that have them")->required();
   command.footer(
       "Draws linkages at random, ranks them by the ratio of motor to joint, refines the best and writes a robot for "

@@ -72,8 +72,7 @@ int view(const ViewArguments& arguments) {
 
 void addView(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<ViewArguments>();
-  command.add_option("robot", arguments->robot.name, "name, directory, .urdf, .sdf, .usda, .yaml or MuJoCo .xml file")
-      ->required();
+  addRobot(command, arguments->robot);
   addRobotFlags(command, arguments->robot);
   command
       .add_option(

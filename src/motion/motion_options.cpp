@@ -3,8 +3,10 @@
 #include "bielle/motion/run.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "motion/described_options.h"
 #include "motion/footholds.h"
 #include "motion/obstacles.h"
+#include "solve/fddp_checks.h"
 
 namespace bielle {
 
@@ -214,6 +216,43 @@ void describe(OptionFields& f, HopOptions& o) {
   f.number("stance", o.stance, "s", kNotNegative,
            "time on one foot before the first flight, between flights and after the last one");
   describeGait(f, o.gait);
+}
+
+void describe(OptionFields& f, LimitOptions& o) {
+  f.number("dead_point_margin", o.dead_point_margin, "1", {},
+           "least transmission of a linkage (joint speed over motor speed), relative to that at the start; the largest "
+           "is its inverse; 0: no bounds. A motion within 0.1 rad of a dead point is solved again with a larger one, "
+           "unless less than the default is given");
+}
+
+void describe(OptionFields& f, ObjectiveOptions& o) {
+  f.choice("objective", o.objective, {"effort", "energy", "peak-torque"},
+           "effort: weighted squares; energy: electrical energy of the motors; peak-torque: largest ratio of a torque "
+           "to its limit. The last two start from the motion of least effort");
+  f.number("regeneration", o.regeneration, "1", {0, 1}, "share of the regenerated electrical energy that is reused");
+  f.number("regularization", o.regularization, "1", kPositive, "share of the other costs that is kept; default: 0.2");
+}
+
+void describe(OptionFields& f, ProblemOptions& o) {
+  f.choice("formulation", o.formulation, {"full", "reduced"},
+           "reduced: loops are closed at every node; full: all joints of the spanning tree, loops closed by "
+           "accelerations");
+  describe(f, o.limits);
+  describe(f, o.objective);
+}
+
+void describe(OptionFields& f, FddpOptions& o) {
+  f.integer("max_iterations", o.max_iterations, {1, kMostIterations}, "largest number of iterations");
+  f.integer("threads", o.threads, {0, kMostThreads}, "number of threads; 0: all; results do not depend on it");
+}
+
+void describe(OptionFields& f, LiftOptions& o) {
+  f.choice("method", o.method, {"newton", "nlopt"},
+           "newton: each node separately, torques from inverse dynamics; nlopt: one step of the closed dynamics after "
+           "the other, torques by SLSQP, as in the paper's appendix");
+  f.number("singular", o.singular, "1", {0, 1}, "margin below which a linkage is at a dead point");
+  f.number("position_tolerance", o.position_tolerance, "rad, m", kPositive, "tolerance of nlopt's positions");
+  f.number("velocity_tolerance", o.velocity_tolerance, "rad/s, m/s", kPositive, "tolerance of nlopt's velocities");
 }
 
 }  // namespace bielle

@@ -7,9 +7,11 @@
 #include "bielle/motion/solve.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
+#include "motion/described_options.h"
 #include "paper/commands.h"
 #include "paper/jump.h"
 #include "paper/walk.h"
+#include "results/option_flags.h"
 
 namespace bielle::paper {
 namespace {
@@ -109,14 +111,7 @@ void addLift(CLI::App& app, Action& action) {
   const auto arguments = std::make_shared<LiftArguments>();
   command.add_option("DIR", arguments->serial_directory, "result of `bielle-paper walk --serial`")->required();
   command.add_option("-o,--output", arguments->directory, "directory of the results")->required();
-  command
-      .add_option_function<std::string>(
-          "--method",
-          [arguments](const std::string& name) {
-            arguments->options.method = name == "nlopt" ? LiftMethod::Nlopt : LiftMethod::Newton;
-          },
-          "as of `bielle lift`")
-      ->check(CLI::IsMember({"newton", "nlopt"}));
+  addFlags(arguments->options, command);
   command.callback(
       [&action, arguments] { action = [=](const CommandLine& line) { return liftWalk(*arguments, line); }; });
 }

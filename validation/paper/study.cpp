@@ -127,8 +127,7 @@ void addStudy(CLI::App& app, Action& action) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   command
-      .add_option("--robot", arguments->robot,
-                  "name, directory, .urdf, .yaml or MuJoCo .xml file of a robot with an approximate serial model")
+      .add_option("--robot", arguments->robot, "name, directory or file of a robot with an approximate serial model")
       ->capture_default_str();
   command.add_option("--values", arguments->values, "values of the parameter of one study, instead of its own");
   command.footer("Studies:\n" + list +

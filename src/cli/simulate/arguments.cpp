@@ -194,11 +194,6 @@ void describeFiles(OptionFields& fields, SimulateArguments& a) {
   fields.flag("dry_run", a.dry_run, "check the options only: read no motion, execute nothing, write nothing");
 }
 
-std::string makeFlag(std::string name) {
-  std::replace(name.begin(), name.end(), '_', '-');
-  return "--" + name;
-}
-
 }  // namespace
 
 WorldGround makeGround(const SimulateArguments& arguments, const Ground& planned, const StandingPlace& place) {
