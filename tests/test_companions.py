@@ -6,9 +6,11 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 
 PROJECT = """cmake_minimum_required(VERSION 3.22)
 project(small NONE)
@@ -71,6 +73,17 @@ def check_building(directory, core, source):
     assert printed.returncode == 2 and "goes on from there" in printed.stderr, printed
     (tree / "fails").unlink()
     (tree / "made").unlink()
+
+    # Ctrl-C ends the build, which begins anew; where the core alone is killed, it goes on, and the next call waits for it.
+    for ends, makes in ((lambda call: os.killpg(call.pid, signal.SIGINT), 2), (lambda call: call.kill(), 1)):
+        with subprocess.Popen([core, "design", "a.yaml"], stderr=subprocess.DEVNULL, start_new_session=True) as call:
+            while count_makes(tree) == 0:
+                time.sleep(0.01)
+            ends(call)
+        printed = run(core, "design", "b.yaml")
+        assert printed.stdout == "companion: design b.yaml\n" and count_makes(tree) == makes, printed
+        (tree / "bin/bielle-design").unlink()
+        (tree / "made").unlink()
 
     calls = [subprocess.Popen([core, "design", f"{name}.yaml"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
              for name in "ab"]

@@ -20,9 +20,7 @@ def find_program(name: str) -> str:
     built = Path(__file__).absolute().parents[2] / "bin" / name
     found = str(built) if built.is_file() else shutil.which(name)
     if found is None:
-        option = {"bielle-check": "VALIDATION", "bielle-simulate": "SIMULATION"}.get(name)
-        remedy = f"build Bielle with -DBIELLE_BUILD_{option}=ON (it needs Simbody)" if option else "install Bielle"
-        raise FileNotFoundError(f"{name} is not on the PATH; {remedy}")
+        raise FileNotFoundError(f"{name} is not on the PATH; install Bielle")
     return found
 
 
@@ -64,7 +62,7 @@ def check(result: Union[Directory, Result]) -> Dict[str, Any]:
         with tempfile.TemporaryDirectory() as directory:
             result.write(directory)
             return check(directory)
-    table: Dict[str, Any] = json.loads(run_program("bielle-check", ["--json", str(result)], statuses=(0, 1)))
+    table: Dict[str, Any] = json.loads(run_program("bielle", ["check", "--json", str(result)], statuses=(0, 1)))
     return table
 
 
@@ -97,8 +95,8 @@ def simulate(
     if directory is None:
         with tempfile.TemporaryDirectory() as output:
             return simulate(result, output, progress, **options, summary_only=True)
-    arguments = [str(result), "-o", str(directory), *make_arguments(options)]
-    run_program("bielle-simulate", arguments, progress, statuses=(0, 1, 3))  # 1: it fell; 3: not decided
+    arguments = ["simulate", str(result), "-o", str(directory), *make_arguments(options)]
+    run_program("bielle", arguments, progress, statuses=(0, 1, 3))  # 1: it fell; 3: not decided
     worlds = str(options.get("world", "")).split(",")
     if len(worlds) > 1:
         return {world: json.loads((Path(directory) / world / "summary.json").read_text()) for world in worlds}

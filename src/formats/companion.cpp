@@ -79,6 +79,7 @@ constexpr const char* kMissing = "is neither beside this program nor on the PATH
 std::string findRemedy(const std::string& program) {
   static const std::map<std::string, std::string> builds = {
       {"bielle-check", "build Bielle with -DBIELLE_BUILD_VALIDATION=ON (it needs Simbody)"},
+      {"bielle-dxf", "it is a part of Bielle: install that again, or run cmake in its build tree, which puts it there"},
       {"bielle-simulate", "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody)"},
       {"bielle-step",
        "build Bielle where OpenCASCADE is (Debian: libocct-data-exchange-dev, libocct-modeling-algorithms-dev, "
@@ -112,7 +113,7 @@ std::string obtainCompanion(const std::string& program) {
 
 std::string requireCompanion(const std::string& program) {
   std::string path = obtainCompanion(program);
-  if (path.empty()) throw InputError("", program, kMissing, findRemedy(program));
+  if (path.empty()) throw InputError("", program, std::string("it ") + kMissing, findRemedy(program));
   return path;
 }
 
