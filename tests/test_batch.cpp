@@ -23,7 +23,7 @@ struct Start {
 
 // Near the ground, turned and moving in all coordinates, with random torques and pushes.
 Start makeStarts(const Model& model, int count, unsigned seed) {
-  const testing::PostureHold posture(model);
+  const PostureHold posture(model);
   const ConstraintSet closures = makeConstraintSet(model);
   Workspace ws(model);
   std::mt19937 generator(seed);

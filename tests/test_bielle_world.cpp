@@ -245,7 +245,7 @@ TEST_CASE("bielle world: accelerations in the air are those of the full system")
 TEST_CASE("bielle world: steps are of second order, in the air and on the ground") {
   const Model& model = getBipetto();
   const Flight flight = makeFlight();
-  const testing::PostureHold posture(model);
+  const PostureHold posture(model);
   for (bool flies : {true, false}) {
     std::vector<VectorXd> ends;
     for (double h : {5e-4, 2.5e-4, 1.25e-4}) {
@@ -273,7 +273,7 @@ TEST_CASE("bielle world: steps are of second order, in the air and on the ground
 TEST_CASE("bielle world: torques are cut at the limits of the motors") {
   const auto world = makeTestWorld();
   const Model& model = getBipetto();
-  const testing::PostureHold posture(model);
+  const PostureHold posture(model);
   world->reset(posture.posture(), VectorXd::Zero(model.nv()));
   const VectorXd u = VectorXd::Constant(model.nu(), -1e9);
   world->setTorques(u);
@@ -285,7 +285,7 @@ TEST_CASE("bielle world: torques are cut at the limits of the motors") {
 
 TEST_CASE("bielle world: it advances without allocation") {
   const Model& model = getBipetto();
-  const testing::PostureHold posture(model);
+  const PostureHold posture(model);
   const auto world = makeTestWorld();
   VectorXd q = posture.posture();
   q[2] += 0.001;
@@ -306,7 +306,7 @@ TEST_CASE("bielle world: it advances without allocation") {
 
 TEST_CASE("worlds: an interrupt ends a period of many steps, and the world can go on") {
   const Model& model = getBipetto();
-  const testing::PostureHold posture(model);
+  const PostureHold posture(model);
   std::atomic<bool> interrupt{true};
   for (const std::string& name : listWorlds()) {
     CAPTURE(name);

@@ -63,7 +63,7 @@ TEST_CASE("mujoco world: springs and dampers between points move a linkage, and 
 
 TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined, one of hundreds") {
   const Model model = loadRobot("bipetto").model;
-  const testing::PostureHold posture(model);
+  const PostureHold posture(model);
   MujocoWorldOptions options;
   options.world.ground.height = -0.2;
   for (int i = 0; i < 300; ++i) options.world.ground.steps.push_back({{2 + 0.1 * i, 0, 1}, 0.1, 0.1, 0, 0, 0});
@@ -103,7 +103,7 @@ TEST_CASE("mujoco world: a ground of more boxes under the soles than it can have
 
 TEST_CASE("mujoco world: it advances without allocation") {
   const Model model = loadRobot("bipetto").model;
-  const testing::PostureHold posture(model);
+  const PostureHold posture(model);
   MujocoWorldOptions options;
   options.world.ground = makeTiles({0.001, 0.25, -1, 2, 2, 1});
   const auto world = makeMujocoWorld(model, options);
@@ -236,7 +236,7 @@ TEST_CASE("mujoco world: reset takes a state as it is, and the same torques make
     CHECK(world->time() == 0);
     CHECK(world->configuration() == q);
     CHECK(world->books().motor_work == 0);
-    REQUIRE(testing::hold(*world, testing::PostureHold(model), 0.2));
+    REQUIRE(testing::hold(*world, PostureHold(model), 0.2));
     end = world->configuration();
   }
   CHECK(ends[0] == ends[1]);

@@ -16,8 +16,6 @@
 namespace bielle::worlds::testing {
 namespace {
 
-constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad
-
 Vector3d calcTrunkCom(const World& world, const Model& model) {
   Workspace ws(model);
   updatePlacements<double>(model, ws, world.configuration());
@@ -31,22 +29,6 @@ double calcLoad(const World& world) {
 }
 
 }  // namespace
-
-PostureHold::PostureHold(const Model& model) : model_(model), q_(makeStandingPosture(model)) {
-  std::vector<int> feet;
-  for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-  u_ = calcStaticTorques(model, makeConstraintSet(model, makeContactTargets(model, q_, feet, 0, 0)), q_).u;
-}
-
-VectorXd PostureHold::calcTorques(ConstVectorRef q, ConstVectorRef v) const {
-  VectorXd u = u_;
-  for (int m = 0; m < model_.nu(); ++m) {
-    const Motor& motor = model_.motors()[m];
-    const int at = model_.joints()[motor.joint].idx_q;
-    u[m] += kStiffness * (q_[at] - q[at]) - kDamping * v[motor.dof];
-  }
-  return u;
-}
 
 bool hold(World& world, const PostureHold& posture, double duration, const std::function<Vector3d(double)>& push) {
   const int ticks = static_cast<int>(std::lround(duration / 1e-3));

@@ -4,22 +4,9 @@
 #include <memory>
 
 #include "bielle/formats/reader.h"
-#include "bielle/worlds/world.h"
+#include "worlds/posture_hold.h"
 
 namespace bielle::worlds::testing {
-
-// Keeps a posture by springs and dampers on the motors about the torques that hold it.
-class PostureHold {
- public:
-  explicit PostureHold(const Model& model);
-  const VectorXd& posture() const { return q_; }
-  VectorXd calcTorques(ConstVectorRef q, ConstVectorRef v) const;
-  VectorXd calcTorques(const World& world) const { return calcTorques(world.configuration(), world.velocity()); }
-
- private:
-  const Model& model_;
-  VectorXd q_, u_;
-};
 
 // Advances by control steps of 1 ms. \returns false if the world broke off
 bool hold(World& world, const PostureHold& posture, double duration,

@@ -5,18 +5,13 @@
 #include <ctime>
 #include <random>
 
-#include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/closure.h"
-#include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/motion/motion.h"
 #include "bielle/worlds/batch.h"
+#include "dynamics/largest_gaps.h"
 #include "math/lane_registers.h"
 
 namespace bielle {
 namespace {
-
-constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad, about the torques that hold the posture
 
 double readWallClock() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -24,14 +19,10 @@ double readWallClock() {
 
 }  // namespace
 
-BatchTask::BatchTask(const Model& model, bool falls) : model_(model), falls_(falls), q_(makeStandingPosture(model)) {
-  std::vector<int> feet;
-  for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-  u_ = calcStaticTorques(model, makeConstraintSet(model, makeContactTargets(model, q_, feet, 0, 0)), q_).u;
-}
+BatchTask::BatchTask(const Model& model, bool falls) : model_(model), falls_(falls), hold_(model) {}
 
 VectorXd BatchTask::makeConfiguration() const {
-  VectorXd q = q_;
+  VectorXd q = hold_.posture();
   if (falls_) q[2] += 0.05;
   return q;
 }
@@ -46,13 +37,7 @@ VectorXd BatchTask::makeVelocity(int world) const {
 
 VectorXd BatchTask::calcTorques(ConstVectorRef q, ConstVectorRef v) const {
   if (falls_) return VectorXd::Zero(model_.nu());
-  VectorXd u = u_;
-  for (int m = 0; m < model_.nu(); ++m) {
-    const Motor& motor = model_.motors()[m];
-    const int at = model_.joints()[motor.joint].idx_q;
-    u[m] += kStiffness * (q_[at] - q[at]) - kDamping * v[motor.dof];
-  }
-  return u;
+  return hold_.calcTorques(q, v);
 }
 
 double BatchTask::calcPush(int tick, int world) const { return falls_ || tick >= 50 ? 0 : 10.0 / (1 + world); }
@@ -91,9 +76,7 @@ BatchSpeed measureBatch(const BatchTask& task, int worlds, double seconds, doubl
 double calcLargestGap(const Model& model, ConstVectorRef q) {
   Workspace ws(model);
   updatePlacements<double>(model, ws, q);
-  double gap = 0;
-  for (const Closure& closure : model.closures()) gap = std::max(gap, calcClosureGap(ws, closure).position);
-  return gap;
+  return calcLargestGaps(model, ws).position;
 }
 
 double readProcessorClock() {

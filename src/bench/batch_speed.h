@@ -1,6 +1,6 @@
 #pragma once
 /// \file Speed of many worlds at once (worlds/batch.h).
-#include "bielle/model/model.h"
+#include "worlds/posture_hold.h"
 
 namespace bielle {
 
@@ -21,7 +21,7 @@ class BatchTask {
  private:
   const Model& model_;
   const bool falls_;
-  VectorXd q_, u_;
+  const worlds::PostureHold hold_;
 };
 
 /// Of the steps alone, without control.

@@ -1,11 +1,12 @@
 #include <algorithm>
 
-#include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/results/result.h"
 #include "cli/softness_study.h"
+#include "dynamics/largest_gaps.h"
+#include "math/largest.h"
 #include "model/number_text.h"
 
 namespace bielle::cli {
@@ -40,12 +41,8 @@ VectorXd pick(const VectorXd& values, const std::vector<int>& columns) {
 double calcLargestGap(const Model& model, const VectorXd& q) {
   Workspace ws(model);
   updatePositions(model, ws, q);
-  double largest = 0;
-  for (const Closure& closure : model.closures()) {
-    const ClosureGap gap = calcClosureGap(ws, closure);
-    largest = std::max({largest, gap.position, gap.angle});
-  }
-  return largest;
+  const ClosureGap gap = calcLargestGaps(model, ws);
+  return getLarger(gap.position, gap.angle);
 }
 
 // By coordinate, of the wrenches of the loops of the robot that moved.

@@ -7,6 +7,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/footsteps.h"
+#include "dynamics/largest_gaps.h"
 #include "math/largest.h"
 #include "math/so3.h"
 #include "motion/record_tables.h"
@@ -19,12 +20,8 @@ void recordNode(const Model& model, Workspace& ws, const VectorXd& x, int k, Mot
   record.v.row(k) = x.segment(model.nq(), model.nv());
   updatePositions(model, ws, x.head(model.nq()));
   record.com.row(k) = calcCom(model, ws);
-  record.gap.row(k).setZero();
-  for (const Closure& closure : model.closures()) {
-    const ClosureGap gap = calcClosureGap(ws, closure);
-    record.gap(k, 0) = getLarger(record.gap(k, 0), gap.position);
-    record.gap(k, 1) = getLarger(record.gap(k, 1), gap.angle);
-  }
+  const ClosureGap gap = calcLargestGaps(model, ws);
+  record.gap.row(k) << gap.position, gap.angle;
 }
 
 void recordStage(const RobotProblem& problem, RobotEvaluator& evaluator, const VectorXd& x, const VectorXd& u, int k,

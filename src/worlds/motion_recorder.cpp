@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/names.h"
+#include "dynamics/largest_gaps.h"
 #include "math/largest.h"
 #include "motion/record_tables.h"
 #include "worlds/contact_law.h"
@@ -53,12 +53,8 @@ void MotionRecorder::addNode(const std::vector<PredictedFoothold>& footholds) {
   record_.v.row(node_) = v;
   updatePositions(model_, ws_, q);
   record_.com.row(node_) = calcCom(model_, ws_);
-  record_.gap.row(node_).setZero();
-  for (const Closure& closure : model_.closures()) {
-    const ClosureGap gap = calcClosureGap(ws_, closure);
-    record_.gap(node_, 0) = getLarger(record_.gap(node_, 0), gap.position);
-    record_.gap(node_, 1) = getLarger(record_.gap(node_, 1), gap.angle);
-  }
+  const ClosureGap gap = calcLargestGaps(model_, ws_);
+  record_.gap.row(node_) << gap.position, gap.angle;
   if (node_ > 0)
     record_.a.row(node_ - 1) =
         (record_.v.row(node_) - record_.v.row(node_ - 1)) / (record_.time[node_] - record_.time[node_ - 1]);

@@ -4,9 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
-#include "math/largest.h"
+#include "dynamics/largest_gaps.h"
 
 namespace bielle::worlds {
 
@@ -91,9 +90,7 @@ Books World::books() const {
 
 double World::gap() const {
   updatePlacements(model_, ws_, q_);
-  double gap = 0;
-  for (const Closure& closure : model_.closures()) gap = getLarger(gap, calcClosureGap(ws_, closure).position);
-  return gap;
+  return calcLargestGaps(model_, ws_).position;
 }
 
 void World::clearFootForces() {
