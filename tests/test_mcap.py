@@ -14,6 +14,7 @@ import sys
 import tempfile
 import xml.etree.ElementTree
 
+import node
 import read_mcap
 
 BIELLE, *REST = sys.argv[1:]
@@ -230,7 +231,7 @@ def check_core(path, file):
     script = os.path.join(os.path.dirname(path), "core.js")
     with open(script, "w", encoding="utf-8") as out:
         out.write(CORE)
-    environment = {**os.environ, "NODE_PATH": os.environ.get("BIELLE_NODE_MODULES", "")}
+    environment = {**os.environ, "NODE_PATH": node.MODULES}
     result = subprocess.run(["node", script, path], capture_output=True, text=True, env=environment)
     assert result.returncode == 0, result.stderr
     ours = [f"{topic} {file['schemas'][topic]} {time} {sha256(data).hexdigest()}" for topic, time, data in file["raw"]]
@@ -365,10 +366,7 @@ def check_joints(place_of_files):
 
 def main():
     if REST == ["core"]:
-        modules = os.environ.get("BIELLE_NODE_MODULES", "")
-        if not shutil.which("node") or not os.path.isdir(os.path.join(modules, "@mcap", "core")):
-            print("skipped: no node, or no @mcap/core in $BIELLE_NODE_MODULES (npm install @mcap/core)")
-            return 77
+        node.require("@mcap/core")
     with tempfile.TemporaryDirectory() as scratch:
         squat = os.path.join(scratch, "squat")
         run("solve", "squat", "--robot", "bipetto", "--depth", "0.9", "--set", "duration=0.6", "--set", "settle=0",

@@ -4,10 +4,10 @@ It is npm's @mujoco/mujoco, looked for in $BIELLE_NODE_MODULES; without node, th
 """
 import json
 import os
-import shutil
-import subprocess
 import sys
 import tempfile
+
+from node import require, run, step_mujoco
 
 try:
     import numpy as np
@@ -16,12 +16,8 @@ except ImportError:
     sys.exit(77)
 
 BIELLE = sys.argv[1]
-MODULES = os.environ.get("BIELLE_NODE_MODULES", "")
-PROGRAM = """
-import fs from 'fs';
-const M = await (await import(process.argv[2] + '/@mujoco/mujoco/mujoco.js')).default();
-const EQUALITY = 0;
-const results = JSON.parse(fs.readFileSync(process.argv[3])).map(({file, frames}) => {
+STEP = """
+({file, frames}) => {
   const model = M.MjModel.from_xml_string(fs.readFileSync(file, 'utf8')), data = new M.MjData(model);
   const worst = {bodies: 0, turns: 0, loops: 0};
   const getLoops = () => data.efc_pos.filter((x, row) => data.efc_type[row] === EQUALITY).map(Math.abs);
@@ -41,15 +37,8 @@ const results = JSON.parse(fs.readFileSync(process.argv[3])).map(({file, frames}
     for (let i = 0; i < 100; ++i) M.mj_step(model, data);
   }
   return {...worst, finite: data.qpos.every(Number.isFinite) && (data.time > 0) === !frames.length};
-});
-console.log(JSON.stringify({version: M.mj_versionString(), results}));
+}
 """
-
-
-def run(*arguments):
-    result = subprocess.run(list(map(str, arguments)), capture_output=True, text=True)
-    assert result.returncode == 0, (arguments, result.stdout + result.stderr)
-    return result.stdout
 
 
 def read_frames(path, names):
@@ -60,9 +49,7 @@ def read_frames(path, names):
 
 
 def main():
-    if not shutil.which("node") or not os.path.isdir(os.path.join(MODULES, "@mujoco", "mujoco")):
-        print("skipped: no node, or no @mujoco/mujoco in $BIELLE_NODE_MODULES (npm install @mujoco/mujoco)")
-        return 77
+    require("@mujoco/mujoco")
     with tempfile.TemporaryDirectory() as place:
         os.chdir(place)
         run(BIELLE, "solve", "squat", "--robot", "bipetto", "--depth", 0.85, "--duration", 0.6, "--set", "settle=0", "--set",
@@ -80,15 +67,11 @@ def main():
             for joints in ("balls", "hinges"):
                 run(BIELLE, "convert", robot, "--to", "mjcf", "--joints", joints, "-o", f"{robot}.{joints}.xml")
                 tasks.append({"file": f"{robot}.{joints}.xml", "frames": []})
-        for name, text in (("program.mjs", PROGRAM), ("tasks.json", json.dumps(tasks))):
-            with open(name, "w", encoding="utf-8") as file:
-                file.write(text)
-        found = json.loads(run("node", "program.mjs", os.path.abspath(MODULES), "tasks.json"))
+        found = step_mujoco(STEP, tasks)
         for task, result in zip(tasks, found["results"]):
             agrees = max(result["bodies"], result["turns"], result["loops"]) < 1e-9 and result["finite"]
             assert agrees == (task is not poisoned), (task["file"], result)
     print(f"MuJoCo {found['version']} has the bodies of 2 references where the files have them, and carries out {len(robots)} robots")
-    return 0
 
 
-sys.exit(main())
+main()

@@ -5,22 +5,18 @@ It is npm's @mujoco/mujoco, looked for in $BIELLE_NODE_MODULES; without node or 
 import json
 import os
 import re
-import shutil
-import subprocess
 import sys
 import tempfile
 
+from node import require, run, step_mujoco
+
 BIELLE = sys.argv[1]
-MODULES = os.environ.get("BIELLE_NODE_MODULES", "")
 TOLERANCE = 0.1  # as promised
 
 # Motors are held by a huge armature while the loop comes to rest; then they pull as much as that took, and steps that are a little
 # shorter and longer than the longest stable one follow.
-PROGRAM = """
-import fs from 'fs';
-const M = await (await import(process.argv[2] + '/@mujoco/mujoco/mujoco.js')).default();
-const EQUALITY = 0;
-const results = JSON.parse(fs.readFileSync(process.argv[3])).map(({file, motor, stable}) => {
+STEP = """
+({file, motor, stable}) => {
   const model = M.MjModel.from_xml_string(fs.readFileSync(file, 'utf8')), data = new M.MjData(model);
   const armature = model.dof_armature[motor], step = model.opt.timestep;
   model.dof_armature[motor] = 1e9;
@@ -45,8 +41,7 @@ const results = JSON.parse(fs.readFileSync(process.argv[3])).map(({file, motor, 
     return false;
   });
   return result;
-});
-console.log(JSON.stringify({version: M.mj_versionString(), results}));
+}
 """
 
 
@@ -84,16 +79,8 @@ def make_cases():
             make_swing(pin.replace("rocker", "tip") + " solref='0.06 1' solimp='0.9 0.95'").replace("</body></worldbody>", TIP)]
 
 
-def run(*arguments):
-    result = subprocess.run(list(map(str, arguments)), capture_output=True, text=True)
-    assert result.returncode == 0, (arguments, result.stdout + result.stderr)
-    return result.stdout
-
-
 def main():
-    if not shutil.which("node") or not os.path.isdir(os.path.join(MODULES, "@mujoco", "mujoco")):
-        print("skipped: no node, or no @mujoco/mujoco in $BIELLE_NODE_MODULES (npm install @mujoco/mujoco)")
-        return 77
+    require("@mujoco/mujoco")
     with tempfile.TemporaryDirectory() as place:
         os.chdir(place)
         tasks, rows = [], []
@@ -106,10 +93,7 @@ def main():
             assert rows[-1]["state"] == "holds" and abs(rows[-1]["position"]) < 1e-9, rows[-1]
             stable = rows[-1]["stable_step"]
             tasks.append({"file": f"{k}.xml", "motor": 0, "stable": stable if stable < 0.1 else None})
-        for name, text in (("program.mjs", PROGRAM), ("tasks.json", json.dumps(tasks))):
-            with open(name, "w", encoding="utf-8") as file:
-                file.write(text)
-        found = json.loads(run("node", "program.mjs", os.path.abspath(MODULES), "tasks.json"))
+        found = step_mujoco(STEP, tasks)
         weld, old = found["results"][2], run(BIELLE, "softness", "2.xml", "--postures", 1, "--mujoco", 2, "--json", "-o", "old")
         assert abs(json.loads(old)["loops"][0]["sag"] / max(map(abs, weld["moved"][1:2])) - 1) > TOLERANCE  # of other versions
         steps = 0
@@ -129,7 +113,6 @@ def main():
                 assert result["diverges"] == [False, True], (task, result)
         assert steps == 5, tasks
     print(f"MuJoCo {found['version']} opens {len(tasks)} loops as far as predicted, and steps of {steps} are stable as long as predicted")
-    return 0
 
 
-sys.exit(main())
+main()
