@@ -11,7 +11,8 @@ if(BIELLE_BUILD_SIMULATION)
   bielle_test(batch SOURCES test_batch.cpp world_trials.cpp LIBS bielle_simulation)
   bielle_test(manifold_world SOURCES test_manifold_world.cpp world_trials.cpp LIBS bielle_simulation)
   bielle_test(dead_point_stop SOURCES test_dead_point_stop.cpp LIBS bielle_simulation)
-  bielle_test(predictive_controller SOURCES test_predictive_controller.cpp LIBS bielle_simulation)
+  bielle_test(predictive_controller SOURCES test_predictive_controller.cpp test_predictive_timing.cpp predictive_trials.cpp
+    LIBS bielle_simulation)
   # Whole walks, step by step: many minutes under sanitizers.
   bielle_test(predictive_feet SOURCES test_predictive_feet.cpp LIBS bielle_control)
   set_tests_properties(predictive_controller predictive_feet PROPERTIES LABELS system)
