@@ -534,7 +534,8 @@ TEST_CASE("parts: errors give the file, the line, the name and what to do") {
   refuse(kSlider, "type: prismatic", "type: sliding", {"joint type 'sliding' is unknown"});
   refuse(kSlider, "end: [crank, 0]", "end: [0, 0]", {"are in one place"});
   refuse(kSlider, "tree:", "trees: {}\ntree:", {"'trees'", "known keys are"});
-  refuse(kRobotOfRods, "tree:", "motor_catalogue: none.yaml\ntree:", {"key 'motor_catalogue'", "no motor is taken from it"});
+  refuse(kRobotOfRods,
+         "tree:", "motor_catalogue: none.yaml\ntree:", {"key 'motor_catalogue'", "no motor is taken from it"});
   CHECK_THROWS_WITH(loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/parts/knee/belt.yaml"),
                     Contains("it is a part of a robot"));
 }
