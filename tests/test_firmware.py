@@ -20,7 +20,7 @@ COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]
 OK, CLAMPED, NEAR, NOT_REACHED = range(4)
 # An emulated Cortex-M4F.
-ARM = ["arm-none-eabi-gcc", "-std=c99", "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
+ARM = ["arm-none-eabi-gcc", "-std=gnu99", "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
 EMULATOR = ["qemu-system-arm", "-M", "mps2-an386", "-icount", "shift=7", "-nographic", "-semihosting", "-kernel"]
 HAS_ARM = shutil.which(ARM[0]) and shutil.which(EMULATOR[0])
 if not COMPILERS:
@@ -429,10 +429,17 @@ class FirmwareTest(unittest.TestCase):
         self.assertEqual(here, there)
         self.assertLess(instructions, 10000)
         self.assertLess(size, 8192)
-        # Another last bit of a constant is noticed.
         source = os.path.join(place, "ankley_left_anklex_left.c")
         with open(source) as file:
             text = file.read()
+        # Nothing is fused, in C++ either, where no standard forbids it; without the pragma much is.
+        pragma = '#pragma GCC optimize("fp-contract=off")'
+        self.assertIn(pragma, text)
+        for language, standard in (("c", "gnu99"), ("c++", "c++11")):
+            for code, is_fused in ((text, False), (text.replace(pragma, ""), True)):
+                made = run(*ARM, "-O2", "-x", language, "-std=" + standard, "-S", "-", "-o", "-", "-I", place, input=code).stdout
+                self.assertEqual("vfma" in made, is_fused, standard)
+        # Another last bit of a constant is noticed.
         with open(source, "w") as file:
             file.write(text.replace("0.166666552f", "0.166666567f"))
         self.assertNotEqual(run_on_arm(place, "ankley_left_anklex_left", 1000)[0], here)

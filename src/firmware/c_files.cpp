@@ -45,7 +45,8 @@ class CWriter {
                 {"@held@",
                  "The bodies that a serial model has are not among them, nor are springs on the joints themselves."}},
                {{"@about@", about + "   Neither damping nor friction is in the torques."}, {"@base@", maps_.base}});
-    out[source] = finish(kSourceText, listParts(space, end), {{"@include@", "#include \"" + header + "\""}});
+    out[source] = finish(kSourceText, listParts(space, end),
+                         {{"@include@", (is_single_ ? kUnfusedText : "") + ("#include \"" + header + "\"")}});
     out[test] = finish(kTestText, listTest(source, test), {{"@include@", "#include \"" + header + "\""}});
     return out;
   }

@@ -89,6 +89,17 @@ void NAME_joint_limits(const NAME_ratio *ratio, REAL torque[SIZE], REAL speed[SI
 #endif
 )";
 
+// Before all else in `float`. GCC fuses with every standard of C++ and does not know the pragma of the standards; Clang
+// fuses with every standard (findings/standards-that-fuse.sh).
+inline constexpr const char* kUnfusedText =
+    R"(/* The same bits on every processor: no multiplication is fused with an addition. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("fp-contract=off")
+#else
+#pragma STDC FP_CONTRACT OFF
+#endif
+)";
+
 inline constexpr const char* kSourceText = R"(/* @title@ See the header. */
 @include@
 

@@ -36,9 +36,10 @@ std::string writeReadme(const std::vector<Maps>& all, const FirmwareOptions& opt
            prefix + "motor_torque(&ratio, wanted_joint_torque, NULL, motor_torque);\n```\n\n`" + compile + " -O2 " +
            name + end + " " + name + "_test" + end +
            " -lm && ./a.out` compares it with postures of the mechanism with all its bodies and closures." +
-           (options.is_single ? " All processors get the same bits, unless multiplications and additions are fused: "
-                                "`-ffp-contract=off` forbids it, as does `-std=c99`."
-                              : "") +
+           (options.is_single
+                ? " All processors get the same bits, since a pragma keeps compilers from fusing multiplications and "
+                  "additions; `-ffast-math` and Clang's `-ffp-contract=fast` overrule it."
+                : "") +
            "\n\nPositions "
            "are rad (m of "
            "slides), counted as in the robot's file. What is out of range is clamped, and the status says so; a value "
