@@ -562,6 +562,7 @@ TEST_CASE("expressions: numbers, points by component, and what is not one") {
   symbols.define("p", Vector3d(1, 2, 3));
   CHECK(symbols.calcNumber("a^3 + p.z/2") == 9.5);
   CHECK(symbols.calcNumber("a > 1 && a < 3 ? sqrt(16) : 0") == 4);
+  CHECK(symbols.calcNumber("(0.5 && 0.5) + (0.5 || 0)") == 2);  // where muParser simplifies, they are 0
   CHECK(symbols.calcPoint("2*p - a*z") == Vector3d(2, 4, 4));
   CHECK(symbols.calcPoint("a - 2") == Vector3d::Zero());
   CHECK_THROWS_AS(symbols.calcPoint("a"), ExpressionError);  // as `gravity: -9.81`

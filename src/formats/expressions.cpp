@@ -68,7 +68,8 @@ struct Symbols::Data {
 
 Symbols::Symbols() : data_(std::make_unique<Data>()) {
   mu::Parser& parser = data_->parser;
-  parser.EnableOptimizer(false);  // the same roundings whatever the numbers
+  // The same roundings whatever the numbers, and `0.5 && 0.5` is true (findings/muparser-folds-and.sh).
+  parser.EnableOptimizer(false);
   parser.DefineNameChars(kNameCharacters);
   parser.ClearConst();
   parser.DefineFun("hypot", calcHypot);
