@@ -348,9 +348,13 @@ TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and te
                       [&](const std::string& w) { return w.find(lost) != std::string::npos; }));
   CHECK(text.warnings.size() == 5);
   CHECK(text.urdf.find("<dynamics damping=\"0.5\" friction=\"0.25\"/>") != std::string::npos);
-  CHECK(text.urdf.find("effort=\"7\" velocity=\"3\"") != std::string::npos);
+  // Limits that there are not are large numbers, because zeros lock a joint elsewhere, and come back as none.
+  CHECK(text.urdf.find("lower=\"-1e+16\" upper=\"1e+16\" effort=\"7\" velocity=\"3\"") != std::string::npos);
+  CHECK(text.urdf.find("upper=\"1e+16\" effort=\"1e+16\" velocity=\"1e+16\"") != std::string::npos);
   const RobotDirectory directory;
   const Model back = loadRobot(directory.writeRobot(text.urdf, "")).model;
+  CHECK((-back.lowerLimits().array() == HUGE_VAL && back.upperLimits().array() == HUGE_VAL).all());
+  CHECK((back.velocityLimits().array() == HUGE_VAL).count() == 3);
   REQUIRE(back.jointForces().size() == 1);
   CHECK((back.jointForces()[0].damping == 0.5 && back.jointForces()[0].friction == 0.25));
   REQUIRE(back.closures().size() == 2);

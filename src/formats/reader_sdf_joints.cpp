@@ -7,7 +7,7 @@
 namespace bielle {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity(), kNoLimit = 1e15;  // 1e16 is none in SDF
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 std::string describeSdf(const sdf::Joint& joint) { return "joint '" + joint.Name() + "'"; }
 

@@ -302,11 +302,11 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
     throw InputError(path, "joint '" + joint.name + "'", "its effort or velocity limit is negative",
                      "give a positive limit, or 0 for none");
   if ((limits.lower != 0 || limits.upper != 0) && kind != JointKind::Continuous && getNv(kind) == 1) {
-    out.lower = VectorXd::Constant(1, limits.lower);
-    out.upper = VectorXd::Constant(1, limits.upper);
+    out.lower = VectorXd::Constant(1, limits.lower > -kNoLimit ? limits.lower : -HUGE_VAL);
+    out.upper = VectorXd::Constant(1, limits.upper < kNoLimit ? limits.upper : HUGE_VAL);
   }
-  if (limits.effort > 0) out.effort = limits.effort;
-  if (limits.velocity > 0) out.velocity = limits.velocity;
+  if (limits.effort > 0 && limits.effort < kNoLimit) out.effort = limits.effort;
+  if (limits.velocity > 0 && limits.velocity < kNoLimit) out.velocity = limits.velocity;
   return out;
 }
 

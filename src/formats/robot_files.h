@@ -14,6 +14,9 @@
 
 namespace bielle {
 
+inline constexpr double kNoLimit =
+    1e15;  ///< from here on a limit in a URDF or SDF file is none: libsdformat has 1e16 for it
+
 struct UrdfLink {
   std::string name;
   Inertia inertia;  ///< in the link frame; zero without an <inertial> element

@@ -15,6 +15,9 @@ namespace {
 // Of links for those who read a URDF alone: libsdformat 12.3 leaves out one of at most 1e-6 kg (crosses of universal joints), and
 // all that hangs on it, without an error; DART 6.12 takes 1 kg for one without mass.
 constexpr double kLeastMass = 2e-6, kLeastInertia = 1e-12;  // kg, kg m^2
+// What libsdformat has for a limit that there is not. Of zeros, or of nothing, some make a joint that is locked
+// (findings/urdf-zero-limits.sh).
+constexpr double kNone = 1e16;
 
 void addOrigin(XMLElement& e, const SE3& X) {
   XMLElement& origin = addElement(e, "origin", {{"xyz", formatExact(X.p)}});
@@ -182,9 +185,11 @@ class UrdfWriter {
     const double effort = warnings_ ? getEffortLimit(joint) : HUGE_VAL;
     if (!ranged && !slow && std::isinf(effort) && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
     XMLElement& limit = addElement(e, "limit");
-    if (ranged) setAttributes(limit, {{"lower", formatExact(lower[0])}, {"upper", formatExact(upper[0])}});
-    setAttributes(limit, {{"effort", formatExact(std::isfinite(effort) ? effort : 0)},
-                          {"velocity", formatExact(slow ? velocity[0] : 0)}});
+    if (joint.nv == 1 && joint.kind != JointKind::Continuous)
+      setAttributes(limit, {{"lower", formatExact(ranged ? lower[0] : -kNone)},
+                            {"upper", formatExact(ranged ? upper[0] : kNone)}});
+    setAttributes(limit, {{"effort", formatExact(std::isfinite(effort) ? effort : kNone)},
+                          {"velocity", formatExact(slow ? velocity[0] : kNone)}});
   }
 
   double getEffortLimit(const Joint& joint) const {

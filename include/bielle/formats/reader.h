@@ -8,7 +8,7 @@
 /// the file. A link without <inertial> has no mass. A root named "world" is the ground; any other root is carried by a
 /// free-flyer named "root_joint", or merged into the ground when the base is fixed.
 /// - <limit>: `effort` and `velocity` apply to the motor and to the joint (published files often have placeholders
-///   there: override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints
+///   there: override them by `motors`). 0 means none, as does a `lower` and `upper` of 0, or a number from 1e15 on. Joints
 ///   whose number of coordinates is changed by the YAML have no limits.
 /// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> its damping and friction, unless
 ///   `joint_forces` names it; meshes need not exist. Files for Drake (formats/drake.h) can also define loops,
