@@ -100,7 +100,7 @@ TEST_CASE("footholds: a file's errors name the entry, impossible steps their num
            {"- {foot: right, x: 0.2, y: -0.1, pitch: 0.1}", "level"},
            {"- {foot: right, x: 0.2, y: -0.1}\n- {foot: right, x: 0.3, y: -0.1}", "alternately"},
            {"- {foot: right, x: 0.9, y: -0.1}", "reach"},
-           {"- {foot: right, x: 0.2, y: -0.1, z: 0.05}\n- {foot: left, x: 0.2, y: 0.0}", "in the ground"}}) {
+           {"- {foot: right, x: 0.2, y: -0.1, z: 0.05}\n- {foot: left, x: 0.2, y: 0.0}", "in the stone of step 1"}}) {
     CAPTURE(text);
     FootholdsOptions options;
     options.footholds = read("footholds:\n" + text + "\n");
