@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "bielle/dynamics/closing.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/names.h"
@@ -172,7 +173,7 @@ TEST_CASE("a loop that cannot be closed is refused with the file, the closure an
   fs::copy_file(robot.string() + ".yaml", directory.str() + "/stretched.yaml");
   const CommandResult result = run({"info", directory.str()});
   checkRefused(result, "closure 'coupler': its loop cannot be closed");
-  CHECK_THAT(result.err, Catch::Contains(directory.str()));
+  CHECK_THAT(result.err, Catch::Contains(directory.str() + "/stretched.urdf: closure"));
 }
 
 TEST_CASE("robots are listed with their places") {
@@ -217,13 +218,13 @@ TEST_CASE("what changes no mechanism is one line of a robot's warnings, and a li
   const std::string path = directory.write("arm.xml", R"(<mujoco model="arm">
 <option cone="elliptic"/>
 <worldbody><light/><camera/>
-<body name="link"><joint name="turn" axis="0 1 0"/><camera/><inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/></body>
+<body name="link"><joint name="turn" axis="0 1 0"/><camera/><geom type="capsule" size="0.1 0.1" contype="0" conaffinity="0"/><inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/></body>
 </worldbody>
 <actuator><motor joint="turn"/></actuator>
 <sensor><jointpos joint="turn"/></sensor>
 </mujoco>)");
   const std::string told =
-      "bielle: warning: " + path + ": what changes no mechanism is left out (4 kinds of elements; ";
+      "bielle: warning: " + path + ": what changes no mechanism is left out (5 kinds of elements; ";
   const std::string list = "bielle: left out: " + path + ": ";
   for (std::vector<std::string> command : std::vector<std::vector<std::string>>{
            {"info", path}, {"convert", path, "-o", directory.path() + "/copy"}, {"ratio", path, "--joint", "turn"}}) {
@@ -231,8 +232,8 @@ TEST_CASE("what changes no mechanism is one line of a robot's warnings, and a li
     CAPTURE(command[0], result.err);
     CHECK_THAT(result.err, Catch::Contains(told) && !Catch::Contains("camera") && !Catch::Contains(list));
     command.push_back("--verbose");
-    for (const char* element :
-         {"<light> (line 3)", "<camera> (lines 3, 4)", "<option> (line 2): 'cone'", "<sensor> <jointpos> (line 7)"})
+    for (const char* element : {"<light> (line 3)", "<camera> (lines 3, 4)", "<option> (line 2): 'cone'",
+                                "<geom> (line 4): a capsule is drawn as a cylinder", "<sensor> <jointpos> (line 7)"})
       CHECK_THAT(run(command).err, Catch::Contains(told) && Catch::Contains(list + element + "\n"));
   }
   for (const std::string command : {"info", "eval", "view", "convert", "adopt", "ratio", "modes", "bench"})
@@ -258,6 +259,9 @@ TEST_CASE("info lists the joints of references as given and as assembled, and te
   CHECK(result.status == 0);
   CHECK_THAT(result.err, Catch::Contains("robot.yaml: reference 'bent': it is assembled with") &&
                              Catch::Contains("'rocker_joint' at ") && Catch::Contains(" instead of 0.2"));
+  // By the path that was given, as all other messages name it.
+  const std::string given = fs::relative(directory.path()).string();
+  CHECK_THAT(run({"info", given}).err, Catch::Contains("bielle: warning: " + given + "/robot.yaml: reference 'bent'"));
   const json info = json::parse(result.out);
   CHECK(info["warnings"].size() == 1);
   const auto joint = std::find_if(info["reference_joints"].begin(), info["reference_joints"].end(), [](const json& of) {
@@ -349,6 +353,28 @@ TEST_CASE("eval tells that loops are open, and closes them around the joints of 
     if (joint.nq == 1) again["joints"][joint.name]["q"] = out["q"][joint.idx_q];
   CHECK(json::parse(eval({}, again.dump()).out)["q"] == out["q"]);
   CHECK(eval({}, again.dump()).err.empty());
+  // So are speeds: of the joint that moves, and of those that follow.
+  again["joints"]["crank_joint"]["v"] = 0.7;
+  const CommandResult opening = eval({}, again.dump()), moving = eval({"--close"}, again.dump());
+  const double speed = json::parse(opening.out)["largest_opening_speed"];
+  CHECK(speed > 0.01);
+  CHECK_THAT(opening.err, Catch::Contains("closure 'coupler' opens at " + formatNumber(speed, "%.3g")) &&
+                              Catch::Contains("--close"));
+  CHECK(moving.err.empty());
+  const json moved = json::parse(moving.out);
+  const Joint& crank = model.joints()[model.findJoint("crank_joint")];
+  CHECK(moved["v"][crank.idx_v].get<double>() == Approx(0.7).margin(1e-9));
+  CHECK(moved["largest_opening_speed"].get<double>() < 1e-12);
+  // As fast as the closed configurations beside this one change.
+  constexpr double h = 1e-5;
+  VectorXd q = Eigen::Map<const VectorXd>(moved["q"].get<std::vector<double>>().data(), model.nq());
+  const auto at = [&](double step) {
+    VectorXd beside = q;
+    beside[crank.idx_q] += 0.7 * step;
+    return closeConfiguration(model, beside, {"crank_joint"}).q;
+  };
+  const VectorXd rates = model.difference(at(-h), at(h)) / (2 * h);
+  for (int k = 0; k < model.nv(); ++k) CHECK(moved["v"][k].get<double>() == Approx(rates[k]).margin(1e-7));
 }
 
 TEST_CASE("eval understands other ways to write a configuration") {

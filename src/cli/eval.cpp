@@ -21,7 +21,7 @@ struct EvalArguments {
   bool derivatives = false, close = false;
 };
 
-constexpr double kOpen = 1e-6;  // m or rad: gaps of loops above it are told
+constexpr double kOpen = 1e-6;  // m or rad, and per s relative above 1: gaps and speeds of opening above it are told
 
 // The dynamics at a state, up to date.
 struct Evaluation {
@@ -34,6 +34,20 @@ struct Evaluation {
   ConstrainedWorkspace cws;
   NumericalStatus status;
 };
+
+// The loop that opens fastest, m/s or rad/s.
+double calcLargestOpening(const Evaluation& at, const VectorXd& v, std::string* worst = nullptr) {
+  double largest = 0;
+  for (int c = 0; c < at.constraints.num_loops; ++c) {
+    const Closure& closure = at.constraints.closures[static_cast<size_t>(c)];
+    const double opening =
+        (at.cws.J.middleRows(at.constraints.offsets[c], getRows(closure.kind)) * v).cwiseAbs().maxCoeff();
+    if (opening <= largest) continue;
+    largest = opening;
+    if (worst) *worst = closure.name;
+  }
+  return largest;
+}
 
 Json listNumbers(const VectorXd& vector) { return std::vector<double>(vector.begin(), vector.end()); }
 
@@ -83,6 +97,7 @@ Json describe(const Model& model, const EvalState& state, const Evaluation& at) 
           {"contact_wrenches", contacts},
           {"closure_residuals", residuals},
           {"largest_gap", calcLargestGap(at.ws, at.constraints)},
+          {"largest_opening_speed", calcLargestOpening(at, state.v)},
           {"rank", mobility.rank},
           {"mobility", mobility.mobility},
           {"constraint_error", at.cws.residual},
@@ -102,13 +117,20 @@ int evaluate(const EvalArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
   EvalState state = readState(robot.model, arguments.state, robot.model.makeNeutral());
   const std::string file = arguments.state == "-" ? "standard input" : arguments.state;
-  if (arguments.close) closeState(robot.model, file, state);
+  if (arguments.close) {
+    closeState(robot.model, file, state);
+    closeMotion(robot.model, file, state);
+  }
   Evaluation at(robot.model, state);
   requireOk(at.status);
   std::string worst;
   if (const double gap = calcLargestGap(at.ws, at.constraints, &worst); gap > kOpen)
     std::cerr << "bielle: warning: " << file << ": closure '" << worst << "' is open by " << formatNumber(gap, "%.3g")
               << " (m or rad): the robot cannot be in this state; give one whose loops are closed, or --close\n";
+  else if (const double opening = calcLargestOpening(at, state.v, &worst);
+           opening > kOpen * (1 + state.v.lpNorm<Eigen::Infinity>()))
+    std::cerr << "bielle: warning: " << file << ": closure '" << worst << "' opens at " << formatNumber(opening, "%.3g")
+              << " (m/s or rad/s): the robot cannot move so; give velocities that keep its loops closed, or --close\n";
   Json json = describe(robot.model, state, at);
   if (arguments.derivatives) {
     requireOk(updateConstrainedDerivatives(robot.model, at.ws, at.cws, at.constraints));
@@ -132,7 +154,7 @@ void addEval(CLI::App& command, Action& action) {
   command.add_option("--state", arguments->state, "JSON file with the state; - for the standard input")->required();
   command.add_flag("--derivatives", arguments->derivatives, "add the derivatives with respect to q, v and u");
   command.add_flag("--close", arguments->close,
-                   "close the loops first: joints that the state gives stay where they are, if they can");
+                   "close the loops first: joints that the state gives stay as they are and move, if they can");
   addRobotFlags(command, arguments->robot);
   command.footer(std::string(kStateHelp) +
                  "The output is JSON: accelerations by joint (rates of v); wrenches of closures and contacts\n"
@@ -143,7 +165,8 @@ void addEval(CLI::App& command, Action& action) {
                  "matrices. Rows and columns are named by `order`: da_* has rows v, dlambda_* rows lambda; *_dq has "
                  "columns v (the tangent of q),\n"
                  "*_du columns u. Without --close the state is taken as it is; largest_gap is the largest residual of "
-                 "a loop (m or rad). Where closures are\nredundant, forces have the least norm.\n"
+                 "a loop (m or rad),\nlargest_opening_speed that of its rate. Where closures are redundant, forces "
+                 "have the least norm.\n"
                  "Examples:\n"
                  "  bielle eval bipetto --state state.json --derivatives\n"
                  "  echo '{\"torques\": {\"crank_joint\": 1}}' | bielle eval fourbar --state -");

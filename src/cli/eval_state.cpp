@@ -8,6 +8,8 @@
 #include <set>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kept_motion.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "formats/text_file.h"
@@ -36,7 +38,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kFollows = 1e-6;         // weight of joints that are not given, relative to those that are
-constexpr double kToldDifference = 1e-6;  // rad or m: differences from what is given that are told
+constexpr double kToldDifference = 1e-6;  // rad or m, and per s relative above 1: differences from what is given
 constexpr int kDeepest = 20;              // elements of a state are not nested deeper; reading them recurses
 
 class StateReader {
@@ -218,6 +220,27 @@ void closeState(const Model& model, const std::string& file, EvalState& state) {
       warnOfMisfit(file, joint, "position", state.q[joint.idx_q], closed.q[joint.idx_q]);
   }
   state.q = closed.q;
+}
+
+void closeMotion(const Model& model, const std::string& file, EvalState& state) {
+  if (model.closures().empty() || state.moving.empty()) return;
+  Workspace ws(model);
+  const ConstraintSet loops = makeConstraintSet(model);
+  updatePositions(model, ws, state.q);
+  std::vector<int> held;
+  for (int j : state.moving)
+    for (int k = 0; k < model.joints()[j].nv; ++k) held.push_back(model.joints()[j].idx_v + k);
+  VectorXd values(held.size());
+  for (size_t k = 0; k < held.size(); ++k) values[k] = state.v[held[k]];
+  const VectorXd wanted = Closing(model, ws, loops, held).solve(VectorXd::Zero(loops.rows), values);
+  const VectorXd given = state.v;
+  state.v = projectVelocity(model, ws, loops, state.q, wanted);
+  for (int j : state.moving) {
+    const Joint& joint = model.joints()[j];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
+      if (std::abs(state.v[k] - given[k]) > kToldDifference * (1 + std::abs(given[k])))
+        warnOfMisfit(file, joint, "velocity", given[k], state.v[k]);
+  }
 }
 
 }  // namespace bielle::cli

@@ -21,6 +21,8 @@ EvalState readState(const Model& model, const std::string& path, ConstVectorRef 
 // \throws InputError when the loops do not close nearby
 // \param file  named in messages
 void closeState(const Model& model, const std::string& file, EvalState& state);
+// Then the motion: the least velocity with that of the joints that the file moves; one that keeps the loops closed, if it does not.
+void closeMotion(const Model& model, const std::string& file, EvalState& state);
 // Tells that a joint does not start with what the file gives.
 void warnOfMisfit(const std::string& file, const Joint& joint, const std::string& what, double given, double taken);
 

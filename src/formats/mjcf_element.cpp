@@ -84,9 +84,9 @@ void MjcfNotes::addAttribute(const std::string& path, const std::string& element
   lines.insert(line);
 }
 
-void MjcfNotes::addHarmless(const std::string& path, const std::string& element, int line) {
-  add(path, element, line, kLeftOut);
-  harmless_.insert({path, element, kLeftOut});
+void MjcfNotes::addHarmless(const std::string& path, const std::string& element, int line, const std::string& problem) {
+  add(path, element, line, problem);
+  harmless_.insert({path, element, problem});
 }
 
 void MjcfNotes::addTo(UrdfFile& tree) const {
@@ -94,7 +94,7 @@ void MjcfNotes::addTo(UrdfFile& tree) const {
   for (const Kind& kind : order_) {
     const std::string elements = kind.element + formatLines(lines_.at(kind));
     if (harmless_.count(kind)) {
-      tree.harmless.push_back(kind.path + ": " + elements);
+      tree.harmless.push_back(kind.path + ": " + elements + (kind.problem == kLeftOut ? "" : ": " + kind.problem));
     } else if (kind.problem != kLeftOut) {
       tree.warnings.push_back(kind.path + ": " + elements + ": " + kind.problem);
     } else {
@@ -163,6 +163,10 @@ std::string MjcfElement::describe() const { return tag_ + name_ + " (line " + st
 
 void MjcfElement::fail(const std::string& problem, const std::string& remedy) const {
   throw InputError(path_, describe(), problem, remedy);
+}
+
+void MjcfElement::noteHarmless(const std::string& problem) const {
+  settings_.notes.addHarmless(path_, "<" + tag_ + ">", line_, problem);
 }
 
 void MjcfElement::note(const std::string& problem) const {

@@ -27,7 +27,8 @@ class MjcfNotes {
   void add(const std::string& path, const std::string& element, int line, const std::string& problem);
   void addAttribute(const std::string& path, const std::string& element, int line, const std::string& attribute);
   /// Of what changes no mechanism, such as cameras and lights.
-  void addHarmless(const std::string& path, const std::string& element, int line);
+  void addHarmless(const std::string& path, const std::string& element, int line,
+                   const std::string& problem = "left out");
   /// "path: element (lines ...): problem", in the order in which they were first added, as warnings; what is just "left out" is one
   /// line of a file at the end. What changes no mechanism, to which most attributes about contacts and solvers belong, goes apart.
   void addTo(UrdfFile& tree) const;
@@ -77,6 +78,7 @@ class MjcfElement {
 
   [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const;
   void note(const std::string& problem) const;
+  void noteHarmless(const std::string& problem) const;  ///< of what changes no mechanism
   /// The same of an element that is not read: its attributes are not noted.
   void leaveOut(const std::string& problem = "left out");
   /// "joint 'knee' (line 3)"

@@ -179,7 +179,7 @@ void MjcfReader::readVisual(const Child& child, const BodyPlace& place) {
   if (touches && addShape(shape.type == "capsule", size, visual, tree_.links[place.link]))
     e.note("its shape is used for distances only, not for contact (feet: the key contacts of a YAML file)");
   if (!is_drawn) return;
-  if (shape.type == "capsule") e.note("a capsule is drawn as a cylinder");
+  if (shape.type == "capsule") e.noteHarmless("a capsule is drawn as a cylinder");
   tree_.links[place.link].visuals.push_back(visual);
 }
 

@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/kept_motion.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
@@ -17,9 +16,6 @@
 
 namespace bielle::worlds {
 namespace {
-
-constexpr double kToldDifference =
-    1e-6;  // rad/s or m/s, relative above 1: differences from what is given that are told
 
 // The base of a robot with feet as high as puts the lowest sole on the ground.
 void lift(const Model& model, VectorXd& q) {
@@ -65,28 +61,6 @@ void leaveOutTurns(const Model& model, const std::string& file, cli::EvalState& 
   }
 }
 
-// The least velocity with that of the joints that the file moves; one that keeps the loops closed, if it does not.
-void move(const Model& model, const std::string& file, cli::EvalState& state) {
-  if (model.closures().empty() || state.moving.empty()) return;
-  Workspace ws(model);
-  const ConstraintSet loops = makeConstraintSet(model);
-  updatePositions(model, ws, state.q);
-  std::vector<int> held;
-  for (int j : state.moving)
-    for (int k = 0; k < model.joints()[j].nv; ++k) held.push_back(model.joints()[j].idx_v + k);
-  VectorXd values(held.size());
-  for (size_t k = 0; k < held.size(); ++k) values[k] = state.v[held[k]];
-  const VectorXd wanted = Closing(model, ws, loops, held).solve(VectorXd::Zero(loops.rows), values);
-  const VectorXd given = state.v;
-  state.v = projectVelocity(model, ws, loops, state.q, wanted);
-  for (int j : state.moving) {
-    const Joint& joint = model.joints()[j];
-    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
-      if (std::abs(state.v[k] - given[k]) > kToldDifference * (1 + std::abs(given[k])))
-        cli::warnOfMisfit(file, joint, "velocity", given[k], state.v[k]);
-  }
-}
-
 }  // namespace
 
 FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments, const std::string& robot) {
@@ -98,7 +72,7 @@ FreeStart makeFreeStart(const Model& model, const SimulateArguments& arguments, 
     throw InputError(file, "key 'contacts'", "feet of a free motion stand where the ground holds them", "remove it");
   leaveOutTurns(model, file, state);
   cli::closeState(model, file, state);
-  move(model, file, state);
+  cli::closeMotion(model, file, state);
   return {state.q, state.v, state.u};
 }
 
