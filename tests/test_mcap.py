@@ -382,7 +382,7 @@ def main():
         check_carried_out(squat, info, os.path.join(scratch, "happened"))
         for arguments in (("mcap", "-o", os.path.join(squat, "trajectory.npz")), ("mjlab", "--fps", 0),
                           ("mjlab", "-o", os.path.join(squat, "trajectory.npz")), ("amp", "-o", os.path.join(squat, "a.xml")),
-                          ("mjlab", "--isaac-lab", 3), ("amp", "--isaac-lab", 1)):
+                          ("mjlab", "--isaac-lab", 3), ("amp", "--isaac-lab", 1), ("sto", "--fps", 50), ("mcap", "--fps", 50)):
             run("export", squat, "--format", *arguments, status=2)
         check_told(squat, os.path.join(scratch, "told"))
         check_mesh(scratch)

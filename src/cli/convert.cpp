@@ -4,6 +4,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/firmware/firmware.h"
@@ -94,9 +95,16 @@ void writeFirmware(const LoadedRobot& robot, const ConvertArguments& arguments) 
 }
 
 int convert(const ConvertArguments& arguments) {
-  if (!isFirmware(arguments.format) && (!arguments.ranges.empty() || arguments.is_single))
-    throw InputError("", arguments.ranges.empty() ? "--precision" : "--range",
+  const ConvertArguments usual;
+  const bool has_postures = arguments.postures != usual.postures;
+  if (!isFirmware(arguments.format) && (!arguments.ranges.empty() || arguments.is_single || has_postures))
+    throw InputError("",
+                     !arguments.ranges.empty() ? "--range"
+                     : has_postures            ? "--postures"
+                                               : "--precision",
                      "it says how maps of linkages are computed", "add --to c, or leave it out");
+  if (arguments.hole != usual.hole && arguments.format != "dxf")
+    throw InputError("", "--hole", "only plates for a workshop have holes", "add --to dxf, or leave it out");
   if (!arguments.joints.empty() && arguments.format != "mjcf")
     throw InputError("", "--joints", "it says how a file of MuJoCo is written", "add --to mjcf, or leave it out");
   LoadedRobot robot = arguments.robot.load();

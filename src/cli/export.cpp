@@ -18,9 +18,11 @@ namespace fs = std::filesystem;
 namespace bielle::cli {
 namespace {
 
+constexpr double kRate = 50;  // frames per second, unless they are given
+
 struct ExportArguments {
   std::string directory, format = "sto", output;
-  double rate = 50;
+  std::optional<double> rate;
   std::optional<int> isaac_lab;
 };
 
@@ -48,9 +50,15 @@ int exportTrajectory(const ExportArguments& arguments) {
   if (arguments.isaac_lab && !is_of_isaac)
     throw InputError("", "--isaac-lab", "'" + arguments.format + "' is the same for each version of it",
                      "leave it out, or give --format amp or beyondmimic");
-  ExportRequest request{arguments.directory, arguments.format,
-                        path.string(),       "",
-                        arguments.rate,      arguments.isaac_lab.value_or(kIsaacLab)};
+  if (arguments.rate && !isReference(arguments.format))
+    throw InputError("", "--fps", "'" + arguments.format + "' has the steps of the motion",
+                     "leave it out, or give --format mjlab, amp or beyondmimic");
+  ExportRequest request{arguments.directory,
+                        arguments.format,
+                        path.string(),
+                        "",
+                        arguments.rate.value_or(kRate),
+                        arguments.isaac_lab.value_or(kIsaacLab)};
   if (hasRobot(arguments.format)) {
     request.robot = fs::path(path).replace_extension(".xml").string();
     if (request.robot == path.string())
@@ -83,9 +91,8 @@ void addExport(CLI::App& command, Action& action) {
           "sto: everything over time (OpenSim)")
       ->check(CLI::IsMember({"amp", "beyondmimic", "mcap", "mjlab", "mot", "problem", "sto"}))
       ->capture_default_str();
-  command.add_option("--fps", arguments->rate, "frames per second of a reference for learning")
-      ->check(isWithin(1e-3, 1e4))
-      ->capture_default_str();
+  command.add_option("--fps", arguments->rate, "frames per second of a reference for learning; default: 50")
+      ->check(isWithin(1e-3, 1e4));
   command
       .add_option("--isaac-lab", arguments->isaac_lab,
                   "version that will read amp or beyondmimic; default: 2, with a warning\n"
