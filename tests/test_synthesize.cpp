@@ -165,6 +165,8 @@ TEST_CASE("synthesize: lengths of any generated robot, as robots within their ra
   const auto calc_deviation = [](const JointRatios& r) { return (r.ratios.array() / 1.1 - 1).abs().maxCoeff(); };
   CHECK(calc_deviation(found) < 0.7 * calc_deviation(usual));
   CHECK(found.distance >= 0.2);
+  // With the digits of the search itself.
+  CHECK_THAT(readFile(out + "/leg_1/leg_1.yaml"), Catch::Matches("[^]*knee_crank: 0\\.\\d{14,}\n[^]*"));
   CHECK_THAT(search({"--parameter", "knee_length"}).err, Contains("knee_crank"));
   CHECK_THAT(search({"--parameter", "knee_crank=0.1:0.2"}).err, Contains("is not in the range"));
 }

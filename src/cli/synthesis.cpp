@@ -41,18 +41,13 @@ void setValue(OptionValues& values, const std::string& name, const OptionValue& 
   values.emplace_back(name, value);
 }
 
-std::string formatValue(double value) { return formatNumber(value, "%.9g"); }
-
 YamlTree makeRobot(const SoughtLinkage& sought, const VectorXd& x) {
   OptionValues values = sought.settings;
   for (size_t i = 0; i < sought.variables.size(); ++i)
     setValue(values, sought.variables[i].parameter, x[static_cast<Eigen::Index>(i)]);
   YamlTree robot;
   robot["generator"] = sought.generator;
-  for (const auto& [name, value] : values) {
-    const double* number = std::get_if<double>(&value);
-    robot["set"][name] = number ? formatValue(*number) : formatOption(value);
-  }
+  for (const auto& [name, value] : values) robot["set"][name] = formatOption(value);
   return robot;
 }
 
@@ -61,8 +56,8 @@ YamlTree makeVariable(const DesignVariable& variable) {
   node["name"] = variable.name;
   node["parameter"] = variable.parameter;
   node["unit"] = variable.unit;
-  node["bounds"].add(formatValue(variable.lower));
-  node["bounds"].add(formatValue(variable.upper));
+  node["bounds"].add(formatExact(variable.lower));
+  node["bounds"].add(formatExact(variable.upper));
   return node;
 }
 
@@ -90,7 +85,7 @@ YamlTree makeMeasure(const std::string& measure, const std::string& motors) {
 
 YamlTree makeStart(const std::vector<DesignVariable>& variables, const VectorXd& x) {
   YamlTree node = YamlTree::makeLine();
-  for (size_t i = 0; i < variables.size(); ++i) node[variables[i].name] = formatValue(x[static_cast<Eigen::Index>(i)]);
+  for (size_t i = 0; i < variables.size(); ++i) node[variables[i].name] = formatExact(x[static_cast<Eigen::Index>(i)]);
   return node;
 }
 
