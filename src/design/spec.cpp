@@ -353,11 +353,15 @@ DesignConstraint readConstraint(const Entry& entry, DesignSpec& spec) {
 void readRoot(const Entry& root, DesignSpec& spec) {
   const Fields fields = root.getFields(kDesignKeys);
   spec.robot = readRobotSpec(fields, root);
-  const Entry *architecture = find(fields, "architecture"), *variables = find(fields, "variables");
+  const Entry *architecture = find(fields, "architecture"), *variables = find(fields, "variables"),
+              *catalogue = find(fields, "motor_catalogue");
   if (architecture) readArchitecture(*architecture, spec);
   if (!architecture || variables)
     for (const Entry& item : require(fields, "variables", root).getList())
-      spec.variables.push_back(readVariable(item, spec, find(fields, "motor_catalogue")));
+      spec.variables.push_back(readVariable(item, spec, catalogue));
+  if (catalogue && std::none_of(spec.variables.begin(), spec.variables.end(),
+                                [](const DesignVariable& variable) { return !variable.types.empty(); }))
+    catalogue->fail("no motor is taken from it", "give a variable with a `motor` and `choices`, or remove it");
   if (const Entry* motions = find(fields, "motions")) spec.motions = readMotionSpecs(*motions, true);
   if (const Entry* drives = find(fields, "drives")) spec.drives = readDrives(*drives, spec);
   if (const Entry* mode = find(fields, "mode"))
