@@ -3,6 +3,7 @@
 import gc
 import multiprocessing
 import pickle
+import re
 import threading
 import weakref
 
@@ -188,6 +189,27 @@ def test_own_constraint(model, height):
     assert bounded.converged
     assert find_farthest(bounded) == pytest.approx(most, abs=1e-8)
     assert max(y.max() for y in bounded.multipliers.values if y.size) > 0
+
+    # What is not a number is named, in its value and in its derivatives.
+    class Broken(Knee):
+        def __init__(self, values, derivatives):
+            self.factors = values, derivatives
+
+        def calc(self, node):
+            return super().calc(node) * self.factors[0]
+
+        def calc_jacobian(self, node):
+            return {"q": super().calc_jacobian(node)["q"] * self.factors[1]}
+
+    for factors, told in (
+        ((np.nan, 1), "node 50: .*'broken knee' is not a number"),
+        ((1, np.nan), "not finite: the derivatives of constraint 'broken knee' at node 50$"),
+    ):
+        broken = bielle.PathConstraint("broken knee", Broken(*factors), lower=[-np.inf], upper=[-1], scale=[0.01])
+        stages = list(plan.stages)
+        stages[50] = stages[50].replace(path_constraints=stages[50].path_constraints + (broken,))
+        failed = bielle.Motion(model, plan.replace(stages=stages)).solve()
+        assert re.search(told, failed.summary.message), failed.summary.message
 
 
 def test_residuals_of_the_library_compare_and_pickle(model):

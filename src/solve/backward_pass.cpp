@@ -151,4 +151,10 @@ std::string BackwardPass::checkModel(const ShootingProblem& problem, const Linea
   return {};
 }
 
+int BackwardPass::findInfiniteRow(int node) const {
+  for (Eigen::Index row = 0; row < models_[node].Ct().cols(); ++row)
+    if (rows_[node][row] && !models_[node].Ct().col(row).allFinite()) return static_cast<int>(row);
+  return -1;
+}
+
 }  // namespace bielle

@@ -39,6 +39,8 @@ class BackwardPass {
   /// N + 1, of costs and dynamics alone, and of constraints with weights.
   const std::vector<StageModel>& models() const { return models_; }
   const LqSweep& sweep() const { return sweep_; }
+  /// The first constraint with weights at a node whose derivatives are not finite, or -1.
+  int findInfiniteRow(int node) const;
   /// Times of all updates since resize(), summed over the threads.
   double linearizeSeconds() const { return linearize_seconds_; }
   double sweepSeconds() const { return sweep_seconds_; }

@@ -1,5 +1,6 @@
 #include "solve/fddp_iterations.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -158,6 +159,12 @@ FddpIterations::End FddpIterations::updateStep() {
     const LqResult result = sweep.result();
     if (result.status == NumericalStatus::NotFinite) {
       summary_.message = "node " + std::to_string(result.node) + ": the quadratic models are not finite";
+      for (const int k : {result.node, std::min(result.node + 1, N_)})  // LqSweep finds it there or one node earlier
+        if (const int row = memory_.backward.findInfiniteRow(k); row >= 0) {
+          summary_.message +=
+              ": the derivatives of " + problem_.getConstraintName(k, row) + " at node " + std::to_string(k);
+          break;
+        }
       return FddpTermination::Failed;
     }
     line_.regularization = regularization_;
