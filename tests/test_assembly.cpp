@@ -48,6 +48,20 @@ TEST_CASE("assembly: Bipetto half sitting, from scratch") {
     CHECK(std::abs(result.q[model.joints()[model.findJoint(joint)].idx_q] - angle) < 0.02);
 }
 
+TEST_CASE("assembly: whole turns of far angles are left out where nothing counts them") {
+  const Model model = loadOwn("fourbar").model;
+  const VectorXd near = closeConfiguration(model, model.makeNeutral()).q;
+  VectorXd far = near;
+  far[0] += 2 * kPi * 1e9;  // rounded to 1e-6
+  const AssemblyResult result = closeConfiguration(model, far);
+  CAPTURE(result.message);
+  REQUIRE(result.status == NumericalStatus::Ok);
+  CHECK((result.q - near).norm() < 1e-5);
+  Reference reference{"turned", {{"crank_joint", {far[0]}}}, "", 0, {}};
+  const VectorXd q = assemble(model, makeReferenceProblem(model, reference)).q;
+  CHECK(listReferenceJoints(model, reference, q).front().moved < 1e-9);
+}
+
 TEST_CASE("assembly: a given angle out of reach is listed with where it ends, one within reach stays") {
   const Model model = loadOwn("fourbar").model;
   Reference reference{"bent", {{"crank_joint", {1.047198}}, {"rocker_joint", {0.2}}}, "", 0, {}};

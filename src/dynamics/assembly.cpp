@@ -9,6 +9,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "dynamics/assembly_refinement.h"
+#include "dynamics/whole_turns.h"
 #include "math/decompositions.h"
 #include "math/largest.h"
 #include "math/so3.h"
@@ -158,7 +159,9 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
 
 }  // namespace
 
-AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options) {
+AssemblyResult assemble(const Model& model, const AssemblyProblem& given, const AssemblyOptions& options) {
+  AssemblyProblem problem = given;
+  problem.q_ref = leaveOutTurns(model, given.q_ref);
   HardConditions conditions(model, problem);
   AssemblyResult result;
   result.q = problem.q_ref;
@@ -463,7 +466,8 @@ AssemblyResult assembleReference(const Model& model, const std::string& name, co
 
 std::vector<ReferenceJoint> listReferenceJoints(const Model& model, const Reference& reference, ConstVectorRef q) {
   std::vector<ReferenceJoint> joints;
-  const VectorXd difference = model.difference(makeReferenceProblem(model, reference).q_ref, q);
+  const VectorXd given = leaveOutTurns(model, makeReferenceProblem(model, reference).q_ref);
+  const VectorXd difference = model.difference(given, q);
   for (const auto& [name, values] : reference.joints) {
     const int index = model.findJoint(name);
     const Joint& joint = model.joints()[index];

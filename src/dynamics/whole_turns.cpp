@@ -7,10 +7,14 @@
 
 namespace bielle {
 
-bool countsTurns(const Model& model, int joint) {
-  const int dof = model.joints()[joint].idx_v;
-  const auto isHeld = [&](const JointForce& force) { return force.joint == joint && force.stiffness != 0; };
-  const auto isTerm = [&](const CouplerTerm& term) { return term.joint == joint; };
+bool isAngle(JointKind kind, int k) {
+  const bool is_hinge = kind == JointKind::Revolute || kind == JointKind::Continuous || kind == JointKind::Universal;
+  return is_hinge || (kind == JointKind::Planar && k == 2);
+}
+
+bool countsTurns(const Model& model, int dof) {
+  const auto isHeld = [&](const JointForce& force) { return force.dof == dof && force.stiffness != 0; };
+  const auto isTerm = [&](const CouplerTerm& term) { return term.dof == dof; };
   const auto isCoupled = [&](const Closure& closure) {
     return std::any_of(closure.terms.begin(), closure.terms.end(), isTerm);
   };
@@ -21,11 +25,9 @@ bool countsTurns(const Model& model, int joint) {
 
 std::vector<int> listFreeTurns(const Model& model) {
   std::vector<int> places;
-  for (int i = 1; i < model.numBodies(); ++i) {
-    const Joint& joint = model.joints()[i];
-    if ((joint.kind == JointKind::Revolute || joint.kind == JointKind::Continuous) && !countsTurns(model, i))
-      places.push_back(joint.idx_q);
-  }
+  for (const Joint& joint : model.joints())
+    for (int k = 0; k < joint.nv; ++k)
+      if (isAngle(joint.kind, k) && !countsTurns(model, joint.idx_v + k)) places.push_back(joint.idx_q + k);
   return places;
 }
 
@@ -41,6 +43,12 @@ bool leaveOutTurns(const std::vector<int>& free_turns, VectorXd& q, VectorXd& tu
     any = true;
   }
   return any;
+}
+
+VectorXd leaveOutTurns(const Model& model, ConstVectorRef q) {
+  VectorXd near = q, turns = VectorXd::Zero(model.nq());
+  leaveOutTurns(listFreeTurns(model), near, turns);
+  return near;
 }
 
 }  // namespace bielle

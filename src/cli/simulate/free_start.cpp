@@ -47,17 +47,19 @@ void leaveOutTurns(const Model& model, const std::string& file, cli::EvalState& 
   constexpr double kFar = 1e5;  // rad
   for (int j : state.placed) {
     const Joint& joint = model.joints()[j];
-    if (joint.kind != JointKind::Revolute && joint.kind != JointKind::Continuous) continue;
-    double& angle = state.q[joint.idx_q];
-    if (std::abs(angle) <= kFar) continue;
-    if (countsTurns(model, j))
-      throw InputError(file, "joint '" + joint.name + "'",
-                       "its angle of " + formatNumber(angle) + " rad is rounded by more than loops may be open",
-                       "give one within " + formatNumber(kFar) + " rad");
-    const double rest = std::remainder(angle, 2 * M_PI);
-    std::cerr << "bielle: warning: " << file << ": joint '" << joint.name << "': of its angle " << formatNumber(angle)
-              << " rad whole turns are left out; it starts with " << formatNumber(rest) << "\n";
-    angle = rest;
+    for (int k = 0; k < joint.nv; ++k) {
+      if (!isAngle(joint.kind, k)) continue;
+      double& angle = state.q[joint.idx_q + k];
+      if (std::abs(angle) <= kFar) continue;
+      if (countsTurns(model, joint.idx_v + k))
+        throw InputError(file, "joint '" + joint.name + "'",
+                         "its angle of " + formatNumber(angle) + " rad is rounded by more than loops may be open",
+                         "give one within " + formatNumber(kFar) + " rad");
+      const double rest = std::remainder(angle, 2 * M_PI);
+      std::cerr << "bielle: warning: " << file << ": joint '" << joint.name << "': of its angle " << formatNumber(angle)
+                << " rad whole turns are left out; it starts with " << formatNumber(rest) << "\n";
+      angle = rest;
+    }
   }
 }
 
