@@ -57,6 +57,10 @@ TEST_CASE("terrain: a point leaves a box by the shortest way, but not into the g
   CHECK((side.normal + Vector3d::UnitX()).norm() < 1e-12);
   CHECK(terrain.touch({0.999, 0.1, 0.05}).normal.z() == 1);  // the next box is beyond this side
   CHECK(terrain.touch({-0.2, 0, -0.01}).depth == Approx(0.01));
+  // In the corner of ground and side, both push.
+  const Terrain::Touch corner = terrain.touch({0.004, 0.1, -0.003});
+  CHECK(corner.depth == Approx(0.005));
+  CHECK((corner.normal - Vector3d(-0.8, 0, 0.6)).norm() < 1e-12);
   // One that came from above leaves through the top, however near the side is.
   CHECK(terrain.touch({0.004, 0.1, 0.05}, {-0.01, 0.1, 0.101}).depth == Approx(0.05));
   CHECK(terrain.touch({0.004, 0.1, 0.05}, {-0.01, 0.1, 0.099}).depth == Approx(0.004));

@@ -190,7 +190,13 @@ Terrain::Touch Terrain::touch(const Vector3d& point) const {
     const double along = axes[axis].dot(at), sign = along < 0 ? -1 : 1, depth = halves[axis] - sign * along;
     if (depth >= touch.depth) continue;
     const Eigen::Vector2d out = sign * axes[axis], beyond = point.head<2>() + (depth + kBeyond) * out;
-    if (find(beyond.x(), beyond.y()).height < point.z()) touch = {depth, {out.x(), out.y(), 0}};
+    const Surface next = find(beyond.x(), beyond.y());
+    const double rest = (next.height - point.z()) * next.normal.z();
+    const Vector3d way = depth * Vector3d(out.x(), out.y(), 0) + rest * next.normal;
+    if (rest <= 0)
+      touch = {depth, {out.x(), out.y(), 0}};
+    else if (way.norm() < touch.depth)
+      touch = {way.norm(), way.normalized()};
   }
   return touch;
 }
@@ -238,10 +244,11 @@ void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double
     return gap <= over && gap >= -under && findTop(at.x(), at.y()) == &top;
   };
   visit(low, high, [&](const Top& top) {
-    for (Place& place : places)
-      if (top.covers(place.home.x(), place.home.y(), kInside) &&
-          calcHeight(place.home) - top.calcHeight(place.home.x(), place.home.y()) <= over)
-        place.distance = 0;
+    for (Place& place : places) {
+      const double gap = calcHeight(place.home) - top.calcHeight(place.home.x(), place.home.y());
+      const double margin = gap < -under ? 0 : kInside;  // a side of a higher step pushes as soon as it is touched
+      if (gap <= over && top.covers(place.home.x(), place.home.y(), margin)) place.distance = 0;
+    }
   });
   const auto isOff = [](const Place& place) { return place.distance > 0; };
   if (std::none_of(places.begin(), places.end(), isOff)) return;

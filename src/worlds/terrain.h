@@ -24,8 +24,9 @@ class Terrain {
     double depth = 0;                     ///< m, negative above the ground
     Vector3d normal = Vector3d::UnitZ();  ///< unit, out of the ground
   };
-  /// How deep a point is in the ground, along the normal of the surface through which the way out is shortest: the top of a
-  /// box, or one of its sides unless there is ground beyond it.
+  /// How deep a point is in the ground, along the shortest way out: through the top of a box, or through one of its sides and
+  /// then, where the ground beyond is higher than the point, out of that. In the corner of a step and the side of the next one a
+  /// spring of this depth thus pushes like one of each.
   Touch touch(const Vector3d& point) const;
   /// The same for a point that came from another one: out of a top above which it was, however near its sides are.
   Touch touch(const Vector3d& point, const Vector3d& from) const;
