@@ -50,6 +50,7 @@ class ManifoldWorld : public World {
   bool settle(ConstVectorRef d, ConstVectorRef u);
   void takeOver();
   void updateFeet();
+  std::string describeState() const;
   std::string describeStop() const;
   Vector3d getPlace(int body, const Vector3d& point) const { return field_.workspace().X_WB[body].act(point); }
   Vector3d calcVelocityAt(int body, const Vector3d& x) const {
@@ -155,12 +156,12 @@ bool ManifoldWorld::takeStep(double& h) {
   field_.begin(near_);
   x_.setZero();
   x_.segment(nv, nv) = v_;
-  if (!evaluate(x_, rate_)) return fail(field_.failure());
+  if (!evaluate(x_, rate_)) return fail(describeState());
   const double independence = field_.independence();
   if (independence < kLessIndependent * best_independence_ && independence > kNearest * best_independence_) {
     field_.select(near_);
     field_.begin(near_);
-    if (!evaluate(x_, rate_)) return fail(field_.failure());
+    if (!evaluate(x_, rate_)) return fail(describeState());
   }
   best_independence_ = std::max(best_independence_, field_.independence());
   scale_.head(nv).setConstant(tolerance_);
@@ -280,6 +281,12 @@ Books ManifoldWorld::books() const {
       books, [this](int body, const Vector3d& point) { return ws_.X_WB[body].act(point); },
       [this](const JointStop& stop) { return q_[stop.coordinate]; });
   return books;
+}
+
+// Why a state has no accelerations.
+std::string ManifoldWorld::describeState() const {
+  return field_.failure().empty() ? "its accelerations are not finite after " + formatNumber(time_) + " s"
+                                  : field_.failure();
 }
 
 std::string ManifoldWorld::describeStop() const {

@@ -173,6 +173,7 @@ class SimbodyWorld : public World {
   void finishStep(double duration);
   void readState();
   void realizeForces();
+  void breakOff(const std::exception& error);
 
   SimbodyTree tree_;
   ContactSet contacts_;
@@ -261,12 +262,20 @@ void SimbodyWorld::start() {
     tree_.system.realize(state, Stage::Velocity);
     tree_.system.projectU(state, no_estimate, within, results);
     integrator_->initialize(state);
+    tree_.system.realize(integrator_->updAdvancedState(), Stage::Velocity);
+    last_ = forces_->calcPowers(integrator_->getAdvancedState());
+    readState();
   } catch (const std::exception& error) {
-    message_ = error.what();
+    breakOff(error);
   }
+}
+
+// The engine stopped within a step or at a start, whose state is of no stage: back to the last one that was read.
+void SimbodyWorld::breakOff(const std::exception& error) {
+  message_ = error.what();
+  std::replace(message_.begin(), message_.end(), '\n', ' ');
+  integrator_->updAdvancedState() = placeState();
   tree_.system.realize(integrator_->updAdvancedState(), Stage::Velocity);
-  last_ = forces_->calcPowers(integrator_->getAdvancedState());
-  readState();
 }
 
 // Forces that do not depend on the state alone have changed: what was computed of them is stale.
@@ -290,11 +299,7 @@ bool SimbodyWorld::step(double duration) {
       if (integrator_->getTime() > start && isInterrupted()) break;  // the first return may be before any step
     }
   } catch (const std::exception& error) {
-    message_ = error.what();
-    std::replace(message_.begin(), message_.end(), '\n', ' ');
-    // The engine stopped within a step, whose state is of no stage: back to the last one that was read.
-    integrator_->updAdvancedState() = placeState();
-    tree_.system.realize(integrator_->updAdvancedState(), Stage::Velocity);
+    breakOff(error);
     work_ = work;
     return false;
   }
