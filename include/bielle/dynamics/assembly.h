@@ -59,6 +59,8 @@ struct AssemblyResult {
   std::string worst;  ///< name of the closure or target with the largest residual
 };
 
+/// Whole turns are left out of angles beyond 1e4 rad, which are rounded by more than the tolerance, where nothing counts them, as
+/// ranges, springs and couplers do.
 AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options = {});
 
 /// Nearest closed configuration to q, without other targets.
