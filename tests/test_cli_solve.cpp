@@ -367,6 +367,27 @@ TEST_CASE("without limits there is none for one motor either") {
   checkRefused(run(makeShortSquat(directory.str(), {"--no-limits", "--limit", "motor_knee_right=80"})), "limit");
 }
 
+TEST_CASE("options that others make useless are told, and what is given twice is refused") {
+  const OutputDirectory directory;
+  const auto plan = [&](std::vector<std::string> options) {
+    options.insert(options.end(), {"--dry-run"});
+    return run(makeShortSquat(directory.str(), options));
+  };
+  for (const auto& [options, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--serial-armature", "1e-2"}, "--serial-armature has no effect: the model is closed"},
+           {{"--regularization", "0.5"}, "--regularization has no effect: the objective is effort"},
+           {{"--dead-point-margin", "0.3", "--no-limits"}, "--dead-point-margin has no effect: --no-limits"},
+           {{"--set", "closure_kp=500"}, "--set closure_kp has no effect: loops are closed at every node"}}) {
+    const CommandResult result = plan(options);
+    CHECK(result.status == 0);
+    CHECK_THAT(result.err, Catch::StartsWith("bielle: warning: ") && Catch::Contains(told));
+  }
+  CHECK(plan({"--dead-point-margin", "0.3"}).err.empty());
+  checkRefused(plan({"--set", "depth=0.9"}), "'depth' is given twice");
+  checkRefused(plan({"--set", "com_weight=1e4", "--set", "com_weight=1e5"}), "'com_weight' is given twice");
+  checkRefused(plan({"--limit", "motor_knee_left=80", "--limit", "motor_knee_left=90"}), "is given twice");
+}
+
 TEST_CASE("durations are free within the bounds given, or as planned") {
   const OutputDirectory directory;
   const auto solve = [&](std::vector<std::string> options) {

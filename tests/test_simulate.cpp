@@ -296,6 +296,7 @@ TEST_CASE("simulate: options that others make useless are told, and periods that
       {{"--nodes", "50", "--control", "gains"}, "--nodes has no effect: control is not predictive"},
       {{"--fine-nodes", "20", "--control", "open"}, "--fine-nodes has no effect"},
       {{"--iterations", "2", "--control", "gains"}, "--iterations has no effect"},
+      {{"--nodes", "20", "--fine-nodes", "40"}, "--fine-nodes has no effect: all 20 --nodes are one stage long"},
       {{"--look-ahead", "20", "--control", "open"}, "--look-ahead has no effect: open control has no gains"},
       {{"--noise", "2"}, "--noise has no effect: ideal sensors have none"},
       {{"--hold", "2", "--duration", "3"}, "--hold has no effect: --duration ends the motion"},
@@ -310,6 +311,7 @@ TEST_CASE("simulate: options that others make useless are told, and periods that
     CHECK_THAT(result.err, Catch::StartsWith("bielle: warning: ") && Catch::Contains(told));
   }
   for (const std::vector<std::string>& options : {std::vector<std::string>{"--nodes", "50"},
+                                                  {"--nodes", "20"},
                                                   {"--accuracy", "1e-6"},
                                                   {"--hold", "2"},
                                                   {"--time-step", "0.001"},
@@ -329,6 +331,12 @@ TEST_CASE("simulate: options that others make useless are told, and periods that
   const nlohmann::json summary = parseSummary(output);
   CHECK(summary["warnings"].size() == 1);
   CHECK(summary["integration"]["longest_step_s"].get<double>() == Approx(5e-4));  // half a period
+  const CommandResult controlled = simulate(output, {"--control", "gains", "--duration", "0.02", "--summary-only",
+                                                     "--time-step", "0.0007", "--accuracy", "1e-3"});
+  CAPTURE(controlled.err);
+  CHECK(controlled.err.empty());  // steps of controlled error are as long as they may be
+  const CommandResult early = simulate(output, {"--duration", "0.02", "--summary-only", "--lead", "500"});
+  CHECK_THAT(early.err, Catch::Contains("--lead has no effect: stages last "));
 }
 
 TEST_CASE(

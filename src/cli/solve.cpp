@@ -3,7 +3,9 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -34,6 +36,7 @@ struct SolveArguments {
   bool serial = false;
   std::string serial_armature = "1e-3";
   std::vector<std::string> settings;                                      // name=value
+  std::set<std::string> flags;                                            // options of the motion that are given so
   std::vector<std::string> effort_limits, velocity_limits, power_limits;  // motor=value
   TimingArguments timings;
   FddpOptions solver = makeMotionSolverOptions();
@@ -43,12 +46,14 @@ struct SolveArguments {
 
 LimitOptions makeLimits(const SolveArguments& arguments) {
   LimitOptions limits = arguments.problem.limits;
-  for (const std::string& setting : arguments.effort_limits)
-    limits.efforts.insert(parseSetting("--limit", setting, "motor_knee_right=12"));
-  for (const std::string& setting : arguments.velocity_limits)
-    limits.velocities.insert(parseSetting("--velocity-limit", setting, "motor_knee_right=15"));
-  for (const std::string& setting : arguments.power_limits)
-    limits.powers.insert(parseSetting("--power-limit", setting, "motor_knee_right=40"));
+  const auto read = [](const std::string& flag, const std::vector<std::string>& settings, const std::string& example,
+                       std::map<std::string, double>& out) {
+    requireOnce(flag, settings, example);
+    for (const std::string& setting : settings) out.insert(parseSetting(flag, setting, example));
+  };
+  read("--limit", arguments.effort_limits, "motor_knee_right=12", limits.efforts);
+  read("--velocity-limit", arguments.velocity_limits, "motor_knee_right=15", limits.velocities);
+  read("--power-limit", arguments.power_limits, "motor_knee_right=40", limits.powers);
   requireOption(limits.enforced || !limits.areGiven(), "no-limits", "it contradicts the limit given for a motor",
                 "leave out one of them");
   return limits;
@@ -239,7 +244,33 @@ void printPlan(const Motion& motion) {
             << "\n";
 }
 
+// Options that others make useless.
+std::vector<std::string> listIdleOptions(const SolveArguments& arguments) {
+  std::vector<std::string> idle;
+  const auto check = [&](bool is_given, const std::string& option, const std::string& reason) {
+    if (is_given) idle.push_back(option + " has no effect: " + reason);
+  };
+  const ObjectiveOptions& objective = arguments.problem.objective;
+  check(!arguments.serial && arguments.serial_armature != SolveArguments().serial_armature, "--serial-armature",
+        "the model is closed");
+  check(objective.objective == Objective::Effort && objective.regularization.has_value(), "--regularization",
+        "the objective is effort");
+  const LimitOptions& limits = arguments.problem.limits;
+  const bool has_margin = limits.dead_point_margin != LimitOptions().dead_point_margin;
+  check(has_margin && arguments.serial, "--dead-point-margin", "the serial model has no linkages");
+  check(has_margin && !limits.enforced, "--dead-point-margin", "--no-limits leaves out all bounds");
+  for (const std::string& setting : arguments.settings) {
+    const std::string name = splitSetting("--set", setting, "com_weight=1e5").first,
+                      last = name.substr(name.rfind('.') + 1);
+    check(arguments.problem.formulation == Formulation::Reduced && (last == "closure_kp" || last == "closure_kd"),
+          "--set " + name, "loops are closed at every node, without --formulation full");
+  }
+  return idle;
+}
+
 int solve(const SolveArguments& arguments, MotionRequest request) {
+  requireOnce("--set", arguments.settings, "com_weight=1e5", arguments.flags);
+  printWarnings(listIdleOptions(arguments));
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] = splitSetting("--set", setting, "com_weight=1e5");
     request.options.set(name, parseOption(value));
@@ -355,8 +386,10 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   addOutput(sub, arguments);
   addFiles(sub, request);
   for (const std::string& flag : motion.flags)
-    addOption(sub, request->options.get(flag),
-              [request, flag](const OptionValue& value) { request->options.set(flag, value); });
+    addOption(sub, request->options.get(flag), [arguments, request, flag](const OptionValue& value) {
+      arguments->flags.insert(flag);
+      request->options.set(flag, value);
+    });
   addSolverOptions(sub, arguments);
   sub.footer("Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " +
              motion.example + "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" + kOutcome);

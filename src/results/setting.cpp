@@ -28,4 +28,13 @@ std::pair<std::string, double> parseSetting(const std::string& flag, const std::
   return {setting.substr(0, equals), value};
 }
 
+void requireOnce(const std::string& flag, const std::vector<std::string>& settings, const std::string& example,
+                 std::set<std::string> given) {
+  for (const std::string& setting : settings) {
+    const std::string name = splitSetting(flag, setting, example).first;
+    if (!given.insert(name).second)
+      throw InputError("", flag + " " + setting, "'" + name + "' is given twice", "give it once");
+  }
+}
+
 }  // namespace bielle

@@ -1,7 +1,9 @@
 #pragma once
 // Settings on command lines.
+#include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace bielle {
 
@@ -12,5 +14,9 @@ std::pair<std::string, std::string> splitSetting(const std::string& flag, const 
 // name=number. \throws InputError that shows the example
 std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
                                             const std::string& example);
+
+// \param given  names that other options have set   \throws InputError where a name is given twice
+void requireOnce(const std::string& flag, const std::vector<std::string>& settings, const std::string& example,
+                 std::set<std::string> given = {});
 
 }  // namespace bielle

@@ -292,6 +292,9 @@ std::vector<std::string> listIdleOptions(const SimulateArguments& a) {
         "the steps of world " + a.world + " are of a fixed length");
   const PlanControl control = a.wanted_control.value_or(a.control.control);
   check(control == PlanControl::Predictive, {"nodes", "fine_nodes", "iterations"}, "control is not predictive");
+  const PredictiveOptions& predictive = a.control.predictive;
+  check(predictive.fine_nodes <= predictive.nodes, {"fine_nodes"},
+        "all " + std::to_string(predictive.nodes) + " --nodes are one stage long");
   check(a.solve_time == 0, {"lead"}, "with --solve-time solves begin with their stages");
   check(control != PlanControl::Open, {"look_ahead"}, "open control has no gains");
   check(a.sensors == Sensing::Real, {"noise"}, "ideal sensors have none");
@@ -359,11 +362,7 @@ void parseOptions(SimulateArguments& arguments) {
     throw InputError("", "--world " + arguments.world, "a world is given twice", "give it once");
   std::set<std::string> names;
   if (arguments.speed) names.insert("speed");
-  for (const std::string& setting : arguments.settings) {
-    const std::string name = splitSetting("--set", setting, "steps=8").first;
-    if (!names.insert(name).second)
-      throw InputError("", "--set " + setting, "'" + name + "' is given twice", "give it once");
-  }
+  requireOnce("--set", arguments.settings, "steps=8", names);
 }
 
 void addOptions(CLI::App& app, SimulateArguments& a) {

@@ -83,16 +83,22 @@ void roundPeriods(SimulateArguments& arguments) {
   execution.record_period = period;
 }
 
-// What has no effect on this motion and robot.
-std::vector<std::string> listIdleInPlan(const SimulateArguments& arguments, const Plan& plan) {
+// What has no effect on this motion, robot and world.
+std::vector<std::string> listIdleInPlan(const SimulateArguments& arguments, const Plan& plan, const World& world) {
   const ExecutionOptions& o = arguments.execution;
   std::vector<std::string> idle;
   const double steps = std::ceil(o.control_period / arguments.time_step - 1e-9), step = o.control_period / steps;
-  if (arguments.time_step > 0 && step < 0.99 * arguments.time_step)
+  const bool has_fixed_steps = !(world.integration().tolerance > 0);
+  if (has_fixed_steps && arguments.time_step > 0 && step < 0.99 * arguments.time_step)
     idle.push_back("--time-step " + formatNumber(arguments.time_step) + ": steps are of " + formatNumber(step) +
                    " s at most, an even part of --control-period");
   if (arguments.errors.rod > 0 && plan.robot.model.closures().empty())
     idle.push_back("--rod-error has no effect: the robot has no closures");
+  double longest = 0;  // s
+  for (const Policy::Stage& stage : plan.policy.stages()) longest = std::max(longest, stage.duration);
+  const double lead = arguments.control.predictive.lead;
+  if (!plan.walk && lead > 0 && lead >= longest)
+    idle.push_back("--lead has no effect: stages last " + formatNumber(1e3 * longest) + " ms at most");
   return idle;
 }
 
@@ -210,7 +216,6 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   std::vector<std::string> warnings = arguments.robot.empty() ? plan.robot.warnings : std::vector<std::string>();
   for (const std::string& each : listIdleOptions(arguments)) warnings.push_back(each);
   requirePushesToEnd(plan, arguments.execution);
-  for (const std::string& each : listIdleInPlan(arguments, plan)) warnings.push_back(each);
   const PlanController controller = makeController(plan, arguments.control);
   const StandingPlace place = findPlace(plan.robot.model, plan.schedule.phases.front().contacts);
   const auto [ground, start] = makeGround(arguments, plan.ground, place);
@@ -219,6 +224,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   const double tolerance = controlsError(arguments.world) ? arguments.accuracy : 0;
   const auto world = makeWorld(arguments.world, addErrors(plan, robot.model, arguments.errors),
                                {ground, arguments.time_step, &isInterrupted(), tolerance});
+  for (const std::string& each : listIdleInPlan(arguments, plan, *world)) warnings.push_back(each);
   for (const std::string& each : world->warnings()) warnings.push_back("world " + arguments.world + ": " + each);
   tell(warnings);
   ExecutionOptions& options = arguments.execution;
