@@ -10,6 +10,7 @@
 #include "bielle/motion/motion.h"
 #include "bielle/worlds/bielle_world.h"
 #include "count_allocations.h"
+#include "mechanisms.h"
 #include "own_robots.h"
 #include "selection.h"
 #include "world_trials.h"
@@ -164,6 +165,12 @@ TEST_CASE("bielle world: a robot is pushed, and the work of the push is booked")
 
 TEST_CASE("bielle world: soles and edges rest on the sides and corners of steps") {
   testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
+    return makeBielleWorld(model, {options, {}});
+  });
+}
+
+TEST_CASE("bielle world: a sole stops at the side of a step") {
+  testing::checkRisers([](const Model& model, const WorldOptions& options) {
     return makeBielleWorld(model, {options, {}});
   });
 }
@@ -353,6 +360,57 @@ TEST_CASE("bielle world: an angle that has grown for long changes nothing, at fi
     for (double turns : {2e3, 2e5, 2e7}) {
       CAPTURE(tolerance, turns);
       CHECK((move(2 * M_PI * turns) - near).norm() < 1e-6);  // 2e7 turns are rounded to 1.5e-8 rad
+    }
+  }
+}
+
+TEST_CASE("worlds: speeds at which nothing can go on end with a message, in every world") {
+  const Model model = bielle::testing::loadOwn("fourbar").model;
+  const VectorXd q = findClosedConfiguration(model).q;
+  Workspace ws(model);
+  const VectorXd v = projectVelocity(model, ws, makeConstraintSet(model), q, VectorXd::Ones(model.nv()));
+  for (const std::string& name : listWorlds())
+    for (const double tolerance : {0.0, 1e-9})
+      for (const double speed : {1e12, 1e200}) {
+        if (tolerance > 0 && name != "bielle") continue;
+        CAPTURE(name, tolerance, speed);
+        WorldOptions options;
+        options.tolerance = tolerance;
+        const auto world = makeWorld(name, model, options);
+        world->reset(q, speed * v);
+        CHECK_FALSE(world->advance(0.01));
+        CHECK(world->message().size() > 10);
+        CHECK(world->message().find('\n') == std::string::npos);
+        CHECK(world->configuration().allFinite());
+        world->books();
+        world->reset(q, v);
+        CHECK(world->advance(0.01));  // it can be used again
+      }
+}
+
+TEST_CASE("bielle world: angles of joints of all kinds may have grown for long") {
+  std::mt19937 generator(2);
+  for (const JointKind kind : {JointKind::Revolute, JointKind::Universal, JointKind::Planar}) {
+    const auto [model, q] = bielle::testing::makeRandomMechanism(generator, kind, ClosureKind::Ball3D,
+                                                                 bielle::testing::MechanismBase::Fixed);
+    VectorXd turned = VectorXd::Zero(model.nq());
+    for (const Joint& joint : model.joints())
+      if (joint.kind == kind)
+        turned.segment(joint.idx_q, joint.nq).tail(kind == JointKind::Universal ? 2 : 1).setOnes();
+    for (double tolerance : {0.0, 1e-9}) {
+      WorldOptions options;
+      options.tolerance = tolerance;
+      const std::unique_ptr<World> world = makeWorld("bielle", model, options);
+      const auto move = [&](double angle) {
+        world->reset(q + angle * turned, VectorXd::Zero(model.nv()));
+        REQUIRE(world->advance(0.02));
+        CHECK(world->integration().shortest_step > 1e-5);
+        return VectorXd(world->configuration() - angle * turned);
+      };
+      CAPTURE(getName(kind), tolerance);
+      const VectorXd near = move(0);
+      CHECK((near - q).norm() > 1e-3);
+      CHECK((move(2 * M_PI * 1e6) - near).norm() < 1e-6);
     }
   }
 }

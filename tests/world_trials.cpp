@@ -134,6 +134,38 @@ void checkOverhangs(const std::function<std::unique_ptr<World>(const Model&, con
   }
 }
 
+void checkRisers(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld) {
+  constexpr double kWay = 0.004, kTread = 0.2;  // from the riser, m
+  WorldOptions options;
+  options.ground.friction = 0.4;
+  options.ground.steps = {{{-0.5, 0, kTread}, 1, 1, 0, 0, 0}, {{0.5, 0, kTread + 0.1}, 1, 1, 0, 0, 0}};
+  for (const double yaw : {0.0, 0.2, 0.785}) {
+    const Model model = makeBlock(ContactKind::Surface6D, {0, 0, 0.02});
+    const ContactFrame& sole = model.contacts()[0];
+    const auto world = makeWorld(model, options);
+    const double reach = sole.half_length * std::cos(yaw) + sole.half_width * std::sin(yaw);
+    VectorXd q = model.makeNeutral();
+    q.head<7>() << -reach - kWay, 0, kTread, 0, 0, std::sin(yaw / 2), std::cos(yaw / 2);
+    world->reset(q, VectorXd::Zero(model.nv()));
+    const Books start = world->books();
+    for (int i = 0; i < 300; ++i) {
+      world->setPush({60, 0, 0});
+      REQUIRE(world->advance(1e-3));
+    }
+    Workspace ws(model);
+    updatePlacements(model, ws, world->configuration());
+    const SE3 X_WF = getPlacement(ws, sole.body, sole.X_BF);
+    double front = -1;
+    for (const double x : {-1, 1})
+      for (const double y : {-1, 1})
+        front = std::max(front, X_WF.act({x * sole.half_length, y * sole.half_width, 0}).x());
+    CAPTURE(yaw, world->configuration().transpose());
+    CHECK(std::abs(front) < 1e-3);
+    CHECK(world->configuration()[2] == Approx(kTread).margin(1e-3));
+    CHECK(calcBalanceError(start, world->books()) < 0.01);
+  }
+}
+
 void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances) {
   const PostureHold posture(model);
   world.reset(posture.posture(), VectorXd::Zero(model.nv()));

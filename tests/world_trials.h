@@ -24,6 +24,8 @@ struct TrialTolerances {
 Model makeBlock(ContactKind kind, const Vector3d& com);
 // Soles and edges of a block overhang the sides and corners of steps by up to half of their length, and stay where they are.
 void checkOverhangs(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld);
+// A block slides over a step and against the side of the next one, which holds it.
+void checkRisers(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld);
 
 // Each takes a world of Bipetto on flat ground at height 0 and friction 0.7.
 void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances);
