@@ -407,7 +407,6 @@ TEST_CASE("robots are found by name, directory and file; the error for an unknow
   CHECK(loadRobot(second.path() + "/toy").model.nu() == 1);
   CHECK(loadRobot(second.path() + "/toy/").model.nu() == 1);
   CHECK(loadRobot(second.path() + "/toy/toy.urdf").model.nu() == 1);
-  CHECK(loadRobot(second.path() + "/toy/toy.yaml").model.nu() == 1);  // with the URDF beside it
   CHECK(loadRobot(second.path() + "/lonely").model.name() == "toy");
   // The settings beside a URDF stand for both.
   CHECK(loadRobot(second.path() + "/toy/toy.yaml").model.nu() == 1);

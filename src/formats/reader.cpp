@@ -228,8 +228,6 @@ RobotFiles readRobotFiles(const std::filesystem::path& path) {
   if (path.extension() != ".yaml") return readUrdfAndYaml(path);
   const YamlFile own = readYaml(path.string());
   if (own.composed) return generate(own);
-  const std::filesystem::path tree = std::filesystem::path(path).replace_extension(".urdf");
-  if (own.models.empty() && !own.generator && std::filesystem::exists(tree)) return readUrdfAndYaml(tree);
   RobotFiles files = own.generator ? generate(own) : readCompleted(own);
   complete(own, files.yaml);
   return files;
