@@ -15,7 +15,6 @@ namespace bielle::worlds {
 namespace {
 
 constexpr int kMaxNewton = 20;
-constexpr int kMostForesights = 6;          // of the velocity of a step
 constexpr double kNewtonTolerance = 1e-10;  // of a change of velocity, relative to 1 (m/s, rad/s) and the largest
 constexpr double kLeastShare = 1.0 / 64;    // of a Newton step that must lower the residual
 constexpr int kMostHalvings = 6;            // of a step
@@ -51,12 +50,6 @@ T calcLargestOf(const VectorX<T>& x) {
 }
 
 template <typename T>
-void assignWorks(const MaskOf<T>& mask, const WorksOf<T>& from, WorksOf<T>& to) {
-  for (auto part : {&WorksOf<T>::motor, &WorksOf<T>::push, &WorksOf<T>::contact, &WorksOf<T>::stop, &WorksOf<T>::joint})
-    assignLanes(mask, from.*part, to.*part);
-}
-
-template <typename T>
 void assignMoment(const MaskOf<T>& mask, const typename LeapfrogOf<T>::Moment& from,
                   typename LeapfrogOf<T>::Moment& to) {
   if (all(mask)) {
@@ -66,7 +59,8 @@ void assignMoment(const MaskOf<T>& mask, const typename LeapfrogOf<T>::Moment& f
   for (auto part : {&LeapfrogOf<T>::Moment::owed, &LeapfrogOf<T>::Moment::length, &LeapfrogOf<T>::Moment::energy})
     assignLanes(mask, from.*part, to.*part);
   assignLanes(mask, from.half_last, to.half_last);
-  assignWorks<T>(mask, from.works, to.works);
+  for (auto part : {&WorksOf<T>::motor, &WorksOf<T>::push, &WorksOf<T>::contact, &WorksOf<T>::stop, &WorksOf<T>::joint})
+    assignLanes(mask, from.works.*part, to.works.*part);
   for (size_t c = 0; c < to.wrenches.size(); ++c) assignLanes(mask, from.wrenches[c], to.wrenches[c]);
 }
 
@@ -290,12 +284,13 @@ void LeapfrogOf<T>::multiply(const Vector& w) {
   }
 }
 
-// Eqs. (1) and (2). Where energy is off, they are solved again with b at the velocity that was found.
+// Eqs. (1) and (2)
 template <typename T>
 MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
   tree_.updateMassMatrix();
   moment_.half_last *= select(moment_.length > T(0), T(h / moment_.length), T(1));
   moment_.length = h;
+  tree_.updateLoads(tau_, moment_.half_last, which);
   std::vector<ContactPointOf<T>>& points = contacts_.points;
   for (size_t i = 0; i < points.size(); ++i) {
     places_[i] = getPlace(points[i].body, points[i].p);
@@ -308,35 +303,27 @@ MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
       steps_[i] = {h, linear(twist) + angular(twist).cross(places_[i])};
   }
   com_ = getPlace(pushed_body_, model_.bodies()[pushed_body_].inertia.com.cast<T>());
-  dw_.setZero();
+  const Mask solved = solve(h, which);
+  if (!any(solved)) return solved;
+  w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
+  loads_.setZero();
+  addForces(w_mean_, loads_, nullptr);
   const T before = moment_.works.sum();
-  Mask done = makeMask<T>(false), left = which;
-  for (int i = 0; i < kMostForesights && any(left); ++i) {
-    tree_.updateLoads(tau_, moment_.half_last, left);
-    left = left && solve(h, left);
-    w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
-    loads_.setZero();
-    addForces(w_mean_, loads_, nullptr);
-    const WorksOf<T> works = moment_.works;
-    book(h);
-    // At the middle, the mean of before and after the kick.
-    const Vector& w = tree_.reducedVelocity();
-    multiply(w_mean_);
-    const T added = product_.dot(dw_);
-    multiply(w);
-    const T kinetic = 0.5 * product_.dot(w) + 0.5 * added;
-    using std::abs;
-    const Mask holds =
-        balance(kinetic + abs(added), kinetic + tree_.calcPotential() - 0.5 * (before + moment_.works.sum()), left);
-    assignWorks<T>(!holds, works, moment_.works);
-    assignLanes(left, 0.5 * dw_, moment_.half_last);
-    done = done || holds;
-    left = left && !holds;
-  }
+  book(h);
+  // At the middle, the mean of before and after the kick.
+  const Vector& w = tree_.reducedVelocity();
+  multiply(w_mean_);
+  const T added = product_.dot(dw_);
+  multiply(w);
+  const T kinetic = 0.5 * product_.dot(w) + 0.5 * added;
+  using std::abs;
+  const Mask done =
+      balance(kinetic + abs(added), kinetic + tree_.calcPotential() - 0.5 * (before + moment_.works.sum()), solved);
   if (!any(done)) return done;
   for (size_t i = 0; i < points.size(); ++i) updateAnchor<T>(contacts_.terrain, places_[i], forces_[i], points[i]);
   contacts_.settle([this](int body) { return tree_.getPlacement(body); });
   tree_.kick(dw_, done);
+  moment_.half_last = 0.5 * dw_;
   return done;
 }
 
@@ -346,6 +333,7 @@ template <typename T>
 MaskOf<T> LeapfrogOf<T>::solve(const T& h, const Mask& which) {
   note(Trouble::Forces, which);
   assignLanes(which, T(0), amount_);
+  dw_.setZero();
   T size = updateResidual(h, &damping_);
   Mask active = which && size <= T(std::numeric_limits<double>::max()), solved = makeMask<T>(false);
   for (int i = 0; i < kMaxNewton && any(active); ++i) {
