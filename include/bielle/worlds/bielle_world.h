@@ -14,9 +14,8 @@
 ///
 /// s = 1 or, where that does not lower the residual, a half of it and so on; so no damper limits h, nor do contacts and stops;
 /// springs of the robot do, by h < 2 / frequency. D_i is not symmetric where a point slides, since the normal force sets its
-/// friction. b is taken at a velocity foreseen with the last dw and, while energy is off by more than below, up to five times at
-/// the one found. Since forces act at the middle with the mean velocity, (1) changes the kinetic energy by exactly the work that
-/// the books take.
+/// friction. b is taken at a velocity foreseen with the last dw. Since forces act at the middle with the mean velocity, (1)
+/// changes the kinetic energy by exactly the work that the books take.
 ///
 /// In a fall, steps of this length may be too long: a loop does not close after a drift, (1) has no solution that Newton
 /// steps find, or energy less work differs between the middles of two steps, by more than 3e-4 of the kinetic energy and
