@@ -82,7 +82,9 @@ TEST_CASE("bad input is one line of error and status 2") {
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction"})), "name=value");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction=0.7m"})), "'0.7m' is not a number");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction=nan"})), "not finite");
-  checkRefused(run(makeShortSquat(directory.str(), {"--set", "depth=-1"})), "option 'depth'");
+  checkRefused(run(makeShortSquat(directory.str(), {"--set", "depth=-1"})), "'depth' is given twice");
+  checkRefused(run({"solve", "squat", "--robot", "bipetto", "--set", "depth=-1", "-o", directory.str()}),
+               "option 'depth'");
   checkRefused(run(makeShortSquat(directory.str(), {"--formulation", "best"})), "best");
   checkRefused(run(makeShortSquat(directory.str(), {"--max-iterations", "0"})), "--max-iterations");
   checkRefused(run({"solve", "squat", "--robot", "fourbar", "-o", directory.str()}), "needs feet");
@@ -246,8 +248,10 @@ TEST_CASE("info lists the joints of references as given and as assembled, and te
   const fs::path fourbar = fs::path(BIELLE_SOURCE_DIR) / "robots/fourbar";
   const std::string urdf = readFile(fourbar / "fourbar.urdf"), yaml = readFile(fourbar / "fourbar.yaml");
   const auto inform = [&](const std::string& limit, const std::string& reference) {
-    const std::string axis = "<child link=\"rocker\"/>\n    <axis xyz=\"0 -1 0\"/>\n    <limit ";
-    return run({"info", directory.writeRobot(replaceOnce(urdf, axis, axis + limit), yaml + reference), "--json"});
+    const std::string axis = "<child link=\"rocker\"/>\n    <axis xyz=\"0 -1 0\"/>\n    <limit ",
+                      none = "lower=\"-1e16\" upper=\"1e16\" ";
+    return run(
+        {"info", directory.writeRobot(replaceOnce(urdf, axis + none, axis + limit), yaml + reference), "--json"});
   };
   const CommandResult as_it_is = run({"info", fourbar.string()});
   CHECK(as_it_is.err.empty());

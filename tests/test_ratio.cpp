@@ -257,7 +257,8 @@ TEST_CASE("a sweep ends at joint limits, and where loops lose rank") {
   };
   const std::string before = "<child link=\"crank\"/>\n    <axis xyz=\"0 -1 0\"/>\n    <limit ";
   const RobotDirectory directory;
-  directory.writeRobot(replaceOnce(read(place + ".urdf"), before, before + "lower=\"0.8\" upper=\"1.5\" "),
+  directory.writeRobot(replaceOnce(read(place + ".urdf"), before + "lower=\"-1e16\" upper=\"1e16\" ",
+                                   before + "lower=\"0.8\" upper=\"1.5\" "),
                        read(place + ".yaml"));
   const Robot robot(directory.path(), {"rocker_joint"});
   const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);

@@ -220,7 +220,8 @@ TEST_CASE("check: limits of joints and motors, and soles that overlap") {
     return checkMotion(motion);
   };
   const std::string urdf = read("bipetto.urdf"), yaml = read("bipetto.yaml");
-  const std::regex motors("effort=\"0\" velocity=\"0\""), range("upper=\"0.523599\""), sole("sole: \\[0.10, 0.10\\]");
+  const std::regex motors("effort=\"1e16\" velocity=\"1e16\""), range("upper=\"0.523599\""),
+      sole("sole: \\[0.10, 0.10\\]");
   CHECK(getFailures(check(std::regex_replace(urdf, motors, "effort=\"20\" velocity=\"30\""), yaml)) == Names());
   CHECK(getFailures(check(std::regex_replace(urdf, motors, "effort=\"14\" velocity=\"30\""), yaml)) ==
         Names{"motors: effort over limit"});
