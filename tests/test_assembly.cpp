@@ -59,7 +59,7 @@ TEST_CASE("assembly: whole turns of far angles are left out where nothing counts
   CHECK((result.q - near).norm() < 1e-5);
   Reference reference{"turned", {{"crank_joint", {far[0]}}}, "", 0, {}};
   const VectorXd q = assemble(model, makeReferenceProblem(model, reference)).q;
-  CHECK(listReferenceJoints(model, reference, q).front().moved < 1e-9);
+  CHECK(listReferenceJoints(model, reference, q).front().moved < 1e-5);  // as of other references, which are targets
 }
 
 TEST_CASE("assembly: a given angle out of reach is listed with where it ends, one within reach stays") {
