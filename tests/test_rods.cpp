@@ -356,7 +356,7 @@ TEST_CASE("MuJoCo's spatial tendon of fixed length is a distance") {
   CHECK(rod.length == Approx(length).epsilon(1e-14));
   CHECK(robot.model.pointSprings().empty());
   for (const std::string& warning : robot.warnings)
-    CHECK_THAT(warning, !Catch::Contains("<tendon>") && !Catch::Contains("<spatial>"));
+    CHECK_THAT(warning, !Catch::Contains("left out") || Catch::Contains("what changes no mechanism"));
   CHECK(calcMobility(robot.model, findClosedConfiguration(robot.model).q).mobility == 1);
   const Model longer = loadRobot(write(two, R"(<tendon tendon1="rod" polycoef="0.01 0 0 0 0"/>)")).model;
   CHECK(longer.closures()[0].length == Approx(length + 0.01).epsilon(1e-14));
