@@ -103,7 +103,8 @@ void WindowPlanner::solve(const Request& request, Solution& solution, Preview* p
   prepared_ = false;
   tellTime(request, solution);
   if (solution.took.seconds == 0) solution.took.seconds = solution.seconds;  // there was no draft
-  const double next =                                                        // another one begins
+  // When the next solve begins.
+  const double next =
       std::max(horizon_->getStart(solution.target), horizon_->getStart(solution.target + 1) - getLead(options_)) -
       advance_;
   const bool late = options_.own_thread && request.measurement.actionTime() + solution.seconds >= next;

@@ -59,9 +59,9 @@ class WeightCalculator {
     const auto found = file_.bodies.find(link);
     if (found == file_.bodies.end()) return {0, 0};  // the world
     const Frame& frame = model_.frames()[model_.findFrame(link)];
+    if (found->second.slides && version != MujocoVersion::Two) return {1 / model_.bodies()[frame.body].inertia.mass, 0};
     const MatrixXd J =
         calcFrameJacobian(model_, ws_, frame.body, frame.X_BF * SE3(Matrix3d::Identity(), found->second.centre));
-    if (found->second.slides && version != MujocoVersion::Two) return {1 / model_.bodies()[frame.body].inertia.mass, 0};
     const VectorXd diagonal = (J * inverse_ * J.transpose()).diagonal();
     return {diagonal.head<3>().mean(), diagonal.tail<3>().mean()};
   }

@@ -348,7 +348,7 @@ void SdfReader::noteElements(const XMLElement& element) {
     if (own.rfind("drake:", 0) == 0 && tag == "model") continue;  // reader_sdf_drake.cpp
     if (harmless.count(own))
       notes_.addHarmless(path_, "<" + tag + "> <" + own + ">", e->GetLineNum());
-    else if (own == "plugin" && e->FirstChildElement("mimicJoint"))
+    else if (own == "plugin" && e->FirstChildElement("joint") && e->FirstChildElement("mimicJoint"))  // is read
       continue;
     else if (!read.at(tag).count(own))
       notes_.add(path_, "<" + tag + "> <" + own + ">", e->GetLineNum(), "left out");

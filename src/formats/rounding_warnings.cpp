@@ -53,8 +53,7 @@ void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, co
     std::vector<std::string> motors;
     for (const Motor& motor : model.motors())
       if (contains(linkage.joints, motor.joint)) motors.push_back(motor.name);
-    if (static_cast<int>(motors.size()) <= linkage.written || motors.empty())
-      return about + "it is locked as it is written: ";
+    if (static_cast<int>(motors.size()) <= linkage.written) return about + "it is locked as it is written: ";
     return about + "mobility " + std::to_string(linkage.written) + " is less than the " +
            std::to_string(motors.size()) + (motors.size() > 1 ? " motors" : " motor") + " in its loops (" +
            listItems(motors) + "): ";

@@ -63,8 +63,8 @@ std::vector<GoalOutcome> measureCarriedGoals(const Plan& plan, PlanControl contr
   const double end = record.time[record.time.size() - 1] + kClockTolerance;
   for (size_t i = 0; i < plan.goals.size(); ++i) {
     Goal goal = plan.goals[i];
-    if (plan.cycles > 1 &&
-        goal.kind == GoalKind::Speed)  // that of all cycles, since the first ones are still disturbed by the start
+    // That of all whole cycles, since the first ones are still disturbed by the start.
+    if (plan.cycles > 1 && goal.kind == GoalKind::Speed)
       goal.last *= std::max(1, static_cast<int>(end / plan.getTime(goal.last)));
     bool is_recorded = plan.getTime(goal.first) >= record.time[0] - kClockTolerance && plan.getTime(goal.last) <= end;
     goal.first = findRow(record.time, plan.getTime(goal.first));
