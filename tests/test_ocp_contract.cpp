@@ -114,6 +114,27 @@ TEST_CASE("shooting problem: a stage that replaces another is as if it had alway
   CHECK(after.Fx() == wanted.Fx());
   CHECK(after.lx == wanted.lx);
   CHECK(before.cost != wanted.cost);
+
+  // The same of numbers that are changed where they are.
+  const auto change = [](StageSpec& spec) {
+    spec.dt = 0.02;
+    spec.state.weight = 4;
+    spec.costs[0].weight *= 3;
+    for (Closure& closure : spec.constraints.closures) closure.kp = 25;
+  };
+  change(others[0]);
+  const RobotProblem changed(model, q, v, others, how.formulation);
+  REQUIRE(probe.linearize(0, x, u, x, before) == NumericalStatus::Ok);
+  const long allocations = num_allocations;
+  replaced.changeNumbers(0, change);
+  CHECK(num_allocations == allocations);
+  REQUIRE(probe.linearize(0, x, u, x, after) == NumericalStatus::Ok);
+  REQUIRE(ProblemProbe(changed).linearize(0, x, u, x, wanted) == NumericalStatus::Ok);
+  CHECK(after.cost == wanted.cost);
+  CHECK(after.Fx() == wanted.Fx());
+  CHECK(before.cost != wanted.cost);
+  CHECK_THROWS_AS(replaced.changeNumbers(0, [](StageSpec& spec) { spec.dt = 0; }), InputError);
+  replaced.changeNumbers(0, change);
   StageSpec large = makeStage({0, 1}, 1);
   addGroundCosts(model, {}, VectorXd::Constant(2, 100), large);
   CHECK_THROWS_AS(replaced.replaceStage(0, large), std::invalid_argument);

@@ -169,7 +169,7 @@ class ShiftedWalk {
       solver.advance(trajectory);
       extend(whole_, evaluator_, k + options_.nodes - 1, trajectory);
     }
-    const FddpSummary summary = solver.step(trajectory);
+    const FddpSummary& summary = solver.step(trajectory);
     times_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     if (countPreemptions() == preemptions) undisturbed_.push_back(times_.back());
     return summary.termination != FddpTermination::Failed;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "bielle/motion/motion.h"
 
@@ -61,24 +62,6 @@ bool areAlike(const Model& model, const StateCost& a, const StateCost& b) {
          areSame(a.v_ref.head<5>(), b.v_ref.head<5>()) && areSame(a.v_ref.tail(others), b.v_ref.tail(others));
 }
 
-// Eq. (7) of robot_problem.h: the steps of stages follow the springs of joints, longer ones need not.
-VectorXd makeSpringArmature(const Model& model, double h) {
-  VectorXd armature = VectorXd::Zero(model.nv());
-  for (const JointForce& force : model.jointForces())
-    armature[force.dof] += 0.25 * h * h * std::max(0.0, force.stiffness);
-  return armature;
-}
-
-StageSpec stretch(const Model& model, const StageSpec& first, int length) {
-  StageSpec spec = first;
-  spec.dt *= length;
-  if (!model.jointForces().empty()) spec.armature = makeSpringArmature(model, spec.dt);
-  limitGains(spec.step, spec.dt, spec.constraints);
-  // Costs grow with the length, and penalties, which are of squares, likewise.
-  for (PathConstraint& constraint : spec.path_constraints) constraint.scale /= std::sqrt(length);
-  return spec;
-}
-
 }  // namespace
 
 int countMostStages(const PredictiveOptions& options, double h) {
@@ -91,7 +74,7 @@ WindowGrid::WindowGrid(Horizon& horizon, const PredictiveOptions& options)
     : horizon_(horizon), options_(options), time_(calcTimeScale(horizon.getProblem())) {}
 
 void WindowGrid::clear() {
-  for (const Node& node : nodes_) restore(node);
+  for (Node& node : nodes_) restore(node);
   nodes_.clear();
 }
 
@@ -101,7 +84,7 @@ void WindowGrid::move(int first, int changed, int changed_end) {
   nodes_.clear();
   next_.reset();
   const int count = options_.nodes, begin = before_.empty() ? first : before_.front().begin;
-  for (int stage = first; stage < begin; ++stage) add({stage, 1, nullptr, Origin::Earlier, 0});
+  for (int stage = first; stage < begin; ++stage) add({stage, 1, Origin::Earlier, 0});
   for (size_t i = 0; i < before_.size(); ++i) {
     Node node = before_[i];
     node.source = static_cast<int>(i);
@@ -110,9 +93,9 @@ void WindowGrid::move(int first, int changed, int changed_end) {
     if (node.begin < first) {
       restore(node);
       if (end <= first) continue;
-      node = {first, end - first, nullptr, Origin::Cut, node.source};
+      node = {first, end - first, Origin::Cut, node.source};
     }
-    add(std::move(node));
+    add(node);
   }
   while (static_cast<int>(nodes_.size()) < count) append();
   for (; static_cast<int>(nodes_.size()) > count; nodes_.pop_back()) {
@@ -150,34 +133,76 @@ bool WindowGrid::areAlike(int stage, int next) const {
 }
 
 int WindowGrid::getMost(const Node& node) const {
-  const double h = node.first ? node.first->dt : horizon_.getProblem().spec(getStage(node.begin)).dt;
+  const double h = node.numbers >= 0 ? numbers_[node.numbers].dt : horizon_.getProblem().spec(getStage(node.begin)).dt;
   return getMostStages(node.begin - first_, options_.fine_nodes, h > 0 ? calcRatio(h / time_) : 1);
 }
 
-void WindowGrid::restore(const Node& node) {
-  if (node.first) horizon_.getProblem().replaceStage(getStage(node.begin), *node.first);
+// Of the first of a node's stages, which stands for all of them. In place: a copy would be sixty blocks of memory.
+void WindowGrid::stretch(StageSpec& spec, int length, Numbers& before) const {
+  before.dt = spec.dt;
+  spec.dt *= length;
+  // Eq. (7) of robot_problem.h: the steps of stages follow the springs of joints, longer ones need not.
+  const Model& model = horizon_.getProblem().model();
+  if (!model.jointForces().empty()) {
+    before.armature.swap(spec.armature);
+    spec.armature.setZero(model.nv());
+    for (const JointForce& force : model.jointForces())
+      spec.armature[force.dof] += 0.25 * spec.dt * spec.dt * std::max(0.0, force.stiffness);
+  }
+  before.others.clear();
+  for (const Closure& closure : spec.constraints.closures)
+    before.others.insert(before.others.end(), {closure.kp, closure.kd});
+  limitGains(spec.step, spec.dt, spec.constraints);
+  // Costs grow with the length, and penalties, which are of squares, likewise.
+  for (PathConstraint& constraint : spec.path_constraints) {
+    before.others.insert(before.others.end(), constraint.scale.begin(), constraint.scale.end());
+    constraint.scale /= std::sqrt(length);
+  }
 }
 
-// Adds a node, in parts if it is too long; the problem has its stage as it was.
+void WindowGrid::restore(StageSpec& spec, Numbers& before) const {
+  spec.dt = before.dt;
+  if (!horizon_.getProblem().model().jointForces().empty()) spec.armature.swap(before.armature);
+  auto next = before.others.begin();
+  for (Closure& closure : spec.constraints.closures) {
+    closure.kp = *next++;
+    closure.kd = *next++;
+  }
+  for (PathConstraint& constraint : spec.path_constraints)
+    for (double& scale : constraint.scale) scale = *next++;
+}
+
+void WindowGrid::restore(Node& node) {
+  if (node.numbers < 0) return;
+  if (node.begin >= horizon_.begin())  // else the problem has another stage there by now
+    horizon_.getProblem().changeNumbers(getStage(node.begin),
+                                        [&](StageSpec& spec) { restore(spec, numbers_[node.numbers]); });
+  free_.push_back(std::exchange(node.numbers, -1));
+}
+
+// Adds a node, in parts if it is too long.
 void WindowGrid::add(Node node) {
   const int most = getMost(node);
   if (node.length > most) {
     const int half = (node.length + 1) / 2;
     restore(node);
-    Node rest{node.begin + half, node.length - half, nullptr, Origin::Cut, node.source};
-    node.first = nullptr;
+    const Node rest{node.begin + half, node.length - half, Origin::Cut, node.source};
     node.length = half;
-    add(std::move(node));
-    add(std::move(rest));
+    add(node);
+    add(rest);
     return;
   }
-  if (node.length > 1 && !node.first) {
-    RobotProblem& problem = horizon_.getProblem();
-    const int stage = getStage(node.begin);
-    node.first = std::make_shared<StageSpec>(problem.spec(stage));
-    problem.replaceStage(stage, stretch(problem.model(), *node.first, node.length));
+  if (node.length > 1 && node.numbers < 0) {
+    if (free_.empty()) {
+      free_.push_back(static_cast<int>(numbers_.size()));
+      numbers_.emplace_back();
+    }
+    node.numbers = free_.back();
+    free_.pop_back();
+    horizon_.getProblem().changeNumbers(getStage(node.begin),
+                                        [&](StageSpec& spec) { stretch(spec, node.length, numbers_[node.numbers]); });
   }
-  nodes_.push_back(std::move(node));
+  nodes_.push_back(node);
 }
 
 void WindowGrid::append() {
@@ -186,7 +211,7 @@ void WindowGrid::append() {
   node.source = std::max(0, static_cast<int>(before_.size()) - 1);
   const int most = getMost(node);
   while (node.length < most && areAlike(node.begin, node.begin + node.length)) ++node.length;
-  add(std::move(node));
+  add(node);
 }
 
 }  // namespace bielle

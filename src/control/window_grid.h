@@ -1,6 +1,5 @@
 #pragma once
 // Which stages of a horizon the nodes of a window stand for: near ones for one each, far ones for several.
-#include <memory>
 #include <optional>
 
 #include "control/horizon.h"
@@ -27,10 +26,10 @@ class WindowGrid {
     Appended,  // not part of it
   };
   struct Node {
-    int begin = 0, length = 1;               // stages
-    std::shared_ptr<const StageSpec> first;  // that of the horizon; null if the node is that stage
+    int begin = 0, length = 1;  // stages
     Origin origin = Origin::Appended;
-    int source = 0;  // Kept and Cut: this node of the window before
+    int source = 0;    // Kept and Cut: this node of the window before
+    int numbers = -1;  // its place among those that stages have without it; -1: the node is its stage
     int end() const { return begin + length; }
   };
 
@@ -55,10 +54,19 @@ class WindowGrid {
   const Node* next() const { return next_ ? &*next_ : nullptr; }
 
  private:
+  // What a stage has before it is made longer.
+  struct Numbers {
+    double dt = 0;
+    VectorXd armature;
+    std::vector<double> others;  // gains and scales of its constraints
+  };
+  void stretch(StageSpec& spec, int length, Numbers& before) const;
+  void restore(StageSpec& spec, Numbers& before) const;
+
   int getStage(int stage) const;
   int getMost(const Node& node) const;
   bool areAlike(int stage, int next) const;
-  void restore(const Node& node);
+  void restore(Node& node);
   void add(Node node);
   void append();
 
@@ -66,6 +74,8 @@ class WindowGrid {
   const PredictiveOptions& options_;
   const double time_;  // of the robot's size
   std::vector<Node> nodes_, before_;
+  std::vector<Numbers> numbers_;
+  std::vector<int> free_;  // of these
   int first_ = 0;
   std::vector<int> stages_;
   std::vector<NodeSource> sources_;

@@ -165,7 +165,7 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   const NodeEvaluation* predicted = prepared_ ? predicted_.get() : solver_.getEvaluation(0);
   if (!predicted || predicted->x != x_) predicted = &evaluator_.evaluate(node, x_, u_);
   if (predicted->status != NumericalStatus::Ok) return false;
-  measured_ = interpolate(node, *predicted, measured_, 1);
+  interpolate(node, *predicted, measured_, 1, measured_);
   if (updateImpact(model_, impact_, problem_.spec(node).constraints, measured_.head(model_.nq()),
                    measured_.tail(model_.nv())) == NumericalStatus::Ok)
     measured_.tail(model_.nv()) = impact_.v_plus;
@@ -177,7 +177,7 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   solution.skipped = target - (request.stage + 1);
   advance_ += horizon_->getStart(target) - horizon_->getStart(request.stage + 1);
   while (isImpact(target)) {
-    step = &evaluator_.evaluate(horizon_->getNode(target), VectorXd(x_), VectorXd::Zero(model_.nu()));
+    step = &evaluator_.evaluate(horizon_->getNode(target), x_, u_.setZero());
     if (step->status != NumericalStatus::Ok) return false;
     x_ = step->x_next;
     ++target;
@@ -197,14 +197,14 @@ VectorXd WindowPlanner::findRest(const Request& request, const RobotEvaluation& 
 }
 
 // From the state of an evaluation a share of the way to another, with loops closed.
-VectorXd WindowPlanner::interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share) {
-  VectorXd dx(problem_.tangentSize(node)), moved(problem_.stateSize());
-  const DifferenceTask difference{node, &at, &x, &dx};
+void WindowPlanner::interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share, VectorXd& out) {
+  dx_.resize(problem_.tangentSize(node));
+  out.resize(problem_.stateSize());
+  const DifferenceTask difference{node, &at, &x, &dx_};
   problem_.difference(&difference, 1, scratch_.get());
-  dx *= share;
-  const IntegrateTask integrate{node, &at, &dx, &moved};
+  dx_ *= share;
+  const IntegrateTask integrate{node, &at, &dx_, &out};
   problem_.integrate(&integrate, 1, scratch_.get());
-  return moved;
 }
 
 bool WindowPlanner::solveWindow(const Request& request, Solution& solution, Preview* preview) {
@@ -228,7 +228,7 @@ bool WindowPlanner::solveWindow(const Request& request, Solution& solution, Prev
       preview->publish();
     };
   }
-  const FddpSummary summary = solver_.step(trajectory_, {}, preview ? &foresight_ : nullptr);
+  const FddpSummary& summary = solver_.step(trajectory_, {}, preview ? &foresight_ : nullptr);
   recordSolve(summary, solution.took);
   if (summary.termination == FddpTermination::Failed) return false;
   const Clock::time_point begin = Clock::now();
@@ -240,10 +240,13 @@ bool WindowPlanner::solveWindow(const Request& request, Solution& solution, Prev
 
 // The window begins with this stage, and with the state that was predicted for it; earlier than before if a foot is late.
 bool WindowPlanner::move(int first) {
-  for (const WindowGrid::Node& node : grid_.nodes()) {
-    if (node.begin >= first) break;
-    past_us_.push_back(trajectory_.us[&node - grid_.nodes().data()]);
-    if (past_us_.size() > static_cast<size_t>(kLowering + kLate + 2)) past_us_.pop_front();
+  const std::vector<WindowGrid::Node>& nodes = grid_.nodes();
+  for (size_t k = 0; k < nodes.size() && nodes[k].begin < first; ++k) {
+    if (past_us_.size() < static_cast<size_t>(kLowering + kLate + 2))
+      past_us_.emplace_back();
+    else
+      std::rotate(past_us_.begin(), past_us_.begin() + 1, past_us_.end());
+    past_us_.back() = trajectory_.us[k];
   }
   const int end = grid_.end();
   if (lowered_)
@@ -252,56 +255,55 @@ bool WindowPlanner::move(int first) {
     grid_.move(first);
   lowered_ = false;
   std::swap(before_, trajectory_);
-  trajectory_.xs.clear();
-  trajectory_.us.clear();
-  for (const WindowGrid::Node& node : grid_.nodes())
-    if (!continueNode(node)) return false;
-  if (grid_.end() == end) trajectory_.xs.push_back(before_.xs.back());
-  if (const WindowGrid::Node* next = grid_.next())
-    if (!continueNode(*next)) return false;
-  trajectory_.us.resize(options_.nodes);
+  trajectory_.xs.resize(nodes.size() + 1);
+  trajectory_.us.resize(nodes.size());
+  for (size_t k = 0; k < nodes.size(); ++k) {
+    if (!continueState(nodes[k], k)) return false;
+    continueControl(nodes[k], k);
+  }
+  if (grid_.end() == end) trajectory_.xs.back() = before_.xs.back();
+  if (grid_.next() && !continueState(*grid_.next(), nodes.size())) return false;
   solver_.move(grid_.sources());
   setWindow();
   return true;
 }
 
-// Adds a node to the trajectory, from that of the window before. An appended one brings the state at its end along.
-bool WindowPlanner::continueNode(const WindowGrid::Node& node) {
-  auto& [xs, us] = trajectory_;
+// The state of node k, from the trajectory of the window before; that after an appended node is there already.
+bool WindowPlanner::continueState(const WindowGrid::Node& node, size_t k) {
+  std::vector<VectorXd>& xs = trajectory_.xs;
   using Origin = WindowGrid::Origin;
-  const bool has_state = xs.size() > us.size();
-  switch (node.origin) {
-    case Origin::Kept:
-      xs.push_back(before_.xs[node.source]);
-      us.push_back(before_.us[node.source]);
-      break;
-    case Origin::Cut:
-      if (xs.empty()) {
-        xs.push_back(x_);
-      } else {
-        const WindowGrid::Node& whole = grid_.before()[node.source];
-        const int stage = grid_.stages()[us.size() - 1];  // any: their tangent spaces are alike
-        const NodeEvaluation* at = solver_.getEvaluation(node.source);
-        if (!at) at = &evaluator_.evaluate(stage, before_.xs[node.source], before_.us[node.source]);
-        const double share = static_cast<double>(node.begin - whole.begin) / whole.length;
-        xs.push_back(interpolate(stage, *at, before_.xs[node.source + 1], share));
-        if (!xs.back().allFinite()) return false;
-      }
-      us.push_back(before_.us[node.source]);
-      break;
-    case Origin::Earlier:
-      xs.push_back(x_);
-      us.push_back(past_us_.empty() ? before_.us.front() : past_us_.back());
-      if (!past_us_.empty()) past_us_.pop_back();
-      break;
-    case Origin::Appended:
-      if (!has_state) xs.push_back(before_.xs.back());
-      us.push_back(us.empty() ? before_.us.back() : us.back());
-      xs.push_back(xs.back());
-      horizon_->extend(node.begin, node.end(), xs.back(), us.back());
-      break;
+  if (node.origin == Origin::Kept) {
+    xs[k] = before_.xs[node.source];
+  } else if (node.origin == Origin::Earlier || (node.origin == Origin::Cut && k == 0)) {
+    xs[k] = x_;
+  } else if (node.origin == Origin::Cut) {
+    const WindowGrid::Node& whole = grid_.before()[node.source];
+    const int stage = grid_.stages()[k - 1];  // any: their tangent spaces are alike
+    const NodeEvaluation* at = solver_.getEvaluation(node.source);
+    if (!at) at = &evaluator_.evaluate(stage, before_.xs[node.source], before_.us[node.source]);
+    const double share = static_cast<double>(node.begin - whole.begin) / whole.length;
+    interpolate(stage, *at, before_.xs[node.source + 1], share, xs[k]);
+    return xs[k].allFinite();
+  } else if (k == 0 || grid_.nodes()[k - 1].origin != Origin::Appended) {
+    xs[k] = before_.xs.back();
   }
   return true;
+}
+
+// The control of node k; and after one that is appended, the state.
+void WindowPlanner::continueControl(const WindowGrid::Node& node, size_t k) {
+  auto& [xs, us] = trajectory_;
+  using Origin = WindowGrid::Origin;
+  if (node.origin == Origin::Kept || node.origin == Origin::Cut) {
+    us[k] = before_.us[node.source];
+  } else if (node.origin == Origin::Earlier) {
+    us[k] = past_us_.empty() ? before_.us.front() : past_us_.back();
+    if (!past_us_.empty()) past_us_.pop_back();
+  } else {
+    us[k] = k == 0 ? before_.us.back() : us[k - 1];
+    xs[k + 1] = xs[k];
+    horizon_->extend(node.begin, node.end(), xs[k + 1], us[k]);
+  }
 }
 
 void WindowPlanner::setWindow() {

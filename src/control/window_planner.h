@@ -1,6 +1,5 @@
 #pragma once
 // What predictive control solves, window by window. One thread at a time may call it.
-#include <deque>
 #include <functional>
 #include <limits>
 
@@ -78,8 +77,9 @@ class WindowPlanner {
   bool isPrepared(int first) const;
   void restart(int stage);
   bool move(int first);
-  VectorXd interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share);
-  bool continueNode(const WindowGrid::Node& node);
+  void interpolate(int node, const NodeEvaluation& at, const VectorXd& x, double share, VectorXd& out);
+  bool continueState(const WindowGrid::Node& node, size_t k);
+  void continueControl(const WindowGrid::Node& node, size_t k);
   void tellTime(const Request& request, Draft& out) const;
   void setWindow();
   void startFromGuess(int stage);
@@ -131,9 +131,9 @@ class WindowPlanner {
   Receding solver_;
   ShootingTrajectory trajectory_, before_;  // of the window, and of that before it
   Foresight foresight_;
-  std::deque<VectorXd> past_us_;  // of the stages before the window, as many as it may go back
-  double advance_ = 0;            // how far feet that landed early or late have brought the motion ahead of its plan, s
-  int checked_ = 0;               // the last stage whose feet were looked for
+  std::vector<VectorXd> past_us_;  // of the stages before the window, as many as it may go back
+  double advance_ = 0;  // how far feet that landed early or late have brought the motion ahead of its plan, s
+  int checked_ = 0;     // the last stage whose feet were looked for
   // A foot that is waited for, or -1; the stage with which it is to stand; for how long, s.
   struct Late {
     int foot = -1, landing = -1;
@@ -147,7 +147,7 @@ class WindowPlanner {
   // Gains of the last stage of a phase that was far enough from its end; of the present phase and the one before, to which a
   // late foot leads back.
   KeptGains kept_[2];
-  VectorXd x_, measured_, u_;
+  VectorXd x_, measured_, u_, dx_;
 };
 
 }  // namespace bielle

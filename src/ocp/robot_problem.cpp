@@ -147,6 +147,11 @@ void RobotProblem::replaceStage(int stage, StageSpec spec) {
   transcription_->updateStage(stage);
 }
 
+void RobotProblem::acceptNumbers(int stage) {
+  checkSpec(model_, specs_[stage], stage, stage == numStages());
+  transcription_->updateStateCost(stage);
+}
+
 void RobotProblem::setTerminalReference(ConstVectorRef q, ConstVectorRef v) {
   specs_.back().state.q_ref = q;
   specs_.back().state.v_ref = v;

@@ -296,9 +296,19 @@ void AugmentedLagrangian::move(const std::vector<NodeSource>& sources) {
   const size_t num_nodes = nodes_.size();
   if (num_nodes != sources.size()) return;  // no solve so far
   if (ahead_) takeBack();
+  // The first of the nodes that have the same source takes its memory, too: most are as large as that.
   moved_.resize(num_nodes);
-  for (size_t k = 0; k < num_nodes; ++k) moved_[k] = sources[k].share * nodes_.at(sources[k].node).multipliers;
-  for (size_t k = 0; k < num_nodes; ++k) nodes_[k].multipliers.swap(moved_[k]);
+  takers_.assign(num_nodes, -1);
+  for (size_t k = num_nodes; k-- > 0;) takers_.at(sources[k].node) = static_cast<int>(k);
+  const auto takes = [&](size_t k) { return takers_[sources[k].node] == static_cast<int>(k); };
+  for (size_t k = 0; k < num_nodes; ++k)
+    if (!takes(k)) moved_[k].multipliers = sources[k].share * nodes_[sources[k].node].multipliers;
+  for (size_t k = 0; k < num_nodes; ++k) {
+    if (!takes(k)) continue;
+    std::swap(moved_[k], nodes_[sources[k].node]);
+    moved_[k].multipliers *= sources[k].share;
+  }
+  nodes_.swap(moved_);
   kept_ = true;
 }
 

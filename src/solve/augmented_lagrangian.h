@@ -107,12 +107,13 @@ class AugmentedLagrangian {
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;
-  std::vector<VectorXd> moved_;
-  Eigen::Index rows_ = 0;   // of all nodes
-  bool holds_ = false;      // by Eq. (14)
-  bool restoring_ = false;  // minimizes the violations alone
-  bool kept_ = false;       // the next resize() keeps multipliers and penalty
-  bool ahead_ = false;      // the first node still has to follow the others
+  std::vector<Node> moved_;  // memory of move()
+  std::vector<int> takers_;  // likewise: of each node's memory
+  Eigen::Index rows_ = 0;    // of all nodes
+  bool holds_ = false;       // by Eq. (14)
+  bool restoring_ = false;   // minimizes the violations alone
+  bool kept_ = false;        // the next resize() keeps multipliers and penalty
+  bool ahead_ = false;       // the first node still has to follow the others
   double penalty_ = 1;
   double far_penalty_ = 1;  // without what was added close to the solution; where the next solve starts
   Measures at_;

@@ -40,11 +40,19 @@ FddpResult solve(const ShootingProblem& problem, ShootingTrajectory guess, const
 
 FddpSummary FddpSolve::run() {
   start();
+  finish(iterate());
+  const AugmentedLagrangian& lagrangian = memory_.lagrangian;
+  if (summary_.termination == FddpTermination::MaxIterations && lagrangian.violation() > options_.constraints.tolerance)
+    summary_.message += "; " + lagrangian.describeWorst(problem_);
+  return std::move(summary_);
+}
+
+FddpTermination FddpSolve::iterate() {
   while (true) {
-    if (const End end = linearize()) return finish(*end);
-    if (const End end = findStep()) return finish(*end);
+    if (const End end = linearize()) return *end;
+    if (const End end = findStep()) return *end;
     acceptStep();
-    if (const End end = checkProgress()) return finish(*end);
+    if (const End end = checkProgress()) return *end;
     if (settling_ == 0) adaptRegularization();
   }
 }

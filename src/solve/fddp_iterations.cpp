@@ -301,7 +301,7 @@ void FddpIterations::adaptRegularization() {
   }
 }
 
-FddpSummary FddpIterations::finish(FddpTermination termination) {
+void FddpIterations::finish(FddpTermination termination) {
   summary_.termination = termination;
   if (!memory_.lagrangian.isEmpty()) {
     if (termination == FddpTermination::Converged) memory_.lagrangian.adoptMultipliers(getIterate());
@@ -325,15 +325,13 @@ FddpSummary FddpIterations::finish(FddpTermination termination) {
     summary_.log.push_back(line_);
     if (observer_.callback) observer_.callback(line_, trajectory_);
   }
-  if (!summary_.message.empty()) return std::move(summary_);
+  if (!summary_.message.empty()) return;
   switch (termination) {
     case FddpTermination::Converged:
       summary_.message = "the gradient vanishes and the gaps are closed";
       break;
     case FddpTermination::MaxIterations:
       summary_.message = "the iteration limit was reached";
-      if (memory_.lagrangian.violation() > options_.constraints.tolerance)
-        summary_.message += "; " + memory_.lagrangian.describeWorst(problem_);
       break;
     case FddpTermination::Interrupted:
       summary_.message = "stopped by the caller";
@@ -343,7 +341,6 @@ FddpSummary FddpIterations::finish(FddpTermination termination) {
     case FddpTermination::Failed:
       break;
   }
-  return std::move(summary_);
 }
 
 }  // namespace bielle

@@ -60,7 +60,7 @@ class FddpIterations {
   void acceptStep();
   End checkProgress();
   void adaptRegularization();
-  FddpSummary finish(FddpTermination termination);
+  void finish(FddpTermination termination);
 
   // Whether the iterate is the optimum.
   bool isOptimal();

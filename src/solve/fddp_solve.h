@@ -17,6 +17,7 @@ class FddpSolve : private FddpIterations {
  private:
   static constexpr int kCreeping = 20;  // iterations in which the cost must have hardly changed
 
+  FddpTermination iterate();
   End linearize();
   bool isCreeping() const;
   void settle();

@@ -14,9 +14,16 @@ namespace {
 /// One call of step().
 class RecedingStep : private FddpIterations {
  public:
+  /// \param last  a summary that is over: its memory is used, and belongs to the new one in the end
   RecedingStep(const RecedingOptions& options, const ShootingProblem& problem, ShootingTrajectory& trajectory,
-               const FddpObserver& observer, FddpMemory& memory)
-      : FddpIterations(options, options.iterations, problem, trajectory, observer, memory) {}
+               const FddpObserver& observer, FddpMemory& memory, FddpSummary& last)
+      : FddpIterations(options, options.iterations, problem, trajectory, observer, memory), last_(last) {
+    summary_.log.swap(last.log);
+    summary_.log.clear();
+    summary_.message.swap(last.message);
+    summary_.message.clear();
+  }
+  ~RecedingStep() { last_ = std::move(summary_); }
 
   void prepare(double regularization) {
     start();
@@ -26,25 +33,24 @@ class RecedingStep : private FddpIterations {
 
   /// \param regularization  of the first sweep, if the initial one is less; then what the next step starts with: more after a
   /// search in vain, else less
-  FddpSummary run(bool prepared, double& regularization, Foresight* foresight) {
+  void run(bool prepared, double& regularization, Foresight* foresight) {
     foresight_ = foresight;
     if (prepared)
       resume();
     else
       start();
     regularization_ = std::max(regularization_, regularization);
-    const FddpSummary summary = iterate();
+    finish(iterate());
     regularization = rejected_ > 0 ? regularization_ : regularization / options_.regularization_decrease;
-    return summary;
   }
 
  private:
-  FddpSummary iterate() {
+  FddpTermination iterate() {
     while (true) {
-      if (const End end = linearize()) return finish(*end);
-      if (const End end = findStep()) return finish(*end);
+      if (const End end = linearize()) return *end;
+      if (const End end = findStep()) return *end;
       acceptStep();
-      if (const End end = checkProgress()) return finish(*end);
+      if (const End end = checkProgress()) return *end;
       adaptRegularization();
     }
   }
@@ -125,6 +131,7 @@ class RecedingStep : private FddpIterations {
 
   static constexpr int kShortestSegment = 3;  // stages; 48 then make two full batches of segments
 
+  FddpSummary& last_;
   Foresight* foresight_ = nullptr;  // still to be filled
   int rejected_ = 0;                // searches without an acceptable step
 };
@@ -139,10 +146,11 @@ Receding::~Receding() = default;
 Receding::Receding(Receding&&) noexcept = default;
 Receding& Receding::operator=(Receding&&) noexcept = default;
 
-FddpSummary Receding::step(ShootingTrajectory& trajectory, const FddpObserver& observer, Foresight* foresight) {
+const FddpSummary& Receding::step(ShootingTrajectory& trajectory, const FddpObserver& observer, Foresight* foresight) {
   if (!std::exchange(advanced_, false)) regularization_ = 0;
   const bool prepared = std::exchange(prepared_, false);
-  return RecedingStep(options_, *problem_, trajectory, observer, *memory_).run(prepared, regularization_, foresight);
+  RecedingStep(options_, *problem_, trajectory, observer, *memory_, summary_).run(prepared, regularization_, foresight);
+  return summary_;
 }
 
 void Receding::prepare(ShootingTrajectory& trajectory) {
@@ -150,7 +158,7 @@ void Receding::prepare(ShootingTrajectory& trajectory) {
     throw std::invalid_argument("Receding: only a step with a constant penalty can be prepared");
   prepared_ = false;
   const FddpObserver none;
-  RecedingStep(options_, *problem_, trajectory, none, *memory_).prepare(advanced_ ? regularization_ : 0);
+  RecedingStep(options_, *problem_, trajectory, none, *memory_, summary_).prepare(advanced_ ? regularization_ : 0);
   prepared_ = true;
 }
 

@@ -58,7 +58,9 @@ class Receding {
   /// from zero unless advance() or setMultipliers() came after the last step. Exceptions of the problem leave it, with the
   /// current iterate in the trajectory. \throws std::invalid_argument like solve()
   /// \param foresight  if any, is filled on the way; getGains() and getLinearized() are then of the same sweep
-  FddpSummary step(ShootingTrajectory& trajectory, const FddpObserver& observer = {}, Foresight* foresight = nullptr);
+  /// \return valid until the next step()
+  const FddpSummary& step(ShootingTrajectory& trajectory, const FddpObserver& observer = {},
+                          Foresight* foresight = nullptr);
 
   /// All of the next step() for which the initial state of the window need not be known: evaluations of all nodes but the first,
   /// their multipliers, models and sweep. The step does the rest, with the same result. Until then nothing but that state may
@@ -95,6 +97,7 @@ class Receding {
   RecedingOptions options_;
   std::unique_ptr<FddpMemory> memory_;
   std::vector<NodeSource> sources_;  // of advance()
+  FddpSummary summary_;              // of the last step()
   double regularization_ = 0;        // that the last step ended with
   bool advanced_ = false;            // since then
   bool prepared_ = false;            // the next one

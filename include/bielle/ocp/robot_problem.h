@@ -184,6 +184,14 @@ class RobotProblem : public ShootingProblem {
   /// or it has more costs, constraints or rows of them than any stage of the constructor had, or other bodies in
   /// contact
   void replaceStage(int stage, StageSpec spec);
+  /// Changes numbers of a stage where they are: its step, its armature, references, weights, scales, gains of its constraints. Its
+  /// functions, their order, and the bodies in contact stay, so that nothing is allocated. Otherwise like replaceStage().
+  /// \param change  change(StageSpec&)   \throws InputError as the constructor does, of the numbers as they then are
+  template <typename Change>
+  void changeNumbers(int stage, const Change& change) {
+    change(specs_[stage]);
+    acceptNumbers(stage);
+  }
   /// Changes the reference of the terminal state cost: the target of a receding horizon.
   /// \param q  nq   \param v  nv
   void setTerminalReference(ConstVectorRef q, ConstVectorRef v);
@@ -194,6 +202,8 @@ class RobotProblem : public ShootingProblem {
   std::vector<CostValue> getCosts(int node, const RobotEvaluation& at) const;
 
  private:
+  void acceptNumbers(int stage);
+
   Model model_;
   Formulation formulation_;
   std::vector<StageSpec> specs_;
