@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "bielle/motion/registry.h"
 #include "control/clock.h"
 #include "model/number_text.h"
 
@@ -35,14 +34,6 @@ double findEnd(const Plan& plan, const Foothold& foothold) {
   return end;
 }
 
-// Of the motion that predictive control solves.
-std::vector<Goal> listFreedGoals(const Plan& plan) {
-  MotionRequest freed = *plan.solution->motion.request;
-  const StandingRobot standing = makeStandingRobot(plan.model());
-  freeFeet(plan.model(), standing, plan.ground, freed.options);
-  return freed.plan(plan.model(), standing).goals;
-}
-
 }  // namespace
 
 std::vector<GoalOutcome> measurePlannedGoals(const Plan& plan) {
@@ -54,15 +45,13 @@ std::vector<GoalOutcome> measurePlannedGoals(const Plan& plan) {
   return outcomes;
 }
 
-std::vector<GoalOutcome> measureCarriedGoals(const Plan& plan, PlanControl control, const MotionRecord& record) {
+std::vector<GoalOutcome> measureCarriedGoals(const Plan& plan, const std::vector<Goal>& goals,
+                                             const MotionRecord& record) {
   std::vector<GoalOutcome> outcomes;
-  if (plan.goals.empty()) return outcomes;
-  const bool is_free = control == PlanControl::Predictive;
-  const std::vector<Goal> freed = is_free ? listFreedGoals(plan) : plan.goals;
+  if (goals.empty()) return outcomes;
   const MotionTrack track = makeTrack(plan.robot.model, record);
   const double end = record.time[record.time.size() - 1] + kClockTolerance;
-  for (size_t i = 0; i < plan.goals.size(); ++i) {
-    Goal goal = plan.goals[i];
+  for (Goal goal : goals) {
     // That of all whole cycles, since the first ones are still disturbed by the start.
     if (plan.cycles > 1 && goal.kind == GoalKind::Speed)
       goal.last *= std::max(1, static_cast<int>(end / plan.getTime(goal.last)));
@@ -74,7 +63,6 @@ std::vector<GoalOutcome> measureCarriedGoals(const Plan& plan, PlanControl contr
       is_recorded &= at <= end;
       foothold.node = findRow(record.time, at);
     }
-    if (goal.kind == GoalKind::Footholds && i < freed.size()) goal.tolerance = freed[i].tolerance;
     outcomes.push_back({goal, is_recorded ? measureGoal(goal, track) : std::numeric_limits<double>::quiet_NaN()});
   }
   return outcomes;

@@ -11,7 +11,9 @@ std::vector<GoalOutcome> measurePlannedGoals(const Plan& plan);
 /// On a record that begins with the plan, at the same times: its nodes are the rows of the record. Of a foothold, where the foot
 /// stands half way to its next step, since feet land earlier or later than planned; under predictive control, which places feet
 /// anew, within the room that it has. A goal that ends after the record is not achieved (NaN).
-std::vector<GoalOutcome> measureCarriedGoals(const Plan& plan, PlanControl control, const MotionRecord& record);
+/// \param goals  of the controller
+std::vector<GoalOutcome> measureCarriedGoals(const Plan& plan, const std::vector<Goal>& goals,
+                                             const MotionRecord& record);
 
 /// A sentence for each goal for which the two differ by more than 5 % of the plan's (of footholds, and where 0 is requested, by more
 /// than the tolerance).

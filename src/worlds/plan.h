@@ -96,6 +96,7 @@ void freeFeet(const Model& model, const StandingRobot& standing, const Ground& g
 struct PlanController {
   std::unique_ptr<Controller> law;                   ///< of the closed robot
   const PredictiveController* prediction = nullptr;  ///< the part of it that predicts, or null
+  std::vector<Goal> goals{};                         ///< those of the plan; of footholds, within the room that it has
 };
 /// \param options  for which the plan was made
 /// \throws InputError as PredictiveController does

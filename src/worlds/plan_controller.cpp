@@ -35,8 +35,9 @@ ShootingTrajectory repeatTrajectory(const Solution& solution, int cycles) {
   return out;
 }
 
-// Along a plan, with the model cut at its balls.
-std::unique_ptr<PredictiveController> predict(const Plan& plan, const Model& cut, PredictiveOptions options) {
+// Along a plan, with the model cut at its balls. \param goals  of the plan, then as far as feet that may land elsewhere meet them
+std::unique_ptr<PredictiveController> predict(const Plan& plan, const Model& cut, PredictiveOptions options,
+                                              std::vector<Goal>& goals) {
   const Model& model = plan.model();
   const Solution& solution = *plan.solution;
   const Motion& motion = solution.motion;
@@ -48,7 +49,10 @@ std::unique_ptr<PredictiveController> predict(const Plan& plan, const Model& cut
   const StandingRobot standing = makeStandingRobot(cut, q0);
   freeFeet(cut, standing, motion.ground, freed.options);
   if (plan.cycles > 1) freed.options.set("cycles", plan.cycles * freed.options.get<int>("cycles"));
-  return std::make_unique<PredictiveController>(makePredictiveMotion(cut, freed.plan(cut, standing), problem, options),
+  MotionPlan planned = freed.plan(cut, standing);
+  for (size_t i = 0; i < std::min(goals.size(), planned.goals.size()); ++i)
+    if (goals[i].kind == GoalKind::Footholds) goals[i].tolerance = planned.goals[i].tolerance;
+  return std::make_unique<PredictiveController>(makePredictiveMotion(cut, std::move(planned), problem, options),
                                                 restrictTrajectory(model, cut, repeatTrajectory(solution, plan.cycles)),
                                                 options);
 }
@@ -58,10 +62,11 @@ std::unique_ptr<PredictiveController> predict(const Plan& plan, const Model& cut
 PlanController makeController(const Plan& plan, const ControlOptions& options) {
   const Model& model = plan.model();
   PlanController out;
+  out.goals = plan.goals;
   if (options.control == PlanControl::Predictive) {
     const Model cut = plan.walk ? plan.walk->model() : plan.serial ? model : cutAtBalls(model);
     auto prediction = plan.walk ? std::make_unique<PredictiveController>(*plan.walk, options.predictive)
-                                : predict(plan, cut, options.predictive);
+                                : predict(plan, cut, options.predictive, out.goals);
     out.prediction = prediction.get();
     out.law = std::move(prediction);
     if (!cut.isCopyOf(model)) out.law = std::make_unique<RestrictedController>(model, cut, std::move(out.law));

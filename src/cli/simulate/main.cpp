@@ -231,7 +231,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   options.fall.only_whirling = controller.prediction != nullptr;
   options.interrupt = &isInterrupted();
   makeOutputDirectory(arguments.output);
-  const CarriedOut carried{arguments, plan, robot, controller.prediction, ground, command, warnings};
+  const CarriedOut carried{arguments, plan, robot, controller, ground, command, warnings};
   const auto writeFiles = [&carried](const Execution& execution) { return write(carried, execution); };
   ExecutionObserver observer;
   if (!arguments.summary_only) {  // a campaign's, which looks at nothing else

@@ -34,7 +34,7 @@ MotionResult makeResult(const CarriedOut& carried, const Execution& execution) {
   result.record = execution.record;
   result.objective = plan.summary.objective;
   setFigures(carried.robot.model, result);
-  result.goals = worlds::measureCarriedGoals(plan, carried.arguments.control.control, execution.record);
+  result.goals = measureCarriedGoals(plan, carried.controller.goals, execution.record);
   result.gap_position = execution.largest_gap;  // also between the rows of the record
   result.slip_position = execution.largest_slip;
   result.slip_angle = execution.largest_tilt.value;
@@ -167,10 +167,6 @@ std::optional<double> findSteadySpeed(const std::vector<GoalOutcome>& outcomes) 
   return {};
 }
 
-std::vector<GoalOutcome> measureCarriedGoals(const CarriedOut& carried, const Execution& e) {
-  return worlds::measureCarriedGoals(carried.plan, carried.arguments.control.control, e.record);
-}
-
 std::string describeSteadySpeed(const std::vector<GoalOutcome>& outcomes) {
   const std::optional<double> speed = findSteadySpeed(outcomes);
   return speed ? " with the time that it stands, " + formatNumber(*speed, "%.3f") + " m/s in its steady steps" : "";
@@ -192,7 +188,7 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   summary["believed_model"] = getName(plan.belief);
   if (plan.belief != Belief::Closed)
     summary["plan_reachable_until"] = plan.lifted.first_missed < 0 ? nullptr : Json(plan.lifted.first_missed);
-  if (carried.prediction) summary["solves"] = listSolves(carried.prediction->counts());
+  if (carried.controller.prediction) summary["solves"] = listSolves(carried.controller.prediction->counts());
   // Of feet that carry: how far they turn from the ground and sink into it.
   summary["contact_slip"]["depth_m"] = e.largest_depth.value;
   for (const auto& [name, value] : plan.summary.options)
@@ -239,7 +235,7 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   summary["saturated_share"] = e.saturated_share;
   summary["real_time_factor"] = e.realTimeFactor();
   summary["seconds"] = {{"whole", e.whole_seconds}, {"world", e.world_seconds}, {"control", e.control_seconds}};
-  if (arguments.execution.real_time) summary["real_time"] = listTimes(carried.prediction->counts(), e);
+  if (arguments.execution.real_time) summary["real_time"] = listTimes(carried.controller.prediction->counts(), e);
   return summary;
 }
 
@@ -352,7 +348,7 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
   std::cout << (e.outcome == Outcome::Undecided ? ": " : ": it ") << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
-  const std::vector<GoalOutcome> goals = measureCarriedGoals(carried, e);
+  const std::vector<GoalOutcome> goals = measureCarriedGoals(plan, carried.controller.goals, e.record);
   char text[1000];
   std::snprintf(text, sizeof text,
                 "\n"
@@ -376,8 +372,8 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
   if (plan.lifted.first_missed >= 0)
     std::cout << "  the linkages cannot follow the plan from " << plan.lifted.first_missed
               << " s on: " << plan.lifted.message << "\n";
-  if (carried.prediction) {
-    const PredictiveCounts& c = carried.prediction->counts();
+  if (carried.controller.prediction) {
+    const PredictiveCounts& c = carried.controller.prediction->counts();
     const Quantiles after = calcSolveTimes(c, false), whole = calcSolveTimes(c, true);
     std::snprintf(text, sizeof text,
                   "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"

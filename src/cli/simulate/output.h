@@ -18,9 +18,9 @@ void tell(const std::vector<std::string>& warnings);
 struct CarriedOut {
   const SimulateArguments& arguments;
   const Plan& plan;
-  const LoadedRobot& robot;                // of the world, without random errors
-  const PredictiveController* prediction;  // null under other control
-  const Ground& ground;                    // of the world
+  const LoadedRobot& robot;  // of the world, without random errors
+  const PlanController& controller;
+  const Ground& ground;  // of the world
   const std::vector<std::string>& command;
   const std::vector<std::string>& warnings;
 };
