@@ -29,26 +29,43 @@ bool record(NumericalStatus status, State& s) {
   return valid;
 }
 
-// Dynamics of a state that the robot cannot be in are those of no motion.
-void warnOfOpenLoops(const Model& m, const py::object& q) {
-  constexpr double kTold = 1e-6;  // m or rad
+// Dynamics of a state that the robot cannot be in, or of velocities that it cannot have, are those of no motion.
+// \param v  none: it rests
+void warnOfOpenLoops(const Model& m, const py::object& q, const py::object& v = py::none()) {
+  constexpr double kTold = 1e-6;  // m or rad; of velocities, over the largest
   if (m.closures().empty()) return;
   const ConstraintSet loops = makeConstraintSet(m);
-  const py::array gaps = mapStates({{"q", q, m.nq()}}, {{}}, [&] {
+  std::vector<StateInput> inputs = {{"q", q, m.nq()}};
+  if (!v.is_none()) inputs.push_back({"v", v, m.nv()});
+  const std::vector<py::array> open = mapStates(inputs, {{}, {}}, [&] {
     return [&, ws = std::make_shared<Workspace>(m)](State& s) {
       updatePositions(m, *ws, s.in[0]);
       s.out[0][0] = calcLargestGap(*ws, loops);
+      double& opening = s.out[1][0] = 0;
+      if (s.in.size() == 1) return;
+      updateVelocities<double>(m, *ws, s.in[1]);
+      for (const Closure& closure : m.closures())
+        opening = std::max(opening, calcClosureVelocity(*ws, closure).cwiseAbs().maxCoeff());
+      opening /= 1 + s.in[1].lpNorm<Eigen::Infinity>();
     };
-  })[0];
-  const double* const begin = static_cast<const double*>(gaps.data());
-  const double largest = gaps.size() > 0 ? *std::max_element(begin, begin + gaps.size()) : 0;
-  if (!(largest > kTold)) return;
-  char text[160];  // with one digit: Python tells the same text once a line
-  std::snprintf(
-      text, sizeof text,
-      "loops are open by up to %.0e (m or rad): the robot cannot be in this state; close(q) gives one near it",
-      largest);
-  if (PyErr_WarnEx(PyExc_RuntimeWarning, text, 1) < 0) throw py::error_already_set();
+  });
+  const auto findLargest = [&open](size_t i) {
+    const double* const begin = static_cast<const double*>(open[i].data());
+    return open[i].size() > 0 ? *std::max_element(begin, begin + open[i].size()) : 0;
+  };
+  // Numbers have one digit: Python tells the same text once a line.
+  char text[200] = "";
+  if (const double gap = findLargest(0); gap > kTold)
+    std::snprintf(
+        text, sizeof text,
+        "loops are open by up to %.0e (m or rad): the robot cannot be in this state; close(q) gives one near it", gap);
+  else if (const double opening = findLargest(1); opening > kTold)
+    std::snprintf(
+        text, sizeof text,
+        "velocities open loops by up to %.0e of the largest: the robot cannot move so; project_velocity(q, v) "
+        "gives some that keep them closed",
+        opening);
+  if (*text && PyErr_WarnEx(PyExc_RuntimeWarning, text, 1) < 0) throw py::error_already_set();
 }
 
 void solveForward(const Model& m, const ConstraintSet& set, ConstrainedMemory& memory, State& s) {
@@ -77,7 +94,7 @@ void addForward(ModelType& type) {
         [result, getShapes, solve](const Model& m, const py::object& q, const py::object& v, const py::object& u,
                                    const py::object& contacts) {
           const ConstraintSet set = readConstraints(m, contacts);
-          warnOfOpenLoops(m, q);
+          warnOfOpenLoops(m, q, v);
           return makeNamed(
               result, mapStates({{"q", q, m.nq()}, {"v", v, m.nv()}, {"u", u, m.nu()}}, getShapes(m, set), [&] {
                 return [&, memory = std::make_shared<ConstrainedMemory>(m)](State& s) { solve(m, set, *memory, s); };
@@ -156,7 +173,7 @@ void addImpact(ModelType& type) {
       "impact",
       [](const Model& m, const py::object& q, const py::object& v, const py::object& contacts) {
         const ConstraintSet set = readConstraints(m, contacts);
-        warnOfOpenLoops(m, q);
+        warnOfOpenLoops(m, q, v);
         return makeNamed("Impact", mapStates({{"q", q, m.nq()}, {"v", v, m.nv()}}, {{m.nv()}, {set.rows}, {}}, [&] {
                            return [&, iws = std::make_shared<ImpactWorkspace>(m)](State& s) {
                              if (!record(updateImpact(m, *iws, set, s.in[0], s.in[1]), s)) return;
@@ -172,7 +189,7 @@ void addImpact(ModelType& type) {
       [](const Model& m, const py::object& q, const py::object& v, const py::object& contacts) {
         const ConstraintSet set = readConstraints(m, contacts);
         const Shape square = {m.nv(), m.nv()}, rows = {set.rows, m.nv()};
-        warnOfOpenLoops(m, q);
+        warnOfOpenLoops(m, q, v);
         return makeNamed(
             "ImpactDerivatives", mapStates({{"q", q, m.nq()}, {"v", v, m.nv()}}, {square, square, rows, rows, {}}, [&] {
               return [&, iws = std::make_shared<ImpactWorkspace>(m)](State& s) {

@@ -311,7 +311,8 @@ def test_ratio_of_a_knee(model):
 
 
 def test_dynamics_of_open_loops_are_told(model, state):
-    q, v, u = state
+    q, _, u = state
+    v = np.zeros(model.nv)
     opened = np.array(q)
     opened[list(model.q_names).index("knee_left")] += 0.05
     gap = np.abs(model.closure_residual(opened)).max()
@@ -328,3 +329,10 @@ def test_dynamics_of_open_loops_are_told(model, state):
             with pytest.warns(RuntimeWarning, match="loops are open by up to .*e-.*close") as told:
                 call(states)
             assert len(told) == 1
+    moving = np.full(model.nv, 0.5)
+    for call in (lambda v: model.forward_dynamics(q, v, u), lambda v: model.impact(q, v, ("foot_left",))):
+        with pytest.warns(RuntimeWarning, match=r"velocities open loops by up to .*e.*project_velocity\(q, v\)"):
+            call(moving)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            call(model.project_velocity(q, moving))
