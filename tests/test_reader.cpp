@@ -340,6 +340,10 @@ TEST_CASE("what is possible but odd is a warning") {
       warn(replaceOnce(kToyUrdf, "<parent link=\"arm\"/>", "<parent link=\"arm\"/>\n<dynamics damping=\"0.1\"/>"),
            kToyYaml),
       Contains(urdf + "joint 'wrist': its <dynamics> (line 33) is left out"));
+  CHECK_THAT(warn(replaceOnce(kToyUrdf, "<material name=\"red\"><color rgba=\"1 0 0 1\"/></material>",
+                              "<material name=\"orange\"/>"),
+                  kToyYaml),
+             Contains(urdf + "link 'arm': no <material> 'orange'"));
   CHECK_THAT(warn(kToyUrdf, "name_mot: [shoulder]\nmotors: {rod_joint: {}}"), Contains(yaml + "key 'name_mot'"));
 }
 

@@ -2,10 +2,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/formats/robot_writer.h"
+#include "bielle/results/robot_info.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/decimals.h"
 #include "get_error.h"
@@ -72,15 +74,17 @@ double calcHalfUnit(const std::string& numbers, Decimals::Kind kind = Decimals::
   return decimals.calcHalfUnit();
 }
 
-// MuJoCo's: bodies in the frames of their hinges, and two points, a lever apart, for each hinge that closes a loop.
-std::string makeMjcf(const HingeNet& net, int decimals, double lever) {
+// MuJoCo's: bodies in the frames of their hinges, and two points, a lever apart, for each hinge that closes a loop: anchors, or sites
+// of both bodies, which are rounded on each. \param more  elements
+std::string makeMjcf(const HingeNet& net, int decimals, double lever, bool with_sites = false,
+                     const std::string& more = "") {
   const auto write = [decimals](const auto& numbers) {
     std::string text;
     for (const double x : numbers) text += formatNumber(x, ("%." + std::to_string(decimals) + "f").c_str()) + " ";
     return text;
   };
   std::vector<SE3> X_WB(net.bodies);
-  std::vector<std::string> bodies(net.bodies);
+  std::vector<std::string> bodies(net.bodies), sites(net.bodies);
   std::vector<int> parents(net.bodies, -1);
   parents[0] = 0;
   std::string closures;
@@ -97,18 +101,27 @@ std::string makeMjcf(const HingeNet& net, int decimals, double lever) {
                       std::to_string(k + 1) + "\"/><geom size=\"0.02\"/>";
       continue;
     }
-    for (const double side : {-0.5, 0.5})
+    for (const double side : {-0.5, 0.5}) {
+      const Vector3d point = X_W.act({0, 0, side * lever});
+      const std::string site = "site" + std::to_string(k) + (side < 0 ? "a" : "b");
+      for (const auto& [body, end] : {std::pair(body1, "1"), {body2, "2"}})
+        sites[body] += "<site name=\"" + site + end + "\" pos=\"" + write(X_WB[body].inverse().act(point)) + "\"/>";
+      if (with_sites) {
+        closures += "<connect site1=\"" + site + "1\" site2=\"" + site + "2\"/>";
+        continue;
+      }
       closures += "<connect body1=\"" + name(body2) + "\" body2=\"" + name(body1) + "\" anchor=\"" +
-                  write((X_WB[body2].inverse() * X_W).act({0, 0, side * lever})) + "\"/>";
+                  write(X_WB[body2].inverse().act(point)) + "\"/>";
+    }
   }
   const std::function<std::string(int)> writeChildren = [&](int parent) {
-    std::string text;
+    std::string text = sites[parent];
     for (int body = 1; body < net.bodies; ++body)
       if (parents[body] == parent) text += bodies[body] + writeChildren(body) + "</body>";
     return text;
   };
   return "<mujoco><compiler angle=\"radian\"/><worldbody>" + writeChildren(0) + "</worldbody><equality>" + closures +
-         "</equality></mujoco>";
+         "</equality>" + more + "</mujoco>";
 }
 
 }  // namespace
@@ -256,6 +269,52 @@ TEST_CASE("hinges whose axes run through two points that are near to each other"
       CHECK(turned.status == NumericalStatus::Ok);
       CHECK(turned.q[0] == Approx(0.05).epsilon(0.1));
     }
+}
+
+TEST_CASE("two points on each of two bodies are a hinge, though their distances are rounded") {
+  std::mt19937 rng(11);
+  for (const int decimals : {5, 6, 9}) {
+    CAPTURE(decimals);
+    const RobotDirectory directory;
+    const std::string motors = R"(<actuator><motor joint="hinge1"/><motor joint="hinge2"/></actuator>)";
+    const LoadedRobot robot = loadRobot(
+        directory.write("net.xml", makeMjcf(makeHingeNet(Family::Spherical, rng), decimals, 0.03, true, motors)));
+    REQUIRE(robot.model.closures().size() == 1);
+    CHECK(robot.model.closures()[0].kind == ClosureKind::Hinge5D);
+    // It moves with one freedom, of which the second motor is told.
+    CHECK(countWarnings(robot, "as a spherical linkage") == 1);
+    CHECK(countWarnings(robot,
+                        "mobility 1 is less than the 2 motors in its loops (hinge1, hinge2): they work against") == 1);
+    CHECK(countWarnings(robot, "more than its numbers are rounded") == 0);
+  }
+}
+
+TEST_CASE("loops that lengths lock are not said to have axes that do") {
+  const RobotDirectory directory;
+  // Two levers that two rods join, of which one is not turned as far as the other.
+  const auto write = [](double x, double z) { return formatNumber(x, "%.17g") + " 0 " + formatNumber(z, "%.17g"); };
+  const auto begin = [&](const std::string& name, double x, double z) {
+    return "<body name=\"" + name + "\" pos=\"" + write(x, z) + "\"><joint name=\"" + name +
+           "\" axis=\"0 1 0\"/><geom size=\"0.02\"/>";
+  };
+  constexpr double kRadius = 0.05, kApart = 0.3, kTurned = 0.4, kOther = 0.401;
+  std::string levers = begin("a", 0, 0), closures;
+  for (const double side : {1.0, -1.0}) {
+    const double x = side * kRadius * std::cos(kTurned), z = side * kRadius * std::sin(kTurned);
+    const double x2 = kApart + side * kRadius * std::cos(kOther), z2 = side * kRadius * std::sin(kOther);
+    const std::string rod = side > 0 ? "front" : "back";
+    levers += begin(rod, x, z) + "</body>";
+    closures += "<connect body1=\"" + rod + "\" body2=\"b\" anchor=\"" + write(x2 - x, z2 - z) + "\"/>";
+  }
+  levers += "</body>" + begin("b", kApart, 0) + "</body>";
+  const LoadedRobot robot =
+      loadRobot(directory.write("levers.xml", "<mujoco><worldbody>" + levers + "</worldbody><equality>" + closures +
+                                                  "</equality><actuator><motor joint=\"a\"/></actuator></mujoco>"));
+  CHECK(countWarnings(robot,
+                      "mobility 0 is less than the 1 motor in its loops (a): placements of a, front, back, b do") == 1);
+  const nlohmann::json mobility = nlohmann::json::parse(makeRobotInfo(robot))["mobility"];
+  CHECK(mobility["mobility"] == 0);
+  CHECK(mobility["locked"] == 1);
 }
 
 TEST_CASE("a linkage without motors that is locked by rounding is told, too") {

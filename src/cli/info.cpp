@@ -21,6 +21,10 @@ std::string describeSpins(int count) {
   return count == 0 ? "" : " of which " + std::to_string(count) + (count == 1 ? " idle spin" : " idle spins");
 }
 
+std::string describeLocked(int count) {
+  return count == 0 ? "" : "; " + std::to_string(count) + " more if numbers of its linkages fitted, see the warnings";
+}
+
 void printInfo(const Json& robot) {
   const auto count = [&robot](const char* key) { return std::to_string(robot[key].get<int>()); };
   const Json& mobility = robot["mobility"];
@@ -33,7 +37,8 @@ void printInfo(const Json& robot) {
                               {"closure rows", count("closure_rows") + ", rank " + mobility["rank"].dump() + " at " +
                                                    mobility["posture"].get<std::string>() +
                                                    (mobility["closed"].get<bool>() ? "" : ", where loops are open")},
-                              {"mobility", mobility["mobility"].dump() + describeSpins(mobility["idle_spins"])}});
+                              {"mobility", mobility["mobility"].dump() + describeSpins(mobility["idle_spins"]) +
+                                               describeLocked(mobility["locked"])}});
   printSection(robot, "joints", "joints", {"name", "kind", "parent", "child", "nq", "nv"});
   printSection(robot, "closures", "closures (gaps in m and rad)",
                {"name", "kind", "frame1", "frame2", "rows", "loop_dofs"});

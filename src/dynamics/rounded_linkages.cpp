@@ -287,12 +287,18 @@ RoundedLinkages findRoundedLinkages(const Model& model, const RoundingTolerance&
     });
     const bool is_open = found.rank < 0, is_short = !is_open && motors > linkage.numDofs() - found.rank;
     if ((found.exact || found.mended) && !is_short) continue;
+    if (found.mended) {
+      out.short_of_freedoms.push_back(out.mended.back());
+      out.short_of_freedoms.back().written = out.mended.back().meant;
+      continue;
+    }
     linkage = written;
     const RoundingTolerance most = {kFar, kFar * linkage.length(), {}};
     const Finding far = examine(linkage, starts, std::vector<RoundingTolerance>(own.size(), most));
     if (far.mended) {
       out.locked.push_back(describe(model, cluster, linkage, far));
       if (is_open) out.locked.back().written = -1;
+      if (out.locked.back().apart <= std::max(tolerance.angle, kLeastRounding)) out.locked.back().axes.clear();
     } else if (is_short) {
       out.short_of_freedoms.push_back(describe(model, cluster, linkage, found));
     }

@@ -42,10 +42,10 @@ struct RoundedLinkage {
   std::vector<int> closures;  ///< indices into Model::closures()
   std::vector<int> joints;    ///< body/joint indices
   LinkageShape shape = LinkageShape::Other;
-  int written = 0, meant = 0;     ///< mobility; as written, -1 if the loops do not close
-  double angle = 0, length = 0;   ///< largest change of a placement that gives it back, rad and m
-  double apart = 0;               ///< largest angle between axes that were meant to be parallel, rad
-  std::vector<std::string> axes;  ///< the two of them: "joint 'knee'", "closure 'pin'"
+  int written = 0, meant = 0;    ///< mobility; as written (of short_of_freedoms: as read), -1 if the loops do not close
+  double angle = 0, length = 0;  ///< largest change of a placement that gives it back, rad and m
+  double apart = 0;              ///< largest angle between axes that were meant to be parallel, rad
+  std::vector<std::string> axes;  ///< the two of them, if that is more than rounding: "joint 'knee'", "closure 'pin'"
 };
 
 struct RoundedLinkages {

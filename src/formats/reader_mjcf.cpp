@@ -46,6 +46,9 @@ RobotFiles MjcfReader::read() {
   forEach("equality", [this](const XMLElement& e) { readEquality(e); });
   forEach("actuator", [this](const XMLElement& e) { readActuator(e); });
   readTendonRanges();
+  GeometryDecimals decimals;
+  for (const XMLElement* root : settings_.files.listRoots()) decimals.add(*root, settings_.angle != 1);
+  tree_.rounding = decimals.calcTolerance();
   joinHinges();
   addClosures();
   forEach("custom", [this](const XMLElement& e) { readCustom(e); });
@@ -55,9 +58,6 @@ RobotFiles MjcfReader::read() {
     softness_.start[slot.joint] = {slot.q_ref.data(), slot.q_ref.data() + slot.q_ref.size()};
   for (const XMLElement* e : getChildren(settings_.files.root())) noteSection(*e);
   settings_.notes.addTo(tree_);
-  GeometryDecimals decimals;
-  for (const XMLElement* root : settings_.files.listRoots()) decimals.add(*root, settings_.angle != 1);
-  tree_.rounding = decimals.calcTolerance();
   for (const Tie& tie : ties_)
     if (tie.kind == ClosureKind::Hinge5D) tree_.rounding.levers[tie.name] = tie.lever;
   return {std::move(tree_), std::move(yaml_)};

@@ -128,13 +128,16 @@ void MjcfReader::readTie(MjcfElement& e, const std::string& name) {
 // The writer's NAME.1 and NAME.2 give it their name.
 void MjcfReader::joinHinges() {
   constexpr double kSameLength = 1e-6;  // relative
+  // Of four points, each of whose coordinates is rounded.
+  const double rounding = 4 * std::sqrt(3) * tree_.rounding.length;
   for (size_t i = 0; i < ties_.size(); ++i)
     for (size_t j = i + 1; j < ties_.size(); ++j) {
       Tie &a = ties_[i], &b = ties_[j];
       if (a.kind != ClosureKind::Ball3D || b.kind != ClosureKind::Ball3D || a.body1 != b.body1 || a.body2 != b.body2)
         continue;
       const Vector3d along = a.X_L1.p - b.X_L1.p, along2 = a.X_L2.p - b.X_L2.p;
-      if (!(along.norm() > 1e-6) || std::abs(along.norm() - along2.norm()) > kSameLength * along.norm()) continue;
+      const double length = along.norm(), off = std::abs(length - along2.norm());
+      if (!(length > 1e-6) || off > kSameLength * length + std::min(rounding, 0.01 * length)) continue;
       const Vector3d turned = a.X_L1.R * a.X_L2.R.transpose() * along2;  // where the bodies stand
       const std::string stem = a.name.substr(0, a.name.size() - std::min<size_t>(2, a.name.size()));
       if (a.name == stem + ".1" && b.name == stem + ".2")

@@ -323,6 +323,28 @@ void hideBalls(XMLElement& robot) {
     if (getAttribute(e, "type") == "spherical") e->SetAttribute("type", "floating");
 }
 
+// urdfdom refuses the whole robot for a colour that nothing before it defines.
+void removeUnknownColours(XMLElement& robot, const std::string& path, std::vector<std::string>& warnings) {
+  std::set<std::string> known, told;
+  for (const XMLElement* e : getChildren(robot))
+    if (getTag(*e) == "material") known.insert(getAttribute(e, "name"));
+  for (XMLElement* link = robot.FirstChildElement("link"); link; link = link->NextSiblingElement("link"))
+    for (XMLElement* visual = link->FirstChildElement("visual"); visual;
+         visual = visual->NextSiblingElement("visual")) {
+      XMLElement* const material = visual->FirstChildElement("material");
+      if (!material) continue;
+      const std::string name = getAttribute(material, "name");
+      if (material->FirstChildElement()) {
+        known.insert(name);
+      } else if (!name.empty() && known.count(name) == 0) {
+        if (told.insert(name).second)
+          warnings.push_back(path + ": link '" + getAttribute(link, "name") + "': no <material> '" + name +
+                             "' is defined before it: it has no colour from it");
+        visual->DeleteChild(material);
+      }
+    }
+}
+
 // A root without mass whose only child floats is the world, on which the file itself puts a free base.
 void takeRootAsWorld(UrdfFile& file) {
   const UrdfLink& root = file.links.at(file.root);
@@ -368,6 +390,7 @@ UrdfFile parseUrdf(const std::string& xml, const std::string& path, YamlFile& se
   document.DeepCopy(&plain);
   if (for_drake) removeDrake(*plain.RootElement());
   hideBalls(*plain.RootElement());
+  removeUnknownColours(*plain.RootElement(), path, tree.warnings);
   urdf::ModelInterfaceSharedPtr model;
   std::string complaints;
   {

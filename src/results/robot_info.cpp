@@ -13,8 +13,10 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "dynamics/idle_spins.h"
+#include "dynamics/loop_problem.h"
 #include "dynamics/point_spring.h"
 #include "dynamics/regular_mobility.h"
+#include "dynamics/rounded_linkages.h"
 #include "math/constants.h"
 #include "model/frame_name.h"
 #include "model/number_text.h"
@@ -161,6 +163,19 @@ Json describePointSprings(const Model& model, const std::vector<Posture>& postur
   return springs;
 }
 
+// Freedoms that rows of closures take over a way, though they say the same in a posture: linkages that are rounded too much.
+int countLocked(const Model& model, ConstVectorRef q) {
+  int locked = 0;
+  for (const RoundedLinkage& linkage : findRoundedLinkages(model, {}).locked) {
+    if (linkage.written < 0) continue;
+    int dofs = 0;
+    for (int joint : linkage.joints) dofs += model.joints()[joint].nv;
+    const int rank = calcMobility(selectClosures(model, linkage.closures), q).rank;
+    locked += std::max(0, dofs - linkage.written - rank);
+  }
+  return locked;
+}
+
 // At the first reference that closes, else at a closed configuration near neutral; beside it where it is singular.
 Json describeMobility(const Model& model, const std::vector<Posture>& postures) {
   std::string place = "closed neutral";
@@ -170,6 +185,7 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
   for (size_t i = postures.size(); i-- > 1;)
     if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
   const Mobility mobility = calcMobility(model, q), regular = closed ? calcRegularMobility(model, q) : mobility;
+  const int locked = closed ? countLocked(model, q) : 0;
   if (regular.rank > mobility.rank)
     place += " (singular: rank " + std::to_string(mobility.rank) + " there, this beside it)";
   return {{"posture", place},
@@ -177,7 +193,8 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
           {"singular", regular.rank > mobility.rank},
           {"rows", regular.rows},
           {"rank", regular.rank},
-          {"mobility", regular.mobility},
+          {"mobility", regular.mobility - locked},
+          {"locked", locked},
           {"idle_spins", closed && regular.mobility > 0 ? countIdleSpins(model, q) : 0}};
 }
 
