@@ -20,6 +20,8 @@ bielle_sdf_packages=(libsdformat-dev)
 bielle_mcap_packages=(libprotobuf-dev protobuf-compiler)
 # OpenCASCADE, which writes STEP files (bielle convert). Without it everything else is built.
 bielle_step_packages=(libocct-data-exchange-dev libocct-modeling-algorithms-dev libocct-ocaf-dev)
+# Ceres, for least squares (bielle identify). Without it everything else is built.
+bielle_identify_packages=(libceres-dev)
 # assimp, which reads meshes of further kinds. Without it everything else is built.
 bielle_mesh_packages=(libassimp-dev)
 # ezdxf, which writes DXF files (bielle convert) when it is there. Without it everything else works.

@@ -25,6 +25,15 @@ add_test(NAME firmware COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}
 add_test(NAME firmware_all COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_firmware.py $<TARGET_FILE:bielle_command> all 5000)
 set_tests_properties(firmware firmware_all PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
+# Lengths and offsets found again from logs.
+if(TARGET bielle-identify)
+  add_test(NAME identify_command COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_identify.py
+    $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
+  set_tests_properties(identify_command PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+else()
+  message(STATUS "The test identify_command is left out: install libceres-dev")
+endif()
+
 # Manual pages and completion follow the help of the command.
 foreach(name man completion)
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_${name}.py

@@ -32,6 +32,7 @@ void addBench(CLI::App& command, Action& action);
 void addRatio(CLI::App& command, Action& action);
 void addModes(CLI::App& command, Action& action);
 void addSoftness(CLI::App& command, Action& action);
+void addIdentify(CLI::App& command, Action& action);
 void addSynthesize(CLI::App& command, Action& action);
 void addLift(CLI::App& command, Action& action);
 void addCampaign(CLI::App& command, Action& action);

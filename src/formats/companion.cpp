@@ -80,6 +80,7 @@ std::string findRemedy(const std::string& program) {
   static const std::map<std::string, std::string> builds = {
       {"bielle-check", "build Bielle with -DBIELLE_BUILD_VALIDATION=ON (it needs Simbody)"},
       {"bielle-dxf", "it is a part of Bielle: install that again, or run cmake in its build tree, which puts it there"},
+      {"bielle-identify", "build Bielle where Ceres is (Debian: libceres-dev)"},
       {"bielle-simulate", "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody)"},
       {"bielle-step",
        "build Bielle where OpenCASCADE is (Debian: libocct-data-exchange-dev, libocct-modeling-algorithms-dev, "

@@ -1,0 +1,320 @@
+// bielle identify: lengths and offsets of a robot from logs of its motors and joints.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/formats/robot_writer.h"
+#include "bielle/model/error.h"
+#include "bielle/results/result.h"
+#include "cli/commands.h"
+#include "cli/identify_tasks.h"
+#include "cli/table.h"
+#include "formats/text_file.h"
+#include "identify/estimate.h"
+#include "model/listing.h"
+#include "results/interrupt.h"
+#include "results/output_place.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+constexpr double kQuiet = 1;       // s, before progress is told
+constexpr double kSuspicious = 5;  // noise over the one assumed
+
+struct IdentifyArguments {
+  RobotArgument robot;
+  std::string log, directory;
+  IdentifyChoice choice;
+  int every = 1, iterations = 50;
+  bool json = false;
+};
+
+struct Identified {
+  const LinkageTask* task = nullptr;
+  std::vector<GeometryNumber> geometry;
+  std::vector<LinkageSensor> sensors;
+  int rows = 0, left_out = 0;
+  LinkageEstimate estimate;
+};
+
+// Without a log: what can be found.
+int list(const Model& model, const std::vector<LinkageTask>& tasks) {
+  std::cout << model.name() << "\n";
+  for (const LinkageTask& task : tasks) {
+    std::cout << "  linkage of " << task.name << "\n";
+    std::vector<std::string> columns, rods, lengths, places;
+    for (const LinkageSensor& sensor : task.sensors) columns.push_back(sensor.name);
+    for (const GeometryNumber& number : task.geometry) {
+      if (const size_t dot = number.name.rfind('.'); dot != std::string::npos) {
+        if (number.name[dot + 1] == 'x') places.push_back(number.name.substr(0, dot));
+        continue;
+      }
+      (number.is_rod ? rods : lengths).push_back(number.name + " " + formatNumber(number.value, "%.5g"));
+    }
+    printTable(std::cout,
+               {{"columns", listItems(columns)},
+                {"rods", listItems(rods)},
+                {"lengths", listItems(lengths)},
+                {"places .x .y .z", listItems(places)}},
+               "    ");
+  }
+  return kOk;
+}
+
+// Every n-th row.
+MotionLog thin(MotionLog log, int every) {
+  if (every == 1) return log;
+  MotionLog out{log.path, {}, log.names, {}, {}};
+  const auto count = static_cast<Eigen::Index>((log.rows.size() - 1) / static_cast<size_t>(every) + 1);
+  out.time.resize(count), out.values.resize(count, log.values.cols());
+  for (Eigen::Index k = 0; k < count; ++k) {
+    out.time[k] = log.time[k * every];
+    out.values.row(k) = log.values.row(k * every);
+    out.rows.push_back(log.rows[static_cast<size_t>(k * every)]);
+  }
+  return out;
+}
+
+// The linkages that the log tells about.
+std::vector<LoggedTask> chooseTasks(const std::vector<LinkageTask>& tasks, const MotionLog& log) {
+  std::vector<LoggedTask> chosen;
+  std::string reasons;
+  for (const LinkageTask& task : tasks) {
+    LoggedTask logged = matchLog(task, log);
+    if (logged.left_out.empty()) {
+      chosen.push_back(std::move(logged));
+      continue;
+    }
+    const std::string reason = "linkage of " + task.name + ": " + logged.left_out;
+    reasons += (reasons.empty() ? "" : "; ") + reason;
+    if (!logged.sensors.empty()) std::cerr << "bielle: warning: " << log.path << ": " << reason << "\n";
+  }
+  if (chosen.empty())
+    throw InputError(log.path, "columns", reasons,
+                     "log positions of motors and of joints, named as above, in rad or m");
+  return chosen;
+}
+
+// Of one linkage; empty if the user asked for the end before there was one.
+std::optional<Identified> identify(const IdentifyArguments& arguments, const MotionLog& log, LoggedTask logged) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto tell = [&](const std::string& text) {
+    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > kQuiet)
+      std::cerr << "bielle: linkage of " << logged.task->name << ": " << text << std::endl;
+  };
+  Identified out;
+  out.task = logged.task;
+  out.geometry = chooseGeometry(*logged.task, arguments.choice.free);
+  out.sensors = logged.sensors;
+  const auto K = static_cast<int>(logged.readings.rows());
+  LogFit fit(logged.task->cluster, out.geometry, out.sensors, std::move(logged.readings), logged.task->q);
+  if (!fit.follow(isInterrupted())) return {};
+  out.rows = fit.numRows(), out.left_out = K - out.rows;
+  if (out.rows < 2 || 2 * out.rows < K) {
+    const std::vector<Eigen::Index>& used = fit.usedRows();
+    size_t first = 0;
+    while (first < used.size() && used[first] == static_cast<Eigen::Index>(first)) ++first;
+    throw InputError(log.path, log.rows[first],
+                     "the linkage of " + out.task->name +
+                         " has no configuration near these positions, nor near those of " +
+                         std::to_string(out.left_out - 1) + " more of " + std::to_string(K) + " rows",
+                     "check units (rad, m), signs and zeros, and that the columns are named as the robot's joints");
+  }
+  tell("followed through " + std::to_string(out.rows) + " rows");
+  EstimateOptions options;
+  options.iterations = arguments.iterations;
+  for (const LinkageSensor& sensor : out.sensors) options.fixed.push_back(matches(arguments.choice.exact, sensor.name));
+  options.progress = [&](int iteration, double misfit) {
+    tell("iteration " + std::to_string(iteration) + ", misfit " + formatNumber(misfit, "%.3g"));
+    return !isInterrupted();
+  };
+  out.estimate = estimate(fit, options);
+  return out;
+}
+
+Json describe(const Identified& found) {
+  const LinkageEstimate& estimate = found.estimate;
+  Json unknowns = Json::array(), unseen = Json::array(), columns = Json::array();
+  for (const Unknown& unknown : estimate.unknowns) {
+    Json one = {{"name", unknown.name}, {"kind", unknown.is_offset ? "offset" : "length"}, {"unit", unknown.unit}};
+    one["before"] = unknown.before;
+    one["after"] = unknown.is_seen ? Json(unknown.after) : Json();
+    one["deviation"] = unknown.is_seen ? Json(unknown.deviation) : Json();
+    one["seen"] = unknown.is_seen;
+    unknowns.push_back(std::move(one));
+  }
+  for (const Combination& combination : estimate.unseen) {
+    Json one = Json::object();
+    for (const auto& [name, share] : combination) one[name] = share;
+    unseen.push_back(std::move(one));
+  }
+  for (const LinkageSensor& sensor : found.sensors) columns.push_back(sensor.name);
+  return {{"linkage", found.task->name},
+          {"columns", columns},
+          {"rows", found.rows},
+          {"left_out", found.left_out},
+          {"unknowns", unknowns},
+          {"not_seen", unseen},
+          {"misfit_before", estimate.misfit_before},
+          {"misfit_after", estimate.misfit_after},
+          {"noise_over_assumed", estimate.noise},
+          {"iterations", estimate.iterations},
+          {"converged", estimate.converged},
+          {"ended", estimate.message}};
+}
+
+// Without the sign of a zero.
+std::string format(double value, const char* as = "%.6f") {
+  const std::string text = formatNumber(value, as);
+  return text.find_first_of("123456789") == std::string::npos ? formatNumber(0, as) : text;
+}
+
+void print(const Identified& found) {
+  const LinkageEstimate& estimate = found.estimate;
+  std::cout << "linkage of " << found.task->name << ": " << found.rows << " rows, " << estimate.message << "\n";
+  std::vector<Row> rows = {{"", "unit", "before", "after", "change", "+-"}};
+  for (const Unknown& unknown : estimate.unknowns) {
+    Row row = {unknown.name + (unknown.is_offset ? ", offset" : ""), unknown.unit, format(unknown.before), "not seen"};
+    if (unknown.is_seen) {
+      row.back() = format(unknown.after);
+      row.push_back(format(unknown.after - unknown.before, "%+.6f"));
+      row.push_back(formatNumber(unknown.deviation, "%.1e"));
+    }
+    rows.push_back(std::move(row));
+  }
+  printTable(std::cout, rows);
+  std::cout << "  misfit " << formatNumber(estimate.misfit_before, "%.3g") << " -> "
+            << formatNumber(estimate.misfit_after, "%.3g") << " rad or m\n";
+  for (const Combination& combination : estimate.unseen) {
+    std::string text;
+    for (const auto& [name, share] : combination)
+      text += (text.empty() ? "" : ", ") + name + " by " + formatNumber(share, "%.3g");
+    std::cout << "  not seen: changes of " << text << ", together\n";
+  }
+}
+
+void warn(const Identified& found, const std::string& log) {
+  const auto tell = [&](const std::string& text) {
+    std::cerr << "bielle: warning: " << log << ": linkage of " << found.task->name << ": " << text << std::endl;
+  };
+  if (found.left_out > 0)
+    tell(std::to_string(found.left_out) + " rows near which it has no configuration are left out");
+  if (found.estimate.noise > kSuspicious)
+    tell("what is left is " + formatNumber(found.estimate.noise, "%.3g") +
+         " times the noise that is assumed (--noise): other numbers than the free ones are wrong, or it has play");
+}
+
+int run(const IdentifyArguments& arguments) {
+  const LoadedRobot robot = arguments.robot.load();
+  const std::vector<LinkageTask> tasks =
+      listTasks(robot.model, findClosedConfiguration(robot.model).q, arguments.choice);
+  if (arguments.log.empty()) return list(robot.model, tasks);
+  std::vector<std::string> inputs = listFiles(robot), wanted;
+  inputs.push_back(arguments.log);
+  requireApart(arguments.directory, inputs);
+  formatRobot(robot.model);  // \throws what its files could not say in the end
+  for (const LinkageTask& task : tasks)
+    for (const LinkageSensor& sensor : task.sensors) wanted.push_back(sensor.name);
+  const MotionLog log = thin(readLog(arguments.log, wanted), arguments.every);
+  std::vector<LoggedTask> chosen = chooseTasks(tasks, log);
+  watchInterrupts();
+  std::vector<Identified> all;
+  for (LoggedTask& logged : chosen) {
+    if (isInterrupted()) break;
+    if (std::optional<Identified> found = identify(arguments, log, std::move(logged))) all.push_back(std::move(*found));
+  }
+  if (all.empty()) {
+    std::cerr << "bielle: error: interrupted before the first estimate; nothing is written" << std::endl;
+    return kFailed;
+  }
+  Model model = robot.model;
+  Json linkages = Json::array();
+  bool converged = all.size() == chosen.size();
+  for (const Identified& found : all) {
+    const auto n = static_cast<Eigen::Index>(found.geometry.size());
+    model = changeGeometry(model, found.task->cluster.get(), found.geometry, found.estimate.x.head(n));
+    linkages.push_back(describe(found));
+    converged = converged && found.estimate.converged;
+  }
+  makeOutputDirectory(arguments.directory);
+  writeRobot(model, arguments.directory, "with what `bielle identify` found");
+  const Json summary = {{"robot", arguments.robot.name},
+                        {"log", arguments.log},
+                        {"interrupted", static_cast<bool>(isInterrupted())},
+                        {"linkages", linkages}};
+  const std::string path = (fs::path(arguments.directory) / "identified.json").string();
+  writeTextFile(path, formatJson(summary) + "\n");
+  if (arguments.json)
+    std::cout << formatJson(summary) << "\n";
+  else
+    for (const Identified& found : all) print(found);
+  for (const Identified& found : all) warn(found, arguments.log);
+  (arguments.json ? std::cerr : std::cout) << "  " << arguments.directory << "\n  " << path << "\n";
+  if (isInterrupted())
+    std::cerr << "bielle: error: interrupted; what is written is the best estimate so far" << std::endl;
+  return converged && !isInterrupted() ? kOk : kFailed;
+}
+
+}  // namespace
+
+void addIdentify(CLI::App& command, Action& action) {
+  const auto arguments = std::make_shared<IdentifyArguments>();
+  IdentifyChoice& choice = arguments->choice;
+  addRobot(command, arguments->robot);
+  CLI::Option* log =
+      command.add_option("LOG", arguments->log,
+                         ".csv or .npz with the columns time [s] and positions of motors and joints by name [rad, m], "
+                         "also a trajectory of "
+                         "`bielle simulate`; without it, the columns and numbers of each linkage are listed");
+  CLI::Option* output = command.add_option("-o,--output", arguments->directory,
+                                           "directory for the robot with what was found, and identified.json");
+  log->needs(output);
+  output->needs(log);
+  const auto addList = [&command](const char* name, std::vector<std::string>& list, const char* help) {
+    command.add_option(name, list, help)->allow_extra_args(false);
+  };
+  addList("--joint", choice.joints, "only the linkage of this joint; may be repeated");
+  addList(
+      "--free", choice.free,
+      "what is looked for, beside offsets: rods, or the name of a length or a coordinate of a place (* stands for any "
+      "text); none; may be repeated (default: rods)");
+  addList("--no-offset", choice.exact, "a column without an offset (* stands for any text); may be repeated");
+  addList("--sensor", choice.sensors, "a column that is measured beside motors and serial joints; may be repeated");
+  addList("--noise", choice.noise,
+          "NAME=VALUE: standard deviation of a column's noise [rad or m], * for all (default: 1e-4); may be repeated");
+  command.add_option("--every", arguments->every, "only every n-th row")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
+  command.add_option("--iterations", arguments->iterations, "at most, for each linkage")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  command.add_flag("--json", arguments->json, "print JSON");
+  addRobotFlags(command, arguments->robot);
+  command.footer(
+      "Finds the lengths of rods, and the offsets of encoders, with which the closed linkages go where motors and "
+      "joints "
+      "were\n"
+      "measured, all of which may be noisy (docs/identify.md). A reading is the coordinate plus the offset. `+-` is "
+      "the "
+      "standard\n"
+      "deviation, by the noise that is left. What the log does not show is `not seen`, and which changes together it "
+      "does "
+      "not\n"
+      "show: with angles alone, that of all lengths of a linkage by the same factor.\n"
+      "-o is a robot for every other command. After Ctrl-C it has the best estimate so far.\n"
+      "Exit status: 0 done, 1 interrupted or not converged, 2 bad input.\n"
+      "Examples:\n"
+      "  bielle identify fourbar\n"
+      "  bielle identify fourbar log.csv -o found\n"
+      "  bielle identify fourbar log.csv --free rods --free crank --no-offset crank_joint -o found\n"
+      "  bielle identify bipetto log.npz --joint knee_left --noise '*=5e-5' --noise knee_left=2e-4 -o found");
+  command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
+}
+
+}  // namespace bielle::cli

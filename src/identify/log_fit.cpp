@@ -1,0 +1,183 @@
+#include "identify/log_fit.h"
+
+#include <atomic>
+#include <cmath>
+
+#include "bielle/dynamics/kinematics.h"
+#include "math/decompositions.h"
+
+namespace bielle {
+namespace {
+
+constexpr int kMostSteps = 60, kMostHalvings = 8;
+constexpr double kLongestStep = 0.3;     // of a coordinate, rad or m
+constexpr double kShortestStep = 1e-12;  // likewise; then Eq. (1) is met
+constexpr double kStalled = 1e-8;        // steps as short as this stop where they no longer halve: rounding
+constexpr double kRank = 1e-9;           // of A, relative
+constexpr int kChunk = 64;               // rows that a thread takes at once
+
+double calcLongest(const VectorXd& v) { return v.size() ? v.cwiseAbs().maxCoeff() : 0; }
+
+}  // namespace
+
+struct LogFit::Memory {
+  Memory(const ReducedCluster& cluster, size_t sensors)
+      : scratch(cluster),
+        state(cluster),
+        next(cluster),
+        variation(cluster.model),
+        still(cluster.model),
+        A(static_cast<Eigen::Index>(sensors), cluster.size),
+        rest(static_cast<Eigen::Index>(sensors)) {}
+
+  ClusterScratch scratch;
+  ClusterState state, next;
+  VariationWorkspace variation;
+  MotionVariation still;
+  VectorXd no_guess, d;
+  MatrixXd A;
+  VectorXd rest;                                             // y - o - S q over sigma
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;  // of A
+};
+
+LogFit::LogFit(std::shared_ptr<const ReducedCluster> cluster, std::vector<GeometryNumber> geometry,
+               std::vector<LinkageSensor> sensors, MatrixXd readings, VectorXd q_start)
+    : cluster_(std::move(cluster)),
+      geometry_(std::move(geometry)),
+      sensors_(std::move(sensors)),
+      readings_(std::move(readings)),
+      q_start_(std::move(q_start)) {
+  for (const GeometryNumber& number : geometry_) variations_.push_back(makeVariation(cluster_->model, number));
+}
+
+// Eq. (1) from memory.state, whose loops may be open, to a state that is closed; then A, its factors and r are those there.
+bool LogFit::project(const ReducedCluster& cluster, const VectorXd& readings, Memory& m) const {
+  double last = INFINITY;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const ClusterBasis& basis = m.state.basis;
+    for (size_t s = 0; s < sensors_.size(); ++s) {
+      const auto i = static_cast<Eigen::Index>(s);
+      m.A.row(i) = basis.N.row(sensors_[s].dof) / sensors_[s].noise;
+      m.rest[i] = (readings[i] - basis.q[sensors_[s].position]) / sensors_[s].noise;
+    }
+    m.factors.setThreshold(kRank);
+    m.factors.compute(m.A);
+    m.d = basis.N * VectorXd(m.factors.solve(m.rest));  // Eq. (2)
+    const double size = calcLongest(m.d);
+    if (!std::isfinite(size)) return false;
+    if (step > 0 && (size < kShortestStep || (size < kStalled && size > 0.5 * last))) return true;
+    last = size;
+    if (size > kLongestStep) m.d *= kLongestStep / size;
+    int halving = 0;
+    while (!closeCluster<double>(cluster, m.scratch, basis, m.d, m.no_guess, m.next)) {
+      if (++halving > kMostHalvings) return false;
+      m.d *= 0.5;
+    }
+    std::swap(m.state, m.next);
+  }
+  return false;
+}
+
+bool LogFit::follow(const std::atomic<bool>& interrupt) {
+  Memory memory(*cluster_, sensors_.size());
+  const Eigen::Index K = readings_.rows();
+  q_.resize(q_start_.size(), K);
+  used_.clear();
+  VectorXd q = q_start_;
+  for (Eigen::Index k = 0; k < K; ++k) {
+    if (interrupt) return false;
+    if (!updateClusterState<double>(*cluster_, memory.scratch, q, memory.state)) break;
+    if (!project(*cluster_, readings_.row(k).transpose(), memory)) continue;
+    q = memory.state.basis.q;
+    q_.col(static_cast<Eigen::Index>(used_.size())) = q;
+    used_.push_back(k);
+  }
+  q_.conservativeResize(Eigen::NoChange, numRows());
+  return true;
+}
+
+bool LogFit::evaluateRow(const ReducedCluster& cluster, const VectorXd& x, size_t row, Memory& m, VectorXd& r,
+                         MatrixXd* J, int& told) {
+  const auto n = static_cast<Eigen::Index>(geometry_.size()), count = static_cast<Eigen::Index>(sensors_.size());
+  const auto k = static_cast<Eigen::Index>(row);
+  if (!updateClusterState<double>(cluster, m.scratch, q_.col(k), m.state)) return false;
+  const VectorXd readings = readings_.row(used_[row]).transpose() - x.tail(count);
+  if (!project(cluster, readings, m)) return false;
+  q_.col(k) = m.state.basis.q;
+  r.segment(k * count, count) = m.rest;
+  told = static_cast<int>(count - m.factors.rank());
+  if (!J) return true;
+  // Eq. (3) before P.
+  MatrixXd D = MatrixXd::Zero(count, n + count);
+  if (n > 0) {
+    loadClusterState(cluster, m.state, m.scratch);
+    updateVelocities<double>(cluster.model, m.scratch.ws, VectorXd::Zero(cluster.model.nv()));
+    updateAccelerations<double>(cluster.model, m.scratch.ws, VectorXd::Zero(cluster.model.nv()));
+    const ClusterBasis& basis = m.state.basis;
+    MatrixXd dh = MatrixXd::Zero(cluster.rank, n), e(cluster.model.nv(), n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const ModelVariation& change = variations_[static_cast<size_t>(i)];
+      updateVariation(cluster.model, m.scratch.ws, change, m.still, m.variation);
+      const VectorXd all = calcResidualVariation(m.scratch.ws, cluster.closures, change, m.variation);
+      for (int p = 0; p < cluster.rank; ++p)  // rows of idle spins, which follow those of closures, do not change
+        if (const auto at = basis.rows[static_cast<size_t>(p)]; at < all.size()) dh(p, i) = all[at];
+    }
+    applyPseudoInverse(cluster, basis, 1, dh, e);  // residuals fall by J dq (notation.h)
+    for (Eigen::Index s = 0; s < count; ++s) D.row(s).head(n) = -e.row(sensors_[static_cast<size_t>(s)].dof);
+  }
+  D.rightCols(count).diagonal().setConstant(-1);
+  for (Eigen::Index s = 0; s < count; ++s) D.row(s) /= sensors_[static_cast<size_t>(s)].noise;
+  for (Eigen::Index i = 0; i < D.cols(); ++i) {
+    const VectorXd column = D.col(i);
+    J->block(k * count, i, count, 1) = column - m.A * VectorXd(m.factors.solve(column));
+  }
+  return true;
+}
+
+bool LogFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) {
+  const auto n = static_cast<Eigen::Index>(geometry_.size());
+  const size_t rows = used_.size(), entries = rows * sensors_.size();
+  ReducedCluster cluster = *cluster_;
+  cluster.model = changeGeometry(cluster_->model, nullptr, geometry_, x.head(n));
+  cluster.closures = makeConstraintSet(cluster.model);
+  r.resize(static_cast<Eigen::Index>(entries));
+  if (J) J->resize(static_cast<Eigen::Index>(entries), size());
+  std::atomic<size_t> next{0};
+  std::atomic<bool> fails{false};
+  std::atomic<long> told{0};
+  const MatrixXd before = q_;
+  team_.run(getDefaultThreads(), [&](int) {
+    Memory memory(cluster, sensors_.size());
+    long own = 0;
+    for (size_t begin = 0; (begin = next.fetch_add(kChunk)) < rows && !fails;)
+      for (size_t row = begin; row < std::min(begin + kChunk, rows); ++row) {
+        int of_row = 0;
+        if (!evaluateRow(cluster, x, row, memory, r, J, of_row)) fails = true;
+        own += of_row;
+      }
+    told += own;
+  });
+  told_ = told;
+  if (fails) q_ = before;  // the next search begins where configurations were found
+  return !fails;
+}
+
+double LogFit::calcMisfit(const VectorXd& r) const {
+  double sum = 0;
+  const auto count = static_cast<Eigen::Index>(sensors_.size());
+  for (Eigen::Index i = 0; i < r.size(); ++i) sum += std::pow(r[i] * sensors_[static_cast<size_t>(i % count)].noise, 2);
+  return r.size() ? std::sqrt(sum / static_cast<double>(r.size())) : 0;
+}
+
+int LogFit::calcSeenFreedoms(const VectorXd& q) const {
+  ClusterPoint point(*cluster_);
+  if (!point.update(*cluster_, q)) return 0;
+  MatrixXd A(sensors_.size(), cluster_->size);
+  for (size_t s = 0; s < sensors_.size(); ++s)
+    A.row(static_cast<Eigen::Index>(s)) = point.basis().N.row(sensors_[s].dof);
+  Eigen::ColPivHouseholderQR<MatrixXd> qr;
+  qr.setThreshold(kRank);
+  return static_cast<int>(qr.compute(A).rank());
+}
+
+}  // namespace bielle
