@@ -64,7 +64,7 @@ def write_log(path, columns):
                fmt="%.9f")
 
 
-def measure_fourbar(path, seed=1, rows=4000, sweep=(0.3, 6.0), noise=NOISE, **lengths):
+def measure_fourbar(path, seed=1, rows=2000, sweep=(0.3, 6.0), noise=NOISE, **lengths):
     random = np.random.default_rng(seed)
     crank = 0.5 * (sweep[0] + sweep[1]) - 0.5 * (sweep[1] - sweep[0]) * np.cos(np.linspace(0, 4 * math.pi, rows))
     readings = {"time": np.arange(rows) * 1e-3, "crank_joint": crank + OFFSET,
@@ -92,7 +92,7 @@ class Identify(unittest.TestCase):
         measure_fourbar("log.csv", coupler=COUPLER + 1e-3)
         result, done = identify("fourbar", "log.csv")
         linkage, = result["linkages"]
-        self.assertEqual(linkage["rows"], 4000)
+        self.assertEqual(linkage["rows"], 2000)
         self.assertTrue(linkage["converged"] and not result["interrupted"])
         self.assertLess(abs(get(linkage, "coupler")["after"] - COUPLER - 1e-3), LENGTH_GOAL)
         self.assertLess(abs(get(linkage, "crank_joint")["after"] - OFFSET), OFFSET_GOAL)
@@ -232,7 +232,7 @@ class Identify(unittest.TestCase):
 
     def test_interruption(self):
         """After Ctrl-C the best estimate so far is written, and told as such."""
-        measure_fourbar("long.csv", rows=80000, coupler=COUPLER + 1e-3)
+        measure_fourbar("long.csv", rows=60000, coupler=COUPLER + 1e-3)
         call = subprocess.Popen([BIELLE, "identify", "fourbar", "long.csv", "-o", "ended"], stdout=subprocess.PIPE,
                                 stderr=subprocess.PIPE, text=True)
         for line in call.stderr:

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 namespace bielle::cli {
 namespace {
 
-constexpr double kQuiet = 1;       // s, before progress is told
+constexpr double kQuiet = 0.5;     // s, before progress is told
 constexpr double kSuspicious = 5;  // noise over the one assumed
 
 struct IdentifyArguments {
@@ -84,20 +84,20 @@ MotionLog thin(MotionLog log, int every) {
 // The linkages that the log tells about.
 std::vector<LoggedTask> chooseTasks(const std::vector<LinkageTask>& tasks, const MotionLog& log) {
   std::vector<LoggedTask> chosen;
-  std::string reasons;
+  std::vector<std::string> reasons, told;
   for (const LinkageTask& task : tasks) {
     LoggedTask logged = matchLog(task, log);
-    if (logged.left_out.empty()) {
-      chosen.push_back(std::move(logged));
+    if (!logged.left_out.empty()) {
+      reasons.push_back("linkage of " + task.name + ": " + logged.left_out);
+      if (!logged.sensors.empty()) told.push_back(reasons.back());
       continue;
     }
-    const std::string reason = "linkage of " + task.name + ": " + logged.left_out;
-    reasons += (reasons.empty() ? "" : "; ") + reason;
-    if (!logged.sensors.empty()) std::cerr << "bielle: warning: " << log.path << ": " << reason << "\n";
+    chosen.push_back(std::move(logged));
   }
   if (chosen.empty())
-    throw InputError(log.path, "columns", reasons,
+    throw InputError(log.path, "columns", listItems(told.empty() ? reasons : told),
                      "log positions of motors and of joints, named as above, in rad or m");
+  for (const std::string& reason : told) std::cerr << "bielle: warning: " << log.path << ": " << reason << "\n";
   return chosen;
 }
 
@@ -195,7 +195,10 @@ void print(const Identified& found) {
     std::string text;
     for (const auto& [name, share] : combination)
       text += (text.empty() ? "" : ", ") + name + " by " + formatNumber(share, "%.3g");
-    std::cout << "  not seen: changes of " << text << ", together\n";
+    if (combination.size() == 1)
+      std::cout << "  not seen: " << combination.front().first << "\n";
+    else
+      std::cout << "  not seen: changes of " << text << ", together\n";
   }
 }
 

@@ -10,7 +10,8 @@
 namespace bielle {
 namespace {
 
-constexpr int kMostRounds = 4;  // of finding out what is seen
+constexpr int kMostRounds = 4;      // of finding out what is seen
+constexpr double kRounding = 1e-7;  // of the noise
 
 // d of Eq. (1); 0 of what is known.
 VectorXd makeScales(const LogFit& fit, const EstimateOptions& options) {
@@ -115,6 +116,7 @@ LinkageEstimate estimate(LogFit& fit, const EstimateOptions& options) {
     problem.size = sight.seen;
     problem.residuals = static_cast<int>(r.size());
     problem.iterations = options.iterations;
+    problem.enough = 0.5 * kRounding * kRounding * static_cast<double>(r.size());
     problem.evaluate = [&](const VectorXd& c, VectorXd& residuals, MatrixXd* jacobian) {
       MatrixXd all;
       if (!fit.evaluate(along * c, residuals, jacobian ? &all : nullptr)) return false;

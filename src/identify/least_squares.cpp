@@ -37,10 +37,12 @@ class Progress : public ceres::IterationCallback {
  public:
   explicit Progress(const LeastSquares& problem) : problem_(problem) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    if (summary.iteration > 0 && !summary.step_is_successful) return ceres::SOLVER_CONTINUE;
     interrupted = problem_.progress && !problem_.progress(summary.iteration, summary.cost);
-    return interrupted ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+    is_enough = summary.cost <= problem_.enough;
+    return interrupted || is_enough ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
-  bool interrupted = false;
+  bool interrupted = false, is_enough = false;
 
  private:
   const LeastSquares& problem_;
@@ -72,7 +74,7 @@ LeastSquaresEnd minimize(const LeastSquares& problem) {
   ceres::Solve(options, &posed, &summary);
   end.iterations = static_cast<int>(summary.iterations.size()) - 1;
   end.interrupted = progress.interrupted;
-  end.converged = summary.termination_type == ceres::CONVERGENCE;
+  end.converged = summary.termination_type == ceres::CONVERGENCE || (progress.is_enough && !end.interrupted);
   end.message = end.converged                                       ? "converged"
                 : end.interrupted                                   ? "interrupted"
                 : summary.termination_type == ceres::NO_CONVERGENCE ? "the iterations ended before it converged"

@@ -10,9 +10,10 @@ namespace bielle {
 struct LeastSquares {
   int size = 0, residuals = 0;
   int iterations = 50;  ///< at most
+  double enough = 0;    ///< |r|^2 / 2 below which nothing is left but rounding
   /// r, and J if it is asked for; false where there is none
   std::function<bool(const VectorXd& x, VectorXd& r, MatrixXd* J)> evaluate;
-  /// Called at each iteration with |r|^2 / 2; false asks for the end
+  /// Called at each step that is taken with |r|^2 / 2; false asks for the end
   std::function<bool(int iteration, double cost)> progress;
 };
 

@@ -13,7 +13,7 @@ constexpr int kMostSteps = 60, kMostHalvings = 8;
 constexpr double kLongestStep = 0.3;     // of a coordinate, rad or m
 constexpr double kShortestStep = 1e-12;  // likewise; then Eq. (1) is met
 constexpr double kStalled = 1e-8;        // steps as short as this stop where they no longer halve: rounding
-constexpr double kRank = 1e-9;           // of A, relative
+constexpr double kRank = 1e-6;           // of A, relative: what moves less is a freedom that no sensor sees
 constexpr int kChunk = 64;               // rows that a thread takes at once
 
 double calcLongest(const VectorXd& v) { return v.size() ? v.cwiseAbs().maxCoeff() : 0; }
