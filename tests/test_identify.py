@@ -227,6 +227,8 @@ class Identify(unittest.TestCase):
         refuse(lines, "--free elbow: no linkage has it; there are: rods, none, crank, coupler, rocker", options=("--free", "elbow"))
         refuse(lines, "--noise", options=("--noise", "crank_joint=0"))
         refuse(lines, "--joint elbow", options=("--joint", "elbow"))
+        pathlib.Path("bad.npz").write_text("time,crank_joint\n")
+        self.assertIn("numpy.savez(", run("identify", "fourbar", "bad.npz", "-o", "none", status=2).stderr)
         done = run("identify", "fourbar", "log.csv", status=2)
         self.assertIn("--output", done.stderr)
 

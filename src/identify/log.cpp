@@ -135,8 +135,17 @@ MotionLog readText(const std::string& path, const std::vector<std::string>& want
   return table.finish();
 }
 
+NpyArrays readLogArchive(const std::string& path) {
+  try {
+    return readArchive(path);
+  } catch (const InputError& error) {
+    throw InputError(path, error.element(), error.problem(),
+                     "give arrays of float64 by name, as numpy.savez(FILE, time=TIMES, JOINT=POSITIONS) writes them");
+  }
+}
+
 MotionLog readArrays(const std::string& path, const std::vector<std::string>& wanted) {
-  const NpyArrays arrays = readArchive(path);
+  const NpyArrays arrays = readLogArchive(path);
   struct Column {
     const NpyArray* array;
     size_t first, step;
