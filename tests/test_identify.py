@@ -101,6 +101,9 @@ class Identify(unittest.TestCase):
         self.assertLess(abs(linkage["noise_over_assumed"] - 1), 0.05)
         self.assertGreater(linkage["misfit_before"], 20 * linkage["misfit_after"])
         self.assertIn("coupler", done.stdout)
+        page = pathlib.Path("found/report.html").read_text(encoding="utf-8")
+        self.assertIn("<td>coupler</td>", page)
+        self.assertEqual(page.count("<svg"), 1 if shutil.which("gnuplot") else 0)
         # The robot that is written has the length, for every other command.
         shown = run("info", "found").stdout
         self.assertIn("mobility", shown)

@@ -5,16 +5,16 @@
 #include <filesystem>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
-#include "cli/identify_tasks.h"
+#include "cli/identify_report.h"
 #include "cli/table.h"
 #include "formats/text_file.h"
-#include "identify/estimate.h"
 #include "model/listing.h"
 #include "results/interrupt.h"
 #include "results/output_place.h"
@@ -33,14 +33,6 @@ struct IdentifyArguments {
   IdentifyChoice choice;
   int every = 1, iterations = 50;
   bool json = false;
-};
-
-struct Identified {
-  const LinkageTask* task = nullptr;
-  std::vector<GeometryNumber> geometry;
-  std::vector<LinkageSensor> sensors;
-  int rows = 0, left_out = 0;
-  LinkageEstimate estimate;
 };
 
 // Without a log: what can be found.
@@ -116,6 +108,8 @@ std::optional<Identified> identify(const IdentifyArguments& arguments, const Mot
   LogFit fit(logged.task->cluster, out.geometry, out.sensors, std::move(logged.readings), logged.task->q);
   if (!fit.follow(isInterrupted())) return {};
   out.rows = fit.numRows(), out.left_out = K - out.rows;
+  out.time.resize(out.rows);
+  for (int k = 0; k < out.rows; ++k) out.time[k] = log.time[fit.usedRows()[static_cast<size_t>(k)]];
   if (out.rows < 2 || 2 * out.rows < K) {
     const std::vector<Eigen::Index>& used = fit.usedRows();
     size_t first = 0;
@@ -135,71 +129,9 @@ std::optional<Identified> identify(const IdentifyArguments& arguments, const Mot
     return !isInterrupted();
   };
   out.estimate = estimate(fit, options);
+  if (out.estimate.unknowns.empty())
+    throw std::runtime_error("linkage of " + out.task->name + ": " + out.estimate.message);
   return out;
-}
-
-Json describe(const Identified& found) {
-  const LinkageEstimate& estimate = found.estimate;
-  Json unknowns = Json::array(), unseen = Json::array(), columns = Json::array();
-  for (const Unknown& unknown : estimate.unknowns) {
-    Json one = {{"name", unknown.name}, {"kind", unknown.is_offset ? "offset" : "length"}, {"unit", unknown.unit}};
-    one["before"] = unknown.before;
-    one["after"] = unknown.is_seen ? Json(unknown.after) : Json();
-    one["deviation"] = unknown.is_seen ? Json(unknown.deviation) : Json();
-    one["seen"] = unknown.is_seen;
-    unknowns.push_back(std::move(one));
-  }
-  for (const Combination& combination : estimate.unseen) {
-    Json one = Json::object();
-    for (const auto& [name, share] : combination) one[name] = share;
-    unseen.push_back(std::move(one));
-  }
-  for (const LinkageSensor& sensor : found.sensors) columns.push_back(sensor.name);
-  return {{"linkage", found.task->name},
-          {"columns", columns},
-          {"rows", found.rows},
-          {"left_out", found.left_out},
-          {"unknowns", unknowns},
-          {"not_seen", unseen},
-          {"misfit_before", estimate.misfit_before},
-          {"misfit_after", estimate.misfit_after},
-          {"noise_over_assumed", estimate.noise},
-          {"iterations", estimate.iterations},
-          {"converged", estimate.converged},
-          {"ended", estimate.message}};
-}
-
-// Without the sign of a zero.
-std::string format(double value, const char* as = "%.6f") {
-  const std::string text = formatNumber(value, as);
-  return text.find_first_of("123456789") == std::string::npos ? formatNumber(0, as) : text;
-}
-
-void print(const Identified& found) {
-  const LinkageEstimate& estimate = found.estimate;
-  std::cout << "linkage of " << found.task->name << ": " << found.rows << " rows, " << estimate.message << "\n";
-  std::vector<Row> rows = {{"", "unit", "before", "after", "change", "+-"}};
-  for (const Unknown& unknown : estimate.unknowns) {
-    Row row = {unknown.name + (unknown.is_offset ? ", offset" : ""), unknown.unit, format(unknown.before), "not seen"};
-    if (unknown.is_seen) {
-      row.back() = format(unknown.after);
-      row.push_back(format(unknown.after - unknown.before, "%+.6f"));
-      row.push_back(formatNumber(unknown.deviation, "%.1e"));
-    }
-    rows.push_back(std::move(row));
-  }
-  printTable(std::cout, rows);
-  std::cout << "  misfit " << formatNumber(estimate.misfit_before, "%.3g") << " -> "
-            << formatNumber(estimate.misfit_after, "%.3g") << " rad or m\n";
-  for (const Combination& combination : estimate.unseen) {
-    std::string text;
-    for (const auto& [name, share] : combination)
-      text += (text.empty() ? "" : ", ") + name + " by " + formatNumber(share, "%.3g");
-    if (combination.size() == 1)
-      std::cout << "  not seen: " << combination.front().first << "\n";
-    else
-      std::cout << "  not seen: changes of " << text << ", together\n";
-  }
 }
 
 void warn(const Identified& found, const std::string& log) {
@@ -256,9 +188,11 @@ int run(const IdentifyArguments& arguments) {
   if (arguments.json)
     std::cout << formatJson(summary) << "\n";
   else
-    for (const Identified& found : all) print(found);
+    for (const Identified& found : all) print(std::cout, found);
   for (const Identified& found : all) warn(found, arguments.log);
-  (arguments.json ? std::cerr : std::cout) << "  " << arguments.directory << "\n  " << path << "\n";
+  const std::string page =
+      writeIdentifyPage(arguments.directory, robot.model.name() + ": found in " + arguments.log, all);
+  (arguments.json ? std::cerr : std::cout) << "  " << arguments.directory << "\n  " << path << "\n  " << page << "\n";
   if (isInterrupted())
     std::cerr << "bielle: error: interrupted; what is written is the best estimate so far" << std::endl;
   return converged && !isInterrupted() ? kOk : kFailed;
@@ -275,8 +209,9 @@ void addIdentify(CLI::App& command, Action& action) {
                          ".csv or .npz with the columns time [s] and positions of motors and joints by name [rad, m], "
                          "also a trajectory of "
                          "`bielle simulate`; without it, the columns and numbers of each linkage are listed");
-  CLI::Option* output = command.add_option("-o,--output", arguments->directory,
-                                           "directory for the robot with what was found, and identified.json");
+  CLI::Option* output =
+      command.add_option("-o,--output", arguments->directory,
+                         "directory for the robot with what was found, identified.json and report.html");
   log->needs(output);
   output->needs(log);
   const auto addList = [&command](const char* name, std::vector<std::string>& list, const char* help) {

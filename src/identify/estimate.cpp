@@ -64,6 +64,8 @@ double calcNoise(const LogFit& fit, const VectorXd& r, int seen) {
   return left > 0 ? std::sqrt(r.squaredNorm() / left) : 1;
 }
 
+double calcMisfit(const MatrixXd& left) { return left.norm() / std::sqrt(static_cast<double>(left.size())); }
+
 // The rows of a basis of what is not seen, each with as few unknowns as possible: reduced by elimination.
 std::vector<Combination> listUnseen(const Sight& sight, const VectorXd& d, const std::vector<Unknown>& unknowns) {
   MatrixXd rows = sight.V.rightCols(sight.V.cols() - sight.seen).transpose();
@@ -107,7 +109,8 @@ LinkageEstimate estimate(LogFit& fit, const EstimateOptions& options) {
     out.message = "no configuration of the linkage is near the readings";
     return out;
   }
-  out.misfit_before = out.misfit_after = fit.calcMisfit(r);
+  out.left_before = out.left_after = fit.calcLeft(r);
+  out.misfit_before = out.misfit_after = calcMisfit(out.left_before);
   Sight sight = look(J, d, 1);
   for (int round = 0, before = -1; round < kMostRounds && sight.seen != before; ++round) {
     before = sight.seen;
@@ -137,7 +140,8 @@ LinkageEstimate estimate(LogFit& fit, const EstimateOptions& options) {
       out.converged = false;
       break;
     }
-    out.misfit_after = fit.calcMisfit(r);
+    out.left_after = fit.calcLeft(r);
+    out.misfit_after = calcMisfit(out.left_after);
     sight = look(J, d, calcNoise(fit, r, sight.seen));
     r = first;
     if (out.interrupted) break;

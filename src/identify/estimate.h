@@ -39,7 +39,8 @@ struct LinkageEstimate {
   std::vector<Unknown> unknowns;
   std::vector<Combination> unseen;
   VectorXd x;                                  ///< of the fit
-  double misfit_before = 0, misfit_after = 0;  ///< LogFit::calcMisfit
+  MatrixXd left_before, left_after;            ///< LogFit::calcLeft
+  double misfit_before = 0, misfit_after = 0;  ///< root mean squares of these
   double noise = 0;                            ///< sigma of Eq. (2)
   int iterations = 0;
   bool converged = false, interrupted = false;

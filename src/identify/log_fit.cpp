@@ -162,11 +162,11 @@ bool LogFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) {
   return !fails;
 }
 
-double LogFit::calcMisfit(const VectorXd& r) const {
-  double sum = 0;
+MatrixXd LogFit::calcLeft(const VectorXd& r) const {
   const auto count = static_cast<Eigen::Index>(sensors_.size());
-  for (Eigen::Index i = 0; i < r.size(); ++i) sum += std::pow(r[i] * sensors_[static_cast<size_t>(i % count)].noise, 2);
-  return r.size() ? std::sqrt(sum / static_cast<double>(r.size())) : 0;
+  MatrixXd left = RowMatrixXd::Map(r.data(), r.size() / count, count);
+  for (Eigen::Index s = 0; s < count; ++s) left.col(s) *= sensors_[static_cast<size_t>(s)].noise;
+  return left;
 }
 
 int LogFit::calcSeenFreedoms(const VectorXd& q) const {

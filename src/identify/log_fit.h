@@ -55,8 +55,8 @@ class LogFit {
   bool evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J);
   /// Of the last evaluation: the ranks of P, summed over the rows.
   long numTold() const { return told_; }
-  /// Root mean square of y - o - S q, rad or m, from r.
-  double calcMisfit(const VectorXd& r) const;
+  /// y - o - S q (rows x sensors), rad or m, from r.
+  MatrixXd calcLeft(const VectorXd& r) const;
   /// Number of freedoms that the sensors see at a row's configuration: rank of A. \param q  nq, closed
   int calcSeenFreedoms(const VectorXd& q) const;
 

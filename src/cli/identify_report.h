@@ -1,0 +1,28 @@
+#pragma once
+// What was found: as a table, as JSON, and as a page that shows what is left of each column.
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "cli/identify_tasks.h"
+#include "identify/estimate.h"
+#include "results/json_text.h"
+
+namespace bielle::cli {
+
+struct Identified {
+  const LinkageTask* task = nullptr;
+  std::vector<GeometryNumber> geometry;
+  std::vector<LinkageSensor> sensors;
+  int rows = 0, left_out = 0;
+  VectorXd time;  // of the rows
+  LinkageEstimate estimate;
+};
+
+Json describe(const Identified& found);
+void print(std::ostream& out, const Identified& found);
+// The page report.html. Figures are drawn by gnuplot, if installed. Returns its path.
+std::string writeIdentifyPage(const std::string& directory, const std::string& title,
+                              const std::vector<Identified>& all);
+
+}  // namespace bielle::cli
