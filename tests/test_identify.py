@@ -143,6 +143,9 @@ class Identify(unittest.TestCase):
         self.assertEqual(set(combination), {"coupler", "crank", "rocker", "rocker_joint.x"})
         for name, length in (("coupler", COUPLER), ("crank", CRANK), ("rocker", ROCKER)):
             self.assertAlmostEqual(combination[name] / combination["rocker_joint.x"], length / GROUND, delta=0.01)
+        # All joints of the linkage, of which the log has two.
+        linkage, = identify("fourbar", "log.csv", "--sensor", "*")[0]["linkages"]
+        self.assertEqual(linkage["columns"], ["crank_joint", "rocker_joint"])
         # A crank that hardly moves does not tell a length from offsets.
         measure_fourbar("log.csv", sweep=(1.0, 1.002))
         linkage, = identify("fourbar", "log.csv")[0]["linkages"]
@@ -219,7 +222,8 @@ class Identify(unittest.TestCase):
         cells = [line.split(",") for line in lines]
         refuse(lines[:3] + ["0.1,nan,1"] + lines[4:], "bad.csv: line 4, column 'crank_joint': 'nan' is no finite number")
         refuse(lines[:3] + ["0.1,1"], "bad.csv: line 4: it has 2 cells, and the header 3")
-        refuse([",".join(row[:2]) for row in cells], "its 1 column(s) in the log tell no more than where it is")
+        refuse([",".join(row[:2]) for row in cells], "its 1 column(s) in the log tell no more than where it is, with 1 freedom(s)",
+               "log more of its joints: rocker_joint, crank_coupler, rocker_coupler")
         refuse(["time,a,b"] + lines[1:], "the log has none of its columns: crank_joint, rocker_joint")
         refuse([",".join([row[0], row[1], "1.5" if i else row[2]]) for i, row in enumerate(cells)],
                "column 'rocker_joint': it is the same in all rows, while others of its linkage change")

@@ -51,6 +51,7 @@ int list(const Model& model, const std::vector<LinkageTask>& tasks) {
     }
     printTable(std::cout,
                {{"columns", listItems(columns)},
+                {"by --sensor", listItems(task.others)},
                 {"rods", listItems(rods)},
                 {"lengths", listItems(lengths)},
                 {"places .x .y .z", listItems(places)}},
@@ -223,7 +224,8 @@ void addIdentify(CLI::App& command, Action& action) {
       "what is looked for, beside offsets: rods, or the name of a length or a coordinate of a place (* stands for any "
       "text); none; may be repeated (default: rods)");
   addList("--no-offset", choice.exact, "a column without an offset (* stands for any text); may be repeated");
-  addList("--sensor", choice.sensors, "a column that is measured beside motors and serial joints; may be repeated");
+  addList("--sensor", choice.sensors,
+          "a column that is measured beside motors and serial joints (* stands for any text); may be repeated");
   addList("--noise", choice.noise,
           "NAME=VALUE: standard deviation of a column's noise [rad or m], * for all (default: 1e-4); may be repeated");
   command.add_option("--every", arguments->every, "only every n-th row")

@@ -22,10 +22,10 @@ bool matches(const std::string& pattern, const std::string& name) {
   return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
 }
 
-std::vector<LinkageSensor> listSensors(const Model& model, const ReducedCluster& cluster,
-                                       const std::vector<std::string>& more) {
+// Sensors, and what else could be one.
+void addSensors(const Model& model, const std::vector<std::string>& more, LinkageTask& task) {
   const std::vector<std::string> names = makePositionNames(model);
-  std::vector<LinkageSensor> sensors;
+  const ReducedCluster& cluster = *task.cluster;
   for (size_t i = 0; i < cluster.joints.size(); ++i) {
     const int index = cluster.joints[i];
     const Joint &joint = model.joints()[static_cast<size_t>(index)], &own = cluster.model.joints()[i + 1];
@@ -33,15 +33,17 @@ std::vector<LinkageSensor> listSensors(const Model& model, const ReducedCluster&
     if (joint.nq != 1 && joint.kind != JointKind::Universal) continue;
     for (int k = 0; k < joint.nq; ++k) {
       const std::string& name = names[static_cast<size_t>(joint.idx_q + k)];
-      if (!is_usual && !contains(more, name)) continue;
+      if (!is_usual && !cli::matches(more, name)) {
+        task.others.push_back(name);
+        continue;
+      }
       LinkageSensor sensor;
       sensor.name = name;
       sensor.position = own.idx_q + k, sensor.dof = own.idx_v + k;
       sensor.is_length = joint.kind == JointKind::Prismatic;
-      sensors.push_back(std::move(sensor));
+      task.sensors.push_back(std::move(sensor));
     }
   }
-  return sensors;
 }
 
 std::vector<std::string> listJoints(const Model& model, const ReducedCluster& cluster) {
@@ -74,7 +76,7 @@ std::vector<LinkageTask> listTasks(const Model& model, ConstVectorRef q, const I
     if (!is_chosen) continue;
     task.q.resize(task.cluster->model.nq());
     gatherConfiguration(model, *task.cluster, q, task.q);
-    task.sensors = listSensors(model, *task.cluster, choice.sensors);
+    addSensors(model, choice.sensors, task);
     for (const std::string& setting : choice.noise) {
       const auto [name, value] = parseSetting("--noise", setting, kNoiseExample);
       if (!(value > 0))
@@ -103,16 +105,18 @@ std::vector<GeometryNumber> chooseGeometry(const LinkageTask& task, const std::v
 }
 
 void requireKnown(const std::vector<LinkageTask>& tasks, const IdentifyChoice& choice) {
-  std::vector<std::string> sensors, geometry;
+  std::vector<std::string> sensors, measurable, geometry;
   for (const LinkageTask& task : tasks) {
     for (const LinkageSensor& sensor : task.sensors) sensors.push_back(sensor.name);
+    measurable.insert(measurable.end(), task.others.begin(), task.others.end());
     for (const GeometryNumber& number : task.geometry) geometry.push_back(number.name);
   }
   const auto require = [](const char* flag, const std::string& pattern, const std::vector<std::string>& names) {
     if (std::none_of(names.begin(), names.end(), [&](const std::string& name) { return matches(pattern, name); }))
       throw InputError("", std::string(flag) + " " + pattern, "no linkage has it", "there are: " + listItems(names));
   };
-  for (const std::string& name : choice.sensors) require("--sensor", name, sensors);
+  measurable.insert(measurable.begin(), sensors.begin(), sensors.end());
+  for (const std::string& name : choice.sensors) require("--sensor", name, measurable);
   for (const std::string& pattern : choice.exact) require("--no-offset", pattern, sensors);
   for (const std::string& setting : choice.noise)
     require("--noise", parseSetting("--noise", setting, kNoiseExample).first, sensors);
@@ -150,10 +154,14 @@ LoggedTask matchLog(const LinkageTask& task, const MotionLog& log) {
   out.readings.resize(log.values.rows(), count);
   for (int c = 0; c < count; ++c) out.readings.col(c) = log.values.col(columns[static_cast<size_t>(c)]);
   const int freedoms = LogFit(task.cluster, {}, out.sensors, out.readings, task.q).calcSeenFreedoms(task.q);
-  if (count <= freedoms)
-    out.left_out = "its " + std::to_string(count) + " column(s) in the log tell no more than where it is, with " +
-                   std::to_string(freedoms) + " freedom(s); log more of: " + listItems(all) +
-                   ", or name other joints by --sensor";
+  if (count > freedoms) return out;
+  std::vector<std::string> more;
+  for (const std::string& name : all)
+    if (log.find(name) < 0) more.push_back(name);
+  more.insert(more.end(), task.others.begin(), task.others.end());
+  out.left_out = "its " + std::to_string(count) + " column(s) in the log tell no more than where it is, with " +
+                 std::to_string(freedoms) + " freedom(s); log more of its joints: " + listItems(more) +
+                 (task.others.empty() ? "" : " (those that are no motors or serial joints by --sensor)");
   return out;
 }
 

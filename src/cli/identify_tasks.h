@@ -16,6 +16,7 @@ struct LinkageTask {
   std::shared_ptr<const ReducedCluster> cluster;
   VectorXd q;                            // nq of the cluster, closed
   std::vector<LinkageSensor> sensors;    // motors, serial joints and what else is measured
+  std::vector<std::string> others;       // coordinates that could be measured as well
   std::vector<GeometryNumber> geometry;  // all of it
 };
 
