@@ -90,6 +90,11 @@ add_test(NAME problem COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(problem PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
+# Whether the optimum of a problem is stationary, by differences of that program's own.
+add_test(NAME stationarity COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_stationarity.py
+  $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
+set_tests_properties(stationarity PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+
 # The protocol of the suite: a run of a short problem, and what is left of one that was cut off.
 add_test(NAME protocol COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_protocol.py $<TARGET_FILE:bielle_command>
                                 ${PROJECT_SOURCE_DIR})
