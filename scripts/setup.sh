@@ -29,6 +29,8 @@ bielle_dxf_packages=(python3-ezdxf)
 # DART and ODE, which `bielle-loops` compares with where they are installed; not by the tests: with what DART needs they are
 # 120 packages.
 bielle_engine_packages=(libdart-dev libode-dev)
+# IPOPT, which solves the problems of the suite where it is installed (bielle-ipopt); not by the tests, which skip it then.
+bielle_ipopt_packages=(coinor-libipopt-dev)
 # Further dependencies of the tests: Catch2, Python to read NumPy archives, a browser for the reports, a locale with a decimal
 # comma, what tests the Python package.
 bielle_test_packages=(catch2 python3 locales chromium pkg-config python3-pytest

@@ -43,7 +43,8 @@ OTHERS = {
     "nlopt": ["src/motion/slsqp.cpp", "src/design/nlopt_search.h"],
     "ceres/": ["src/identify/least_squares.cpp"],
     "pagmo/": ["src/design/front_search.cpp"],
-    "CLI/": ["src/cli/", "src/results/failure_message.h", "src/results/number_option.h", "validation/"],
+    "CLI/": ["src/cli/", "src/results/failure_message.h", "src/results/number_option.h", "validation/", "suite/"],
+    "Ip": ["suite/ipopt_solver.cpp"],
     "nlohmann/": ["src/", "validation/", "workers/", "tests/"],
     "cctools/": ["workers/"],
     "Simbody": ["src/worlds/", "validation/"],
@@ -57,7 +58,7 @@ OTHERS = {
 PUBLIC = "include/bielle/"
 OUTSIDE = ("examples/", "python/", "tests/consumer/")  # they see what users see, and the worlds of engines
 GENERATED = ("assets.inc", "help.inc", "functions.inc", "foxglove.pb.h", "motion.pb.h")
-FOLDERS = ("include/", "src/", "validation/", "workers/", "tests/", "examples/", "python/")
+FOLDERS = ("include/", "src/", "validation/", "workers/", "suite/", "tests/", "examples/", "python/")
 
 
 def collect(room):
@@ -82,7 +83,7 @@ def find_room(path):
 
 def resolve(path, name, files):
     """The file of this project that `path` includes by `name`, if it is one."""
-    for folder in ("", "include/", "src/", os.path.dirname(path) + "/", "validation/", "tests/"):
+    for folder in ("", "include/", "src/", os.path.dirname(path) + "/", "validation/", "suite/", "tests/"):
         target = os.path.normpath(folder + name)
         if target in files:
             return target

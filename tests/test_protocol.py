@@ -1,5 +1,5 @@
-"""test_protocol.py BIELLE SOURCE: suite/protocol.py starts problems from guesses, goes on after a line that was cut off, and refuses
-what it cannot do before any run.
+"""test_protocol.py BIELLE SOURCE [IPOPT]: suite/protocol.py starts problems from guesses, goes on after a line that was cut off, and refuses
+what it cannot do before any run. With bielle-ipopt, IPOPT finds the same optimum instead.
 
 Exit status 77: there is no NumPy."""
 import importlib.util
@@ -13,6 +13,7 @@ if not importlib.util.find_spec("numpy"):
     sys.exit(77)
 BIELLE = str(pathlib.Path(sys.argv[1]).absolute())
 program = pathlib.Path(sys.argv[2]) / "suite/protocol.py"
+VARIANT, *IPOPT = ("IPOPT, Gauss-Newton", "--ipopt", str(pathlib.Path(sys.argv[3]).absolute())) if sys.argv[3:] else ("exact loops",)
 RUN = json.dumps({"problem": "walk", "variant": "exact loops", "seed": 0, "guess": 0}) + "\n"
 
 with tempfile.TemporaryDirectory() as directory:
@@ -47,8 +48,8 @@ with tempfile.TemporaryDirectory() as directory:
                                       "settle: 0, time_step: 0.02}}]\n")
     subprocess.run([BIELLE, "dataset", "short.yaml", "-o", "short"], cwd=place, check=True, capture_output=True)
     for times in range(2):
-        subprocess.run([sys.executable, program, "short", "runs.jsonl", "--bielle", BIELLE, "--guesses", "0:1", "--variants", "exact loops"],
-                       cwd=place, check=True, capture_output=True)
+        subprocess.run([sys.executable, program, "short", "runs.jsonl", "--bielle", BIELLE, "--guesses", "0:1",
+                        "--variants", VARIANT, *IPOPT], cwd=place, check=True, capture_output=True)
         line, = map(json.loads, (place / "runs.jsonl").read_text().splitlines())
     entry, = map(json.loads, (place / "short/index.jsonl").read_text().splitlines())
     cost = json.loads((place / "short/motions" / entry["name"] / "motion/summary.json").read_text())["cost"]

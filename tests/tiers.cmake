@@ -20,8 +20,9 @@ set(bielle_long_tests
   design_goals design_fronts design_gradient design_constraints part_motions python_design design_page
   # Whole runs of commands, beside those of their pages.
   firmware_all simulate_predictive dataset workers interruptions determinism_long place_long results_alone_long
-  # Programs that are not installed: the paper, the benchmarks of loops, the examples, whose texts the pages show.
-  paper_claims paper_jump paper_residuals paper_study paper_walk loops_motions loops_mechanisms loops_trials
+  # Programs that are not installed: IPOPT beside our solver, the paper, the benchmarks of loops, the examples, whose texts the
+  # pages show.
+  ipopt protocol_ipopt stationarity paper_claims paper_jump paper_residuals paper_study paper_walk loops_motions loops_mechanisms loops_trials
   01_fourbar 02_squat 03_walk 04_stairs 05_jump 06_lift 07_own_motion 08_turn 09_sequence 10_sensitivity 11_own_constraint
   12_controller 13_beam springs_figure documents_new_motion python_notebooks
   # A few rows of each page of results.
