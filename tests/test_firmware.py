@@ -2,6 +2,7 @@
 
 With "all", every linkage of the included robots in both precisions at 1e5 postures, and a table of them (docs/firmware.md)."""
 import ctypes
+import importlib.machinery
 import math
 import os
 import re
@@ -420,6 +421,40 @@ class FirmwareTest(unittest.TestCase):
             self.assertLessEqual(abs(arctangent(y, x) - exact), 3.1 * 2.0 ** (math.frexp(exact)[1] - 24))
         self.assertEqual([sine(x, n) for x in (math.nan, math.inf, -5000, 1e30) for n in (0, 1)], [0, 1] * 4)
         self.assertEqual((arctangent(0, 0), arctangent(0, -1), arctangent(-2, 0)), (0, single(math.pi), -single(math.pi / 2)))
+
+    def test_torch(self):
+        """The text of NumPy's module, with tensors."""
+        modules = {}
+        for kind in ("numpy", "torch"):
+            place = os.path.join(self.place, kind + "_ankles")
+            convert("rsu_biped", place, "--to", kind, "--postures", "200")
+            path = os.path.join(place, "ankley_left_anklex_left.py")
+            with open(path) as file:
+                text = file.read()
+            modules[kind] = path, text[text.index("\nSIZE = "):]
+        self.assertEqual(modules["numpy"][1], modules["torch"][1])
+        try:
+            import numpy as np
+            import torch
+        except ImportError:
+            self.skipTest("NumPy or PyTorch is not installed")
+        arrays, tensors = (importlib.machinery.SourceFileLoader(kind + "_ankle", modules[kind][0]).load_module() for kind in modules)
+        joints = arrays.LOWER + np.random.default_rng(0).uniform(-0.05, 1.05, (200, 2)) * (arrays.UPPER - arrays.LOWER)
+        joints[0, 0] = np.nan
+        motors = arrays.joint_to_motor(np.clip(joints, arrays.LOWER, arrays.UPPER))[0]
+        for name, arguments in (("joint_to_motor", (joints,)), ("motor_to_joint", (motors,)), ("ratio", (joints,)), ("ratio_rate", (joints, joints)),
+                                ("held_torque", (joints,)), ("motor_velocity", (joints, motors)), ("motor_torque", (joints, motors, (0, 0, -9.81))),
+                                ("joint_torque", (joints, motors)), ("clip_joint_torque", (joints, motors)), ("reflected_inertia", (joints,))):
+            # The clamped postures of numbers that are none have rates of none.
+            wanted, found = (getattr(module, name)(*arguments) for module in (arrays, tensors))
+            for a, b in zip(*((x if isinstance(x, tuple) else (x,)) for x in (wanted, found))):
+                self.assertLess(np.nanmax(abs(a * 1.0 - b.double().numpy()), initial=0), 1e-10 * max(1, np.nanmax(abs(a * 1.0), initial=0)), name)
+                self.assertTrue((np.isnan(a * 1.0) == np.isnan(b.double().numpy())).all(), name)
+        # R is the gradient of the motors' positions.
+        inner = torch.as_tensor(joints[1:].clip(arrays.LOWER + 1e-3, arrays.UPPER - 1e-3)).requires_grad_()
+        motors = tensors.joint_to_motor(inner)[0]
+        rows = [torch.autograd.grad(motors[:, i].sum(), inner, retain_graph=True)[0] for i in range(2)]
+        self.assertLess((torch.stack(rows, 1) - tensors.ratio(inner)[0]).abs().max().item(), 1e-9)
 
     @unittest.skipUnless(HAS_ARM, "arm-none-eabi-gcc and qemu-system-arm are not installed")
     def test_the_same_bits_on_arm(self):

@@ -76,6 +76,7 @@ const std::map<std::string, FirmwareLanguage> kFirmware = {{"c", FirmwareLanguag
 bool isFirmware(const std::string& format) { return kFirmware.count(format) > 0; }
 
 void writeFirmware(const LoadedRobot& robot, const ConvertArguments& arguments) {
+                                                           {"torch", FirmwareLanguage::Torch},
   FirmwareOptions options;
   options.language = kFirmware.at(arguments.format);
   options.is_single = arguments.is_single;
@@ -173,13 +174,14 @@ void addConvert(CLI::App& command, Action& action) {
           "bielle: a directory with URDF and YAML, without losses; c, cpp: a directory with the maps of its linkages "
           "between joints and motors, for firmware; drake: a URDF with loops and motors for "
           "Drake; dxf: plates of the plane links, for a workshop; mjcf: a MuJoCo file; sdf: a Gazebo file with "
-          "loops; numpy: those maps as modules for Python; ros2_control: them in C++, and transmissions around them; "
+          "loops; numpy, torch: those maps as modules for Python; ros2_control: them in C++, and transmissions around "
+          "them; "
           "sheet: an SVG drawing with distances, and a CSV file of "
           "lengths, masses and motors; step: "
           "solids for CAD "
           "(AP214), an assembly of links; urdf: a URDF alone; usd: a USD file with loops for Isaac and Newton")
       ->check(CLI::IsMember({"bielle", "c", "cpp", "drake", "dxf", "mjcf", "numpy", "ros2_control", "sdf", "sheet",
-                             "step", "urdf", "usd"}))
+                             "step", "torch", "urdf", "usd"}))
       ->capture_default_str();
   command
       .add_option(

@@ -11,17 +11,22 @@ namespace {
 using namespace firmware;
 
 std::string writeReadme(const std::vector<Maps>& all, const FirmwareOptions& options) {
-  const bool is_python = options.language == FirmwareLanguage::NumPy,
+  const bool is_torch = options.language == FirmwareLanguage::Torch,
+             is_python = is_torch || options.language == FirmwareLanguage::NumPy,
              is_cpp = options.language == FirmwareLanguage::Cpp || options.language == FirmwareLanguage::Ros2Control;
   const std::string name = all.front().name, prefix = is_cpp ? name + "::" : name + "_";
   const std::string type = is_cpp ? "Posture" : "posture", ratio = is_cpp ? "Ratio" : "ratio",
                     real = options.is_single ? "float" : "double", size = std::to_string(all.front().size());
   std::string out = "# Linkages of " + all.front().robot + "\n\nWritten by `bielle convert`. ";
   if (is_python) {
-    out +=
-        "One module a linkage, which needs NumPy alone; all functions take arrays of postures.\n\n```python\nimport " +
-        name + " as linkage\nmotors, reached = linkage.joint_to_motor(joints)             # (N, " + size +
-        ")\ntorques = linkage.motor_torque(joints, joint_torques)        # by virtual work\n```\n";
+    out += "One module a linkage, which needs " +
+           std::string(
+               is_torch ? "PyTorch alone; all functions take tensors of postures, are differentiable, and compute in "
+                          "float64, on the device given to `to()`"
+                        : "NumPy alone; all functions take arrays of postures") +
+           ".\n\n```python\nimport " + name +
+           " as linkage\nmotors, reached = linkage.joint_to_motor(joints)             # (N, " + size +
+           ")\ntorques = linkage.motor_torque(joints, joint_torques)        # by virtual work\n```\n";
   } else {
     const std::string compile = is_cpp ? "c++ -std=c++11" : "cc -std=c99", end = is_cpp ? ".cpp" : ".c";
     out += "Each linkage is a header and a source of " + std::string(is_cpp ? "C++11" : "C99") + " in `" + real +
@@ -88,8 +93,9 @@ FirmwareText formatFirmware(const Model& model, ConstVectorRef q, const Firmware
       throw InputError(model.name(), "--range " + joint, "it is no serial joint of a linkage",
                        "name one of: " + listItems(names));
   for (const Maps& maps : all) {
-    const auto files = options.language == FirmwareLanguage::NumPy
-                           ? writeNumPy(maps)
+    const bool is_torch = options.language == FirmwareLanguage::Torch;
+    const auto files = is_torch || options.language == FirmwareLanguage::NumPy
+                           ? writePython(maps, is_torch)
                            : writeC(maps, options.is_single, options.language != FirmwareLanguage::C);
     out.files.insert(files.begin(), files.end());
   }

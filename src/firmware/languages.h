@@ -6,8 +6,8 @@ namespace bielle::firmware {
 
 // Source, header and test, by name. is_cpp: in a namespace instead of by a prefix.
 std::map<std::string, std::string> writeC(const Maps& maps, bool is_single, bool is_cpp);
-// One module of functions over arrays of postures.
-std::map<std::string, std::string> writeNumPy(const Maps& maps);
+// One module of functions over arrays of postures: of NumPy, or tensors.
+std::map<std::string, std::string> writePython(const Maps& maps, bool is_torch);
 
 // Transmissions of ros2_control around what writeC() makes in C++; the readme receives how they are built.
 std::map<std::string, std::string> writeRos2(const std::vector<Maps>& all, std::string& readme);

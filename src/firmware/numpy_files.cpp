@@ -8,13 +8,50 @@ namespace {
 
 using Eigen::Index;
 
+// In place of NumPy, whose names the rest of a module uses.
+constexpr const char* kTorchText = R"(import math
+
+import torch
+
+
+def _take_numbers(function):
+    def call(*values):
+        like = next(x for x in values if torch.is_tensor(x) and x.is_floating_point())
+        return function(*(x if torch.is_tensor(x) else torch.as_tensor(x, dtype=like.dtype, device=like.device) for x in values))
+    return call
+
+
+class np:
+    """Of NumPy what the rest calls, which is the text of `--to numpy`."""
+    inf = math.inf
+    abs, amax, amin, isnan, sin, cos, sqrt, stack = torch.abs, torch.amax, torch.amin, torch.isnan, torch.sin, torch.cos, torch.sqrt, torch.stack
+    arctan2, maximum, minimum, where = map(_take_numbers, (torch.atan2, torch.maximum, torch.minimum, torch.where))
+    broadcast_arrays = torch.broadcast_tensors
+
+    def array(values):
+        return torch.tensor(values, dtype=torch.float64)
+
+    def asarray(values, _):
+        return torch.as_tensor(values, dtype=torch.float64)
+
+    def einsum(indices, *values):
+        return torch.einsum(indices, *(np.asarray(x, float) for x in values))
+
+
+def to(device):
+    """Moves the constants to where the tensors are that functions get."""
+    global LOWER, UPPER, MOTOR_LOWER, MOTOR_UPPER, ROTOR, EFFORT, SPEED
+    LOWER, UPPER, MOTOR_LOWER, MOTOR_UPPER, ROTOR, EFFORT, SPEED = (
+        x.to(device) for x in (LOWER, UPPER, MOTOR_LOWER, MOTOR_UPPER, ROTOR, EFFORT, SPEED))
+)";
+
 // Keys: SIZE, @..@.
 constexpr const char* kModuleText = R"("""@title@
 
 @about@
 Arrays hold a posture a row: joints and motors (N, SIZE), or (SIZE,) for one.
 """
-import numpy as np
+@import@
 
 SIZE = SIZE_
 LOWER, UPPER = np.array([@lower@]), np.array([@upper@])  # of the joints
@@ -60,8 +97,7 @@ def motor_to_joint(motors):
 
 
 def _start(given, first):
-    zero = np.zeros(given.shape[:-1])
-    q = [zero] * @coordinates@
+    q = [0 * given[..., 0]] * @coordinates@
     q[first:first + SIZE] = [given[..., i] for i in range(SIZE)]
     return q
 
@@ -126,9 +162,8 @@ def joint_torque(joints, motor_torques, gravity=None):
 
 def clip_joint_torque(joints, joint_torques):
     """Joint torques, shortened where the motors cannot give them: what a policy's action becomes."""
-    needed = np.abs(motor_torque(joints, joint_torques))
-    with np.errstate(divide="ignore"):
-        share = np.where(needed > EFFORT, EFFORT / needed, 1.0).min(-1)
+    needed = np.maximum(np.abs(motor_torque(joints, joint_torques)), 1e-200)
+    share = np.amin(np.minimum(EFFORT / needed, 1.0), -1)
     return np.asarray(joint_torques, float) * share[..., None]
 
 
@@ -140,7 +175,7 @@ def reflected_inertia(joints):
 
 }  // namespace
 
-std::map<std::string, std::string> writeNumPy(const Maps& maps) {
+std::map<std::string, std::string> writePython(const Maps& maps, bool is_torch) {
   const int m = maps.size();
   const Mechanism& mechanism = maps.mechanism;
   Style style;
@@ -166,7 +201,8 @@ std::map<std::string, std::string> writeNumPy(const Maps& maps) {
     return deepen(printProgram(program, style, nameInput, targets), "    ");
   };
   const auto printSolution = [&](const Solution& s) {
-    std::string out = "    reached = np.ones(np.shape(q[" + std::to_string(s.given.front()) + "]), bool)\n";
+    const std::string first = nameInput(s.given.front());
+    std::string out = "    reached = " + first + " == " + first + "\n";
     const auto addClosedForms = [&](const std::vector<std::pair<int, Scalar>>& list, const Scalar& least) {
       std::vector<Scalar> formulas;
       std::vector<std::string> targets;
@@ -191,7 +227,7 @@ std::map<std::string, std::string> writeNumPy(const Maps& maps) {
              formatConstant(-kLongestStep, style) + ", " + formatConstant(kLongestStep, style) + ") for x in d]\n";
       for (size_t u = 0; u < unknowns.size(); ++u)
         out += "        " + unknowns[u] + " = " + unknowns[u] + " + " + steps[u] + "\n";
-      out += "    reached = reached & (np.max(np.abs(np.broadcast_arrays(*d)), 0) <= 1e-3)\n";
+      out += "    reached = reached & (np.amax(np.abs(_stack(d)), -1) <= 1e-3)\n";
     }
     addClosedForms(s.after, s.least_after);
     return out + "    return reached\n";
@@ -213,25 +249,27 @@ std::map<std::string, std::string> writeNumPy(const Maps& maps) {
   std::string about;
   for (const std::string& line : describe(maps, false)) about += line + "\n";
   const auto motor = [&](int i) -> const Motor& { return maps.motors[static_cast<size_t>(i)]; };
-  return {{maps.name + ".py", fillIn(kModuleText, {{"SIZE_", std::to_string(m)},
-                                                   {"@lower@", list([&](int i) { return maps.lower[i]; })},
-                                                   {"@upper@", list([&](int i) { return maps.upper[i]; })},
-                                                   {"@motor_lower@", list([&](int i) { return maps.motor_lower[i]; })},
-                                                   {"@motor_upper@", list([&](int i) { return maps.motor_upper[i]; })},
-                                                   {"@rotor@", list([&](int i) { return motor(i).armature; })},
-                                                   {"@effort@", list([&](int i) { return motor(i).effort_limit; })},
-                                                   {"@speed@", list([&](int i) { return motor(i).velocity_limit; })},
-                                                   {"@solve_motors@", printSolution(maps.inverse)},
-                                                   {"@solve_joints@", printSolution(maps.direct)},
-                                                   {"@coordinates@", std::to_string(mechanism.coordinates.size())},
-                                                   {"@ratio@", print(formulas.ratio, listTargets("r", 2 * m * m + 1))},
-                                                   {"@rate@", print(formulas.ratio_rate, listTargets("r", m * m + 1))},
-                                                   {"@held@", print(formulas.held, listTargets("h", m))},
-                                                   {"@about@", about},
-                                                   {"@base@", maps.base},
-                                                   {"@title@", maps.robot + ": " + listItems(maps.joint_names) +
-                                                                   " by " + listItems(maps.motor_names) +
-                                                                   ". Written by `bielle convert --to numpy`."}})}};
+  return {{maps.name + ".py",
+           fillIn(kModuleText,
+                  {{"@import@", is_torch ? kTorchText : "import numpy as np"},
+                   {"SIZE_", std::to_string(m)},
+                   {"@lower@", list([&](int i) { return maps.lower[i]; })},
+                   {"@upper@", list([&](int i) { return maps.upper[i]; })},
+                   {"@motor_lower@", list([&](int i) { return maps.motor_lower[i]; })},
+                   {"@motor_upper@", list([&](int i) { return maps.motor_upper[i]; })},
+                   {"@rotor@", list([&](int i) { return motor(i).armature; })},
+                   {"@effort@", list([&](int i) { return motor(i).effort_limit; })},
+                   {"@speed@", list([&](int i) { return motor(i).velocity_limit; })},
+                   {"@solve_motors@", printSolution(maps.inverse)},
+                   {"@solve_joints@", printSolution(maps.direct)},
+                   {"@coordinates@", std::to_string(mechanism.coordinates.size())},
+                   {"@ratio@", print(formulas.ratio, listTargets("r", 2 * m * m + 1))},
+                   {"@rate@", print(formulas.ratio_rate, listTargets("r", m * m + 1))},
+                   {"@held@", print(formulas.held, listTargets("h", m))},
+                   {"@about@", about},
+                   {"@base@", maps.base},
+                   {"@title@", maps.robot + ": " + listItems(maps.joint_names) + " by " + listItems(maps.motor_names) +
+                                   ". Written by `bielle convert --to " + (is_torch ? "torch" : "numpy") + "`."}})}};
 }
 
 }  // namespace bielle::firmware

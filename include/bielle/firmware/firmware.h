@@ -16,7 +16,7 @@
 namespace bielle {
 
 /// Ros2Control: C++, and plug-ins that are transmissions of ros2_control.
-enum class FirmwareLanguage { C, Cpp, NumPy, Ros2Control };
+enum class FirmwareLanguage { C, Cpp, NumPy, Torch, Ros2Control };
 
 struct FirmwareOptions {
   FirmwareLanguage language = FirmwareLanguage::C;
