@@ -16,7 +16,7 @@ ROOMS = {
     "motion": ["ocp", "formats"],
     "control": ["motion"],
     "results": ["motion", "robots"],
-    "worlds": ["control", "results"],
+    "worlds": ["control", "results", "firmware"],
     "identify": ["results"],
     "report": ["results"],
     "design": ["results"],

@@ -118,8 +118,35 @@ TEST_CASE("simulate: a controller may believe in another model than that of the 
     CHECK(summary["duration"].get<double>() > 0.5);
     CHECK(summary["fell"] == (result.status == 1));
     CHECK(summary["plan_reachable_until"].is_null());
+    CHECK(summary["maps"] == "library");
   }
   CHECK(simulate(output, {"--model", "gears"}).status == 2);
+}
+
+TEST_CASE("simulate: maps as firmware has them stand between a serial controller and the motors") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "generated").string();
+  const CommandResult result =
+      simulate(output, {"--model", "serial", "--maps", "generated", "--control", "gains", "--summary-only"});
+  CAPTURE(result.out, result.err);
+  CHECK(result.status <= 1);  // as with the library's
+  CHECK_THAT(result.out, Catch::Contains("with model serial and generated maps"));
+  const nlohmann::json summary = parseSummary(output), &counts = summary["map_counts"];
+  CHECK(summary["maps"] == "generated");
+  CHECK(counts["measured"].get<int>() > 1000);
+  CHECK(counts["not_reached"] == 0);
+  const auto refuse = [&](const std::vector<std::string>& options) {
+    const CommandResult refused = simulate((scratch.path / "none").string(), options);
+    CHECK(refused.status == 2);
+    return refused.err;
+  };
+  CHECK_THAT(refuse({"--maps", "generated"}), Catch::Contains("--maps generated: the controller knows the robot with"));
+  CHECK_THAT(refuse({"--maps", "generated", "--model", "closed", "--dry-run"}), Catch::Contains("give --model serial"));
+  CHECK_FALSE(fs::exists(scratch.path / "none"));
+  const CommandResult free = runCommand({BIELLE_COMMAND, "simulate", BIELLE_SOURCE_DIR "/robots/fourbar", "--maps",
+                                         "generated", "-o", (scratch.path / "none").string()});
+  CHECK(free.status == 2);
+  CHECK_THAT(free.err, Catch::Contains("--maps") && Catch::Contains("moves freely"));
 }
 
 TEST_CASE("simulate: the plan lies beside what happened, and the page shows both") {

@@ -98,6 +98,7 @@ FirmwareText formatFirmware(const Model& model, ConstVectorRef q, const Firmware
                            ? writePython(maps, is_torch)
                            : writeC(maps, options.is_single, options.language != FirmwareLanguage::C);
     out.files.insert(files.begin(), files.end());
+    out.linkages.push_back({maps.name, maps.joint_names, maps.motor_names});
   }
   std::string readme = writeReadme(all, options);
   if (options.language == FirmwareLanguage::Ros2Control) out.files.merge(writeRos2(all, readme));

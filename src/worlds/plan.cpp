@@ -116,6 +116,7 @@ Plan finishPlan(const LoadedRobot& robot, MotionSummary summary, Belief belief, 
                 const std::string& guess, const ControlOptions& options) {
   const PlanControl control = options.control;
   std::optional<SerialModel> serial = makeSerial(robot.model, summary, belief);
+  if (serial && options.generated_maps) requireCompiler();
   ProblemOptions problem(summary.formulation, summary.step);
   problem.limits = readLimits(summary);
   problem.objective = summary.objective;
@@ -141,7 +142,12 @@ Plan finishPlan(const LoadedRobot& robot, MotionSummary summary, Belief belief, 
   plan.robot = robot;
   plan.summary = std::move(summary);
   plan.belief = belief;
-  if (serial) plan.lifted = makeReference(robot.model, *serial, plan.policy, belief);
+  if (serial && options.generated_maps) {
+    std::vector<VectorXd> planned;
+    for (const Policy::Stage& stage : plan.policy.stages()) planned.push_back(stage.q);
+    plan.maps.emplace(robot.model, *serial, belief, formatMaps(robot.model, *serial, planned));
+  }
+  if (serial) plan.lifted = makeReference(robot.model, *serial, plan.policy, belief, plan.maps);
   plan.serial = std::move(serial);
   plan.solution = std::move(solution);
   plan.iterations = iterations;

@@ -22,6 +22,8 @@ struct ControlOptions {
   PlanControl control = PlanControl::Predictive;
   PredictiveOptions predictive;  ///< its look_ahead is that of gains, too (Policy::setLookAhead)
   double duration = 0;           ///< for which a motion that repeats is to last, s; 0: ten cycles
+  /// Of controllers that believe in a serial chain: whether maps as firmware has them are between them and the motors.
+  bool generated_maps = false;
 };
 
 /// A run goes on for up to so long until it is decided whether the robot stands, s.
@@ -37,6 +39,7 @@ struct Plan {
   MotionSummary summary{};
   Belief belief = Belief::Closed;
   std::optional<SerialModel> serial{};   ///< none for Belief::Closed
+  std::optional<GeneratedMaps> maps{};   ///< likewise, where they are generated
   SerialReference lifted{};              ///< the plan of the serial model as one of the robot; empty for Belief::Closed
   std::optional<Solution> solution{};    ///< of the policy; none for a walk by command
   std::optional<CommandedWalk> walk{};   ///< by command: of the robot cut at its balls, before its first stage
@@ -96,6 +99,7 @@ void freeFeet(const Model& model, const StandingRobot& standing, const Ground& g
 struct PlanController {
   std::unique_ptr<Controller> law;                   ///< of the closed robot
   const PredictiveController* prediction = nullptr;  ///< the part of it that predicts, or null
+  const GeneratedMaps* maps = nullptr;               ///< generated ones in it, or null
   std::vector<Goal> goals{};                         ///< those of the plan; of footholds, within the room that it has
 };
 /// \param options  for which the plan was made

@@ -73,8 +73,12 @@ PlanController makeController(const Plan& plan, const ControlOptions& options) {
   } else {
     out.law = std::make_unique<Policy>(plan.policy);
   }
-  if (plan.serial)
-    out.law = std::make_unique<SerialController>(plan.robot.model, *plan.serial, std::move(out.law), plan.belief);
+  if (plan.serial) {
+    auto serial =
+        std::make_unique<SerialController>(plan.robot.model, *plan.serial, std::move(out.law), plan.belief, plan.maps);
+    out.maps = serial->maps();
+    out.law = std::move(serial);
+  }
   return out;
 }
 

@@ -25,12 +25,10 @@ VectorXd calcMotorTorques(const MatrixXd& R, const VectorXd& tau) { return R.tra
 }  // namespace
 
 SerialController::SerialController(const Model& closed, const SerialModel& serial, std::unique_ptr<Controller> inner,
-                                   Belief belief)
-    : closed_(closed),
-      serial_(serial),
-      inner_(std::move(inner)),
-      belief_(belief),
-      posture_(std::make_unique<PostureLift>(closed_, serial_)) {
+                                   Belief belief, std::optional<GeneratedMaps> maps)
+    : closed_(closed), serial_(serial), inner_(std::move(inner)), belief_(belief), maps_(std::move(maps)) {
+  if (maps_) return;
+  posture_ = std::make_unique<PostureLift>(closed_, serial_);
   posture_->setClosedConfiguration(serial.q_reference, kSingular);
   calcRatio(closed_, serial_.model, *posture_, R_);
 }
@@ -40,14 +38,17 @@ void SerialController::update(const Measurement& measurement, VectorRef u) {
   Measurement believed = measurement;
   believed.q = restrictConfiguration(closed_, serial_.model, measurement.q);
   believed.v = restrictVelocity(closed_, serial_.model, measurement.v);
+  if (maps_) maps_->measure(measurement.q, measurement.v, believed.q, believed.v);
   VectorXd tau(serial_.model.nu());
   inner_->update(believed, tau);
+  if (maps_) return maps_->calcTorques(tau, u);
   if (belief_ == Belief::Serial && posture_->setClosedConfiguration(measurement.q, kSingular) == NumericalStatus::Ok)
     calcRatio(closed_, serial_.model, *posture_, R_);
   u = calcMotorTorques(R_, tau);
 }
 
-SerialReference makeReference(const Model& closed, const SerialModel& serial, const Policy& plan, Belief belief) {
+SerialReference makeReference(const Model& closed, const SerialModel& serial, const Policy& plan, Belief belief,
+                              std::optional<GeneratedMaps> maps) {
   SerialReference out;
   PostureLift posture(closed, serial);
   posture.setClosedConfiguration(serial.q_reference, kSingular);
@@ -64,6 +65,7 @@ SerialReference makeReference(const Model& closed, const SerialModel& serial, co
     if (status == NumericalStatus::Ok && belief == Belief::Serial) calcRatio(closed, serial.model, posture, R);
     q = posture.q();
     v = status == NumericalStatus::Ok ? posture.liftVelocity(v_s) : VectorXd(VectorXd::Zero(closed.nv()));
+    if (maps && status == NumericalStatus::Ok) maps->lead(q_s, v_s, q, v);
   };
   std::vector<Policy::Stage> stages;
   VectorXd q, v, q_next;
@@ -75,7 +77,12 @@ SerialReference makeReference(const Model& closed, const SerialModel& serial, co
     stage.phase = from.phase;
     stage.q = q;
     stage.v = v;
-    stage.u = calcMotorTorques(R, from.u);
+    if (maps) {
+      stage.u.resize(closed.nu());
+      maps->calcTorques(from.u, stage.u);
+    } else {
+      stage.u = calcMotorTorques(R, from.u);
+    }
     setState(from.start + from.duration, q_next, v);
     stage.q_change = closed.difference(q, q_next);
     stage.v_next = v;

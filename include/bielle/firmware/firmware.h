@@ -27,9 +27,16 @@ struct FirmwareOptions {
   std::map<std::string, std::pair<double, double>> ranges;
 };
 
+/// A linkage that has maps.
+struct FirmwareLinkage {
+  std::string name;                         ///< of its files, and before the names of C in them
+  std::vector<std::string> joints, motors;  ///< in the order of its arrays
+};
+
 struct FirmwareText {
   std::map<std::string, std::string> files;  ///< by name
-  std::vector<std::string> warnings;         ///< linkages that are left out
+  std::vector<FirmwareLinkage> linkages;
+  std::vector<std::string> warnings;  ///< linkages that are left out
 };
 
 /// The maps of all linkages whose output is joints.

@@ -109,6 +109,9 @@ void describeControl(OptionFields& fields, SimulateArguments& a) {
                 "the controller's model of the robot. closed: with its linkages; serial: a serial chain with motors "
                 "on its joints, converted by the linkages' ratios in the current posture; ratio: the same, with the "
                 "constant ratios of the standing posture (default: the motion's model)");
+  fields.choice("maps", a.control.generated_maps, {"library", "generated"},
+                "with a serial model: what converts between joints and motors. library: the mechanism; generated: the "
+                "code that `bielle convert --to c` writes, compiled by the C compiler ($CC, or cc), as on a robot");
   fields.integer("nodes", predictive.nodes, {10, 1000}, "number of nodes in the window of predictive control");
   fields.integer("fine_nodes", predictive.fine_nodes, {10, 1000},
                  "number of nodes at its beginning that are one stage long; later ones are up to two, then four");
@@ -318,6 +321,12 @@ std::vector<std::string> listIdlePushes(const std::vector<Push>& pushes, double 
   return idle;
 }
 
+void refuseMaps() {
+  throw InputError("", "--maps generated",
+                   "the controller knows the robot with its linkages, and commands their motors",
+                   "give --model serial or --model ratio");
+}
+
 void requireShortSteps(const SimulateArguments& arguments, const std::string& flag, double period) {
   if (arguments.time_step > period * (1 + 1e-9))
     throw InputError("", "--time-step " + formatNumber(arguments.time_step),
@@ -339,6 +348,7 @@ void parseOptions(SimulateArguments& arguments) {
                        "commanded walks need the closed model", "leave it out");
     readCommands(arguments.commands);
   }
+  if (arguments.control.generated_maps && arguments.belief == Belief::Closed) refuseMaps();
   if (arguments.execution.real_time && arguments.live)
     throw InputError("", "--live", "writing files would delay the world in real time", "leave out --real-time");
   if (!is_predictive)

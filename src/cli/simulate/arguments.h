@@ -71,6 +71,8 @@ std::vector<std::string> splitWorlds(const std::string& text);
 std::vector<std::string> listIdleOptions(const SimulateArguments& arguments);
 /// Pushes that come after the end of a motion, or in part.
 std::vector<std::string> listIdlePushes(const std::vector<Push>& pushes, double duration);
+/// There is nothing to convert for a controller that has the closed model. \throws InputError
+[[noreturn]] void refuseMaps();
 /// Steps cannot be longer than a period at whose ends they end. \throws InputError
 void requireShortSteps(const SimulateArguments& arguments, const std::string& flag, double period);
 

@@ -115,10 +115,11 @@ void addSprings(const Model& model, const std::string& text, const VectorXd& q, 
 
 // What only a plan can use.
 void refuseOptionsOfPlans(const SimulateArguments& arguments) {
-  const auto flag = findGiven(
-      arguments, {"control",    "command",    "model", "speed",      "set",        "real_time", "sensors",
-                  "noise",      "look_ahead", "delay", "jitter",     "live",       "lead",      "solve_time",
-                  "mass_error", "rod_error",  "nodes", "fine_nodes", "iterations", "hold",      "control_period"});
+  const auto flag =
+      findGiven(arguments, {"control",    "command",    "model",      "maps",          "speed",     "set",
+                            "real_time",  "sensors",    "noise",      "look_ahead",    "delay",     "jitter",
+                            "live",       "lead",       "solve_time", "mass_error",    "rod_error", "nodes",
+                            "fine_nodes", "iterations", "hold",       "control_period"});
   if (flag)
     throw InputError("", *flag, "'" + arguments.directory + "' is a robot without a plan, which moves freely",
                      "leave it out, or give the directory of a solved motion");

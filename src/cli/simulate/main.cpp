@@ -51,6 +51,13 @@ void requirePlan(const SimulateArguments& arguments) {
     throw InputError("", "--world", "a motion is carried out in one world at a time", "give one");
 }
 
+// Maps between joints and motors are for controllers that believe in a serial chain.
+void requireSerial(const SimulateArguments& arguments) {
+  if (!arguments.control.generated_maps) return;
+  const Belief of_motion = arguments.robot.empty() ? readSummary(arguments.directory).run.model : Belief::Closed;
+  if (arguments.belief.value_or(of_motion) == Belief::Closed) refuseMaps();
+}
+
 // The motion solved before or, where a robot is given, the motion of that name.
 Plan obtainPlan(const SimulateArguments& arguments) {
   if (arguments.robot.empty()) {
@@ -209,6 +216,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   watchInterrupts();
   if (isFree(arguments)) return simulateFreely(arguments, command) ? kStood : kFell;
   requirePlan(arguments);
+  requireSerial(arguments);
   const std::string reason = chooseControl(arguments);
   roundPeriods(arguments);
   arguments.control.duration = arguments.execution.duration;

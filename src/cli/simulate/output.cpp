@@ -149,6 +149,13 @@ Json listTimes(const PredictiveCounts& counts, const Execution& e) {
           {"peak_memory_MB", readPeakMemory()}};
 }
 
+Json listMapCounts(const GeneratedMaps::Counts& counts) {
+  return {{"measured", counts.measured},
+          {"clamped", counts.clamped},
+          {"not_reached", counts.not_reached},
+          {"largest_difference", counts.largest_difference}};
+}
+
 Json listCommands(const std::vector<TimedCommand>& commands) {
   auto list = Json::array();
   for (const auto& [time, velocity] : commands)
@@ -186,6 +193,8 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   summary["warnings"] = carried.warnings;
   summary["control"] = getName(arguments.control.control);
   summary["believed_model"] = getName(plan.belief);
+  if (plan.belief != Belief::Closed) summary["maps"] = carried.controller.maps ? "generated" : "library";
+  if (carried.controller.maps) summary["map_counts"] = listMapCounts(carried.controller.maps->counts());
   if (plan.belief != Belief::Closed)
     summary["plan_reachable_until"] = plan.lifted.first_missed < 0 ? nullptr : Json(plan.lifted.first_missed);
   if (carried.controller.prediction) summary["solves"] = listSolves(carried.controller.prediction->counts());
@@ -346,6 +355,7 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
             << ", control " << getName(arguments.control.control);
   if (!reason.empty()) std::cout << " (" << reason << ")";
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
+  if (carried.controller.maps) std::cout << " and generated maps";
   std::cout << (e.outcome == Outcome::Undecided ? ": " : ": it ") << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
   const std::vector<GoalOutcome> goals = measureCarriedGoals(plan, carried.controller.goals, e.record);
@@ -369,6 +379,14 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
     std::cout << "  push                " << formatNumber(push.impulse) << " N s at " << formatNumber(push.time)
               << " s, for " << formatNumber(push.duration) << " s, direction " << formatNumber(push.direction)
               << " degrees\n";
+  if (carried.controller.maps) {
+    const GeneratedMaps::Counts& c = carried.controller.maps->counts();
+    std::snprintf(text, sizeof text,
+                  "  maps                joints within %.1e of the measured ones; %ld of %ld linkages clamped, %ld not "
+                  "reached\n",
+                  c.largest_difference, c.clamped, c.measured, c.not_reached);
+    std::cout << text;
+  }
   if (plan.lifted.first_missed >= 0)
     std::cout << "  the linkages cannot follow the plan from " << plan.lifted.first_missed
               << " s on: " << plan.lifted.message << "\n";
