@@ -13,6 +13,7 @@ bielle_test(timed_motions SOURCES test_timed_motions.cpp LIBS bielle_results)
 bielle_test(jump SOURCES test_jump.cpp LIBS bielle_motion)
 bielle_test(limits SOURCES test_limits.cpp LIBS bielle_motion)
 bielle_test(feasibility SOURCES test_feasibility.cpp LIBS bielle_motion bielle_robots)
+bielle_test(serial_tables SOURCES test_serial_tables.cpp LIBS bielle_motion bielle_robots)
 bielle_test(dead_points SOURCES test_dead_points.cpp LIBS bielle_motion bielle_robots)
 bielle_test(formulations SOURCES test_formulations.cpp LIBS bielle_motion)
 # Whole motions: minutes under sanitizers.

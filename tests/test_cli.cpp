@@ -160,6 +160,51 @@ TEST_CASE("an output that is an input is refused, by whatever path") {
   CHECK(readAll() == before);
 }
 
+TEST_CASE("the serial chain of a robot is written with tables of its linkages") {
+  const OutputDirectory directory;
+  const fs::path place = fs::path(directory.str()).parent_path();
+  for (const std::string format : {"mjcf", "urdf"}) {
+    const std::string file = (place / ("chain." + format)).string();
+    const CommandResult result = run({"convert", "rsu_biped", "--to", format, "--serial", "-o", file});
+    CAPTURE(result.err);
+    REQUIRE(result.status == 0);
+    CHECK_THAT(result.err,
+               Catch::Contains("joints of linkages frozen: 8, with 0.64 kg of their bodies; closures left out: 4"));
+    const std::string text = readFile(file);
+    for (const char* loop : {"<connect", "<weld", "<mimic"}) CHECK(text.find(loop) == std::string::npos);
+    const json tables = json::parse(readFile(place / "chain.linkages.json"));
+    CHECK(tables["model"] == "chain." + format);
+    REQUIRE(tables["linkages"].size() == 2);
+    for (const json& table : tables["linkages"]) {
+      const size_t m = table["joints"].size();
+      REQUIRE(m == 2);
+      size_t count = 1;
+      for (size_t i = 0; i < m; ++i) {
+        CHECK(table["axes"][i].size() == table["shape"][i]);
+        CHECK_THAT(text, Catch::Contains(table["joints"][i].get<std::string>()));
+        count *= table["shape"][i].get<size_t>();
+      }
+      for (const auto& [name, entries] : {std::pair("ratio", m * m),
+                                          {"inertia", m * m},
+                                          {"weight", 3 * m},
+                                          {"held", m},
+                                          {"damping", m * m},
+                                          {"friction", m},
+                                          {"torque_alone", m},
+                                          {"speed_most", m}}) {
+        CAPTURE(name);
+        REQUIRE(table[name].size() == count);
+        for (const json& row : table[name]) CHECK(row.size() == entries);
+      }
+    }
+  }
+  checkRefused(run({"convert", "rsu_biped", "--to", "sdf", "--serial", "-o", directory.str()}),
+               "add --to mjcf or --to urdf");
+  checkRefused(run({"convert", "fivebar", "--to", "mjcf", "--serial", "-o", directory.str()}),
+               "no equivalent serial chain");
+  CHECK_FALSE(fs::exists(directory.str()));
+}
+
 TEST_CASE("a loop that cannot be closed is refused with the file, the closure and its gap") {
   const OutputDirectory directory;
   fs::create_directories(directory.str());

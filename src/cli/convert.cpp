@@ -11,6 +11,7 @@
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
+#include "cli/serial_files.h"
 #include "formats/aside_file.h"
 #include "formats/companion.h"
 #include "formats/drake.h"
@@ -34,7 +35,7 @@ struct ConvertArguments {
   std::string format = "bielle", joints, output;
   double payload = 0, hole = 8;
   std::vector<double> payload_at;
-  bool is_single = false;
+  bool is_single = false, is_serial = false;
   int postures = FirmwareOptions().postures;
   std::vector<std::string> ranges;  // joint, low, high, ..
 };
@@ -45,6 +46,9 @@ void describe(OptionFields& f, ConvertArguments& a) {
   f.integer("postures", a.postures, {100, 10000000},
             "with maps of linkages: at how many of each linkage errors are measured");
   f.number("payload", a.payload, "kg", {0, 1e6}, "mass fixed to the trunk");
+  f.flag("serial", a.is_serial,
+         "with --to mjcf or urdf: the chain of the serial joints, with motors on them, for trainers; beside it, in "
+         "NAME.linkages.json, inertia, limits and friction of its linkages over their postures");
 }
 
 void warn(const std::vector<std::string>& warnings) {
@@ -72,11 +76,11 @@ int writeBy(const std::string& name, const std::string& json, const std::string&
 const std::map<std::string, FirmwareLanguage> kFirmware = {{"c", FirmwareLanguage::C},
                                                            {"cpp", FirmwareLanguage::Cpp},
                                                            {"numpy", FirmwareLanguage::NumPy},
+                                                           {"torch", FirmwareLanguage::Torch},
                                                            {"ros2_control", FirmwareLanguage::Ros2Control}};
 bool isFirmware(const std::string& format) { return kFirmware.count(format) > 0; }
 
 void writeFirmware(const LoadedRobot& robot, const ConvertArguments& arguments) {
-                                                           {"torch", FirmwareLanguage::Torch},
   FirmwareOptions options;
   options.language = kFirmware.at(arguments.format);
   options.is_single = arguments.is_single;
@@ -108,12 +112,23 @@ int convert(const ConvertArguments& arguments) {
     throw InputError("", "--hole", "only plates for a workshop have holes", "add --to dxf, or leave it out");
   if (!arguments.joints.empty() && arguments.format != "mjcf")
     throw InputError("", "--joints", "it says how a file of MuJoCo is written", "add --to mjcf, or leave it out");
+  if (arguments.is_serial && arguments.format != "mjcf" && arguments.format != "urdf")
+    throw InputError("", "--serial", "only files of MuJoCo and URDFs are written of the serial chain",
+                     "add --to mjcf or --to urdf, or leave it out");
   LoadedRobot robot = arguments.robot.load();
   requireApart(arguments.output, listFiles(robot));
   Payload payload;
   payload.mass = arguments.payload;
   if (!arguments.payload_at.empty()) payload.at = Eigen::Map<const Vector3d>(arguments.payload_at.data());
   robot.model = addPayload(robot.model, payload);
+  std::optional<SerialFiles> serial;
+  const std::filesystem::path tables = std::filesystem::path(arguments.output).replace_extension(".linkages.json");
+  if (arguments.is_serial) {
+    requireApart(tables.string(), listFiles(robot));
+    serial = makeSerialFiles(robot.model, std::filesystem::path(arguments.output).filename().string());
+    warn(serial->warnings);
+    robot.model = serial->model;
+  }
   if (arguments.format == "bielle") {
     writeRobot(robot.model, arguments.output,
                "Written by `bielle convert` from " + std::filesystem::path(robot.file).filename().string() + ".");
@@ -155,11 +170,15 @@ int convert(const ConvertArguments& arguments) {
   } else {
     MjcfOptions options;
     if (arguments.joints == "hinges") options.rotations = MjcfRotations::Hinges;
-    const MjcfText text = formatMjcf(robot.model, findClosedConfiguration(robot.model).q, options);
+    const MjcfText text = formatMjcf(robot.model, serial ? serial->q : findClosedConfiguration(robot.model).q, options);
     warn(text.warnings);
     writeTextFile(arguments.output, text.xml);
   }
   std::cout << arguments.output << "\n";
+  if (serial) {
+    writeTextFile(tables.string(), serial->tables);
+    std::cout << tables.string() << "\n";
+  }
   return kOk;
 }
 
@@ -224,12 +243,14 @@ void addConvert(CLI::App& command, Action& action) {
       "keep the\n"
       "digits of float.\n"
       "A URDF alone is a tree: loops are left out, linear couplers of two joints become <mimic>.\n"
+      "With --serial, linkages are frozen in the robot's posture.\n"
       "Maps of linkages come with a README.md and tests; they are exact to rounding, and say how exact they were "
       "found.\n"
       "Examples:\n"
       "  bielle convert bipetto --to c --precision float -o maps\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
       "  bielle convert bipetto --to mjcf --joints hinges -o trained.xml\n"
+      "  bielle convert bipetto --to mjcf --serial -o chain.xml\n"
       "  bielle convert bipetto --to usd -o bipetto.usda\n"
       "  bielle convert leg_biped --to dxf -o plates.dxf\n"
       "  bielle convert leg_biped --to sheet -o leg.svg\n"
