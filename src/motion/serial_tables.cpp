@@ -16,7 +16,7 @@
 namespace bielle {
 namespace {
 
-constexpr double kSingularPosture = 1e-3;      // margin of PostureLift below which joints do not determine the linkage
+constexpr double kSingularPosture = 0.05;      // margin of PostureLift below which R is too large for tables
 constexpr int kTableSizes[] = {33, 17, 9, 5};  // values of each joint of linkages with one, two, .. joints
 
 double carryLimit(double factor, double limit) { return factor != 0 ? std::abs(factor) * limit : 0; }

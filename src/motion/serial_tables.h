@@ -41,7 +41,7 @@ struct LinkageTable {
   std::string carrier;                    // body that carries the linkage
   std::vector<std::vector<double>> axes;  // values of each joint
   std::vector<std::optional<LinkagePosture>>
-      postures;  // the last joint changes fastest; none where the linkage cannot follow
+      postures;  // the last joint changes fastest; none where the linkage cannot follow, or nearly so
   // The largest errors halfway between neighbours, by linear interpolation, of entries of R and D.
   double ratio_error = 0, inertia_error = 0;
 };
