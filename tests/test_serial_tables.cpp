@@ -48,6 +48,24 @@ Model limitMotors(const Model& model) {
   return ModelBuilder::restore(parts);
 }
 
+// Of M a - J^T lambda = force, J a = 0 with the soles fixed where they are, too.
+VectorXd solveStanding(const Model& model, const Workspace& ws, const MatrixXd& M, const VectorXd& force,
+                       const MatrixXd& J_loops) {
+  const Eigen::Index n = model.nv(), loops = J_loops.rows(),
+                     rows = loops + 6 * static_cast<Eigen::Index>(model.contacts().size());
+  MatrixXd A = MatrixXd::Zero(n + rows, n + rows), J(rows, n);
+  J.topRows(loops) = J_loops;
+  for (size_t c = 0; c < model.contacts().size(); ++c)
+    J.middleRows(loops + 6 * static_cast<Eigen::Index>(c), 6) =
+        calcFrameJacobian(model, ws, model.contacts()[c].body, model.contacts()[c].X_BF);
+  A.topLeftCorner(n, n) = M;
+  A.bottomLeftCorner(rows, n) = J;
+  A.topRightCorner(n, rows) = -J.transpose();
+  VectorXd b = VectorXd::Zero(n + rows);
+  b.head(n) = force;
+  return Eigen::ColPivHouseholderQR<MatrixXd>(A).solve(b).head(n);  // loops may have redundant rows
+}
+
 struct Trial {
   explicit Trial(const Model& robot)
       : closed(robot), tables(makeSerialTables(closed, findClosedConfiguration(closed).q)), random(1) {
@@ -92,6 +110,12 @@ struct Trial {
     ConstrainedWorkspace cws;
     REQUIRE(updateConstrainedDynamics(closed, ws, cws, makeConstraintSet(closed), q, VectorXd::Zero(closed.nv()),
                                       calcMotorForces(closed, u)) == NumericalStatus::Ok);
+    if (stands) {
+      updateMassMatrix(closed, ws);
+      updateBias(closed, ws);
+      cws.a = solveStanding(closed, ws, ws.M, calcMotorForces(closed, u) - ws.b, cws.J);
+    }
+    a_closed = cws.a;
     return restrictVelocity(closed, tables.serial.model, cws.a);
   }
 
@@ -112,7 +136,9 @@ struct Trial {
       const LinkageTable& table = tables.linkages[i];
       const LinkagePosture& posture = postures[i];
       const Linkage linkage = makeLinkage(closed, tables.serial.q_reference, table.joints);
-      const Vector3d gravity = full.X_WB[linkage.cluster->root].R.transpose() * closed.gravity();
+      const int carrier = linkage.cluster->root;
+      Vector3d gravity = full.X_WB[carrier].R.transpose() * closed.gravity();
+      if (carrier > 0) gravity -= (calcFrameJacobian(closed, full, carrier, SE3()) * a_closed).head<3>();
       VectorXd u_linkage(static_cast<Eigen::Index>(table.motors.size()));
       for (size_t k = 0; k < table.motors.size(); ++k)
         u_linkage[static_cast<Eigen::Index>(k)] = u[closed.findMotor(table.motors[k])];
@@ -126,6 +152,7 @@ struct Trial {
               posture.inertia(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k));
       }
     }
+    if (stands) return solveStanding(model, ws, M, force, MatrixXd(0, model.nv()));
     const MatrixXd inverse = Eigen::FullPivLU<MatrixXd>(M).inverse();
     if (largest) *largest = inverse.cwiseAbs().rowwise().sum().maxCoeff();
     return inverse * force;
@@ -135,9 +162,10 @@ struct Trial {
   const SerialTables tables;
   std::mt19937 random;
   std::vector<std::unique_ptr<LinkageEvaluator>> evaluators;
-  VectorXd q, q_s, u;
+  VectorXd q, q_s, u, a_closed;
   std::vector<LinkagePosture> postures;
   std::vector<VectorXd> joints;
+  bool stands = false;  // with its soles fixed
 };
 
 double calcDifference(const VectorXd& a, const VectorXd& b) {
@@ -257,37 +285,40 @@ TEST_CASE("serial tables: limits are those of the motors, tried one by one") {
   }
 }
 
-// For docs/linkages.md: errors of accelerations at rest, over the closed robot's.
+// For docs/linkages.md: errors of accelerations at rest on fixed soles, over the closed robot's.
 TEST_CASE("serial tables: what each omission costs", "[.table]") {
   for (const char* name : {"bipetto", "rsu_biped", "leg_biped", "kangaroo_leg"}) {
-    Trial trial(loadOwn(name).model);
-    std::map<std::string, std::vector<double>> errors;
-    for (int i = 0; i < 60; ++i) {
-      if (!trial.drawPosture(0.3)) continue;
-      const VectorXd exact = trial.calcClosed();
-      const std::vector<LinkagePosture> all = trial.postures;
-      const auto tryWith = [&](const std::string& what, const auto& change) {
-        for (size_t l = 0; l < all.size(); ++l) change(trial.tables.linkages[l], trial.postures[l] = all[l]);
-        errors[what].push_back((trial.calcSerial() - exact).norm() / exact.norm());
-      };
-      tryWith("1 nothing", [](const LinkageTable&, LinkagePosture& p) { p.inertia.setZero(), p.weight.setZero(); });
-      tryWith("2 armature of the file", [&](const LinkageTable& table, LinkagePosture& p) {
-        p.inertia.setZero(), p.weight.setZero();
-        for (size_t j = 0; j < table.joints.size(); ++j) {
-          const Model& serial = trial.tables.serial.model;
-          p.inertia(j, j) = serial.motors()[serial.findMotor(table.joints[j])].armature;
-        }
-      });
-      tryWith("3 diagonal of inertia", [](const LinkageTable&, LinkagePosture& p) {
-        p.inertia = MatrixXd(p.inertia.diagonal().asDiagonal()), p.weight.setZero();
-      });
-      tryWith("4 inertia", [](const LinkageTable&, LinkagePosture& p) { p.weight.setZero(); });
-      tryWith("5 inertia, weight", [](const LinkageTable&, LinkagePosture&) {});
-    }
-    for (auto& [what, list] : errors) {
-      std::sort(list.begin(), list.end());
-      WARN(name << " " << what << ": median " << list[list.size() / 2] << ", largest " << list.back() << " of "
-                << list.size());
+    for (const bool stands : {false, true}) {
+      Trial trial(loadOwn(name).model);
+      trial.stands = stands;
+      std::map<std::string, std::vector<double>> errors;
+      for (int i = 0; i < 60; ++i) {
+        if (!trial.drawPosture(0.3)) continue;
+        const VectorXd exact = trial.calcClosed();
+        const std::vector<LinkagePosture> all = trial.postures;
+        const auto tryWith = [&](const std::string& what, const auto& change) {
+          for (size_t l = 0; l < all.size(); ++l) change(trial.tables.linkages[l], trial.postures[l] = all[l]);
+          errors[what].push_back((trial.calcSerial() - exact).norm() / exact.norm());
+        };
+        tryWith("1 nothing", [](const LinkageTable&, LinkagePosture& p) { p.inertia.setZero(), p.weight.setZero(); });
+        tryWith("2 armature of the file", [&](const LinkageTable& table, LinkagePosture& p) {
+          p.inertia.setZero(), p.weight.setZero();
+          for (size_t j = 0; j < table.joints.size(); ++j) {
+            const Model& serial = trial.tables.serial.model;
+            p.inertia(j, j) = serial.motors()[serial.findMotor(table.joints[j])].armature;
+          }
+        });
+        tryWith("3 diagonal of inertia", [](const LinkageTable&, LinkagePosture& p) {
+          p.inertia = MatrixXd(p.inertia.diagonal().asDiagonal()), p.weight.setZero();
+        });
+        tryWith("4 inertia", [](const LinkageTable&, LinkagePosture& p) { p.weight.setZero(); });
+        tryWith("5 inertia, weight", [](const LinkageTable&, LinkagePosture&) {});
+      }
+      for (auto& [what, list] : errors) {
+        std::sort(list.begin(), list.end());
+        WARN(name << (stands ? " stands, " : " flies, ") << what << ": median " << list[list.size() / 2] << ", largest "
+                  << list.back() << " of " << list.size());
+      }
     }
   }
 }

@@ -7,10 +7,11 @@
 // mass, the closed robot moves at rest as
 //     (M_s + D) a + b_s + W g + h = R^T u                                                                           (1)
 //     D = (T^T M T - M_s)_JJ,    W = m (dc_s/dq_J - (dc/dq T)_J)^T,    h = -T_J^T tau,                              (2)
-// g being gravity in the frame of the body that carries the linkage, b_s the bias of the serial model and tau the springs on
-// joints that it freezes. All of it depends on the posture of the linkage alone. Where cranks and rods weigh nothing, (1) is
-// exact, D is R^T diag(armature) R and W is zero; else what is left out is that they pull at their carrier as they move, and
-// their Coriolis forces. Dampers d and friction f of frozen joints are, in J,
+// g being gravity less the acceleration of the body that carries the linkage, in its frame, b_s the bias of the serial model and
+// tau the springs on joints that it freezes. All of it depends on the posture of the linkage alone. Where cranks and rods weigh
+// nothing, (1) is exact, D is R^T diag(armature) R and W is zero; it is exact, too, on a carrier that is fixed. Else what is left
+// out is that they pull at a carrier as they move, and feel it turn; and Coriolis forces. Dampers d and friction f of frozen
+// joints are, in J,
 //     B = T_J^T diag(d) T_J,    f_j = sum_k f_k |T_kj|    (of joint j moving alone).                                (3)
 // Torques u within their limits u_m and speeds R v_J within theirs, w_m, are polytopes. The extremes of each joint are
 //     alone: min_i u_mi / |R^-1_ji|, min_i w_mi / |R_ij|;    whatever the others do: sum_i |R_ij| u_mi, sum_i |R^-1_ji| w_mi.  (4)
