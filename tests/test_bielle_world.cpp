@@ -169,6 +169,12 @@ TEST_CASE("bielle world: soles and edges rest on the sides and corners of steps"
   });
 }
 
+TEST_CASE("bielle world: a sole bears the same moment about its normal on level ground and on steps") {
+  testing::checkTwists([](const Model& model, const WorldOptions& options) {
+    return makeBielleWorld(model, {options, {}});
+  });
+}
+
 TEST_CASE("bielle world: a sole stops at the side of a step") {
   testing::checkRisers([](const Model& model, const WorldOptions& options) {
     return makeBielleWorld(model, {options, {}});

@@ -149,31 +149,34 @@ TEST_CASE("contact law: so is that of a step, whose springs take the work that t
   }
 }
 
-TEST_CASE("contact law: a sole lies on the edge of a step, but has no more than corners on level ground") {
+TEST_CASE(
+    "contact law: a sole bears with its corners, whatever ground is elsewhere, and between them on what comes up "
+    "there") {
   const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
   const ContactFrame& sole = robot.model.contacts()[0];
-  // A step whose edge is under the sole: no corner of it is over the step.
-  Ground ground;
-  ground.steps.push_back({{0, 0, 0.01}, 1.2 * sole.half_length, 1, 0, 0, 0});
-  const Terrain terrain(ground);
-  double flat = 0, stepped = 0, force = 0;
-  int corners = 0;
-  for (const ContactPoint& point : makeContactPoints(robot.model, {})) {
-    flat += point.stiffness;
-    ++corners;
-  }
-  CHECK(corners == 8);
-  for (const ContactPoint& point : makeContactPoints(robot.model, ground)) {
-    stepped += point.stiffness;
-    if (point.contact != 0) continue;
-    const Vector3d p = sole.X_BF.inverse().act(point.p);
-    CHECK(std::abs(p.x()) <= sole.half_length * (1 + 1e-12));
-    force += calcContactForce(terrain, point, Vector3d(p.x(), p.y(), 0.0099), Vector3d::Zero()).force.z();
-  }
-  CHECK(stepped == Approx(flat));
+  const auto press = [&](const Ground& ground, double depth) {  // below z = 0; N
+    const Terrain terrain(ground);
+    double force = 0;
+    for (const ContactPoint& point : makeContactPoints(robot.model, ground)) {
+      if (point.contact != 0) continue;
+      const Vector3d p = sole.X_BF.inverse().act(point.p) - depth * Vector3d::UnitZ();
+      CHECK(std::abs(p.x()) <= sole.half_length * (1 + 1e-12));
+      force += calcContactForce(terrain, point, p, Vector3d::Zero()).force.z();
+    }
+    return force;
+  };
   const double weight = robot.model.mass() * robot.model.gravity().norm();
-  CHECK(force ==
-        Approx(weight * 3 / 5));  // three rows of five points are over the step, as deep as its weight makes a sole
+  Ground far, ridge;
+  far.steps.push_back({{5, 0, 0.2}, 1, 1, 0, 0, 0});
+  CHECK(press({}, 1e-4) == Approx(weight));
+  CHECK(press(far, 1e-4) == Approx(weight));
+  CHECK(press(far, 4e-4) == Approx(4 * weight));
+  // A step under the sole, none of whose corners is over it: three rows of five points are, as deep as its weight makes a sole.
+  ridge.height = -0.01;
+  ridge.steps.push_back({Vector3d::Zero(), 1.2 * sole.half_length, 1, 0, 0, 0});
+  CHECK(press(ridge, 3.9e-4) == 0);
+  CHECK(press(ridge, 5e-4) == Approx(weight * 3 / 5));
+  CHECK(makeContactPoints(robot.model, {}).size() == 8);
 }
 
 TEST_CASE("contact law: stops push back from both sides") {

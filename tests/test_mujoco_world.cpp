@@ -91,6 +91,12 @@ TEST_CASE("mujoco world: soles and edges rest on the side of a step") {
   });
 }
 
+TEST_CASE("mujoco world: a sole bears the same moment about its normal on level ground and on steps") {
+  testing::checkTwists([](const Model& model, const WorldOptions& options) {
+    return makeMujocoWorld(model, {options, {}});
+  });
+}
+
 TEST_CASE("mujoco world: a sole stops at the side of a step") {
   testing::checkRisers([](const Model& model, const WorldOptions& options) {
     return makeMujocoWorld(model, {options, {}});

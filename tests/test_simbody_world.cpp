@@ -63,6 +63,14 @@ TEST_CASE("simbody world: soles and edges rest on the sides and corners of steps
   });
 }
 
+TEST_CASE("simbody world: a sole bears the same moment about its normal on level ground and on steps") {
+  testing::checkTwists([](const Model& model, const WorldOptions& options) {
+    SimbodyWorldOptions simbody;
+    simbody.world = options;
+    return makeSimbodyWorld(model, simbody);
+  });
+}
+
 TEST_CASE("simbody world: a sole stops at the side of a step") {
   testing::checkRisers([](const Model& model, const WorldOptions& options) {
     SimbodyWorldOptions simbody;

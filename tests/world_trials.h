@@ -24,6 +24,9 @@ struct TrialTolerances {
 Model makeBlock(ContactKind kind, const Vector3d& com);
 // Soles and edges of a block overhang the sides and corners of steps by up to half of their length, and stay where they are.
 void checkOverhangs(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld);
+// The moment about the normal under which a sole or an edge turns is that of corners that each bear their share of the weight, on level
+// ground, where a step is elsewhere, and where half of it overhangs one.
+void checkTwists(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld);
 // A block slides over a step and against the side of the next one, which holds it.
 void checkRisers(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld);
 

@@ -13,6 +13,7 @@ constexpr double kStopDamping = 0.5;  // s/rad; s/m of sliding joints is longer 
 
 // The ground is at a place of a sole that is at most so far above it, or as deep in it, m.
 constexpr double kOver = 2e-4, kUnder = 5e-3;
+constexpr double kHollow = 4;   // the grid between the corners of a sole is so much higher, over the sinkage
 constexpr double kSteep = 0.5;  // cosine between a sole and the level: points of steeper ones stay where they are
 
 // Eq. (1)
@@ -76,19 +77,22 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
   for (size_t c = 0; c < model.contacts().size(); ++c) {
     const ContactFrame& contact = model.contacts()[c];
     const int along_x = contact.kind == ContactKind::Point3D ? 1 : grid,
-              along_y = contact.kind == ContactKind::Surface6D ? grid : 1, count = along_x * along_y;
+              along_y = contact.kind == ContactKind::Surface6D ? grid : 1, count = along_x * along_y,
+              corners = std::min(along_x, 2) * std::min(along_y, 2);
     for (int i = 0; i < count; ++i) {
       ContactPoint point;
       point.contact = static_cast<int>(c);
       point.body = contact.body;
       const auto place = [](int i, int points) { return points > 1 ? 1 - 2.0 * i / (points - 1) : 0; };  // from 1 to -1
-      const double x = place(i % along_x, along_x) * contact.half_length,
-                   y = place(i / along_x, along_y) * contact.half_width;
-      point.p = contact.X_BF.act(Vector3d(x, y, 0));
-      point.stiffness = sole / count;
+      const double x = place(i % along_x, along_x), y = place(i / along_x, along_y);
+      point.is_corner = (along_x == 1 || std::abs(x) == 1) && (along_y == 1 || std::abs(y) == 1);
+      const double hollow = point.is_corner ? 0 : kHollow * options.sinkage;
+      const int sharers = point.is_corner ? corners : count;
+      point.p = contact.X_BF.act(Vector3d(x * contact.half_length, y * contact.half_width, hollow));
+      point.stiffness = sole / sharers;
       point.damping = options.damping;
       point.shear_stiffness = options.shear_ratio * point.stiffness;
-      point.shear_damping = options.shear_damping * 2 * std::sqrt(options.shear_ratio * sole * model.mass()) / count;
+      point.shear_damping = options.shear_damping * 2 * std::sqrt(options.shear_ratio * sole * model.mass()) / sharers;
       points.push_back(point);
     }
   }
@@ -198,12 +202,11 @@ std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<
     if (contact.kind == ContactKind::Point3D) continue;
     if (i == 0 || points[i].contact != points[i - 1].contact)
       areas.push_back({contact.body, contact.X_BF, contact.half_length, contact.half_width, i, {}, {}});
-    areas.back().homes.push_back(contact.X_BF.inverse().act(points[i].p).head<2>());
+    areas.back().homes.push_back(contact.X_BF.inverse().act(points[i].p));
+    areas.back().places.push_back({});
+    areas.back().places.back().is_corner = points[i].is_corner;
   }
-  for (ContactArea& area : areas) {
-    area.places.resize(area.homes.size());
-    area.lane.resize(area.first + area.homes.size());
-  }
+  for (ContactArea& area : areas) area.lane.resize(area.first + area.homes.size());
   return areas;
 }
 
@@ -217,14 +220,16 @@ void settle<double>(const Terrain& terrain, const SE3& X_WF, ContactArea& area, 
   const Terrain::Corners corners = {centre + along * Eigen::Vector2d(x, y), centre + along * Eigen::Vector2d(-x, y),
                                     centre + along * Eigen::Vector2d(-x, -y), centre + along * Eigen::Vector2d(x, -y)};
   for (size_t i = 0; i < area.homes.size(); ++i)
-    area.places[i].home = area.places[i].support = centre + along * area.homes[i];
+    area.places[i].home = area.places[i].support = centre + along * area.homes[i].head<2>();
   if (R(2, 2) > kSteep) terrain.findSupports(corners, plane, kOver, kUnder, area.places);
   for (size_t i = 0; i < area.homes.size(); ++i) {
     const Eigen::Vector2d& support = area.places[i].support;
     const bool is_home = support == area.places[i].home;
-    const Eigen::Vector2d there = is_home ? area.homes[i] : Eigen::Vector2d(back * (support - centre));
+    const Vector3d& home = area.homes[i];
+    const Eigen::Vector2d there =
+        is_home ? Eigen::Vector2d(home.head<2>()) : Eigen::Vector2d(back * (support - centre));
     ContactPoint& point = points[area.first + i];
-    const Vector3d p = area.X_BF.act(Vector3d(there.x(), there.y(), 0));
+    const Vector3d p = area.X_BF.act(Vector3d(there.x(), there.y(), home.z()));
     const Vector3d shift = R * (area.X_BF.R.transpose() * (p - point.p));
     point.p = p;
     point.anchor += shift;

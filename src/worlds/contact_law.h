@@ -1,10 +1,15 @@
 #pragma once
 /// \file Compliant contact with friction that sticks, for worlds that have no contact of their own.
 ///
-/// A sole touches with the corners of its rectangle or, where the ground has steps, whose edges may lie anywhere under it, with a
-/// grid of points; a point contact with its origin. Points that overhang a step lie on its edge, so that the sole rests on all of it
-/// that the ground bears. A point at x with velocity x' is by
-/// d deep in the ground, whose normal there is n (Terrain::touch); T = 1 - n n^T. With the stiffness k of the point,
+/// A sole touches with the corners of its rectangle, an edge with its ends, a point contact with its origin. Corners that overhang a
+/// step lie on its edge, so that the sole rests on all of it that the ground bears. Where the ground has steps, whose edges may lie
+/// anywhere under it, there is a grid of points between the corners, too. It is a little higher, by what a corner sinks under the
+/// robot's weight, and so bears only what comes up between them: the same sole turns about its normal under the same moment
+/// whatever ground is elsewhere, and bears all that plans ask of it (cost.h, makeWrenchCone(): the sum of the cones of four corners;
+/// a sole of even pressure would bear only about half of that).
+///
+/// A point at x with velocity x' is by d deep in the ground, whose normal there is n (Terrain::touch); T = 1 - n n^T. With the
+/// stiffness k of the point,
 ///
 ///     f_n = k d max(0, 1 + c d'),   d' = -n . x'          while d > 0, else no force                              (1)
 ///
@@ -47,6 +52,7 @@ template <typename T>
 struct ContactPointOf {
   int contact = 0;                           ///< index into Model::contacts()
   int body = 0;                              ///< that carries it
+  bool is_corner = true;                     ///< or an end of an edge, or alone; others lie between these
   Vector3<T> p = Vector3<T>::Zero();         ///< in the frame of the body, m
   T stiffness = 0;                           ///< k, N/m
   double damping = 0;                        ///< c, s/m
@@ -64,12 +70,13 @@ struct ContactArea {
   SE3 X_BF;
   double half_length = 0, half_width = 0;  ///< m
   size_t first = 0;                        ///< of its points
-  std::vector<Eigen::Vector2d> homes;      ///< in the frame of the contact, m
+  std::vector<Vector3d> homes;             ///< in the frame of the contact, m
   std::vector<Terrain::Place> places;      ///< as settle() found them
   std::vector<ContactPoint> lane{};        ///< up to its last point, of one of several robots
 };
 
-/// The points of all contacts of a model on a ground, contact by contact; those of a sole share its stiffness.
+/// The points of all contacts of a model on a ground, contact by contact. The corners of a sole share its stiffness; each of the
+/// grid between them has its share of the same.
 std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& ground,
                                             const ContactOptions& options = {});
 

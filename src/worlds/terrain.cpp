@@ -20,11 +20,12 @@ constexpr double kRounding = 1e-9;  // of a point on a top, m
 // What of a convex polygon lies on a rectangle, by Sutherland and Hodgman ("Reentrant polygon clipping", 1974).
 class Clipped {
  public:
+  static constexpr size_t kMost = 8;  // corners
   explicit Clipped(const Terrain::Corners& corners) : count_(corners.size()) {
     std::copy(corners.begin(), corners.end(), points_.begin());
   }
   void clip(const Eigen::Vector2d& axis, double most) {
-    std::array<Eigen::Vector2d, 8> out;
+    std::array<Eigen::Vector2d, kMost> out;
     size_t count = 0;
     for (size_t i = 0; i < count_; ++i) {
       const Eigen::Vector2d &a = points_[i], &b = points_[(i + 1) % count_];
@@ -50,7 +51,7 @@ class Clipped {
   }
 
  private:
-  std::array<Eigen::Vector2d, 8> points_;
+  std::array<Eigen::Vector2d, kMost> points_;
   size_t count_;
 };
 
@@ -216,6 +217,56 @@ static Clipped clip(const Top& top, const Terrain::Corners& corners) {
   return part;
 }
 
+// Corners of what lies on a step are taken by the nearest places that are free, those of the sole first; each time the corner that is
+// farthest from all that are held.
+template <typename Bears>
+static void giveCorners(const void* top, const Clipped& part, const Terrain::Corners& corners, const Bears& bears,
+                        std::vector<Terrain::Place>& places) {
+  using Place = Terrain::Place;
+  const auto isFree = [&](const Place& place) { return place.top == top; };
+  std::array<Eigen::Vector2d, Clipped::kMost + 1> held, left;  // or the middle of all
+  size_t num_held = 0, num_left = 0;
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (size_t i = 0; i < part.size(); ++i) {
+    const auto isHere = [&](const Eigen::Vector2d& at) { return (at - part[i]).squaredNorm() < kInside * kInside; };
+    bool is_held = std::any_of(corners.begin(), corners.end(), isHere);
+    for (Place& place : places) {
+      if (!isHere(place.support) || (isFree(place) && place.distance > 4 * kInside * kInside)) continue;
+      place.top = nullptr;
+      is_held = true;
+    }
+    middle += part[i] / double(part.size());
+    if (is_held)
+      held[num_held++] = part[i];
+    else if (bears(part[i]))
+      left[num_left++] = part[i];
+  }
+  if (num_held == 0) held[num_held++] = middle;
+  const auto calcRoom = [&](const Eigen::Vector2d& at) {
+    double room = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < num_held; ++i) room = std::min(room, (at - held[i]).squaredNorm());
+    return room;
+  };
+  for (; num_left > 0; --num_left) {
+    size_t farthest = 0;
+    for (size_t i = 1; i < num_left; ++i)
+      if (calcRoom(left[i]) > calcRoom(left[farthest])) farthest = i;
+    const Eigen::Vector2d corner = left[farthest];
+    if (calcRoom(corner) < kInside * kInside) return;
+    const auto calcWay = [&](const Place& place) { return (place.home - corner).squaredNorm(); };
+    Place* taker = nullptr;
+    for (Place& place : places)
+      if (isFree(place) && (!taker || place.is_corner > taker->is_corner ||
+                            (place.is_corner == taker->is_corner && calcWay(place) < calcWay(*taker))))
+        taker = &place;
+    if (!taker) return;
+    taker->support = corner;
+    taker->top = nullptr;
+    left[farthest] = left[num_left - 1];
+    held[num_held++] = corner;
+  }
+}
+
 void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double over, double under,
                            std::vector<Place>& places) const {
   Eigen::Vector2d low = corners[0], high = corners[0];
@@ -265,26 +316,12 @@ void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double
       place.distance = distance;
     }
   });
-  // A top that lies in several cells is visited again: corners that have a place are left.
+  // A top that lies in several cells is visited again: what has its place is left.
   visit(low, high, [&](const Top& top) {
     const auto isFree = [&](const Place& place) { return place.top == &top; };
     if (std::none_of(places.begin(), places.end(), isFree)) return;
-    const Clipped part = clip(top, corners);
-    for (size_t i = 0; i < part.size(); ++i) {
-      const auto isHere = [&](const Eigen::Vector2d& at) { return (at - part[i]).squaredNorm() < kInside * kInside; };
-      const auto isTaken = [&](const Place& place) { return isHere(place.support); };
-      if (std::any_of(corners.begin(), corners.end(), isHere) || std::any_of(places.begin(), places.end(), isTaken) ||
-          !bears(top, part[i]))
-        continue;
-      Place* nearest = nullptr;
-      for (Place& place : places)
-        if (isFree(place) &&
-            (!nearest || (place.home - part[i]).squaredNorm() < (nearest->home - part[i]).squaredNorm()))
-          nearest = &place;
-      if (!nearest) return;
-      nearest->support = part[i];
-      nearest->top = nullptr;
-    }
+    giveCorners(
+        &top, clip(top, corners), corners, [&](const Eigen::Vector2d& at) { return bears(top, at); }, places);
   });
 }
 

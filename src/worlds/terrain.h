@@ -37,9 +37,10 @@ class Terrain {
         support;  ///< where it is; the nearest place of the sole that is at the ground, else home; m (world)
     const void* top = nullptr;  ///< whose edge bears it
     double distance = 0;        ///< squared, m^2
+    bool is_corner = false;     ///< of the sole: before others, it takes a corner of what lies on the step
   };
   using Corners = std::array<Eigen::Vector2d, 4>;
-  /// Moves places of a sole that overhang a step onto its edge; the corners of what lies on the step, first. The ground is at a
+  /// Moves places of a sole that overhang a step onto its edge, to the corners of what lies on the step first. The ground is at a
   /// place where it is at most `over` below it and `under` above it.
   /// \param corners  of the sole, in order, m (world)
   /// \param plane    heights of the sole: z = plane[0] + plane[1] x + plane[2] y

@@ -42,7 +42,7 @@ struct ContactOptions {
   double sinkage = 1e-4;       ///< of one sole under the robot's weight, m; gives k
   double damping = 20;         ///< c, s/m
   double shear_ratio = 1;      ///< k_t / k
-  int grid = 5;                ///< points along each side of a sole on ground with steps
+  int grid = 5;                ///< points along each side of a sole on ground with steps, its corners among them
   double shear_damping = 0.3;  ///< c_t over that which damps the robot's mass on one sole's bristles critically
 };
 
