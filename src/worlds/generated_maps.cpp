@@ -184,7 +184,7 @@ FirmwareText formatMaps(const Model& closed, const SerialModel& serial, const st
       const size_t linkage = findLinkage(serial, error);
       if (linkage == beyond.size() || beyond[linkage] < kBeyond / 8)
         throw InputError(error.source(), error.element(), "there are no generated maps: " + error.problem(),
-                         "change it in the robot's file, or give --maps library");
+                         "plan a motion away from it, or change the robot's file; or give --maps library");
       beyond[linkage] /= 2;
     }
   }
