@@ -89,6 +89,20 @@ TEST_CASE("bielle world: the books of limp robots that fall balance, at any step
     }
 }
 
+// The heel rod of spring_biped, which has no stops, ends the way of its knee 0.13 rad before the leg is straight: what moved the shin
+// moves the light leaf at the heel then, whose speed doubles to 200 rad/s within 0.1 ms.
+TEST_CASE("bielle world: the books of limp legs balance that their own rods stop") {
+  const Model model = bielle::testing::loadOwn("spring_biped").model;
+  bielle::testing::Selection selection(1);
+  for (const auto& [h, seed] : {std::pair(1e-3, 1u), {1e-3, 8u}, {2.5e-4, 3u}}) {
+    if (selection.isLeftOut()) continue;
+    const Fall fall = dropLimp(model, h, seed);
+    CAPTURE(h, seed);
+    CHECK(fall.message == "");
+    CHECK(fall.imbalance < 0.01);
+  }
+}
+
 TEST_CASE("bielle world: a limp robot that lands is where it is after fine steps") {
   bielle::testing::Selection selection(1);
   for (unsigned seed : {1u, 2u, 3u, 7u, 9u}) {
@@ -138,7 +152,7 @@ TEST_CASE("bielle world: one that breaks off says when, in what step and by how 
     }
   CAPTURE(worlds[1]->message());
   CHECK_THAT(worlds[1]->message(),
-             Catch::StartsWith("after 0.0200") && Catch::Contains(" s, in a step of 3.91e-06 s: "));
+             Catch::StartsWith("after 0.0200") && Catch::Contains(" s, in a step of 2.44e-07 s: "));
   // Which of both is noticed first is a matter of rounding.
   CHECK_THAT(worlds[1]->message(), Catch::EndsWith("m or rad are left open") || Catch::EndsWith(" J"));
   CHECK(worlds[1]->time() == Approx(0.02));

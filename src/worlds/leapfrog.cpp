@@ -17,7 +17,7 @@ namespace {
 constexpr int kMaxNewton = 20;
 constexpr double kNewtonTolerance = 1e-10;  // of a change of velocity, relative to 1 (m/s, rad/s) and the largest
 constexpr double kLeastShare = 1.0 / 64;    // of a Newton step that must lower the residual
-constexpr int kMostHalvings = 6;            // of a step
+constexpr int kMostHalvings = 10;           // of a step
 constexpr double kSpan = 20;                // steps between closed ends, to which it returns to halve them
 constexpr double kEnergyError = 3e-4;       // of a step, over the kinetic energy and what forces take of it
 constexpr double kLeastEnergy = 1e-3;       // J/kg of the robot, as that of a sinking by 0.1 mm: below it none counts

@@ -19,7 +19,7 @@
 ///
 /// In a fall, steps of this length may be too long: a loop does not close after a drift, (1) has no solution that Newton
 /// steps find, or energy less work differs between the middles of two steps, by more than 3e-4 of the kinetic energy and
-/// 1 mJ per kilogram. Then the last steps, up to 20, are taken again with half the length, at most six times;
+/// 1 mJ per kilogram. Then the last steps, up to 20, are taken again with half the length, at most ten times;
 /// if that does not help, the world breaks off and tells the time and what was left.
 ///
 /// makeManifoldWorld(): steps of controlled error: a Runge-Kutta method of order 8 on the manifold of
