@@ -4,6 +4,8 @@
     docs/results/suite.py                                 the page from the tables in docs/results/data
     docs/results/suite.py --record DIR RUNS.jsonl ...     first takes them from the suite's data set and adds runs of the
                                                           protocol, which replace earlier runs of the same guesses
+    docs/results/suite.py --record-ipopt DIR RUNS.jsonl   the same of runs of IPOPT, and of ours beside them, into a table of
+                                                          their own; nothing else changes
 
 `--quick` exports a small problem, has it read, and prints the page.
 """
@@ -25,6 +27,8 @@ READER = common.SOURCE / "suite/problem.py"
 SUCCESS = 0.01  # over the least cost
 PROBLEMS = ["problem", "bodies", "velocities", "rows", "stages", "duration", "cost", "violation", "iterations", "reader"]
 RUNS = ["problem", "variant", "seed", "guess", "converged", "cost", "violation", "iterations", "seconds", "end"]
+OTHER, LIMIT = "IPOPT", 20  # variants that begin so; s of the protocol
+OTHER_RUNS = ["limit", *RUNS, "optimum"]
 
 
 def write_table(name, run, columns, rows, data=DATA):
@@ -60,11 +64,30 @@ def record(directory, runs, run):
                      f"{summary['constraints']['largest_violation']:.1e}", summary["iterations"],
                      f"{max(value for _, value, bound in found if bound == reader.TOLERANCE):.1e}"])
     write_table("suite_problems", run, PROBLEMS, rows)
-    before, known = read_table("suite_runs")
-    lines = [[show_entry(json.loads(line)[key]) for key in RUNS]
-             for path in runs for line in pathlib.Path(path).read_text(encoding="utf-8").splitlines()]
-    lines = {tuple(map(str, line[:4])): line for line in [*([row[key] for key in RUNS] for row in known), *lines]}
-    write_table("suite_runs", before if run in before else f"{before}; {run}", RUNS, lines.values())
+    add_runs("suite_runs", run, RUNS, 4, read_lines(runs))
+
+
+def read_lines(runs):
+    return [json.loads(line) for path in runs for line in pathlib.Path(path).read_text(encoding="utf-8").splitlines()]
+
+
+def record_other(directory, runs, run):
+    """Runs of IPOPT, and ours beside them, with the costs of our optima of the same problems."""
+    optima = {}
+    for line in (pathlib.Path(directory) / "index.jsonl").read_text(encoding="utf-8").splitlines():
+        summary = pathlib.Path(directory) / "motions" / json.loads(line)["name"] / "motion/summary.json"
+        optima[json.loads(line)["name"]] = json.loads(summary.read_text(encoding="utf-8"))["cost"]
+    add_runs("suite_ipopt", run, OTHER_RUNS, 5, [{**line, "optimum": optima[line["problem"]]} for line in read_lines(runs)])
+
+
+def add_runs(name, run, columns, keys, lines):
+    """Runs to those of a table; they replace those with the same first entries."""
+    if not lines:
+        return
+    before, known = read_table(name) if (DATA / f"{name}.csv").exists() else (run, [])
+    rows = [[row[key] for key in columns] for row in known] + [[show_entry(line[key]) for key in columns] for line in lines]
+    rows = {tuple(map(str, row[:keys])): row for row in rows}
+    write_table(name, before if run in before else f"{before}; {run}", columns, rows.values())
 
 
 def show_entry(value):
@@ -72,14 +95,15 @@ def show_entry(value):
 
 
 def keep_complete(runs):
-    """The guesses from which every variant has tried all problems; variants that have done so from none do not count."""
+    """The guesses from which every variant of ours has tried all problems, and the variants that have tried all of these; variants
+    of ours that have done so from none do not count."""
     problems = {run["problem"] for run in runs}
     complete = collections.defaultdict(set)
     for (variant, guess), count in collections.Counter((run["variant"], run["guess"]) for run in runs).items():
         if count == len(problems):
             complete[variant].add(guess)
-    shared = set.intersection(*complete.values())
-    return [run for run in runs if run["variant"] in complete and run["guess"] in shared]
+    shared = set.intersection(*(guesses for variant, guesses in complete.items() if not variant.startswith(OTHER)))
+    return [run for run in runs if run["guess"] in shared and complete[run["variant"]] >= shared]
 
 
 def judge(runs):
@@ -140,8 +164,9 @@ def show_problem(name):
 
 def make_page(figure):
     run, problems = read_table("suite_problems")
-    origin, runs = read_table("suite_runs")
-    runs = keep_complete(runs)
+    origin, known = read_table("suite_runs")
+    others = [run for run in read_table("suite_ipopt")[1] if run["variant"].startswith(OTHER) and run["limit"] == str(LIMIT)]
+    runs = keep_complete(known + others)
     judge(runs)
     profiles, count = make_profiles(runs)
     page = common.Page(__file__, "The suite of problems with closed chains", run)
@@ -183,7 +208,45 @@ have no first iteration, because a loop does not close.""")
             cells.append(f"{len(good)}" + (f", {statistics.median(good):.2f}" if good else ""))
         rows.append([show_problem(problem["problem"]), *cells])
     page.table(["problem", *variants], rows)
+    add_other(page, problems)
     return page
+
+
+STARTS = {"optimum": "our optimum", "unperturbed": "the unperturbed guess"}
+
+
+def show_end(run):
+    """What a run came to, beside the cost of our optimum."""
+    if not run["cost"]:
+        return run["end"]
+    ratio, violation = float(run["cost"]) / float(run["optimum"]) - 1, float(run["violation"])
+    cost = "the same" if abs(ratio) <= 1e-6 else f"{100 * ratio:+.2g} %" if ratio < 1 else f"{ratio + 1:.0f} times the cost"
+    return (f"{run['end'].replace('_', ' ')}, {run['iterations']} iterations, {float(run['seconds']):.1f} s, {cost}"
+            + (f", violation {violation:.0e}" if violation > 1e-8 else ""))
+
+
+def add_other(page, problems):
+    origin, runs = read_table("suite_ipopt")
+    page.heading("IPOPT")
+    page.add(f"""The same problems by IPOPT, as [the suite](../suite.md#ipopt) describes it, one thread, on a machine with other work
+({origin}). Problems and optima are those of that commit, which may have changed since the tables above. Costs are told over our
+optimum of the same problem; *the same* is within 1e-6. Of iterates that violate a constraint or leave a gap of more than 1e-8 the
+violation is told, too: their costs say little.""")
+    for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs):
+        these = {(run["problem"], run["variant"]): run for run in runs if (run["guess"], run["limit"]) == (start, limit)}
+        variants = list(dict.fromkeys(variant for _, variant in these))
+        page.add(f"From {STARTS.get(start, f'guess {start}')}, ended after {limit} s:")
+        rows = []
+        for row in problems:
+            cells = [these.get((row["problem"], variant)) for variant in variants]
+            rows.append([show_problem(row["problem"]), *(show_end(run) if run else "not measured" for run in cells)])
+        page.table(["problem", *variants], rows)
+    converged = [run for run in runs if run["variant"].startswith(OTHER) and run["converged"] == "True"]
+    ours = [float(run["cost"]) / float(run["optimum"]) - 1 for run in converged]
+    better = sorted({run["problem"] for run, ratio in zip(converged, ours) if ratio < -1e-6})
+    page.add(f"""Of the {len(converged)} runs of IPOPT that converged, {sum(abs(ratio) <= 1e-6 for ratio in ours)} ended at our optimum
+and {len([ratio for ratio in ours if ratio < -1e-6])} at a better one{": " + ", ".join(map(show_problem, better)) if better else ""}.
+Not measured: other guesses, and five of each with 200 s. Collocation with closures as constraints is not there.""")
 
 
 def run_quick(runner):
@@ -199,12 +262,15 @@ def run_quick(runner):
 def main():
     parser = common.make_parser(__doc__)
     parser.add_argument("--record", nargs="+", metavar="PATH", help="take the tables from a data set and files of runs")
+    parser.add_argument("--record-ipopt", nargs="+", metavar="PATH", help="take the runs of IPOPT from a data set and files of runs")
     arguments = parser.parse_args()
     if arguments.quick:
         run_quick(common.Runner(arguments.bielle))
         return
     if arguments.record:
         record(arguments.record[0], arguments.record[1:], common.describe_run(arguments.commit))
+    if arguments.record_ipopt:
+        record_other(arguments.record_ipopt[0], arguments.record_ipopt[1:], common.describe_run(arguments.commit))
     make_page(figure=True).write(False)
 
 
