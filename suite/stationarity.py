@@ -5,7 +5,10 @@
 
 With L = sum h l + sum y . c, and the steps x+ = f(x, u) of docs/problems.md, Eqs. (2) to (4), costates and gradients are
 
-    p_N = dL/dx_N,    p_k = dL/dx_k + F_x^T p_{k+1},    Q_k = dL/du_k + F_u^T p_{k+1}.                         (1)
+    p_N = dL/dx_N,    Q_k = dL/du_k + F_u^T p_{k+1},    p_k = dL/dx_k + F_x^T p_{k+1} + K_k^T Q_k,              (1)
+
+where torques that are not at their bounds follow a state by K_k, of a linear-quadratic regulator. That changes nothing where Q
+vanishes; without it, errors of Q would grow from step to step as the robot falls.
 
 At a local optimum Q vanishes but for torques at their bounds, which it pulls outwards; y is positive at upper bounds only, and
 negative at lower ones. Columns of F are central differences: of a step that is perturbed by e, every equation, such as that a loop is
@@ -19,6 +22,7 @@ import numpy as np
 from mechanism import RANK, Loops, State, apply, make_plane, transpose
 from problem import Problem, read_bounds
 
+TORQUE = 1e-4  # weight of squares of torques in the regulator, over that of states
 STEP = 1e-5  # rad, m, rad/s, m/s, and over the largest torque
 TOLERANCE = 1e-5  # of Q, over the largest sum of its terms
 COMPLEMENTARITY = 1e-6  # of y times the distance from the bound, over the cost
@@ -247,15 +251,18 @@ def judge(problem, t, derivatives):
     gradient, size = derivatives.cost.copy(), np.abs(derivatives.cost)
     np.add.at(gradient, node, pull)
     np.add.at(size, node, np.abs(pull))
-    Q, terms = np.zeros((N, F.shape[2] - states)), 0.0
-    p = gradient[N, :states]
-    for k in reversed(range(N)):
-        total = gradient[k] + F[k].T @ p
-        terms = max(terms, (size[k] + np.abs(F[k]).T @ np.abs(p))[states:].max())
-        Q[k], p = total[states:], total[:states]
     limits = np.array([read_bounds({"l": problem.data["effort_limits"][stage["effort_limit"]]}, "l", np.inf)
                        for stage in problem.stage[:-1]])
     at = np.abs(t["u"]) >= (1 - 1e-9) * limits
+    Q, terms = np.zeros((N, F.shape[2] - states)), 0.0
+    p, P = gradient[N, :states], np.eye(states)
+    for k in reversed(range(N)):
+        total = gradient[k] + F[k].T @ p
+        terms = max(terms, (size[k] + np.abs(F[k]).T @ np.abs(p))[states:].max())
+        Q[k], free = total[states:], ~at[k]
+        Fx, Fu = F[k][:, :states], F[k][:, states:][:, free]
+        K = -np.linalg.solve(Fu.T @ P @ Fu + TORQUE * np.eye(free.sum()), Fu.T @ P @ Fx)
+        p, P = total[:states] + K.T @ Q[k][free], np.eye(states) + Fx.T @ P @ (Fx + Fu @ K)
     Q = np.where(at, np.maximum(0, Q * np.sign(t["u"])), Q)  # at a bound L falls outwards: Q sign(u) <= 0
     with np.errstate(invalid="ignore"):
         distance = np.where(y > 0, upper - rows, np.where(y < 0, rows - lower, 0))
