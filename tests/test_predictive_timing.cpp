@@ -265,7 +265,7 @@ TEST_CASE("predictive control: a solve that ends before the next one begins is p
   for (double lead : {-1e-3, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
     PredictiveOptions options;
     options.lead = lead;
-    CHECK_THROWS_WITH(makeController(options), Catch::Contains("lead must be finite and not negative"));
+    CHECK_THROWS_WITH(makeController(options), Catch::Contains("'lead': it is n"));
   }
 }
 

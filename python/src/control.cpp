@@ -65,31 +65,7 @@ std::vector<PredictedFoothold> getFootholds(HeldController& self) {
 }  // namespace
 
 void bindControllers(py::module_& module) {
-  Value<PredictiveOptions>(module, "PredictiveOptions", "Options of predictive control.")
-      .field("nodes", &PredictiveOptions::nodes, "nodes of a window, 10 to 1000")
-      .field("fine_nodes", &PredictiveOptions::fine_nodes,
-             "nodes at the beginning that are one stage long; later ones are up to two, then four")
-      .field("iterations", &PredictiveOptions::iterations, "solver iterations at every stage")
-      .field("regularization", &PredictiveOptions::regularization, "regularization of its sweeps")
-      .field("penalty", &PredictiveOptions::penalty, "penalty of violated constraints")
-      .field("look_ahead", &PredictiveOptions::look_ahead,
-             "near the end of a contact phase, the last gains computed at least this long before it are reused, s")
-      .field("dead_point_stop", &PredictiveOptions::dead_point_stop,
-             "motors brake before the transmission of a linkage reaches this share of that at the start, or the "
-             "reciprocal")
-      .field("threads", &PredictiveOptions::threads, "0: all; at most 1024; results are bitwise independent of it")
-      .field("own_thread", &PredictiveOptions::own_thread,
-             "solves run in parallel with control; results then depend on their speed")
-      .field("solve_time", &PredictiveOptions::solve_time,
-             "time that a solve is given, s: another one begins in a stage that leaves so much; without own_thread, "
-             "policies come into force only when it has passed; 0: one solve for each stage")
-      .field("lead", &PredictiveOptions::lead,
-             "time from the measurement to the stage that is solved for, s; 0: the whole stage before; no effect with "
-             "solve_time")
-      .field("end_place", &PredictiveOptions::end_place,
-             "weight of heading and place at the end of a window, 1/m^2 or 1")
-      .field("end_posture", &PredictiveOptions::end_posture, "weight of the other coordinates")
-      .field("end_velocity", &PredictiveOptions::end_velocity, "weight of the velocities, s^2/m^2 or s^2");
+  Value<PredictiveOptions>(module, "PredictiveOptions", "Options of predictive control.").described();
   Value<PredictedFoothold>(module, "PredictedFoothold", "The predicted next foothold of a foot.")
       .field("contact", &PredictedFoothold::contact, "index into the model's contacts")
       .field("time", &PredictedFoothold::time, "time of its landing, s")

@@ -75,24 +75,7 @@ void bindEstimatorOptions(py::module_& module) {
       .field("specific_force", &SensorReadings::specific_force, "acceleration minus gravity in its frame (3,), m/s^2");
   Value<EstimatorOptions>(module, "EstimatorOptions", "Noise is one standard deviation, densities as in data sheets.")
       .field("imu", &EstimatorOptions::imu, "placement of the IMU in the trunk, SE3")
-      .field("bandwidth", &EstimatorOptions::bandwidth, "bandwidth of the motor observers, 1/s")
-      .field("smoothing", &EstimatorOptions::smoothing, "time constant of the accelerations, s")
-      .field("gyro_noise", &EstimatorOptions::gyro_noise, "rad/s/sqrt(Hz)")
-      .field("accelerometer_noise", &EstimatorOptions::accelerometer_noise, "m/s^2/sqrt(Hz)")
-      .field("gyro_offset", &EstimatorOptions::gyro_offset, "offset at the start, rad/s")
-      .field("accelerometer_offset", &EstimatorOptions::accelerometer_offset, "offset at the start, m/s^2")
-      .field("gyro_walk", &EstimatorOptions::gyro_walk, "change of the offset in one second, rad/s")
-      .field("accelerometer_walk", &EstimatorOptions::accelerometer_walk, "change of the offset in one second, m/s^2")
-      .field("tilt", &EstimatorOptions::tilt, "tilt of the trunk at the start, rad")
-      .field("foot_position", &EstimatorOptions::foot_position, "position of a foot from the encoders, m")
-      .field("foot_attitude", &EstimatorOptions::foot_attitude, "attitude of a foot from the encoders, rad")
-      .field("foot_slide", &EstimatorOptions::foot_slide, "displacement of a standing foot in one second, m")
-      .field("foot_turn", &EstimatorOptions::foot_turn, "rotation of a standing foot in one second, rad")
-      .field("planned_contact", &EstimatorOptions::planned_contact,
-             "normal force of a standing foot relative to the weight")
-      .field("surprising_contact", &EstimatorOptions::surprising_contact, "the same where no contact is planned")
-      .field("slip", &EstimatorOptions::slip,
-             "a sole has slipped if its deviation, 6 on average, exceeds this; points and edges, half of it");
+      .described();
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
-#include "bielle/motion/lift.h"
-
 #include <pybind11/stl.h>
 
+#include "bielle/motion/described_options.h"
 #include "bielle/results/result.h"
 #include "bind.h"
 #include "motion.h"
@@ -80,11 +79,7 @@ void bindOutcome(py::module_& module) {
       .value("NLOPT", LiftMethod::Nlopt, "one step of the closed dynamics after the other, torques by SLSQP");
   Value<LiftOptions>(module, "LiftOptions", "How a motion is lifted.")
       .field("method", &LiftOptions::method, "LiftMethod")
-      .field("singular", &LiftOptions::singular, "margin below which a linkage is at a dead point")
-      .field("acceleration_tolerance", &LiftOptions::acceleration_tolerance,
-             "NEWTON: relative to 1 rad/s^2 + the largest")
-      .field("position_tolerance", &LiftOptions::position_tolerance, "NLOPT: of the serial joints, rad and m")
-      .field("velocity_tolerance", &LiftOptions::velocity_tolerance, "NLOPT: rad/s and m/s");
+      .described();
   Value<LiftNode>(module, "LiftNode", "How one node was lifted; errors are the largest of the serial coordinates.")
       .field("status", &LiftNode::status, "NumericalStatus")
       .field("message", &LiftNode::message, "why not lifted")

@@ -1,4 +1,4 @@
-#include "bielle/motion/motion.h"
+#include "bielle/motion/described_options.h"
 #include "bielle/results/result.h"
 #include "bind.h"
 #include "residual.h"
@@ -16,8 +16,7 @@ void bindProblemOptions(py::module_& module) {
       .field("efforts", &LimitOptions::efforts, "by motor, N m or N, instead of the model's")
       .field("velocities", &LimitOptions::velocities, "by motor, rad/s or m/s, instead of the model's")
       .field("powers", &LimitOptions::powers, "by motor, W; driving or braking")
-      .field("dead_point_margin", &LimitOptions::dead_point_margin,
-             "least share of the transmission at the start; 0: none");
+      .described();
   Value<TimingBounds>(module, "TimingBounds", "Bounds of a duration relative to the nominal one.")
       .field("lower", &TimingBounds::lower, "1")
       .field("upper", &TimingBounds::upper, "1");
@@ -26,7 +25,7 @@ void bindProblemOptions(py::module_& module) {
       .field("time_weight", &TimingOptions::time_weight, "cost per second of these phases");
   Value<ObjectiveOptions>(module, "ObjectiveOptions", "What a motion minimizes besides the costs that define it.")
       .field("objective", &ObjectiveOptions::objective, "Objective")
-      .field("regeneration", &ObjectiveOptions::regeneration, "share of the regenerated energy that is reused, 0 to 1")
+      .described()
       .field("regularization", &ObjectiveOptions::regularization, "weight of the other costs; None: the default")
       .field("scale", &ObjectiveOptions::scale, "cost of a joule, or of the peak; None: of the motion of least effort");
   Value<ProblemOptions>(module, "ProblemOptions", "Options of a problem besides those of the motion.")

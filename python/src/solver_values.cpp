@@ -1,4 +1,4 @@
-#include "bielle/solve/fddp.h"
+#include "bielle/motion/described_options.h"
 #include "bind.h"
 #include "value.h"
 
@@ -6,34 +6,10 @@ namespace bielle::python {
 namespace {
 
 void bindOptions(py::module_& module) {
-  Value<ConstraintOptions>(module, "ConstraintOptions", "How constraints are enforced.")
-      .field("tolerance", &ConstraintOptions::tolerance, "largest violation of a converged solve")
-      .field("initial_penalty", &ConstraintOptions::initial_penalty, "cost over squared violation")
-      .field("penalty_increase", &ConstraintOptions::penalty_increase, "factor when the violation falls too slowly")
-      .field("max_penalty", &ConstraintOptions::max_penalty, "largest")
-      .field("multipliers", &ConstraintOptions::multipliers, "false: the penalty alone grows, for comparisons");
+  Value<ConstraintOptions>(module, "ConstraintOptions", "How constraints are enforced.").described();
   Value<FddpOptions>(module, "SolverOptions", "Options of FDDP.")
-      .field("max_iterations", &FddpOptions::max_iterations, "the solver stops there")
-      .field("gradient_tolerance", &FddpOptions::gradient_tolerance, "(cost per unit of control)^2")
-      .field("gap_tolerance", &FddpOptions::gap_tolerance, "largest entry of the gaps")
-      .field("cost_tolerance", &FddpOptions::cost_tolerance, "relative change of the cost by a full step; 0: never")
-      .field(
-          "acceptable_decrease", &FddpOptions::acceptable_decrease,
-          "share of the cost; a solve whose cost falls by less in 20 iterations ends within the constraints; 0: never")
-      .field("initial_regularization", &FddpOptions::initial_regularization, "regularization of the first sweep")
-      .field("min_regularization", &FddpOptions::min_regularization, "least")
-      .field("max_regularization", &FddpOptions::max_regularization, "the solve gives up above this")
-      .field("regularization_increase", &FddpOptions::regularization_increase, "factor")
-      .field("regularization_decrease", &FddpOptions::regularization_decrease, "divisor")
-      .field("state_regularization_ratio", &FddpOptions::state_regularization_ratio,
-             "ratio of the regularization of states to that of controls")
-      .field("long_step", &FddpOptions::long_step, "a step is long above this")
-      .field("short_step", &FddpOptions::short_step, "a step is short up to this")
-      .field("num_step_lengths", &FddpOptions::num_step_lengths, "1, 1/2, 1/4, ...")
-      .field("acceptance", &FddpOptions::acceptance, "share of the predicted decrease, in (0, 1)")
-      .field("constraints", &FddpOptions::constraints, "ConstraintOptions")
-      .field("rollout_segments", &FddpOptions::rollout_segments, "largest number of segments of a rollout")
-      .field("threads", &FddpOptions::threads, "0: all; at most 1024; results are bitwise independent of it");
+      .described()
+      .field("constraints", &FddpOptions::constraints, "ConstraintOptions");
 }
 
 void bindSummary(py::module_& module) {

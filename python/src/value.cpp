@@ -19,4 +19,19 @@ void throwUnknownField(const std::string& type, const std::string& name, const s
   throw py::type_error(type + " has no field '" + name + "'; it has: " + names);
 }
 
+std::string getType(const OptionValue& value) {
+  return std::visit([](const auto& like) { return Convert<std::decay_t<decltype(like)>>::type(); }, value);
+}
+
+OptionValue readLike(const OptionValue& like, py::handle value, const std::string& what) {
+  return std::visit([&](const auto& old) -> OptionValue { return read<std::decay_t<decltype(old)>>(value, what); },
+                    like);
+}
+
+std::string describeField(const Option& option) {
+  const std::string values = option.describeValues();
+  return option.help + (option.unit.empty() ? "" : " [" + option.unit + "]") + (values.empty() ? "" : ", " + values) +
+         ", default " + formatOption(option.value);
+}
+
 }  // namespace bielle::python

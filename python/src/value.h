@@ -39,6 +39,11 @@ std::string formatMember(const py::object& member);
 /// Tells which of the names are meant. \throws TypeError listing them
 [[noreturn]] void throwUnknownField(const std::string& type, const std::string& name, const std::string& names);
 
+/// An option in Python: its type, a value like it, and its help with unit, values and default.
+std::string getType(const OptionValue& value);
+OptionValue readLike(const OptionValue& like, py::handle value, const std::string& what);
+std::string describeField(const Option& option);
+
 /// Value<T>(module, "Name", "what it is").field("name", &T::name, "what it is, unit")...
 template <typename T>
 class Value {
@@ -92,19 +97,44 @@ class Value {
   template <typename M, typename Owner>
   Value& field(const char* name, M Owner::*member, const char* doc) {
     const std::string what = name_ + "." + name;
-    getFields<T>().push_back({name, [member](const T& self, py::handle owner) { return show(self.*member, owner); },
-                              [member, what](T& self, py::handle value) { self.*member = read<M>(value, what); },
-                              [member](const T& a, const T& b) { return same(a.*member, b.*member); }});
-    type_.def_property_readonly(
-        name, [member](const py::object& self) { return show(self.cast<const T&>().*member, self); }, doc);
-    types_[name] = Convert<M>::type();
-    fields_doc_ += std::string("    ") + name + ": " + doc + "\n";
+    return add({name, [member](const T& self, py::handle owner) { return show(self.*member, owner); },
+                [member, what](T& self, py::handle value) { self.*member = read<M>(value, what); },
+                [member](const T& a, const T& b) { return same(a.*member, b.*member); }},
+               Convert<M>::type(), doc);
+  }
+
+  /// The numbers and truth values that describe() names; others have types of their own in Python.
+  Value& described() {
+    for (const Option& option : listOptions(T{})) {
+      const std::string name = option.name;
+      if (std::holds_alternative<std::string>(option.value)) continue;
+      add({name,
+           [name](const T& self, py::handle) {
+             return Convert<OptionValue>::show(listOptions(self).get(name).value, {});
+           },
+           [name, owner = name_](T& self, py::handle value) {
+             OptionSet options = listOptions(self, "field", owner);
+             options.set(name, readLike(options.get(name).value, value, owner + "." + name));
+             self = readOptions(options, self);
+           },
+           [name](const T& a, const T& b) { return listOptions(a).get(name).value == listOptions(b).get(name).value; }},
+          getType(option.value), describeField(option).c_str());
+    }
     return *this;
   }
 
   py::class_<T>& type() { return type_; }
 
  private:
+  Value& add(const Field<T>& field, const std::string& kind, const char* doc) {
+    getFields<T>().push_back(field);
+    const auto get = [show = field.show](const py::object& self) { return show(self.cast<const T&>(), self); };
+    type_.def_property_readonly(field.name.c_str(), get, doc);
+    types_[field.name.c_str()] = kind;
+    fields_doc_ += "    " + field.name + ": " + doc + "\n";
+    return *this;
+  }
+
   static void change(const std::string& type, T& value, const py::dict& changes) {
     for (const auto& [key, entry] : changes) {
       const std::string name = py::str(key);

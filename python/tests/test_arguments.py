@@ -310,22 +310,26 @@ def test_trial(trial, tmp_path):
     assert len(lines) > 50
 
 
-def test_numbers_of_threads_and_stages_are_bounded(robot, model):
-    """20000 threads would take all memory, and more end the process."""
-    request = bielle.Request(motion="squat", options={"depth": 0.95})
-    motion = bielle.Motion.make(model, request)
-    plan = bielle.Motion.plan(model, request)
-    for threads in (-1, 1025, 20000, 100000):
-        with pytest.raises(ValueError, match="threads must lie between 0, which means all, and 1024"):
-            motion.solve(bielle.SolverOptions(threads=threads))
-        with pytest.raises(ValueError, match="threads must lie between"):
-            bielle.solve_request(robot, request, solver=bielle.SolverOptions(threads=threads))
-        with pytest.raises(ValueError, match="threads must lie between"):
-            options = bielle.PredictiveOptions(nodes=10, threads=threads)
-            bielle.Controller.predictive(model, plan, motion.guess, options=options)
+def test_options_keep_to_their_bounds(model):
+    """20000 threads would take all memory, and more end the process. Options are refused where they are given."""
+    motion = bielle.Motion.make(model, bielle.Request(motion="squat", options={"depth": 0.95}))
+    for kind in (bielle.SolverOptions, bielle.PredictiveOptions):
+        for threads in (-1, 1025, 20000, 100000):
+            with pytest.raises(bielle.InputError, match=kind.__name__ + ": field 'threads': .*, 0 .. 1024"):
+                kind(threads=threads)
+            with pytest.raises(bielle.InputError, match="threads"):
+                kind().replace(threads=threads)
     for nodes in (-1, 0, 1001):
-        with pytest.raises(ValueError, match="nodes must lie between 10 and 1000"):
-            bielle.Controller.predictive(model, plan, motion.guess, options=bielle.PredictiveOptions(nodes=nodes))
+        with pytest.raises(ValueError, match="nodes': .* 10 .. 1000"):
+            bielle.PredictiveOptions(nodes=nodes)
+    for changed in ({"acceptance": 0}, {"min_regularization": 0}, {"gap_tolerance": math.nan}, {"long_step": math.inf}):
+        with pytest.raises(bielle.InputError, match=f"'{next(iter(changed))}'"):
+            bielle.SolverOptions(**changed)
+    with pytest.raises(TypeError, match="SolverOptions.threads: expected int"):
+        bielle.SolverOptions(threads=1.5)
+    with pytest.raises(TypeError, match="no field 'thread'; it has: max_iterations, "):
+        bielle.SolverOptions(thread=1)
+    assert "    threads: number of threads; 0: all; results do not depend on it [1], 0 .. 1024, default 0\n" in bielle.SolverOptions.__doc__
     assert motion.solve(bielle.SolverOptions(threads=1024, max_iterations=1)).summary.iterations == 1
 
 

@@ -6,12 +6,12 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
+#include "bielle/motion/described_options.h"
 #include "bielle/motion/registry.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "motion/applied_options.h"
-#include "motion/described_options.h"
 #include "results/option_flags.h"
 #include "results/output_place.h"
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "bielle/model/error.h"
+#include "bielle/motion/described_options.h"
 #include "bielle/motion/serial_model.h"
 #include "bielle/report/report.h"
 #include "bielle/results/result.h"
@@ -17,7 +18,6 @@
 #include "cli/free_timings.h"
 #include "cli/table.h"
 #include "motion/applied_options.h"
-#include "motion/described_options.h"
 #include "motion/feasibility.h"
 #include "results/interrupt.h"
 #include "results/option_flags.h"
@@ -348,7 +348,9 @@ void describe(OptionFields& f, SolveArguments& a) {
   f.text("serial_armature", a.serial_armature,
          "armature of the motors on serial joints [kg m^2], or `reflected`: the rotors' inertia seen there at the "
          "standing posture");
+  f.restrictTo({"max_iterations", "threads"});
   describe(f, a.solver);
+  f.restrictTo({});
   f.text("warm_start", a.warm_start,
          "directory of another result of this robot as the initial guess, resampled if its length differs");
   f.flag("quiet", a.quiet, "do not print a line per iteration");

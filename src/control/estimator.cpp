@@ -25,6 +25,27 @@ ContactFilterNoise makeNoise(const EstimatorOptions& o) {
 
 }  // namespace
 
+void describe(OptionFields& f, EstimatorOptions& o) {
+  f.number("bandwidth", o.bandwidth, "1/s", kPositive, "bandwidth of the motor observers");
+  f.number("smoothing", o.smoothing, "s", kNotNegative, "time constant of the accelerations");
+  f.number("gyro_noise", o.gyro_noise, "rad/s/sqrt(Hz)", kNotNegative, "noise of the gyroscope");
+  f.number("accelerometer_noise", o.accelerometer_noise, "m/s^2/sqrt(Hz)", kNotNegative, "noise of the accelerometer");
+  f.number("gyro_offset", o.gyro_offset, "rad/s", kNotNegative, "offset at the start");
+  f.number("accelerometer_offset", o.accelerometer_offset, "m/s^2", kNotNegative, "offset at the start");
+  f.number("gyro_walk", o.gyro_walk, "rad/s", kNotNegative, "change of the offset in one second");
+  f.number("accelerometer_walk", o.accelerometer_walk, "m/s^2", kNotNegative, "change of the offset in one second");
+  f.number("tilt", o.tilt, "rad", kNotNegative, "tilt of the trunk at the start");
+  f.number("foot_position", o.foot_position, "m", kNotNegative, "position of a foot from the encoders");
+  f.number("foot_attitude", o.foot_attitude, "rad", kNotNegative, "attitude of a foot from the encoders");
+  f.number("foot_slide", o.foot_slide, "m", kNotNegative, "displacement of a standing foot in one second");
+  f.number("foot_turn", o.foot_turn, "rad", kNotNegative, "rotation of a standing foot in one second");
+  f.number("planned_contact", o.planned_contact, "1", kNotNegative,
+           "normal force of a standing foot relative to the weight");
+  f.number("surprising_contact", o.surprising_contact, "1", kNotNegative, "the same where no contact is planned");
+  f.number("slip", o.slip, "1", kPositive,
+           "a sole has slipped if its deviation, 6 on average, exceeds this; points and edges, half of it");
+}
+
 struct Estimator::Parts {
   Parts(const Model& model, ConstVectorRef q, const EstimatorOptions& options);
 

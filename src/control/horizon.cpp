@@ -7,18 +7,38 @@
 #include "bielle/model/error.h"
 #include "control/window_grid.h"
 #include "motion/robot_size.h"
+#include "solve/fddp_checks.h"
 
 namespace bielle {
-namespace {
 
-constexpr int kLeastNodes = 10, kMostNodes = 1000;
-
-void checkNodes(const PredictiveOptions& options) {
-  if (options.nodes < kLeastNodes || options.nodes > kMostNodes)
-    throw std::invalid_argument("PredictiveOptions: nodes must lie between 10 and 1000");
-  if (options.fine_nodes < kLeastNodes)
-    throw std::invalid_argument("PredictiveOptions: there must be at least 10 fine_nodes");
+void describe(OptionFields& f, PredictiveOptions& o) {
+  f.integer("nodes", o.nodes, {10, 1000}, "number of nodes in the window of predictive control");
+  f.integer("fine_nodes", o.fine_nodes, {10, 1000},
+            "number of nodes at its beginning that are one stage long; later ones are up to two, then four");
+  f.integer("iterations", o.iterations, {1, 100}, "solver iterations of predictive control at every stage");
+  f.number("regularization", o.regularization, "1", kPositive, "regularization of its sweeps");
+  f.number("penalty", o.penalty, "1", kPositive, "penalty of violated constraints");
+  f.number("look_ahead", o.look_ahead, "s", kNotNegative,
+           "near the end of a contact phase, the last gains computed at least this long before it are reused");
+  f.number(
+      "dead_point_stop", o.dead_point_stop, "1", {0, 1},
+      "motors brake before the transmission of a linkage reaches this share of that at the start, or the reciprocal");
+  f.integer("threads", o.threads, {0, kMostThreads},
+            "number of threads of predictive control; 0: all; results do not depend on it");
+  f.flag("own_thread", o.own_thread, "solves run in parallel with control; results then depend on their speed");
+  f.number(
+      "solve_time", o.solve_time, "s", kNotNegative,
+      "time that a solve is given: another one begins in a stage that leaves so much; without own_thread, policies "
+      "come into force only when it has passed; 0: one solve for each stage");
+  f.number("lead", o.lead, "s", kNotNegative,
+           "time from the measurement to the stage that is solved for; 0: the whole stage before; no effect with "
+           "solve_time");
+  f.number("end_place", o.end_place, "1/m^2 or 1", kNotNegative, "weight of heading and place at the end of a window");
+  f.number("end_posture", o.end_posture, "1/m^2 or 1", kNotNegative, "weight of the other coordinates");
+  f.number("end_velocity", o.end_velocity, "s^2/m^2 or s^2", kNotNegative, "weight of the velocities");
 }
+
+namespace {
 
 // Of the weights of joints at the end of a walk's window, whose postures are not foreseen: without any, the last stages would
 // throw the swing leg about.
@@ -125,7 +145,7 @@ class MotionHorizon : public Horizon {
 class WalkHorizon : public Horizon {
  public:
   WalkHorizon(CommandedWalk walk, const PredictiveOptions& options) : walk_(std::move(walk)) {
-    checkNodes(options);
+    listOptions(options, "option", "PredictiveOptions").check();
     const Model& model = walk_.model();
     std::vector<StageSpec> specs = {keep(walk_.makeNext())};
     stages_ = countMostStages(options, walk_.timeStep() / calcTime(model, states_[0].head(model.nq())));
@@ -205,7 +225,7 @@ double calcTimeScale(const RobotProblem& problem) {
 
 Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
                             const PredictiveOptions& options) {
-  checkNodes(options);
+  listOptions(options, "option", "PredictiveOptions").check();
   if (plan.stages.size() < 2 || plan.schedule.phases.empty() || plan.guess.us.empty() || plan.guess.xs.empty())
     throw InputError(model.name(), "motion '" + plan.name + "'", "its plan has no stage, phase or guess",
                      "fill them in, e.g. by planSquat()");

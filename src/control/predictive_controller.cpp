@@ -1,8 +1,6 @@
 #include "bielle/control/predictive_controller.h"
 
-#include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "control/clock.h"
@@ -29,10 +27,7 @@ class PredictiveController::Loop {
         next_(planner_.makeEmpty()),
         preview_{planner_.makeEmpty(), {}},
         dead_point_stop_(planner_.model(), planner_.startPosture(), options.dead_point_stop) {
-    if (!(solve_time_ >= 0 && std::isfinite(solve_time_)))
-      throw std::invalid_argument("PredictiveOptions: solve_time must be finite and not negative");
-    if (!(options.lead >= 0 && std::isfinite(options.lead)))
-      throw std::invalid_argument("PredictiveOptions: lead must be finite and not negative");
+    listOptions(options, "option", "PredictiveOptions").check();
     const Model& model = planner_.model();
     WindowPlanner::Solution first = planner_.makeFirst();
     policy_ = std::make_unique<Policy>(model, std::move(first.stages), first.u_hold);

@@ -1,9 +1,9 @@
 // The options of the motions by name. A program lists those of all motions, and may be linked without the motions themselves.
+#include "bielle/motion/described_options.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/run.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
-#include "motion/described_options.h"
 #include "motion/footholds.h"
 #include "motion/obstacles.h"
 #include "solve/fddp_checks.h"
@@ -241,8 +241,35 @@ void describe(OptionFields& f, ProblemOptions& o) {
   describe(f, o.objective);
 }
 
+void describe(OptionFields& f, ConstraintOptions& o) {
+  f.number("tolerance", o.tolerance, "1", kPositive, "largest violation of a converged solve");
+  f.number("initial_penalty", o.initial_penalty, "1", kPositive, "cost over squared violation");
+  f.number("penalty_increase", o.penalty_increase, "1", {1}, "factor when the violation falls too slowly");
+  f.number("max_penalty", o.max_penalty, "1", kPositive, "largest penalty");
+  f.flag("multipliers", o.multipliers, "false: the penalty alone grows, for comparisons");
+}
+
 void describe(OptionFields& f, FddpOptions& o) {
   f.integer("max_iterations", o.max_iterations, {1, kMostIterations}, "largest number of iterations");
+  f.number("gradient_tolerance", o.gradient_tolerance, "1", kNotNegative, "(cost per unit of control)^2");
+  f.number("gap_tolerance", o.gap_tolerance, "1", kNotNegative, "largest entry of the gaps");
+  f.number("cost_tolerance", o.cost_tolerance, "1", kNotNegative,
+           "relative change of the cost by a full step; 0: never");
+  f.number(
+      "acceptable_decrease", o.acceptable_decrease, "1", kNotNegative,
+      "share of the cost; a solve whose cost falls by less in 20 iterations ends within the constraints; 0: never");
+  f.number("initial_regularization", o.initial_regularization, "1", kPositive, "regularization of the first sweep");
+  f.number("min_regularization", o.min_regularization, "1", kPositive, "least regularization");
+  f.number("max_regularization", o.max_regularization, "1", kPositive, "the solve gives up above this");
+  f.number("regularization_increase", o.regularization_increase, "1", {1}, "factor");
+  f.number("regularization_decrease", o.regularization_decrease, "1", {1}, "divisor");
+  f.number("state_regularization_ratio", o.state_regularization_ratio, "1", kNotNegative,
+           "ratio of the regularization of states to that of controls");
+  f.number("long_step", o.long_step, "1", {0, 1}, "a step is long above this");
+  f.number("short_step", o.short_step, "1", {0, 1}, "a step is short up to this");
+  f.integer("num_step_lengths", o.num_step_lengths, {1}, "number of step lengths 1, 1/2, 1/4, ...");
+  f.number("acceptance", o.acceptance, "1", {0, 1, true}, "share of the predicted decrease");
+  f.integer("rollout_segments", o.rollout_segments, {1}, "largest number of segments of a rollout");
   f.integer("threads", o.threads, {0, kMostThreads}, "number of threads; 0: all; results do not depend on it");
 }
 
@@ -251,6 +278,8 @@ void describe(OptionFields& f, LiftOptions& o) {
            "newton: each node separately, torques from inverse dynamics; nlopt: one step of the closed dynamics after "
            "the other, torques by SLSQP, as in the paper's appendix");
   f.number("singular", o.singular, "1", {0, 1}, "margin below which a linkage is at a dead point");
+  f.number("acceleration_tolerance", o.acceleration_tolerance, "1", kPositive,
+           "tolerance of newton's accelerations: share of 1 rad/s^2 + the largest");
   f.number("position_tolerance", o.position_tolerance, "rad, m", kPositive, "tolerance of nlopt's positions");
   f.number("velocity_tolerance", o.velocity_tolerance, "rad/s, m/s", kPositive, "tolerance of nlopt's velocities");
 }

@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "bielle/model/error.h"
+#include "bielle/motion/described_options.h"
 #include "bielle/motion/solve.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
-#include "motion/described_options.h"
 #include "paper/commands.h"
 #include "paper/jump.h"
 #include "paper/walk.h"

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "bielle/control/controller.h"
+#include "bielle/model/options.h"
 
 namespace bielle {
 
@@ -53,6 +54,8 @@ struct EstimatorOptions {
   double slip =
       60;  ///< a sole has slipped if y' S^-1 y of its deviation, 6 on average, exceeds this; others at half of it
 };
+/// Without the placement of the IMU.
+void describe(OptionFields& fields, EstimatorOptions& options);
 
 /// Independent of any simulator: the same object can run on a robot. update() neither allocates nor throws.
 class Estimator {

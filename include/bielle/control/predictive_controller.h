@@ -73,6 +73,7 @@ struct PredictiveOptions {
   /// other coordinates, of the velocities; 1/m^2 or 1, s^2/m^2 or s^2.
   double end_place = 1, end_posture = 100, end_velocity = 10;
 };
+void describe(OptionFields& fields, PredictiveOptions& options);
 
 /// What one solve took.
 struct PredictiveSolve {

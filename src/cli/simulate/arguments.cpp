@@ -12,7 +12,6 @@
 #include "model/number_text.h"
 #include "results/option_flags.h"
 #include "results/setting.h"
-#include "solve/fddp_checks.h"
 #include "worlds/made_ground.h"
 #include "worlds/make_world.h"
 
@@ -99,7 +98,6 @@ void describeFreeMotion(OptionFields& fields, SimulateArguments& a) {
 }
 
 void describeControl(OptionFields& fields, SimulateArguments& a) {
-  PredictiveOptions& predictive = a.control.predictive;
   fields.choice("control", a.wanted_control, kControls,
                 "mpc: predictive control, which solves the next second again at every stage from the measured state; "
                 "gains: the planned torques and linear feedback with the solver's gains, for which the motion is "
@@ -112,13 +110,9 @@ void describeControl(OptionFields& fields, SimulateArguments& a) {
   fields.choice("maps", a.control.generated_maps, {"library", "generated"},
                 "with a serial model: what converts between joints and motors. library: the mechanism; generated: the "
                 "code that `bielle convert --to c` writes, compiled by the C compiler ($CC, or cc), as on a robot");
-  fields.integer("nodes", predictive.nodes, {10, 1000}, "number of nodes in the window of predictive control");
-  fields.integer("fine_nodes", predictive.fine_nodes, {10, 1000},
-                 "number of nodes at its beginning that are one stage long; later ones are up to two, then four");
-  fields.integer("iterations", predictive.iterations, {1, 100},
-                 "solver iterations of predictive control at every stage");
-  fields.integer("threads", predictive.threads, {0, kMostThreads},
-                 "number of threads of predictive control; 0: all; results do not depend on it");
+  fields.restrictTo({"nodes", "fine_nodes", "iterations", "threads"});
+  describe(fields, a.control.predictive);
+  fields.restrictTo({});
   fields.flag("real_time", a.execution.real_time,
               "run the world in real time while predictive control solves in a separate thread. Late policies take "
               "effect on arrival; results depend on the machine");
