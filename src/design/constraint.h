@@ -32,7 +32,7 @@ double calcViolation(const DesignConstraint& constraint, double value);
 double calcMiss(const GoalOutcome& outcome);
 
 /// The same of the pieces of a measure, as p <= 0.
-/// \param motors  those of the constraint, by their numbers   \param motions  with distances and, of motions made anew, margins
+/// \param motors  those of the constraint, by their numbers   \param motions  with the distances and margins that it is about
 /// \param weights  as of getMeasure()
 MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std::vector<int>& motors,
                                    const std::vector<MotorSlopes>& motions, const std::vector<double>& weights,

@@ -135,12 +135,15 @@ void addKeptMotion(const Model& closed, const VectorXd& q0, const DesignMotion& 
   const Motion serial_motion = makeDesignMotion(serial.model, motion, makeStandingRobot(serial.model));
   solved.serial =
       makeSerialTrajectory(serial_motion, restrictRecord(closed, serial.model, serial_motion, solved.record));
-  solved.kept_dofs = findRestrictedDofs(closed, serial.model);
 }
+
+}  // namespace
 
 LiftResult liftMotion(const Model& model, const VectorXd& q0, const SerialTrajectory& kept) {
   return lift(model, makeSerialModel(model, q0), kept);
 }
+
+namespace {
 
 // Starts from the motion of the start design with the motors recomputed, which is nearly a motion of this design.
 // If that fails, starts from its postures and torques.
@@ -166,7 +169,7 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
     throw InputError(model.name(), "start design", outcome.message, "request a motion that the robot can make");
   const ShootingTrajectory& solution = outcome.solution->trajectory;
   const Motion& solved = outcome.solution->motion;
-  SolvedMotion out{makeRecord(solved, solution), solved.goals, solved.schedule, {}, {}, {}};
+  SolvedMotion out{makeRecord(solved, solution), solved.goals, solved.schedule, {}, {}};
   const int last = static_cast<int>(solution.us.size());
   for (int p = 0; p < postures; ++p)
     out.postures.push_back(solution.xs[p * last / std::max(1, postures - 1)].head(model.nq()));

@@ -46,7 +46,6 @@ struct SolvedMotion {
   ContactSchedule schedule;
   std::vector<VectorXd> postures;
   std::optional<SerialTrajectory> serial;  ///< of its equivalent serial chain, where there is one
-  std::vector<int> kept_dofs;              ///< of the closed model: those of the chain, in its order
 };
 
 /// The outcome of one motion of a design.
@@ -69,6 +68,9 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
 /// Solved for a design, from the solution of the start design, or from the guess of the plan if there is none.
 MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion* start,
                            const FddpOptions& options, const std::vector<MotorConversion>& drives);
+
+/// A motion of the start design with the motors recomputed. \param q0  standing posture
+LiftResult liftMotion(const Model& model, const VectorXd& q0, const SerialTrajectory& kept);
 
 /// Postures and accelerations of the start design, which has a serial equivalent, motors recomputed.
 /// \param margin  EvaluationOptions::margin

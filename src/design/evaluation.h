@@ -124,7 +124,7 @@ class DesignEvaluator {
 
   /// \param outcomes  if given, of the motions, in their order, as far as they were made
   Evaluation evaluate(const VectorXd& x, std::vector<MotionOutcome>* outcomes = nullptr) const;
-  /// The same with gradients (gradient.h, optimum_gradient.h). If they do not exist, as at a dead point, the design counts as one whose
+  /// The same with gradients (gradient.h, motion_slopes.h). If they do not exist, as at a dead point, the design counts as one whose
   /// motion fails.
   /// \throws InputError when a measure has no gradient
   SlopedEvaluation differentiate(const VectorXd& x) const;

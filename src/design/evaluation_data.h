@@ -46,8 +46,6 @@ struct DesignEvaluator::Data {
   // \param made  the robot without payload, if it is requested
   Evaluation evaluate(const VectorXd& x, std::vector<MotionOutcome>* outcomes = nullptr,
                       std::optional<Model>* made = nullptr);
-  std::vector<MotorSlopes> calcKeptSlopes(const ArchitectureStart& base, const VectorXd& x,
-                                          const std::vector<MotionOutcome>& outcomes) const;
   MeasurePieces calcStartMargins(const ArchitectureStart& base, const Model& model, const VectorXd& x) const;
   MeasurePieces calcPieces(size_t i, const ArchitectureStart& base, const std::vector<MotorSlopes>& slopes,
                            const RobotSlopes& robot_slopes) const;

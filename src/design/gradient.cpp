@@ -2,13 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <set>
-
-#include "bielle/dynamics/distance.h"
-#include "bielle/dynamics/kinematics.h"
-#include "bielle/model/error.h"
-#include "math/decompositions.h"
 
 namespace bielle {
 namespace {
@@ -127,28 +120,6 @@ void addPeak(const MotorSlopes& motion, int m, int stretch, Eigen::Index piece, 
   }
 }
 
-// Positions among the kept dofs of those of each loop cluster.
-std::vector<std::vector<int>> groupByCluster(const Model& model, const std::vector<int>& kept) {
-  std::vector<std::vector<int>> out;
-  for (const LoopCluster& cluster : model.clusters()) {
-    out.emplace_back();
-    for (size_t i = 0; i < kept.size(); ++i)
-      if (std::binary_search(cluster.dofs.begin(), cluster.dofs.end(), kept[i]))
-        out.back().push_back(static_cast<int>(i));
-  }
-  return out;
-}
-
-// w of Eq. (4), as speeds of all kept dofs.
-VectorXd findFastest(const MatrixXd& T, const std::vector<int>& columns) {
-  MatrixXd T_c(T.rows(), columns.size());
-  for (size_t i = 0; i < columns.size(); ++i) T_c.col(static_cast<Eigen::Index>(i)) = T.col(columns[i]);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(T_c.transpose() * T_c);
-  VectorXd w = VectorXd::Zero(T.cols());
-  for (size_t i = 0; i < columns.size(); ++i) w[columns[i]] = solver.eigenvectors()(i, T_c.cols() - 1);
-  return w;
-}
-
 }  // namespace
 
 bool hasGradient(Measure measure) {
@@ -167,141 +138,6 @@ bool hasGradient(Measure measure) {
     default:
       return false;
   }
-}
-
-namespace {
-
-// Distances of the nearest shapes along a kept motion.
-class DistanceRecorder {
- public:
-  DistanceRecorder(const Model& model, const BodyPairs& left_out, const std::vector<VectorXd>& xs,
-                   const std::vector<ModelVariation>& variations)
-      : model_(model), variations_(variations), pairs_(listPairsBut(left_out, model)), ws_(model), workspace_(model) {
-    if (pairs_.empty()) return;
-    distance_.resize(static_cast<Eigen::Index>(xs.size()));
-    for (Eigen::Index k = 0; k < distance_.size(); ++k)
-      distance_[k] = find(xs[static_cast<size_t>(k)]).distance.distance;
-    for (const auto& [row, node] : listLeast(distance_)) nodes_.insert(node);
-    slopes_.assign(variations.size(), Eigen::RowVectorXd::Zero(distance_.size()));
-  }
-
-  bool isAsked(Eigen::Index k) const { return nodes_.count(k) > 0; }
-  // At node k, by variation i, with the change of q that goes with it.
-  void record(Eigen::Index k, const VectorXd& x, size_t i, const VectorXd& dq) {
-    const NearestPair nearest = find(x);
-    const ShapePair& pair = pairs_[static_cast<size_t>(nearest.pair)];
-    const VectorXd still = VectorXd::Zero(model_.nv());
-    updateVelocities(model_, ws_, still);
-    updateAccelerations(model_, ws_, still);
-    MotionVariation motion(model_);
-    motion.q = dq;
-    updateVariation(model_, ws_, variations_[i], motion, workspace_);
-    slopes_[i][k] = calcDistanceVariation(model_, ws_, pair.a, pair.b, nearest.distance, variations_[i], workspace_);
-  }
-  void take(MotorSlopes& out) {
-    out.distance = std::move(distance_);
-    out.ddistance = std::move(slopes_);
-  }
-
- private:
-  NearestPair find(const VectorXd& x) {
-    updatePositions(model_, ws_, x.head(model_.nq()));
-    return findNearestPair(model_, ws_.X_WB, pairs_);
-  }
-
-  const Model& model_;
-  const std::vector<ModelVariation>& variations_;
-  std::vector<ShapePair> pairs_;
-  Workspace ws_;
-  VariationWorkspace workspace_;
-  Eigen::RowVectorXd distance_;
-  std::vector<Eigen::RowVectorXd> slopes_;
-  std::set<Eigen::Index> nodes_;
-};
-
-class SlopeRecorder {
- public:
-  SlopeRecorder(const Model& model, const std::vector<int>& kept, const std::vector<double>& dt,
-                const std::vector<ModelVariation>& variations)
-      : model_(model),
-        variations_(variations),
-        clusters_(groupByCluster(model, kept)),
-        motion_(model, kept),
-        variation_(model) {
-    const Eigen::Index N = static_cast<Eigen::Index>(dt.size()), c = static_cast<Eigen::Index>(clusters_.size());
-    const MatrixXd of_motors = MatrixXd::Zero(model.nu(), N), of_clusters = MatrixXd::Zero(c, N);
-    out_.dt = dt, out_.u = out_.v = of_motors, out_.margin = of_clusters;
-    out_.du.assign(variations.size(), of_motors), out_.dv = out_.du;
-    out_.dmargin.assign(variations.size(), of_clusters);
-  }
-
-  NumericalStatus record(int k, const SerialTrajectory& trajectory, const LiftResult& lifted) {
-    const NumericalStatus status = motion_.update(lifted.constraints[k], lifted.trajectory.xs[k].head(model_.nq()),
-                                                  trajectory.v[k], trajectory.a[k], trajectory.forces[k]);
-    if (status != NumericalStatus::Ok) return status;
-    write(k, motion_.u(), motion_.v(), out_.u, out_.v);
-    std::vector<VectorXd> fastest;
-    for (size_t c = 0; c < clusters_.size(); ++c) {
-      fastest.push_back(findFastest(motion_.tangent(), clusters_[c]));
-      out_.margin(c, k) = 1 / (motion_.tangent() * fastest[c]).squaredNorm();
-    }
-    for (size_t i = 0; i < variations_.size(); ++i) {
-      const NumericalStatus varied = motion_.calcVariation(variations_[i], variation_);
-      if (varied != NumericalStatus::Ok) return varied;
-      write(k, variation_.u, variation_.motion.v, out_.du[i], out_.dv[i]);
-      if (distances_ && distances_->isAsked(k))
-        distances_->record(k, lifted.trajectory.xs[static_cast<size_t>(k)], i, variation_.motion.q);
-      for (size_t c = 0; c < clusters_.size(); ++c) {
-        const double slope = (motion_.tangent() * fastest[c])
-                                 .dot(motion_.calcTangentVariation(variations_[i], variation_.motion, fastest[c]));
-        out_.dmargin[i](c, k) = -2 * slope * out_.margin(c, k) * out_.margin(c, k);  // Eq. (4)
-      }
-    }
-    return status;
-  }
-
-  void setDistances(DistanceRecorder* distances) { distances_ = distances; }
-  MotorSlopes take() { return std::move(out_); }
-
- private:
-  void write(int k, const VectorXd& u, const VectorXd& v, MatrixXd& to_u, MatrixXd& to_v) const {
-    if (out_.dt[k] > 0) to_u.col(k) = u;
-    for (int m = 0; m < model_.nu(); ++m) to_v(m, k) = v[model_.motors()[m].dof];
-  }
-
-  const Model& model_;
-  const std::vector<ModelVariation>& variations_;
-  std::vector<std::vector<int>> clusters_;
-  KeptMotion motion_;
-  KeptMotion::Variation variation_;
-  MotorSlopes out_;
-  DistanceRecorder* distances_ = nullptr;
-};
-
-}  // namespace
-
-MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
-                            const LiftResult& lifted, const std::vector<ModelVariation>& variations,
-                            const BodyPairs* left_out) {
-  SlopeRecorder recorder(model, kept_dofs, lifted.dt, variations);
-  std::optional<DistanceRecorder> least;
-  if (left_out) {
-    const std::vector<VectorXd>& xs = lifted.trajectory.xs;
-    least.emplace(model, *left_out,
-                  std::vector<VectorXd>(xs.begin(), xs.begin() + static_cast<std::ptrdiff_t>(lifted.dt.size())),
-                  variations);
-    recorder.setDistances(&*least);
-  }
-  for (int k = 0; k < static_cast<int>(lifted.dt.size()); ++k) {
-    const NumericalStatus status = recorder.record(k, trajectory, lifted);
-    if (status == NumericalStatus::Ok) continue;
-    MotorSlopes out;
-    out.failure = "no gradient at node " + std::to_string(k) + ": " + getMessage(status);
-    return out;
-  }
-  MotorSlopes out = recorder.take();
-  if (least) least->take(out);
-  return out;
 }
 
 void append(const MeasurePieces& pieces, MeasurePieces& all) {

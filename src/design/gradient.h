@@ -1,11 +1,8 @@
 #pragma once
-/// \file Gradients of the measures of motions, with respect to the variables of a design; and of those of kept motions
-/// (MotionMode::Kept) what they are made of.
+/// \file Gradients of the measures of motions, with respect to the variables of a design.
 ///
-/// Joints, base and feet keep their motion, as do the contact forces as far as the motion does not determine them. With
-/// the model's change along a variable x_i (variation.h), postures, speeds and torques of the motors change at every
-/// node by Eqs. (2) and (5) of kept_motion.h: dv_i(k), du_i(k). A measure is the largest of smooth pieces p_j, each
-/// with its gradient:
+/// With a variable x_i, speeds and torques of the motors change at every node: dv_i(k), du_i(k) (motion_slopes.h). A measure is the
+/// largest of smooth pieces p_j, each with its gradient:
 ///     rms torque of one motor in one motion     p = (sum h u^2 / T)^1/2,  dp = sum h u du / (T p)                  (1)
 ///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)       (2)
 ///     electrical energy, Eq. (1) of measures.h  p = sum h r P,  dp = sum h r (du v + u dv + 2 u du / K_m^2 + u^2 d(1/K_m^2))
@@ -20,16 +17,13 @@
 /// A kept motion is infeasible where a linkage reaches a dead point of its joints, and torques fall just before it,
 /// which attracts searches. With T_c the tangent of a loop cluster for unit speeds of its joints, w the right singular
 /// vector of its largest singular value and mu = 1 / |T_c w| its margin (ratio.h), designs are kept away from it by
-///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                   (4)
+///     mu(k)^2 >= least^2                                                                                           (4)
 /// for the smallest mu in every stretch. The square falls linearly towards a dead point, where mu itself has a vertical
-/// slope. Of motions made anew, mu and the distances of shapes move with the optimum (optimum_gradient.h).
+/// slope.
 #include <string>
 
-#include "bielle/design/parametrization.h"
 #include "bielle/design/search.h"
-#include "bielle/dynamics/kept_motion.h"
 #include "bielle/motion/goal.h"
-#include "bielle/motion/lift.h"
 #include "design/measures.h"
 #include "design/robot_slopes.h"
 
@@ -41,12 +35,12 @@ bool hasGradient(Measure measure);
 /// Torques and speeds of the motors over the N stages of a motion, and their derivatives. A stage without duration has no
 /// torque.
 struct MotorSlopes {
-  std::vector<double> dt;         ///< N, s
-  MatrixXd u, v;                  ///< nu x N
-  std::vector<MatrixXd> du, dv;   ///< per variable, nu x N
-  MatrixXd margin;                ///< loop clusters x nodes, mu^2 of Eq. (4); of motions made anew if it was requested
-  std::vector<MatrixXd> dmargin;  ///< of motions made anew only at the entries that listLeast() names
-  Eigen::RowVectorXd distance;    ///< of the nearest shapes at all nodes, if it was requested
+  std::vector<double> dt;                     ///< N, s
+  MatrixXd u, v;                              ///< nu x N
+  std::vector<MatrixXd> du, dv;               ///< per variable, nu x N
+  MatrixXd margin;                            ///< loop clusters x nodes, mu^2 of Eq. (4), if it was requested
+  std::vector<MatrixXd> dmargin;              ///< only at the entries that listLeast() names
+  Eigen::RowVectorXd distance;                ///< of the nearest shapes at all nodes, if it was requested
   std::vector<Eigen::RowVectorXd> ddistance;  ///< only at the entries that listLeast() names
   double cost = 0;                            ///< of motions that were optimized for the design, and its derivatives
   VectorXd dcost;
@@ -54,12 +48,6 @@ struct MotorSlopes {
   MatrixXd dgoals;                 ///< goals x variables: of achieved less requested values
   std::string failure;             ///< reason if there are none, or empty
 };
-/// \param kept_dofs  of the model, in the order of the velocities of the serial trajectory
-/// \param lifted  the whole trajectory, lifted to the model
-/// \param left_out  of distances, if there are distances among them
-MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
-                            const LiftResult& lifted, const std::vector<ModelVariation>& variations,
-                            const BodyPairs* left_out = nullptr);
 
 /// Adds pieces to others by the same variables.
 void append(const MeasurePieces& pieces, MeasurePieces& all);

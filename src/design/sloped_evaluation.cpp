@@ -1,11 +1,9 @@
 // Evaluations with gradients.
 #include <algorithm>
-#include <map>
 
 #include "bielle/model/error.h"
 #include "design/evaluation_data.h"
-#include "design/optimum_gradient.h"
-#include "design/variations.h"
+#include "design/motion_slopes.h"
 
 namespace bielle {
 namespace {
@@ -38,25 +36,6 @@ std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std:
   return {};
 }
 
-// Slopes of the motors; a failure is that of the first motion which has none.
-std::vector<MotorSlopes> DesignEvaluator::Data::calcKeptSlopes(const ArchitectureStart& base, const VectorXd& x,
-                                                               const std::vector<MotionOutcome>& outcomes) const {
-  const std::vector<size_t> groups = groupByPayload(motions);
-  std::map<size_t, std::vector<ModelVariation>> variations;  // of the loaded robots
-  std::vector<MotorSlopes> slopes;
-  for (size_t i = 0; i < outcomes.size(); ++i) {
-    if (groups[i] == i)
-      variations[i] =
-          calcVariations(robot, x, [&](const VectorXd& at) { return addPayload(robot.make(at), motions[i].payload); });
-    const SolvedMotion& from = *base.solved[i];
-    slopes.push_back(calcMotorSlopes(*outcomes[i].loaded, from.kept_dofs, *from.serial, outcomes[i].lifted,
-                                     variations.at(groups[i]),
-                                     requested.count(Measure::Distance) > 0 ? &base.left_out : nullptr));
-    if (!slopes.back().failure.empty()) break;
-  }
-  return slopes;
-}
-
 // Margins of the motions of the start design in the linkages of x; none where these cannot follow them.
 MeasurePieces DesignEvaluator::Data::calcStartMargins(const ArchitectureStart& base, const Model& model,
                                                       const VectorXd& x) const {
@@ -67,7 +46,8 @@ MeasurePieces DesignEvaluator::Data::calcStartMargins(const ArchitectureStart& b
     outcomes.push_back(keepMotion(model, motions[i], *base.solved[i], drives, 0));
     if (!outcomes.back().lifted.lifted()) return {};
   }
-  const std::vector<MotorSlopes> slopes = calcKeptSlopes(base, x, outcomes);
+  const std::vector<MotorSlopes> slopes =
+      calcKeptSlopes(robot, x, motions, base.solved, outcomes, {Measure::Margin}, base.left_out);
   return getFailure(slopes).empty() ? calcMarginPieces(kLimitShare * options.margin, slopes) : MeasurePieces();
 }
 
@@ -111,9 +91,11 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
     return kept ? outcome.lifted.lifted() : outcome.solution.has_value();
   };
   if (outcomes.size() < data.motions.size() || !std::all_of(outcomes.begin(), outcomes.end(), is_made)) return out;
+  std::set<Measure> requested = data.requested;
+  if (kept) requested.insert(Measure::Margin);
   const std::vector<MotorSlopes> slopes =
-      kept ? data.calcKeptSlopes(base, x, outcomes)
-           : calcOptimumSlopes(data.robot, x, data.motions, outcomes, data.requested, base.left_out);
+      kept ? calcKeptSlopes(data.robot, x, data.motions, base.solved, outcomes, requested, base.left_out)
+           : calcOptimumSlopes(data.robot, x, data.motions, outcomes, requested, base.left_out);
   if (const std::string& failure = getFailure(slopes); !failure.empty()) {
     out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, {}, failure, {}};
     return out;

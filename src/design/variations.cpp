@@ -1,7 +1,6 @@
-#include "design/variations.h"
-
 #include <algorithm>
 
+#include "bielle/design/parametrization.h"
 #include "bielle/model/error.h"
 
 namespace bielle {
@@ -84,27 +83,22 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
 
 }  // namespace
 
-std::vector<ModelVariation> calcVariations(const Parametrization& robot, const VectorXd& x,
-                                           const std::function<Model(const VectorXd& x)>& make) {
-  const Model here = make(x);
+std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x) {
+  const Model here = robot.make(x);
   std::vector<ModelVariation> out(x.size(), ModelVariation(here));
   for (Eigen::Index i : robot.listContinuous()) {
     const double h = kStep * (robot.upper()[i] - robot.lower()[i]);
     for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
-      const Model there = make(x + steps * h * VectorXd::Unit(x.size(), i));
+      const Model there = robot.make(x + steps * h * VectorXd::Unit(x.size(), i));
       if (!isSameButForPlaces(here, there))
         throw InputError(here.name(), "variable '" + robot.variables()[i].name + "'",
-                         "it changes an axis, a gain, gravity or which joints have springs, for which motor torques "
-                         "have no gradient",
-                         "search without gradients, with bobyqa or sbplx");
+                         "it changes an axis, a gain, gravity or which joints have springs, by which dynamics are not "
+                         "differentiated",
+                         "leave it out");
       addChange(here, there, weight / (12 * h), out[i]);
     }
   }
   return out;
-}
-
-std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x) {
-  return calcVariations(robot, x, [&robot](const VectorXd& at) { return robot.make(at); });
 }
 
 }  // namespace bielle
