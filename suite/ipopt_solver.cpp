@@ -183,7 +183,7 @@ End describe(Ipopt::ApplicationReturnStatus status) {
 const std::vector<std::pair<std::string, std::string>>& listIpoptOptions() {
   static const std::vector<std::pair<std::string, std::string>> options = {{"linear_solver", "mumps"},
                                                                            {"mu_strategy", "adaptive"},
-      {"nlp_scaling_method", "none"},
+                                                                           {"nlp_scaling_method", "none"},
                                                                            {"limited_memory_max_history", "20"},
                                                                            {"bound_relax_factor", "0"},
                                                                            {"tol", "1e-6"},
