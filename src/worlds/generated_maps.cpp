@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPostures = 500;                      // at which the generator measures errors
-constexpr int kMostJoints = 6;                      // of a linkage
+constexpr size_t kMostJoints = 6;                   // of a linkage
 constexpr double kBeyond = 0.2;                     // of what is planned, rad or m
 constexpr int kMapClamped = 1, kMapNotReached = 3;  // statuses of the code
 
@@ -234,6 +234,9 @@ GeneratedMaps::GeneratedMaps(const Model& closed, const SerialModel& serial, Bel
   for (const FirmwareLinkage& linkage : text.linkages) {
     Map map;
     map.function = maps_.size();
+    if (std::max(linkage.motors.size(), linkage.joints.size()) > kMostJoints)
+      throw InputError(closed.name(), "linkage '" + linkage.name + "'",
+                       "it has more than " + std::to_string(kMostJoints) + " motors or joints", "give --maps library");
     for (const std::string& name : linkage.motors) {
       map.motors.push_back(closed.findMotor(name));
       const Motor& motor = closed.motors()[static_cast<size_t>(map.motors.back())];
