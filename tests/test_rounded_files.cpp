@@ -297,7 +297,7 @@ TEST_CASE("loops that lengths lock are not said to have axes that do") {
     return "<body name=\"" + name + "\" pos=\"" + write(x, z) + "\"><joint name=\"" + name +
            "\" axis=\"0 1 0\"/><geom size=\"0.02\"/>";
   };
-  constexpr double kRadius = 0.05, kApart = 0.3, kTurned = 0.4, kOther = 0.401;
+  constexpr double kRadius = 0.05, kApart = 0.3, kTurned = 1.2, kOther = 1.201;
   std::string levers = begin("a", 0, 0), closures;
   for (const double side : {1.0, -1.0}) {
     const double x = side * kRadius * std::cos(kTurned), z = side * kRadius * std::sin(kTurned);
