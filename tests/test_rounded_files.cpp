@@ -1,4 +1,5 @@
 // Files whose linkages move only because of numbers that are rounded: in every format, told once, and written so that they come back.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
@@ -315,6 +316,16 @@ TEST_CASE("loops that lengths lock are not said to have axes that do") {
   const nlohmann::json mobility = nlohmann::json::parse(makeRobotInfo(robot))["mobility"];
   CHECK(mobility["mobility"] == 0);
   CHECK(mobility["locked"] == 1);
+  // What the warning says to give if it was meant to move.
+  const std::string told = *std::find_if(robot.warnings.begin(), robot.warnings.end(), [](const std::string& warning) {
+    return warning.find("`rounding: ") != std::string::npos;
+  });
+  const size_t begin_of = told.find("`rounding: ") + 1;
+  directory.write("meant.yaml",
+                  "model: levers.xml\n" + told.substr(begin_of, told.find('`', begin_of) - begin_of) + "\n");
+  const LoadedRobot meant = loadRobot(directory.path() + "/meant.yaml");
+  CHECK(countWarnings(meant, "as a plane linkage") + countWarnings(meant, "as a linkage of mobility 1") == 1);
+  CHECK(nlohmann::json::parse(makeRobotInfo(meant))["mobility"]["mobility"] == 1);
 }
 
 TEST_CASE("a linkage without motors that is locked by rounding is told, too") {

@@ -158,10 +158,10 @@ bool isIdeal(FollowedLinkage& linkage, const Finding& found, const std::vector<R
 // Of the places of a linkage. Frames of hinges whose axis runs through two points turn as far as these may be off.
 std::vector<RoundingTolerance> makeTolerances(const FollowedLinkage& linkage, const RoundingTolerance& given) {
   RoundingTolerance most;
-  if (given.angle > 0) most.angle = std::clamp(given.angle, kLeastRounding, kMostAngleRounding);
-  if (given.length > 0)
-    most.length =
-        std::clamp(given.length, kLeastRounding, std::max(kLeastRounding, kMostLengthRounding * linkage.length()));
+  const double most_angle = given.is_given ? kMostGivenRounding : kMostAngleRounding,
+               most_length = (given.is_given ? kMostGivenRounding : kMostLengthRounding) * linkage.length();
+  if (given.angle > 0) most.angle = std::clamp(given.angle, kLeastRounding, most_angle);
+  if (given.length > 0) most.length = std::clamp(given.length, kLeastRounding, std::max(kLeastRounding, most_length));
   std::vector<RoundingTolerance> out;
   for (const PlaceChange& change : linkage.changes()) {
     out.push_back(most);
@@ -266,7 +266,6 @@ RoundedLinkage describe(const Model& model, const LoopCluster& cluster, const Fo
 }  // namespace
 
 RoundedLinkages findRoundedLinkages(const Model& model, const RoundingTolerance& tolerance) {
-  constexpr double kFar = 3e-3;  // rad, and of the size: beyond rounding, but hardly meant
   RoundedLinkages out;
   out.model = model;
   if (model.clusters().empty()) return out;
@@ -293,7 +292,7 @@ RoundedLinkages findRoundedLinkages(const Model& model, const RoundingTolerance&
       continue;
     }
     linkage = written;
-    const RoundingTolerance most = {kFar, kFar * linkage.length(), {}};
+    const RoundingTolerance most = {kMostGivenRounding, kMostGivenRounding * linkage.length(), true, {}};
     const Finding far = examine(linkage, starts, std::vector<RoundingTolerance>(own.size(), most));
     if (far.mended) {
       out.locked.push_back(describe(model, cluster, linkage, far));

@@ -27,12 +27,16 @@ namespace bielle {
 /// By how much numbers may be off, half a unit of their last decimals. 0: not at all.
 struct RoundingTolerance {
   double angle = 0, length = 0;  ///< rad; m
+  /// Whether somebody says so, who may say up to kMostGivenRounding; else at most what is taken for rounding counts.
+  bool is_given = false;
   /// How far the two points are apart that the axis of a hinge runs through, m, by its closure: length / lever is its angle.
   std::map<std::string, double> levers;
 };
 
 /// The least and the most that is taken for rounding: rad; m, and of the mechanism's size (L of loop_conflict.h).
 inline constexpr double kLeastRounding = 1e-9, kMostAngleRounding = 1e-3, kMostLengthRounding = 1e-4;
+/// What is hardly meant, in rad, and of the size.
+inline constexpr double kMostGivenRounding = 3e-3;
 
 /// How the axes of a linkage lie to each other.
 enum class LinkageShape { Plane, Spherical, Other };

@@ -42,7 +42,7 @@ class GeometryDecimals {
  public:
   /// \param degrees  whether Euler's angles of MJCF are in degrees
   void add(const tinyxml2::XMLElement& root, bool degrees = false);
-  RoundingTolerance calcTolerance() const { return {angles_.calcHalfUnit(), lengths_.calcHalfUnit(), {}}; }
+  RoundingTolerance calcTolerance() const { return {angles_.calcHalfUnit(), lengths_.calcHalfUnit(), false, {}}; }
 
  private:
   Decimals angles_{Decimals::Kind::Angles}, lengths_;

@@ -390,7 +390,7 @@ RoundingTolerance findTolerance(const UrdfFile& urdf, const YamlFile& yaml) {
   constexpr int kFewest = 4;
   RoundingTolerance tolerance = urdf.rounding;
   if (yaml.rounding)
-    tolerance.angle = tolerance.length = *yaml.rounding;
+    tolerance = {*yaml.rounding, *yaml.rounding, true, tolerance.levers};
   else if (yaml.axes.most_digits() >= kFewest)
     tolerance.angle = std::max(tolerance.angle, yaml.axes.calcHalfUnit());
   return tolerance;

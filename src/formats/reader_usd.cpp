@@ -176,7 +176,7 @@ RobotFiles UsdReader::read() {
   addStart();
   for (const auto& prim : layer_->root.children) noteUnused(*prim);
   notes_.addTo(tree_);
-  tree_.rounding = {angles_.calcHalfUnit(), lengths_.calcHalfUnit(), {}};
+  tree_.rounding = {angles_.calcHalfUnit(), lengths_.calcHalfUnit(), false, {}};
   return {std::move(tree_), std::move(yaml_)};
 }
 

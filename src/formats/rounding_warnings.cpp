@@ -66,7 +66,9 @@ void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, co
                                         formatNumber(linkage.apart, "%.2g") + " rad from parallel";
     warnings.push_back(
         describe(path, linkage) + apart + ", more than its numbers are rounded; with placements that differ by " +
-        describeChange(linkage) + " at most, mobility would be " + std::to_string(linkage.meant) + ": correct them");
+        describeChange(linkage) + " at most, mobility would be " + std::to_string(linkage.meant) +
+        ": correct them, or give `rounding: " + formatNumber(std::max(linkage.angle, linkage.length), "%.1e") +
+        "` in the robot's YAML file if they were meant to fit");
   }
   for (const RoundedLinkage& linkage : linkages.short_of_freedoms)
     warnings.push_back(
