@@ -128,7 +128,7 @@ void MjcfReader::readTie(MjcfElement& e, const std::string& name) {
 // The writer's NAME.1 and NAME.2 give it their name.
 void MjcfReader::joinHinges() {
   constexpr double kSameLength = 1e-6;  // relative
-  // Of four points, each of whose coordinates is rounded.
+  // Of four points, each of whose coordinates is rounded; at most a hundredth of their distance.
   const double rounding = 4 * std::sqrt(3) * tree_.rounding.length;
   for (size_t i = 0; i < ties_.size(); ++i)
     for (size_t j = i + 1; j < ties_.size(); ++j) {

@@ -41,15 +41,15 @@ struct LinkageTable {
   std::vector<std::string> joints, motors;
   std::string carrier;                    // body that carries the linkage
   std::vector<std::vector<double>> axes;  // values of each joint
-  std::vector<std::optional<LinkagePosture>>
-      postures;  // the last joint changes fastest; none where the linkage cannot follow, or nearly so
+  // The last joint changes fastest; none where the linkage cannot follow, or only just.
+  std::vector<std::optional<LinkagePosture>> postures;
   // The largest errors halfway between neighbours, by linear interpolation, of entries of R and D.
   double ratio_error = 0, inertia_error = 0;
 };
 
 struct SerialTables {
-  SerialModel
-      serial;  // without the forces of frozen joints; the armature of its motors is that of the rotors at the reference
+  // Without the forces of frozen joints; the armature of its motors is that of the rotors at the reference.
+  SerialModel serial;
   std::vector<LinkageTable> linkages;
   double frozen_mass = 0;  // kg, of bodies whose joints are frozen
 };

@@ -58,7 +58,7 @@ class Receding {
   /// from zero unless advance() or setMultipliers() came after the last step. Exceptions of the problem leave it, with the
   /// current iterate in the trajectory. \throws std::invalid_argument like solve()
   /// \param foresight  if any, is filled on the way; getGains() and getLinearized() are then of the same sweep
-  /// \return valid until the next step()
+  /// \return valid until the next step() or prepare()
   const FddpSummary& step(ShootingTrajectory& trajectory, const FddpObserver& observer = {},
                           Foresight* foresight = nullptr);
 
