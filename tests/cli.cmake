@@ -25,13 +25,15 @@ add_test(NAME firmware COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}
 add_test(NAME firmware_all COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_firmware.py $<TARGET_FILE:bielle_command> all 5000)
 set_tests_properties(firmware firmware_all PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 
-# Lengths and offsets found again from logs.
+# Lengths and offsets found again from logs; masses and friction from torques.
 if(TARGET bielle-identify)
-  add_test(NAME identify_command COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_identify.py
-    $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
-  set_tests_properties(identify_command PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+  foreach(name identify identify_torques)
+    add_test(NAME ${name}_command COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_${name}.py
+      $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
+    set_tests_properties(${name}_command PROPERTIES LABELS system SKIP_RETURN_CODE 77)
+  endforeach()
 else()
-  message(STATUS "The test identify_command is left out: install libceres-dev")
+  message(STATUS "The tests identify_command and identify_torques_command are left out: install libceres-dev")
 endif()
 
 # Manual pages and completion follow the help of the command.

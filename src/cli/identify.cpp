@@ -1,9 +1,10 @@
-// bielle identify: lengths and offsets of a robot from logs of its motors and joints.
+// bielle identify: lengths and offsets of a robot from logs of its motors and joints, masses and friction from torques.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <optional>
 #include <stdexcept>
 
@@ -31,12 +32,13 @@ struct IdentifyArguments {
   RobotArgument robot;
   std::string log, directory;
   IdentifyChoice choice;
+  TorqueChoice torques;
   int every = 1, iterations = 50;
   bool json = false;
 };
 
 // Without a log: what can be found.
-int list(const Model& model, const std::vector<LinkageTask>& tasks) {
+int list(const Model& model, const std::vector<LinkageTask>& tasks, const std::vector<LoadNumber>& loads) {
   std::cout << model.name() << "\n";
   for (const LinkageTask& task : tasks) {
     std::cout << "  linkage of " << task.name << "\n";
@@ -57,6 +59,10 @@ int list(const Model& model, const std::vector<LinkageTask>& tasks) {
                 {"places .x .y .z", listItems(places)}},
                "    ");
   }
+  if (loads.empty()) return kOk;
+  std::vector<Row> rows = {{"numbers of the dynamics", "unit", "as drawn"}};
+  for (const LoadNumber& number : loads) rows.push_back({number.name, number.unit, formatNumber(number.value, "%.5g")});
+  printTable(std::cout, rows);
   return kOk;
 }
 
@@ -74,8 +80,8 @@ MotionLog thin(MotionLog log, int every) {
   return out;
 }
 
-// The linkages that the log tells about.
-std::vector<LoggedTask> chooseTasks(const std::vector<LinkageTask>& tasks, const MotionLog& log) {
+// The linkages that the log tells about. \param may_be_none  because other things are looked for as well
+std::vector<LoggedTask> chooseTasks(const std::vector<LinkageTask>& tasks, const MotionLog& log, bool may_be_none) {
   std::vector<LoggedTask> chosen;
   std::vector<std::string> reasons, told;
   for (const LinkageTask& task : tasks) {
@@ -87,20 +93,40 @@ std::vector<LoggedTask> chooseTasks(const std::vector<LinkageTask>& tasks, const
     }
     chosen.push_back(std::move(logged));
   }
-  if (chosen.empty())
+  if (chosen.empty() && !may_be_none)
     throw InputError(log.path, "columns", listItems(told.empty() ? reasons : told),
                      "log positions of motors and of joints, named as above, in rad or m");
   for (const std::string& reason : told) std::cerr << "bielle: warning: " << log.path << ": " << reason << "\n";
   return chosen;
 }
 
+// Tells progress of what takes long.
+class Teller {
+ public:
+  explicit Teller(std::string of) : of_(std::move(of)) {}
+  void operator()(const std::string& text) const {
+    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count() > kQuiet)
+      std::cerr << "bielle: " << of_ << ": " << text << std::endl;
+  }
+
+ private:
+  std::string of_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+EstimateOptions makeOptions(const IdentifyArguments& arguments, const Teller& tell) {
+  EstimateOptions options;
+  options.iterations = arguments.iterations;
+  options.progress = [tell](int iteration, double misfit) {
+    tell("iteration " + std::to_string(iteration) + ", misfit " + formatNumber(misfit, "%.3g"));
+    return !isInterrupted();
+  };
+  return options;
+}
+
 // Of one linkage; empty if the user asked for the end before there was one.
 std::optional<Identified> identify(const IdentifyArguments& arguments, const MotionLog& log, LoggedTask logged) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto tell = [&](const std::string& text) {
-    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > kQuiet)
-      std::cerr << "bielle: linkage of " << logged.task->name << ": " << text << std::endl;
-  };
+  const Teller tell("linkage of " + logged.task->name);
   Identified out;
   out.task = logged.task;
   out.geometry = chooseGeometry(*logged.task, arguments.choice.free);
@@ -122,17 +148,45 @@ std::optional<Identified> identify(const IdentifyArguments& arguments, const Mot
                      "check units (rad, m), signs and zeros, and that the columns are named as the robot's joints");
   }
   tell("followed through " + std::to_string(out.rows) + " rows");
-  EstimateOptions options;
-  options.iterations = arguments.iterations;
-  for (const LinkageSensor& sensor : out.sensors) options.fixed.push_back(matches(arguments.choice.exact, sensor.name));
-  options.progress = [&](int iteration, double misfit) {
-    tell("iteration " + std::to_string(iteration) + ", misfit " + formatNumber(misfit, "%.3g"));
-    return !isInterrupted();
-  };
-  out.estimate = estimate(fit, options);
+  std::vector<bool> fixed;
+  for (const LinkageSensor& sensor : out.sensors) fixed.push_back(matches(arguments.choice.exact, sensor.name));
+  out.estimate = estimate(makeProblem(fit, fixed), makeOptions(arguments, tell));
   if (out.estimate.unknowns.empty())
     throw std::runtime_error("linkage of " + out.task->name + ": " + out.estimate.message);
+  out.left_before = fit.calcLeft(out.estimate.r_before), out.left_after = fit.calcLeft(out.estimate.r_after);
   return out;
+}
+
+// From the torques, with the geometry that was found.
+std::optional<IdentifiedLoads> findLoads(const IdentifyArguments& arguments, const Model& model, const VectorXd& q,
+                                         const MotionLog& log, const std::vector<Identified>& geometry) {
+  std::map<std::string, double> offsets;
+  for (const Identified& found : geometry)
+    for (const Unknown& unknown : found.estimate.unknowns)
+      if (unknown.kind == "offset") offsets[unknown.name] = unknown.after;
+  const AssemblyResult closed = closeConfiguration(model, q);
+  if (closed.status != NumericalStatus::Ok)
+    throw std::runtime_error("with the lengths that were found, the robot does not close: " + closed.message);
+  IdentifiedLoads found = identifyLoads(model, closed.q, arguments.choice, arguments.torques, log, offsets,
+                                        makeOptions(arguments, Teller("torques")));
+  if (found.estimate.unknowns.empty()) return {};
+  return found;
+}
+
+void warn(const IdentifiedLoads& found, const std::string& log) {
+  const auto tell = [&](const std::string& text) {
+    std::cerr << "bielle: warning: " << log << ": torques: " << text << std::endl;
+  };
+  if (found.left_out > 0)
+    tell(std::to_string(found.left_out) + " instants near which a linkage has no configuration are left out");
+  if (found.estimate.noise > kSuspicious)
+    tell("what is left is " + formatNumber(kTorqueNoise * found.estimate.noise, "%.3g") +
+         " of them: other numbers than the free ones are wrong, torques are not those at the joints, or something "
+         "touches it");
+  for (const Unknown& unknown : found.estimate.unknowns)
+    if (unknown.is_seen && unknown.after < 0 && unknown.kind != "com")
+      tell(unknown.name + " is below zero, by what is not known of it; the robot has " +
+           (unknown.kind == "mass" ? "a hundredth of what was drawn" : "0"));
 }
 
 void warn(const Identified& found, const std::string& log) {
@@ -148,26 +202,27 @@ void warn(const Identified& found, const std::string& log) {
 
 int run(const IdentifyArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
-  const std::vector<LinkageTask> tasks =
-      listTasks(robot.model, findClosedConfiguration(robot.model).q, arguments.choice);
-  if (arguments.log.empty()) return list(robot.model, tasks);
+  const VectorXd q = findClosedConfiguration(robot.model).q;
+  const bool has_dynamics = !arguments.torques.dynamics.empty();
+  const std::vector<LoadNumber> loads = chooseLoads(robot.model, arguments.torques.dynamics);
+  std::vector<LinkageTask> tasks;
+  if (!has_dynamics || !robot.model.closures().empty()) tasks = listTasks(robot.model, q, arguments.choice);
+  if (arguments.log.empty()) return list(robot.model, tasks, loads);
   std::vector<std::string> inputs = listFiles(robot), wanted;
   inputs.push_back(arguments.log);
   requireApart(arguments.directory, inputs);
   formatRobot(robot.model);  // \throws what its files could not say in the end
+  if (has_dynamics) wanted = listTorqueColumns(robot.model);
   for (const LinkageTask& task : tasks)
     for (const LinkageSensor& sensor : task.sensors) wanted.push_back(sensor.name);
-  const MotionLog log = thin(readLog(arguments.log, wanted), arguments.every);
-  std::vector<LoggedTask> chosen = chooseTasks(tasks, log);
+  const MotionLog whole = readLog(arguments.log, wanted), log = thin(whole, arguments.every);
+  if (has_dynamics) requireTorques(robot.model, q, arguments.choice, whole);
+  std::vector<LoggedTask> chosen = chooseTasks(tasks, log, has_dynamics);
   watchInterrupts();
   std::vector<Identified> all;
   for (LoggedTask& logged : chosen) {
     if (isInterrupted()) break;
     if (std::optional<Identified> found = identify(arguments, log, std::move(logged))) all.push_back(std::move(*found));
-  }
-  if (all.empty()) {
-    std::cerr << "bielle: error: interrupted before the first estimate; nothing is written" << std::endl;
-    return kFailed;
   }
   Model model = robot.model;
   Json linkages = Json::array();
@@ -178,21 +233,34 @@ int run(const IdentifyArguments& arguments) {
     linkages.push_back(describe(found));
     converged = converged && found.estimate.converged;
   }
+  std::optional<IdentifiedLoads> dynamics;
+  if (has_dynamics && !isInterrupted()) dynamics = findLoads(arguments, model, q, whole, all);
+  if (dynamics) {
+    model = changeLoads(model, dynamics->numbers, dynamics->estimate.x);
+    converged = converged && dynamics->estimate.converged;
+  }
+  if (all.empty() && !dynamics) {
+    std::cerr << "bielle: error: interrupted before the first estimate; nothing is written" << std::endl;
+    return kFailed;
+  }
   makeOutputDirectory(arguments.directory);
   writeRobot(model, arguments.directory, "with what `bielle identify` found");
-  const Json summary = {{"robot", arguments.robot.name},
-                        {"log", arguments.log},
-                        {"interrupted", static_cast<bool>(isInterrupted())},
-                        {"linkages", linkages}};
+  Json summary = {{"robot", arguments.robot.name},
+                  {"log", arguments.log},
+                  {"interrupted", static_cast<bool>(isInterrupted())},
+                  {"linkages", linkages}};
+  if (dynamics) summary["dynamics"] = describe(*dynamics);
   const std::string path = (fs::path(arguments.directory) / "identified.json").string();
   writeTextFile(path, formatJson(summary) + "\n");
-  if (arguments.json)
-    std::cout << formatJson(summary) << "\n";
-  else
+  if (arguments.json) std::cout << formatJson(summary) << "\n";
+  if (!arguments.json) {
     for (const Identified& found : all) print(std::cout, found);
+    if (dynamics) print(std::cout, *dynamics);
+  }
   for (const Identified& found : all) warn(found, arguments.log);
-  const std::string page =
-      writeIdentifyPage(arguments.directory, robot.model.name() + ": found in " + arguments.log, all);
+  if (dynamics) warn(*dynamics, arguments.log);
+  const std::string page = writeIdentifyPage(arguments.directory, robot.model.name() + ": found in " + arguments.log,
+                                             all, dynamics ? &*dynamics : nullptr);
   (arguments.json ? std::cerr : std::cout) << "  " << arguments.directory << "\n  " << path << "\n  " << page << "\n";
   if (isInterrupted())
     std::cerr << "bielle: error: interrupted; what is written is the best estimate so far" << std::endl;
@@ -228,7 +296,16 @@ void addIdentify(CLI::App& command, Action& action) {
           "a column that is measured beside motors and serial joints (* stands for any text); may be repeated");
   addList("--noise", choice.noise,
           "NAME=VALUE: standard deviation of a column's noise [rad or m], * for all (default: 1e-4); may be repeated");
-  command.add_option("--every", arguments->every, "only every n-th row")
+  addList("--dynamics", arguments->torques.dynamics,
+          "what is looked for in torques, columns u.MOTOR [N m or N]: masses, coms (centres of mass), armatures, "
+          "frictions, or the name of one, as LINK.mass or MOTOR.friction (* stands for any text); the base must not "
+          "move; may be repeated");
+  command
+      .add_option("--window", arguments->torques.window,
+                  "of the polynomials that smooth positions for --dynamics, their degree being 4 [s]")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-4, 10.0));
+  command.add_option("--every", arguments->every, "only every n-th row, but for --dynamics")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
   command.add_option("--iterations", arguments->iterations, "at most, for each linkage")
@@ -247,12 +324,14 @@ void addIdentify(CLI::App& command, Action& action) {
       "does "
       "not\n"
       "show: with angles alone, that of all lengths of a linkage by the same factor.\n"
+      "With --dynamics, columns u.MOTOR and, if there are any, v.JOINT tell masses, armatures and friction as well.\n"
       "-o is a robot for every other command. After Ctrl-C it has the best estimate so far.\n"
       "Exit status: 0 done, 1 interrupted or not converged, 2 bad input.\n"
       "Examples:\n"
       "  bielle identify fourbar\n"
       "  bielle identify fourbar log.csv -o found\n"
       "  bielle identify fourbar log.csv --free rods --free crank --no-offset crank_joint -o found\n"
+      "  bielle identify fourbar log.csv --dynamics masses --dynamics frictions -o found\n"
       "  bielle identify bipetto log.npz --joint knee_left --noise '*=5e-5' --noise knee_left=2e-4 -o found");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
 }

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/identify_tasks.h"
-#include "identify/estimate.h"
+#include "cli/identify_torques.h"
 #include "results/json_text.h"
 
 namespace bielle::cli {
@@ -15,14 +14,17 @@ struct Identified {
   std::vector<GeometryNumber> geometry;
   std::vector<LinkageSensor> sensors;
   int rows = 0, left_out = 0;
-  VectorXd time;  // of the rows
-  LinkageEstimate estimate;
+  VectorXd time;                     // of the rows
+  MatrixXd left_before, left_after;  // of the columns, rows x sensors
+  Estimate estimate;
 };
 
 Json describe(const Identified& found);
+Json describe(const IdentifiedLoads& found);
 void print(std::ostream& out, const Identified& found);
-// The page report.html. Figures are drawn by gnuplot, if installed. Returns its path.
+void print(std::ostream& out, const IdentifiedLoads& found);
+// The page report.html. Figures are drawn by gnuplot, if installed. Returns its path. \param loads  null: none
 std::string writeIdentifyPage(const std::string& directory, const std::string& title,
-                              const std::vector<Identified>& all);
+                              const std::vector<Identified>& all, const IdentifiedLoads* loads);
 
 }  // namespace bielle::cli

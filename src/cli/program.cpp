@@ -65,7 +65,7 @@ constexpr CommandEntry kCommands[] = {
     {"ratio", "Reduction ratio between motors and a joint along its range", kComplete},
     {"modes", "Frequencies, damping and shapes of small motions about a posture", kComplete},
     {"softness", "How far MuJoCo's loops open, and the settings that keep them closed", kComplete},
-    {"identify", "Find lengths of rods and offsets of encoders from a log", "bielle-identify"},
+    {"identify", "Find lengths, offsets of encoders, masses and friction from a log", "bielle-identify"},
     {"synthesize", "Find linkages that move a joint as requested", "bielle-design"},
     {"lift", "Lift a motion of the serial model to the closed robot", kComplete},
     {"campaign", "Execute motions many times: pushes, grounds, worlds, seeds", "bielle-tasks"},

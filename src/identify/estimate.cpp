@@ -13,24 +13,6 @@ namespace {
 constexpr int kMostRounds = 4;      // of finding out what is seen
 constexpr double kRounding = 1e-7;  // of the noise
 
-// d of Eq. (1); 0 of what is known.
-VectorXd makeScales(const LogFit& fit, const EstimateOptions& options) {
-  VectorXd d(fit.size());
-  double size = 0;
-  for (const GeometryNumber& number : fit.geometry()) size = std::max(size, std::abs(number.value));
-  const auto n = static_cast<Eigen::Index>(fit.geometry().size());
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const GeometryNumber& number = fit.geometry()[static_cast<size_t>(i)];
-    const bool is_place = number.name.find('.') != std::string::npos;
-    d[i] = kShareOfLength * (is_place ? std::max(size, 0.1) : number.value);
-  }
-  for (size_t s = 0; s < fit.sensors().size(); ++s) {
-    const bool is_fixed = s < options.fixed.size() && options.fixed[s];
-    d[n + static_cast<Eigen::Index>(s)] = is_fixed ? 0 : fit.sensors()[s].is_length ? kLengthOffset : kAngleOffset;
-  }
-  return d;
-}
-
 // Eq. (1).
 struct Sight {
   VectorXd s;  // falling
@@ -59,12 +41,10 @@ Sight look(const MatrixXd& J, const VectorXd& d, double noise) {
   return sight;
 }
 
-double calcNoise(const LogFit& fit, const VectorXd& r, int seen) {
-  const double left = static_cast<double>(fit.numTold() - seen);
+double calcNoise(long told, const VectorXd& r, int seen) {
+  const double left = static_cast<double>(told - seen);
   return left > 0 ? std::sqrt(r.squaredNorm() / left) : 1;
 }
-
-double calcMisfit(const MatrixXd& left) { return left.norm() / std::sqrt(static_cast<double>(left.size())); }
 
 // The rows of a basis of what is not seen, each with as few unknowns as possible: reduced by elimination.
 std::vector<Combination> listUnseen(const Sight& sight, const VectorXd& d, const std::vector<Unknown>& unknowns) {
@@ -98,65 +78,98 @@ std::vector<Combination> listUnseen(const Sight& sight, const VectorXd& d, const
 
 }  // namespace
 
-LinkageEstimate estimate(LogFit& fit, const EstimateOptions& options) {
-  LinkageEstimate out;
-  const VectorXd d = makeScales(fit, options);
-  const auto n = static_cast<Eigen::Index>(fit.geometry().size());
-  out.x = VectorXd::Zero(fit.size());
+EstimateProblem makeProblem(LogFit& fit, const std::vector<bool>& fixed) {
+  EstimateProblem problem;
+  double size = 0;
+  for (const GeometryNumber& number : fit.geometry()) size = std::max(size, std::abs(number.value));
+  std::vector<double> scales;
+  for (const GeometryNumber& number : fit.geometry()) {
+    const bool is_place = number.name.find('.') != std::string::npos;
+    problem.unknowns.push_back({number.name, "length", "m", number.value});
+    scales.push_back(kShareOfLength * (is_place ? std::max(size, 0.1) : number.value));
+  }
+  for (size_t s = 0; s < fit.sensors().size(); ++s) {
+    const LinkageSensor& sensor = fit.sensors()[s];
+    problem.unknowns.push_back({sensor.name, "offset", sensor.is_length ? "m" : "rad"});
+    scales.push_back(s < fixed.size() && fixed[s] ? 0 : sensor.is_length ? kLengthOffset : kAngleOffset);
+  }
+  problem.scales = VectorXd::Map(scales.data(), static_cast<Eigen::Index>(scales.size()));
+  problem.evaluate = [&fit](const VectorXd& x, VectorXd& r, MatrixXd* J) {
+    return fit.numRows() > 0 && fit.evaluate(x, r, J);
+  };
+  problem.countTold = [&fit] { return fit.numTold(); };
+  problem.calcMisfit = [&fit](const VectorXd& r) {
+    const MatrixXd left = fit.calcLeft(r);
+    return left.norm() / std::sqrt(static_cast<double>(left.size()));
+  };
+  return problem;
+}
+
+EstimateProblem makeProblem(const TorqueFit& fit) {
+  EstimateProblem problem;
+  const auto n = static_cast<Eigen::Index>(fit.numbers().size());
+  problem.scales.resize(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const LoadNumber& number = fit.numbers()[static_cast<size_t>(i)];
+    problem.unknowns.push_back({number.name, getName(number.kind), number.unit, number.value});
+    problem.scales[i] = fit.scales()[i];
+  }
+  problem.evaluate = [&fit](const VectorXd& x, VectorXd& r, MatrixXd* J) { return fit.evaluate(x, r, J); };
+  problem.countTold = [&fit] { return fit.numRows(); };
+  problem.calcMisfit = [&fit](const VectorXd& r) { return fit.calcShare(r); };
+  return problem;
+}
+
+Estimate estimate(const EstimateProblem& problem, const EstimateOptions& options) {
+  Estimate out;
+  const VectorXd& d = problem.scales;
+  out.x = VectorXd::Zero(d.size());
   VectorXd r;
   MatrixXd J;
-  if (fit.numRows() == 0 || !fit.evaluate(out.x, r, &J)) {
-    out.message = "no configuration of the linkage is near the readings";
+  if (!problem.evaluate(out.x, r, &J)) {
+    out.message = "there is nothing to compare with at the start";
     return out;
   }
-  out.left_before = out.left_after = fit.calcLeft(r);
-  out.misfit_before = out.misfit_after = calcMisfit(out.left_before);
+  out.r_before = out.r_after = r;
+  out.misfit_before = out.misfit_after = problem.calcMisfit(r);
   Sight sight = look(J, d, 1);
   for (int round = 0, before = -1; round < kMostRounds && sight.seen != before; ++round) {
     before = sight.seen;
     const MatrixXd along = d.asDiagonal() * sight.V.leftCols(sight.seen);
-    LeastSquares problem;
-    problem.size = sight.seen;
-    problem.residuals = static_cast<int>(r.size());
-    problem.iterations = options.iterations;
-    problem.enough = 0.5 * kRounding * kRounding * static_cast<double>(r.size());
-    problem.evaluate = [&](const VectorXd& c, VectorXd& residuals, MatrixXd* jacobian) {
+    LeastSquares search;
+    search.size = sight.seen;
+    search.residuals = static_cast<int>(r.size());
+    search.iterations = options.iterations;
+    search.enough = 0.5 * kRounding * kRounding * static_cast<double>(r.size());
+    search.evaluate = [&](const VectorXd& c, VectorXd& residuals, MatrixXd* jacobian) {
       MatrixXd all;
-      if (!fit.evaluate(along * c, residuals, jacobian ? &all : nullptr)) return false;
+      if (!problem.evaluate(along * c, residuals, jacobian ? &all : nullptr)) return false;
       if (jacobian) *jacobian = all * along;
       return true;
     };
-    problem.progress = [&](int iteration, double cost) {
-      // The noise of all sensors is alike, or the misfit is about this.
-      const double share = r.squaredNorm() > 0 ? std::sqrt(2 * cost / r.squaredNorm()) : 0;
+    search.progress = [&](int iteration, double cost) {
+      // The noise of all residuals is alike, or the misfit is about this.
+      const double size = out.r_before.norm();
+      const double share = size > 0 ? std::sqrt(2 * cost) / size : 0;
       return !options.progress || options.progress(iteration, share * out.misfit_before);
     };
-    const VectorXd first = r;
-    const LeastSquaresEnd end = minimize(problem);
+    const LeastSquaresEnd end = minimize(search);
     out.iterations += end.iterations;
     out.converged = end.converged, out.interrupted = end.interrupted, out.message = end.message;
     out.x = along * end.x;
-    if (!fit.evaluate(out.x, r, &J)) {  // a last step that was refused
+    if (!problem.evaluate(out.x, r, &J)) {  // a last step that was refused
       out.converged = false;
       break;
     }
-    out.left_after = fit.calcLeft(r);
-    out.misfit_after = calcMisfit(out.left_after);
-    sight = look(J, d, calcNoise(fit, r, sight.seen));
-    r = first;
+    out.r_after = r;
+    out.misfit_after = problem.calcMisfit(r);
+    sight = look(J, d, calcNoise(problem.countTold(), r, sight.seen));
     if (out.interrupted) break;
   }
   out.noise = sight.noise;
+  out.unknowns = problem.unknowns;
   for (Eigen::Index i = 0; i < d.size(); ++i) {
-    Unknown unknown;
-    const auto k = static_cast<size_t>(i < n ? i : i - n);
-    if (i < n) {
-      unknown.name = fit.geometry()[k].name, unknown.unit = "m";
-      unknown.before = fit.geometry()[k].value;
-    } else {
-      unknown.name = fit.sensors()[k].name, unknown.unit = fit.sensors()[k].is_length ? "m" : "rad";
-      unknown.is_offset = true;
-    }
+    Unknown& unknown = out.unknowns[static_cast<size_t>(i)];
     unknown.after = unknown.before + out.x[i];
     const Eigen::Index unseen = d.size() - sight.seen;
     const double part = sight.V.row(i).tail(unseen).squaredNorm();
@@ -165,7 +178,6 @@ LinkageEstimate estimate(LogFit& fit, const EstimateOptions& options) {
     for (int j = 0; j < sight.seen; ++j) variance += std::pow(sight.noise * sight.V(i, j) / sight.s[j], 2);
     unknown.deviation = unknown.is_seen ? d[i] * std::sqrt(variance) : std::numeric_limits<double>::infinity();
     if (d[i] == 0) unknown.is_seen = true, unknown.deviation = 0;
-    out.unknowns.push_back(std::move(unknown));
   }
   out.unseen = listUnseen(sight, d, out.unknowns);
   return out;

@@ -1,8 +1,10 @@
 #pragma once
-/// \file The likeliest geometry and offsets of a linkage, their standard deviations, and what the log does not tell.
+/// \file The likeliest values of what is not known, their standard deviations, and what the log does not tell: geometry and offsets of a
+/// linkage (log_fit.h), or masses, armatures and friction of a robot (torque_fit.h).
 ///
-/// Of the unknowns x (log_fit.h), each has a scale d: a tenth of a length, of the linkage's size for a place, 0.1 rad or
-/// kLengthOffset for an offset. More than that is not learnt by a linear estimate. The singular values s of the scaled Jacobian
+/// Each of the unknowns x has a scale d: a tenth of a length, of the linkage's size for a place, 0.1 rad or kLengthOffset for an
+/// offset; those of masses, armatures and friction are in torque_fit.h. More than that is not learnt by a linear estimate. The singular
+/// values s of the scaled Jacobian
 ///     J diag(d) = U diag(s) V^T                                                                                      (1)
 /// tell by how much, in scales, each of the combinations v (columns of V) is known: its standard deviation is sigma/s, where
 ///     sigma^2 = |r|^2 / (numbers that the rows tell - combinations that are seen)                                    (2)
@@ -16,6 +18,7 @@
 #include <vector>
 
 #include "identify/log_fit.h"
+#include "identify/torque_fit.h"
 
 namespace bielle {
 
@@ -25,22 +28,35 @@ constexpr double kShareOfLength = 0.1, kAngleOffset = 0.1, kLengthOffset = 0.01;
 /// One number of x.
 struct Unknown {
   std::string name;
-  std::string unit;
-  bool is_offset = false;
-  double before = 0, after = 0;  ///< m or rad
-  double deviation = 0;          ///< standard deviation, likewise; infinite if it is not seen
+  std::string kind;  ///< "length", "offset", or those of loads.h
+  std::string unit;  ///< of the next three
+  double before = 0, after = 0;
+  double deviation = 0;  ///< standard deviation; infinite if it is not seen
   bool is_seen = true;
 };
+
+/// What is minimized: |r(x)|^2, x being changes of the unknowns.
+struct EstimateProblem {
+  std::vector<Unknown> unknowns;  ///< with name, kind, unit and value before
+  VectorXd scales;                ///< d; 0 of what is known
+  /// r over the noise that is assumed, and J if it is asked for; false where there is none
+  std::function<bool(const VectorXd& x, VectorXd& r, MatrixXd* J)> evaluate;
+  std::function<long()> countTold;                      ///< numbers that the rows tell at the last evaluation
+  std::function<double(const VectorXd& r)> calcMisfit;  ///< what is left, as users read it
+};
+/// Geometry and offsets of a linkage, whose fit has followed the log. \param fixed  offsets that are zero; empty: none
+EstimateProblem makeProblem(LogFit& fit, const std::vector<bool>& fixed);
+EstimateProblem makeProblem(const TorqueFit& fit);
 
 /// Unknowns that may change together, by these amounts, without that the log tells: the largest one is 1.
 using Combination = std::vector<std::pair<std::string, double>>;
 
-struct LinkageEstimate {
+struct Estimate {
   std::vector<Unknown> unknowns;
   std::vector<Combination> unseen;
-  VectorXd x;                                  ///< of the fit
-  MatrixXd left_before, left_after;            ///< LogFit::calcLeft
-  double misfit_before = 0, misfit_after = 0;  ///< root mean squares of these
+  VectorXd x;                                  ///< changes
+  VectorXd r_before, r_after;                  ///< of the problem
+  double misfit_before = 0, misfit_after = 0;  ///< of these
   double noise = 0;                            ///< sigma of Eq. (2)
   int iterations = 0;
   bool converged = false, interrupted = false;
@@ -48,13 +64,12 @@ struct LinkageEstimate {
 };
 
 struct EstimateOptions {
-  std::vector<bool> fixed;  ///< of the offsets: known to be zero; empty: none
   int iterations = 50;
   /// Called at each iteration; false asks for the end, and the best so far is the result.
   std::function<bool(int iteration, double misfit)> progress = {};
 };
 
-/// Minimizes |r|^2 from the given robot by Levenberg's and Marquardt's method (Ceres). LogFit::follow() comes first.
-LinkageEstimate estimate(LogFit& fit, const EstimateOptions& options);
+/// Minimizes |r|^2 from x = 0 by Levenberg's and Marquardt's method (Ceres). Without unknowns in the result there is no r.
+Estimate estimate(const EstimateProblem& problem, const EstimateOptions& options);
 
 }  // namespace bielle

@@ -82,22 +82,6 @@ std::vector<Pivot> listPivots(const Model& whole, const ReducedCluster& cluster)
   return out;
 }
 
-// Of every body, the first one of those that it is welded to.
-std::vector<int> groupBodies(const Model& model) {
-  std::vector<int> group(static_cast<size_t>(model.numBodies()));
-  std::iota(group.begin(), group.end(), 0);
-  for (bool changes = true; changes;) {
-    changes = false;
-    for (const Closure& closure : model.closures()) {
-      if (closure.kind != ClosureKind::Weld6D) continue;
-      int &a = group[static_cast<size_t>(closure.body1)], &b = group[static_cast<size_t>(closure.body2)];
-      changes = changes || a != b;
-      a = b = std::min(a, b);
-    }
-  }
-  return group;
-}
-
 // The moves that put b farther from a along u, in the frame of body `at`, of which placements tell where the others are.
 std::vector<GeometryMove> listMoves(const Model& model, const std::vector<SE3>& X_WB, const Pivot& a, const Pivot& b,
                                     int at, const Vector3d& u) {
@@ -169,6 +153,21 @@ GeometryMove placeMove(const ReducedCluster& cluster, GeometryMove move) {
 }
 
 }  // namespace
+
+std::vector<int> groupBodies(const Model& model) {
+  std::vector<int> group(static_cast<size_t>(model.numBodies()));
+  std::iota(group.begin(), group.end(), 0);
+  for (bool changes = true; changes;) {
+    changes = false;
+    for (const Closure& closure : model.closures()) {
+      if (closure.kind != ClosureKind::Weld6D) continue;
+      int &a = group[static_cast<size_t>(closure.body1)], &b = group[static_cast<size_t>(closure.body2)];
+      changes = changes || a != b;
+      a = b = std::min(a, b);
+    }
+  }
+  return group;
+}
 
 std::vector<GeometryNumber> listGeometry(const Model& whole, const ReducedCluster& cluster, ConstVectorRef q) {
   const Model& model = cluster.model;

@@ -26,6 +26,9 @@ struct GeometryNumber {
   std::vector<GeometryMove> moves;  ///< indices are those of the cluster's model
 };
 
+/// Of every body, the first one of those that closures weld to it.
+std::vector<int> groupBodies(const Model& model);
+
 /// All numbers of a linkage, lengths first.
 /// \param model  the whole one, whose names count   \param q  nq of the cluster, closed
 std::vector<GeometryNumber> listGeometry(const Model& model, const ReducedCluster& cluster, ConstVectorRef q);

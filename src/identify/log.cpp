@@ -13,7 +13,7 @@
 namespace bielle {
 namespace {
 
-constexpr const char* kTime = "time";
+constexpr const char *kTime = "time", *kTorque = "u.";
 
 // Columns by name, of which a few are read.
 class LogTable {
@@ -34,12 +34,16 @@ class LogTable {
   }
   size_t size() const { return names_.size(); }
   void set(const std::string& row, size_t column, std::optional<double> value, const std::string& text) {
-    if (!value || !std::isfinite(*value))
-      throw InputError(path_, row + ", column '" + names_[column] + "'", "'" + text + "' is no finite number",
-                       "correct it, or leave the row out");
-    cells_.push_back(*value);
+    const bool is_finite = value && std::isfinite(*value);
+    const bool may_be_empty = text.empty() && names_[column].rfind(kTorque, 0) == 0;  // in the last row: endRow()
+    if (!is_finite && !may_be_empty) refuse(row, column, text);
+    if (!is_finite && empty_ < 0) empty_ = static_cast<int>(column);
+    cells_.push_back(is_finite ? *value : std::nan(""));
   }
-  void endRow(const std::string& row) { rows_.push_back(row); }
+  void endRow(const std::string& row, bool is_last) {
+    if (empty_ >= 0 && !is_last) refuse(row, static_cast<size_t>(empty_), "");
+    rows_.push_back(row);
+  }
 
   MotionLog finish() const {
     const auto time = std::find(names_.begin(), names_.end(), kTime);
@@ -78,9 +82,15 @@ class LogTable {
     return first;
   }
 
+  [[noreturn]] void refuse(const std::string& row, size_t column, const std::string& text) const {
+    throw InputError(path_, row + ", column '" + names_[column] + "'", "'" + text + "' is no finite number",
+                     "correct it, or leave the row out");
+  }
+
   const std::string& path_;
   const std::vector<std::string>& wanted_;
   std::vector<std::string> names_, others_, rows_;
+  int empty_ = -1;             // the first column of torques that is empty in a row
   std::vector<double> cells_;  // row after row
 };
 
@@ -128,7 +138,7 @@ MotionLog readText(const std::string& path, const std::vector<std::string>& want
                        "it has " + std::to_string(count) + " cells, and the header " + std::to_string(columns.size()),
                        "complete the line, or leave it out");
     for (size_t c = 0; c < cells.size(); ++c) table.set(row, c, parseNumber(cells[c]), cells[c]);
-    table.endRow(row);
+    table.endRow(row, text.find_first_not_of(" \t\r\n", at) == std::string::npos);
   }
   if (columns.empty())
     throw InputError(path, "file", "it is empty", "give a log: a header of names, then a line a row");
@@ -157,22 +167,28 @@ MotionLog readArrays(const std::string& path, const std::vector<std::string>& wa
   for (const auto& [name, array] : arrays)
     if (!array.is_text && array.shape.size() == 1 && array.shape[0] == K && table.add(name) >= 0)
       columns.push_back({&array, 0, 1});
-  const auto q = arrays.find("q"), names = arrays.find("q_names");
-  if (q != arrays.end() && names != arrays.end()) {
-    const size_t n = names->second.texts.size();
-    if (q->second.is_text || q->second.shape != std::vector<size_t>{K, n})
-      throw InputError(path, "array 'q'", "its shape does not match `time` and `q_names`",
-                       "give K x n numbers for K times and n names");
+  for (const char* array : {"q", "v", "u"}) {
+    const auto found = arrays.find(array), names = arrays.find(std::string(array) + "_names");
+    if (found == arrays.end() || names == arrays.end()) continue;
+    const size_t n = names->second.texts.size(), before = columns.size();
     for (size_t c = 0; c < n; ++c)
-      if (table.add(names->second.texts[c]) >= 0) columns.push_back({&q->second, c, n});
+      if (table.add(std::string(array) + "." + names->second.texts[c]) >= 0) columns.push_back({&found->second, c, n});
+    const std::vector<size_t>& shape = found->second.shape;
+    const bool lacks_last = array[0] == 'u' && K > 0 && shape == std::vector<size_t>{K - 1, n};
+    if (columns.size() > before && (found->second.is_text || (shape != std::vector<size_t>{K, n} && !lacks_last)))
+      throw InputError(path, std::string("array '") + array + "'",
+                       std::string("its shape does not match `time` and `") + array + "_names`",
+                       "give K x n numbers for K times and n names");
   }
   for (size_t k = 0; k < K; ++k) {
     const std::string row = "row " + std::to_string(k);
     for (size_t c = 0; c < columns.size(); ++c) {
-      const double value = columns[c].array->numbers[columns[c].first + k * columns[c].step];
-      table.set(row, c, value, std::isfinite(value) ? "" : std::isnan(value) ? "nan" : "inf");
+      const size_t at = columns[c].first + k * columns[c].step;
+      const bool is_there = at < columns[c].array->numbers.size();
+      const double value = is_there ? columns[c].array->numbers[at] : std::nan("");
+      table.set(row, c, value, !is_there || std::isfinite(value) ? "" : std::isnan(value) ? "nan" : "inf");
     }
-    table.endRow(row);
+    table.endRow(row, k + 1 == K);
   }
   return table.finish();
 }
@@ -183,6 +199,8 @@ int MotionLog::find(const std::string& name) const {
   const auto found = std::find(names.begin(), names.end(), name);
   return found == names.end() ? -1 : static_cast<int>(found - names.begin());
 }
+
+bool MotionLog::isHeld(int column) const { return std::isnan(values(values.rows() - 1, column)); }
 
 MotionLog readLog(const std::string& path, const std::vector<std::string>& wanted) {
   const bool is_archive = path.size() > 4 && path.compare(path.size() - 4, 4, ".npz") == 0;

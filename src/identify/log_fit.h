@@ -49,6 +49,7 @@ class LogFit {
   bool follow(const std::atomic<bool>& interrupt);
   int numRows() const { return static_cast<int>(used_.size()); }
   const std::vector<Eigen::Index>& usedRows() const { return used_; }  ///< in increasing order
+  const MatrixXd& configurations() const { return q_; }  ///< nq x used rows, closed, of the last evaluation
 
   /// r of all rows that are used (rows x sensors, one after the other), and its derivative by Eq. (3) (entries of r x size()), if
   /// asked for. The results do not depend on the number of threads. False if a configuration is not found.

@@ -1,0 +1,239 @@
+#include "cli/identify_torques.h"
+
+#include <algorithm>
+#include <set>
+
+#include "bielle/model/error.h"
+#include "bielle/model/names.h"
+#include "identify/loaded_states.h"
+#include "model/listing.h"
+#include "model/number_text.h"
+#include "results/interrupt.h"
+
+namespace bielle::cli {
+namespace {
+
+// A position that a log may have: of a joint with one coordinate, or of a universal joint.
+struct Coordinate {
+  std::string name, speed;  // columns
+  int joint = 0, position = 0, dof = 0;
+};
+
+std::vector<Coordinate> listCoordinates(const Model& model) {
+  const std::vector<std::string> positions = makePositionNames(model), speeds = makeVelocityNames(model);
+  std::vector<Coordinate> out;
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    if (joint.nq != 1 && joint.kind != JointKind::Universal) continue;
+    for (int k = 0; k < joint.nq; ++k)
+      out.push_back({positions[static_cast<size_t>(joint.idx_q + k)],
+                     "v." + speeds[static_cast<size_t>(joint.idx_v + k)], i, joint.idx_q + k, joint.idx_v + k});
+  }
+  return out;
+}
+
+// What is used of the log.
+struct TorqueTask {
+  std::vector<LinkageTask> linkages;                // that move
+  std::vector<std::vector<LinkageSensor>> sensors;  // of each, which the log has
+  std::vector<Coordinate> coordinates;              // outside all loops
+};
+
+TorqueTask makeTask(const Model& model, ConstVectorRef q, const IdentifyChoice& choice, const MotionLog& log) {
+  if (model.hasFreeFlyer())
+    throw InputError(model.name(), "base", "it moves, and the forces on it are not in the log",
+                     "log the robot while its base is clamped, its feet in the air, and give --fixed-base");
+  std::vector<std::string> missing;
+  for (const Motor& motor : model.motors())
+    if (log.find("u." + motor.name) < 0) missing.push_back("u." + motor.name);
+  if (model.nu() == 0)
+    throw InputError(model.name(), "motors", "it has none, so that nothing is known of its forces",
+                     "name a robot with `motors`");
+  TorqueTask task;
+  IdentifyChoice all = choice;
+  all.joints.clear();
+  if (!model.closures().empty()) task.linkages = listTasks(model, q, all);
+  std::set<int> looped;
+  for (const LoopCluster& cluster : model.clusters())
+    for (const int dof : cluster.dofs) looped.insert(model.dofs()[static_cast<size_t>(dof)].joint);
+  for (const Coordinate& coordinate : listCoordinates(model)) {
+    if (looped.count(coordinate.joint) > 0) continue;
+    task.coordinates.push_back(coordinate);
+    if (log.find(coordinate.name) < 0) missing.push_back(coordinate.name);
+  }
+  for (int i = 1; i < model.numBodies(); ++i)
+    if (const Joint& joint = model.joints()[static_cast<size_t>(i)];
+        joint.nq > 1 && joint.kind != JointKind::Universal && looped.count(i) == 0)
+      throw InputError(model.name(), "joint '" + joint.name + "'", "no column of a log tells where it is",
+                       "leave --dynamics out: torques tell of joints with one or two angles, or one length");
+  for (const LinkageTask& linkage : task.linkages) {
+    std::vector<LinkageSensor> sensors;
+    std::vector<std::string> absent;
+    for (const LinkageSensor& sensor : linkage.sensors)
+      if (log.find(sensor.name) >= 0)
+        sensors.push_back(sensor);
+      else
+        absent.push_back(sensor.name);
+    const MatrixXd none(0, static_cast<Eigen::Index>(sensors.size()));
+    if (sensors.empty() ||
+        LogFit(linkage.cluster, {}, sensors, none, linkage.q).calcSeenFreedoms(linkage.q) < linkage.cluster->size)
+      missing.insert(missing.end(), absent.begin(), absent.end());
+    task.sensors.push_back(std::move(sensors));
+  }
+  if (!missing.empty())
+    throw InputError(log.path, "columns", "--dynamics needs those that are missing: " + listItems(missing),
+                     "log positions of all motors and joints [rad, m] and torques of all motors [N m, N], or leave "
+                     "--dynamics out");
+  return task;
+}
+
+// Columns of positions with their derivatives, those of speeds in place of the former's where they are logged.
+class SmoothLog {
+ public:
+  SmoothLog(const MotionLog& log, double window) : log_(log), window_(window) {
+    centres_ = listCentres(log.time, window_);
+  }
+  double window() const { return window_; }
+  Eigen::Index size() const { return static_cast<Eigen::Index>(centres_.size()); }
+
+  Smoothed getMotion(const std::string& position, const std::string& speed, double offset) const {
+    Smoothed motion = getColumn(log_.time, log_.find(position), log_.time.size());
+    motion.value.array() -= offset;
+    if (const int column = log_.find(speed); column >= 0) {
+      Smoothed rate = getColumn(log_.time, column, log_.time.size());
+      motion.rate = std::move(rate.value), motion.acceleration = std::move(rate.rate);
+    }
+    return motion;
+  }
+  MatrixXd getTorques(const Model& model) const {
+    MatrixXd torques(size(), model.nu());
+    const Eigen::Index K = log_.time.size();
+    for (int m = 0; m < model.nu(); ++m) {
+      const int column = log_.find("u." + model.motors()[static_cast<size_t>(m)].name);
+      // A torque that is held belongs to the middle of its time.
+      const bool is_held = log_.isHeld(column);
+      const VectorXd held = 0.5 * (log_.time.head(K - 1) + log_.time.tail(K - 1));
+      torques.col(m) = getColumn(is_held ? held : log_.time, column, is_held ? K - 1 : K).value;
+    }
+    return torques;
+  }
+  // Of motors whose positions are logged; empty if there is another one.
+  MatrixXd getSigns(const Model& model, const std::vector<Coordinate>& coordinates) const {
+    MatrixXd speeds(log_.time.size(), model.nu());
+    const std::vector<double> rows(log_.time.begin(), log_.time.end());
+    for (int m = 0; m < model.nu(); ++m) {
+      const Motor& motor = model.motors()[static_cast<size_t>(m)];
+      const auto own = std::find_if(coordinates.begin(), coordinates.end(),
+                                    [&motor](const Coordinate& one) { return one.dof == motor.dof; });
+      const int position = log_.find(own->name), speed = log_.find(own->speed);
+      if (position < 0 && speed < 0) return {};
+      speeds.col(m) = speed >= 0 ? VectorXd(log_.values.col(speed))
+                                 : VectorXd(smooth(log_.time, log_.values.col(position), rows, window_).rate);
+      for (double& value : speeds.col(m)) value = calcFrictionSign(model, motor, value);
+    }
+    return smooth(log_.time, speeds, centres_, window_).value;
+  }
+
+ private:
+  Smoothed getColumn(const VectorXd& time, int column, Eigen::Index rows) const {
+    return smooth(time, log_.values.col(column).head(rows), centres_, window_);
+  }
+
+  const MotionLog& log_;
+  double window_;
+  std::vector<double> centres_;
+};
+
+}  // namespace
+
+std::vector<std::string> listTorqueColumns(const Model& model) {
+  std::vector<std::string> columns;
+  for (const Coordinate& coordinate : listCoordinates(model)) {
+    columns.push_back(coordinate.name);
+    columns.push_back(coordinate.speed);
+  }
+  for (const Motor& motor : model.motors()) columns.push_back("u." + motor.name);
+  return columns;
+}
+
+std::vector<LoadNumber> chooseLoads(const Model& model, const std::vector<std::string>& asked) {
+  const std::map<std::string, std::vector<LoadKind>> kinds = {{"masses", {LoadKind::Mass}},
+                                                              {"coms", {LoadKind::Com}},
+                                                              {"armatures", {LoadKind::Armature}},
+                                                              {"frictions", {LoadKind::Damping, LoadKind::Friction}}};
+  const std::vector<LoadNumber> all = listLoads(model);
+  std::vector<LoadNumber> chosen;
+  std::set<std::string> used;
+  for (const LoadNumber& number : all) {
+    bool is_chosen = false;
+    for (const std::string& one : asked) {
+      const auto kind = kinds.find(one);
+      if (kind != kinds.end() ? !contains(kind->second, number.kind)
+                              : !matches(std::vector<std::string>{one}, number.name))
+        continue;
+      is_chosen = true;
+      used.insert(one);
+    }
+    if (is_chosen) chosen.push_back(number);
+  }
+  for (const std::string& one : asked)
+    if (used.count(one) == 0)
+      throw InputError("", "--dynamics " + one, "the robot has no such number",
+                       "there are: " + listKeys(kinds) + ", " + listItems(getNames(all)));
+  return chosen;
+}
+
+void requireTorques(const Model& model, ConstVectorRef q, const IdentifyChoice& choice, const MotionLog& log) {
+  makeTask(model, q, choice, log);
+}
+
+IdentifiedLoads identifyLoads(const Model& model, ConstVectorRef q, const IdentifyChoice& choice,
+                              const TorqueChoice& torques, const MotionLog& log,
+                              const std::map<std::string, double>& offsets, const EstimateOptions& options) {
+  const TorqueTask task = makeTask(model, q, choice, log);
+  const SmoothLog smooth_log(log, torques.window);
+  const std::vector<Coordinate> all = listCoordinates(model);
+  std::map<std::string, std::string> speeds;
+  for (const Coordinate& coordinate : all) speeds[coordinate.name] = coordinate.speed;
+  const auto getMotion = [&](const std::string& name) {
+    const auto offset = offsets.find(name);
+    return smooth_log.getMotion(name, speeds.at(name), offset == offsets.end() ? 0 : offset->second);
+  };
+  std::vector<MeasuredLinkage> linkages;
+  for (size_t l = 0; l < task.linkages.size(); ++l) {
+    MeasuredLinkage linkage{task.linkages[l].cluster, task.sensors[l], task.linkages[l].q, {}};
+    const auto count = static_cast<Eigen::Index>(linkage.sensors.size());
+    for (MatrixXd* x : {&linkage.motion.value, &linkage.motion.rate, &linkage.motion.acceleration})
+      x->resize(smooth_log.size(), count);
+    for (Eigen::Index s = 0; s < count; ++s) {
+      const Smoothed motion = getMotion(linkage.sensors[static_cast<size_t>(s)].name);
+      linkage.motion.value.col(s) = motion.value;
+      linkage.motion.rate.col(s) = motion.rate;
+      linkage.motion.acceleration.col(s) = motion.acceleration;
+    }
+    linkages.push_back(std::move(linkage));
+  }
+  std::vector<MeasuredCoordinate> coordinates;
+  for (const Coordinate& coordinate : task.coordinates)
+    coordinates.push_back({coordinate.position, coordinate.dof, getMotion(coordinate.name)});
+  const LoadedMotion motion = findLoadedStates(model, q, linkages, coordinates, smooth_log.getTorques(model),
+                                               smooth_log.getSigns(model, all), isInterrupted());
+  IdentifiedLoads out;
+  out.numbers = chooseLoads(model, torques.dynamics);
+  out.instants = static_cast<int>(motion.states.size());
+  out.left_out = static_cast<int>(smooth_log.size()) - out.instants;
+  out.window = smooth_log.window();
+  if (isInterrupted()) return out;
+  if (2 * out.instants < smooth_log.size() || out.instants < 2)
+    throw InputError(log.path, log.rows.front(),
+                     "only at " + std::to_string(out.instants) + " of " + std::to_string(smooth_log.size()) +
+                         " instants, half a window of " + formatNumber(out.window, "%.3g") +
+                         " s apart, the linkages have a configuration near what was measured",
+                     smooth_log.size() < 4 ? "give a longer log, or a shorter --window"
+                                           : "check units (rad, m), signs and zeros, and take a shorter --window");
+  const TorqueFit fit(model, out.numbers, motion.states, motion.groups);
+  out.estimate = estimate(makeProblem(fit), options);
+  return out;
+}
+
+}  // namespace bielle::cli
