@@ -219,6 +219,45 @@ class IdentifyTorques(unittest.TestCase):
         self.assertGreater(wrong, 0.1)
         self.assertLess(right, 0.1 * wrong)
 
+    def test_motion(self):
+        """The motion that shows most: within limits, one that the robot carries out, and with more to tell than another."""
+        draw("drawn")
+        draw("built", TRUTH)
+        run("identify", "drawn", *ALL, "--motion", "5", "--window", "0.05", "-o", "motion")
+        read = lambda path: np.genfromtxt(path, delimiter=",", names=True, deletechars="")
+        plan = read("motion/motion.csv")
+        self.assertLess(np.max(abs(plan["v.crank_joint"])), 20)
+        self.assertLess(np.max(abs(plan["u.crank_joint"])), 10)
+        # It moves as the closed form says, and returns.
+        _, end = place_fourbar(plan["crank_joint"])
+        self.assertLess(np.max(abs(np.exp(1j * plan["rocker_joint"]) - (end - GROUND) / ROCKER)), 1e-6)
+        self.assertAlmostEqual(plan["crank_joint"][0], plan["crank_joint"][-1], delta=1e-6)
+        self.assertLess(np.max(abs(np.gradient(plan["crank_joint"], 1e-3)[1:-1] - plan["v.crank_joint"][1:-1])), 1e-3)
+        power = np.sum(plan["u.crank_joint"] * plan["v.crank_joint"]) * 1e-3  # of a period: what friction takes
+        lost = np.sum(calc_loss_torque(plan["v.crank_joint"], DRAWN) * plan["v.crank_joint"]) * 1e-3
+        self.assertAlmostEqual(power, lost, delta=1e-3 * lost)
+        run("simulate", "drawn", "--state", "motion/start.json", "--torques", "motion/torques.yaml", "--duration", "1",
+            "--record-period", "0.001", "--no-report", "-o", "carried")
+        carried = read("carried/trajectory.csv")["q.crank_joint"]
+        self.assertLess(np.max(abs(carried - plan["crank_joint"][:len(carried)])), 0.02)
+        # Of the robot that was built, with noise, beside a motion that somebody made up.
+        run("simulate", "built", "--state", "motion/start.json", "--torques", "motion/torques.yaml", "--duration", "5",
+            "--record-period", "0.001", "--no-report", "-o", "real")
+        real, random = read("real/trajectory.csv")[:-1], np.random.default_rng(3)
+        columns = {"time": real["time"], **{name: real["q." + name] + 1e-4 * random.standard_normal(len(real))
+                                            for name in ("crank_joint", "rocker_joint")},
+                   "u.crank_joint": real["u.crank_joint"] + 0.01 * random.standard_normal(len(real))}
+        np.savetxt("log.csv", np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="", fmt="%.9f")
+        most, _ = identify("drawn", "log.csv", "--window", "0.05", *ALL)
+        measure("other.csv", TRUTH, rows=5000)
+        other, _ = identify("drawn", "other.csv", "--window", "0.05", *ALL)
+        for name, one in take(other).items():
+            own = take(most)[name]
+            self.assertLess(own["deviation"], one["deviation"], name)
+            self.assertLess(abs(own["after"] - TRUTH[name]), 4 * own["deviation"], name)
+        done = run("identify", "drawn", "--motion", "5", "-o", "none", status=2)
+        self.assertIn("--motion: it needs --dynamics and -o, and no LOG", done.stderr)
+
     def test_bad_input(self):
         draw("drawn")
         measure("log.csv", DRAWN, rows=300)

@@ -13,6 +13,7 @@
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
+#include "cli/identify_motion.h"
 #include "cli/identify_report.h"
 #include "cli/table.h"
 #include "formats/text_file.h"
@@ -33,6 +34,7 @@ struct IdentifyArguments {
   std::string log, directory;
   IdentifyChoice choice;
   TorqueChoice torques;
+  double motion = 0;  // s, of the one that shows most; 0: none
   int every = 1, iterations = 50;
   bool json = false;
 };
@@ -205,6 +207,16 @@ int run(const IdentifyArguments& arguments) {
   const VectorXd q = findClosedConfiguration(robot.model).q;
   const bool has_dynamics = !arguments.torques.dynamics.empty();
   const std::vector<LoadNumber> loads = chooseLoads(robot.model, arguments.torques.dynamics);
+  if (arguments.motion > 0) {
+    if (!has_dynamics || !arguments.log.empty() || arguments.directory.empty())
+      throw InputError("", "--motion", "it needs --dynamics and -o, and no LOG",
+                       "e.g. bielle identify fourbar --dynamics masses --motion 10 -o motion");
+    return findMotion(robot.model, q, arguments.choice, loads, arguments.motion, arguments.torques.window,
+                      arguments.iterations, arguments.robot.name, arguments.directory);
+  }
+  if (arguments.log.empty() != arguments.directory.empty())
+    throw InputError("", arguments.log.empty() ? "-o" : "LOG", "LOG and --output need each other",
+                     "give both, or none");
   std::vector<LinkageTask> tasks;
   if (!has_dynamics || !robot.model.closures().empty()) tasks = listTasks(robot.model, q, arguments.choice);
   if (arguments.log.empty()) return list(robot.model, tasks, loads);
@@ -273,16 +285,12 @@ void addIdentify(CLI::App& command, Action& action) {
   const auto arguments = std::make_shared<IdentifyArguments>();
   IdentifyChoice& choice = arguments->choice;
   addRobot(command, arguments->robot);
-  CLI::Option* log =
-      command.add_option("LOG", arguments->log,
-                         ".csv or .npz with the columns time [s] and positions of motors and joints by name [rad, m], "
-                         "also a trajectory of "
-                         "`bielle simulate`; without it, the columns and numbers of each linkage are listed");
-  CLI::Option* output =
-      command.add_option("-o,--output", arguments->directory,
-                         "directory for the robot with what was found, identified.json and report.html");
-  log->needs(output);
-  output->needs(log);
+  command.add_option("LOG", arguments->log,
+                     ".csv or .npz with the columns time [s] and positions of motors and joints by name [rad, m], "
+                     "also a trajectory of "
+                     "`bielle simulate`; without it, the columns and numbers of each linkage are listed");
+  command.add_option("-o,--output", arguments->directory,
+                     "directory for the robot with what was found, identified.json and report.html");
   const auto addList = [&command](const char* name, std::vector<std::string>& list, const char* help) {
     command.add_option(name, list, help)->allow_extra_args(false);
   };
@@ -305,10 +313,16 @@ void addIdentify(CLI::App& command, Action& action) {
                   "of the polynomials that smooth positions for --dynamics, their degree being 4 [s]")
       ->capture_default_str()
       ->check(CLI::Range(1e-4, 10.0));
+  command
+      .add_option(
+          "--motion", arguments->motion,
+          "without LOG: the motion of this duration that shows most of what --dynamics names, within the limits of the "
+          "motors [s]")
+      ->check(CLI::Range(0.1, 600.0));
   command.add_option("--every", arguments->every, "only every n-th row, but for --dynamics")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
-  command.add_option("--iterations", arguments->iterations, "at most, for each linkage")
+  command.add_option("--iterations", arguments->iterations, "at most, for each linkage, the torques and --motion")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
   command.add_flag("--json", arguments->json, "print JSON");
@@ -332,6 +346,7 @@ void addIdentify(CLI::App& command, Action& action) {
       "  bielle identify fourbar log.csv -o found\n"
       "  bielle identify fourbar log.csv --free rods --free crank --no-offset crank_joint -o found\n"
       "  bielle identify fourbar log.csv --dynamics masses --dynamics frictions -o found\n"
+      "  bielle identify fourbar --dynamics masses --dynamics frictions --motion 10 -o motion\n"
       "  bielle identify bipetto log.npz --joint knee_left --noise '*=5e-5' --noise knee_left=2e-4 -o found");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
 }

@@ -84,8 +84,8 @@ double calcFrictionSign(const Model& model, const Motor& motor, double speed) {
 }
 
 TorqueFit::TorqueFit(const Model& model, std::vector<LoadNumber> numbers, const std::vector<LoadedState>& states,
-                     const std::vector<int>& groups)
-    : numbers_(std::move(numbers)) {
+                     const std::vector<int>& groups, VectorXd weights)
+    : numbers_(std::move(numbers)), weights_(std::move(weights)) {
   for (const LoadNumber& number : numbers_)
     for (const int body : number.bodies)
       if (!contains(bodies_, body)) bodies_.push_back(body);
@@ -96,7 +96,9 @@ TorqueFit::TorqueFit(const Model& model, std::vector<LoadNumber> numbers, const 
 
   Workspace ws(model);
   const Eigen::Index size = states.empty() ? 0 : states.front().N.cols();
-  VectorXd squares = VectorXd::Zero(size), weights = VectorXd::Zero(size);
+  const bool is_weighted = weights_.size() > 0;
+  VectorXd squares = VectorXd::Zero(size);
+  if (!is_weighted) weights_ = VectorXd::Zero(size);
   const auto update = [&](const LoadedState& state) {
     updatePositions(model, ws, state.q);
     updateVelocities<double>(model, ws, state.v);
@@ -108,13 +110,14 @@ TorqueFit::TorqueFit(const Model& model, std::vector<LoadNumber> numbers, const 
     }
   };
   for (const LoadedState& state : states) {
+    if (is_weighted) break;
     update(state);
     squares += (state.N.transpose() * ws.b).cwiseAbs2();
   }
   for (Eigen::Index first = 0, g = 0; g < static_cast<Eigen::Index>(groups.size()); first += groups[g++]) {
     const Eigen::Index count = groups[static_cast<size_t>(g)];
     const double mean = squares.segment(first, count).sum() / static_cast<double>(count * states.size());
-    if (mean > 0) weights.segment(first, count).setConstant(1 / (kTorqueNoise * std::sqrt(mean)));
+    if (mean > 0 && !is_weighted) weights_.segment(first, count).setConstant(1 / (kTorqueNoise * std::sqrt(mean)));
   }
   factor_.resize(columns + 1 + kBlock + size, columns + 1);
   MatrixXd rows(size, columns + 1);
@@ -128,8 +131,8 @@ TorqueFit::TorqueFit(const Model& model, std::vector<LoadNumber> numbers, const 
       rows.col(columns_[i]) = calcMotorPart(model, numbers_[i], state) * state.N.row(motor.dof).transpose();
     }
     rows.col(columns) = state.N.transpose() * (ws.b - calcMotorForces(model, state.u));
-    addRows(weights.asDiagonal() * rows);
-    rows_ += (weights.array() > 0).count();
+    addRows(weights_.asDiagonal() * rows);
+    rows_ += (weights_.array() > 0).count();
   }
   compress();
 }

@@ -38,15 +38,17 @@ struct LoadedState {
 
 class TorqueFit {
  public:
-  /// \param groups  number of reduced coordinates of each reduced joint, in their order in N
+  /// \param groups   number of reduced coordinates of each reduced joint, in their order in N
+  /// \param weights  of the rows, as weights() of another motion; empty: by the states
   TorqueFit(const Model& model, std::vector<LoadNumber> numbers, const std::vector<LoadedState>& states,
-            const std::vector<int>& groups);
+            const std::vector<int>& groups, VectorXd weights = {});
 
   const std::vector<LoadNumber>& numbers() const { return numbers_; }
   long numRows() const { return rows_; }  ///< of Eq. (1)
   /// Scales of the numbers: kShareOfMass of a mass, the radius of gyration of its body for a centre of mass; of armature, damping
   /// and friction as much as alone would take all of the motor's torque, in the root mean square.
   const VectorXd& scales() const { return scales_; }
+  const VectorXd& weights() const { return weights_; }  ///< per reduced coordinate, 1 / (N m or N)
 
   /// e over the noise that is assumed, up to a rotation of all rows, for changes x of the numbers; and its derivative, if asked for.
   /// False for a mass that is not positive.
@@ -64,7 +66,7 @@ class TorqueFit {
   std::vector<Inertia> inertias_;  // theirs, as given
   std::vector<int>
       columns_;  // per number without bodies, its column of the factor; those of bodies come first, ten each
-  VectorXd scales_;
+  VectorXd scales_, weights_;
   MatrixXd factor_;  // of which used_ rows are in use, x (columns, e)
   Eigen::Index used_ = 0;
   long rows_ = 0;
