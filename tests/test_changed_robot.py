@@ -85,6 +85,12 @@ def main():
         # A comment changes no mechanism.
         write("# A robot\n" + original[0], place, "robot", "bipetto.yaml")
         assert "has changed" not in run("check", "squat", where=place).stderr
+        # Nor does rounding, by which linkages that were mended differ from program to program.
+        end = original[1].index('"', mass)
+        for factor, is_other in ((1 + 1e-11, False), (1 + 1e-7, True)):
+            number = repr(float(original[1][mass:end]) * factor)
+            write(original[1][:mass] + number + original[1][end:], place, "robot", "bipetto.urdf")
+            assert ("has changed" in run("check", "squat", where=place).stderr) == is_other, number
         for name, text in (("bipetto.urdf", heavier), ("bipetto.urdf", "<robot"), ("bipetto.yaml", original[0] + "gravity: [0, 0, -1.62]\n")):
             write(original[0], place, "robot", "bipetto.yaml")
             write(original[1], place, "robot", "bipetto.urdf")

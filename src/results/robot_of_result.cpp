@@ -65,15 +65,17 @@ RobotText readAndFormat(const RobotText& text, const std::string& path) {
   return text.urdf.empty() ? text : formatIfPossible(combineFiles(parseRobotText(text, path), {}, nullptr));
 }
 
-// Whether two lines are the same but for the rounding of their numbers.
+// Whether two lines are the same but for the rounding of their numbers. Linkages that were mended (rounded_linkages.h) differ by
+// some 1e-11 from program to program, as what the compiler made of each.
 bool isSame(const std::string& x, const std::string& y) {
+  constexpr double kRounding = 1e-9;
   const char *a = x.data(), *b = y.data(), *a_end = a + x.size(), *b_end = b + y.size();
   while (a < a_end && b < b_end) {
     double first = 0, second = 0;
     const auto [a_next, a_error] = std::from_chars(a, a_end, first);
     const auto [b_next, b_error] = std::from_chars(b, b_end, second);
     const bool are_numbers = a_error == std::errc() && b_error == std::errc();
-    if (are_numbers ? std::abs(first - second) > 1e-12 * std::max(1.0, std::abs(first)) : *a != *b) return false;
+    if (are_numbers ? std::abs(first - second) > kRounding * std::max(1.0, std::abs(first)) : *a != *b) return false;
     a = are_numbers ? a_next : a + 1;
     b = are_numbers ? b_next : b + 1;
   }
@@ -150,9 +152,8 @@ RobotText readOwn(const std::string& directory, const RobotEntry& entry) {
 
 // Of two robots as they are read; empty if they are the same.
 std::string describeChange(const RobotText& now, const RobotText& then) {
-  if (calcFingerprint(now) == calcFingerprint(then)) return "";
-  const bool same_tree = now.urdf == then.urdf;
-  return describeDifference(same_tree ? now.yaml : now.urdf, same_tree ? then.yaml : then.urdf);
+  const std::string tree = describeDifference(now.urdf, then.urdf);
+  return tree.empty() ? describeDifference(now.yaml, then.yaml) : tree;
 }
 
 }  // namespace
@@ -180,8 +181,8 @@ LoadedRobot loadRobotOf(const std::string& directory) {
   LoadedRobot robot = loadOwn(mechanism, readOwn(directory, entry), entry.path);
   if (!isFile(entry.path)) return robot;
   const RobotText then = formatIfPossible(robot.model), read = readAndFormat(now, robot.file);
-  if (current && calcFingerprint(read) == calcFingerprint(then)) return *current;
   const std::string difference = !current ? ", and cannot be read" : describeChange(read, then);
+  if (difference.empty()) return *current;
   const std::string again = entry.command.empty() ? "" : ": `" + describeCommand(entry.command) + "`";
   robot.warnings.push_back(entry.path + ": the robot has changed since the motion in " + directory +
                            " was solved for it" + difference + "; what follows is of the robot of that time, " +
