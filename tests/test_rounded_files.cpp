@@ -188,7 +188,7 @@ TEST_CASE("a linkage is as it is written with all digits, or where rounding is 0
   CHECK(countWarnings(driven, directory.path() + "/driven.yaml: closure ") == 1);
   directory.write("robot.yaml", makeYaml("3d", "rounding: 1\n"));
   CHECK_THAT(getError([&] { loadRobot(directory.path()); }),
-             Catch::Contains("rounding") && Catch::Contains("0 .. 1e-3"));
+             Catch::Contains("rounding") && Catch::Contains("0 .. 3e-3"));
 }
 
 TEST_CASE("a right angle of five digits beside angles that have all of theirs") {
@@ -316,6 +316,7 @@ TEST_CASE("loops that lengths lock are not said to have axes that do") {
   const nlohmann::json mobility = nlohmann::json::parse(makeRobotInfo(robot))["mobility"];
   CHECK(mobility["mobility"] == 0);
   CHECK(mobility["locked"] == 1);
+  CHECK(mobility["rank"] == robot.model.nv());
   // What the warning says to give if it was meant to move.
   const std::string told = *std::find_if(robot.warnings.begin(), robot.warnings.end(), [](const std::string& warning) {
     return warning.find("`rounding: ") != std::string::npos;
@@ -371,4 +372,39 @@ TEST_CASE("left and right linkages that are mirror images stay so") {
       }
     }
   }
+}
+
+TEST_CASE("linkages of three and four decimals move, or are told with the rounding with which they do") {
+  // Whether the first joint turns, and the others with it.
+  const auto moves = [](const Model& model) {
+    AssemblyProblem problem;
+    problem.q_ref = model.makeNeutral();
+    problem.q_ref[0] = 0.05;
+    problem.weights = VectorXd::Constant(model.nv(), 1e-4);
+    problem.weights[0] = 1;
+    const AssemblyResult turned = assemble(model, problem);
+    return turned.status == NumericalStatus::Ok && std::abs(turned.q[0] - 0.05) < 0.005;
+  };
+  std::mt19937 rng(13);
+  int told = 0;
+  for (const Family family : kFamilies)
+    for (const int decimals : {3, 4, 3, 4}) {
+      const RobotDirectory directory;
+      const std::string more = R"(<actuator><motor joint="hinge1"/></actuator>)";
+      const LoadedRobot robot =
+          loadRobot(directory.write("net.xml", makeMjcf(makeHingeNet(family, rng), decimals, 0.1, false, more)));
+      if (moves(robot.model)) continue;
+      ++told;
+      const auto warning = std::find_if(robot.warnings.begin(), robot.warnings.end(), [](const std::string& text) {
+        return text.find("`rounding: ") != std::string::npos;
+      });
+      CAPTURE(getName(family), decimals, robot.warnings);
+      REQUIRE(warning != robot.warnings.end());
+      const size_t begin = warning->find("`rounding: ") + 1;
+      const LoadedRobot meant = loadRobot(directory.write(
+          "meant.yaml", "model: net.xml\n" + warning->substr(begin, warning->find('`', begin) - begin) + "\n"));
+      CAPTURE(meant.warnings);
+      CHECK(moves(meant.model));
+    }
+  CHECK(told > 0);
 }

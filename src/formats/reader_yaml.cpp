@@ -375,8 +375,8 @@ void readRoot(const Entry& root, YamlFile& file) {
   readSharedKeys(fields, file);
   if (const Entry* entry = find(fields, "rounding")) {
     file.rounding = entry->getNumber();
-    if (!(*file.rounding >= 0 && *file.rounding <= kMostAngleRounding))
-      entry->fail("it is not within 0 .. 1e-3",
+    if (!(*file.rounding >= 0 && *file.rounding <= kMostGivenRounding))
+      entry->fail("it is not within 0 .. 3e-3",
                   "give by how much angles (rad) and lengths (m) are rounded; 0: not at all");
   }
   if (const Entry* entry = find(fields, "frames")) readFrames(*entry, file);

@@ -59,16 +59,17 @@ void warnOfRounding(const RoundedLinkages& linkages, const std::string& path, co
            listItems(motors) + "): ";
   };
   for (const RoundedLinkage& linkage : linkages.locked) {
-    if (linkage.written < 0 && linkage.axes.empty()) continue;  // the error that follows says what would close it
     const std::string apart = linkage.axes.empty()
                                   ? "placements of " + listJoints(model, linkage) + " do not fit"
                                   : "axes of " + linkage.axes[0] + " and " + linkage.axes[1] + " are " +
                                         formatNumber(linkage.apart, "%.2g") + " rad from parallel";
-    warnings.push_back(
-        describe(path, linkage) + apart + ", more than its numbers are rounded; with placements that differ by " +
-        describeChange(linkage) + " at most, mobility would be " + std::to_string(linkage.meant) +
-        ": correct them, or give `rounding: " + formatNumber(std::max(linkage.angle, linkage.length), "%.1e") +
-        "` in the robot's YAML file if they were meant to fit");
+    // A placement may change by more than its numbers are off, so that the most that may be given does where more is needed.
+    const double needed = std::min(std::max(linkage.angle, linkage.length), kMostGivenRounding);
+    warnings.push_back(describe(path, linkage) + apart +
+                       ", more than its numbers are rounded; with placements that differ by " +
+                       describeChange(linkage) + " at most, mobility would be " + std::to_string(linkage.meant) +
+                       ": correct them, or give `rounding: " + formatNumber(needed, "%.1e") +
+                       "` in the robot's YAML file if they were meant to fit");
   }
   for (const RoundedLinkage& linkage : linkages.short_of_freedoms)
     warnings.push_back(

@@ -192,7 +192,7 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
           {"closed", closed},
           {"singular", regular.rank > mobility.rank},
           {"rows", regular.rows},
-          {"rank", regular.rank},
+          {"rank", regular.rank + locked},
           {"mobility", regular.mobility - locked},
           {"locked", locked},
           {"idle_spins", closed && regular.mobility > 0 ? countIdleSpins(model, q) : 0}};
