@@ -5,6 +5,7 @@
 #include <chrono>
 #include <limits>
 
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
@@ -141,6 +142,52 @@ TEST_CASE("feasibility: joints too slow for the planned postures are named") {
   slow.limits.velocities = {{"hipy_left", 0.05}};
   CHECK_THAT(listDoubts(makeWalk(getRsuBiped(), {}, slow)),
              Catch::Contains("joint 'hipy_left' may be too slow") && Catch::Contains("its limit is 0.05 rad/s"));
+}
+
+TEST_CASE("feasibility: a robot without motors is refused") {
+  const Model limp = changeModel(getRsuBiped(), [](ModelParts& parts) { parts.motors.clear(); });
+  CHECK_THAT(getError([&] { listDoubts(makeSquat(limp, {})); }),
+             Catch::Contains("motors: the robot has none") && Catch::Contains("under `motors`"));
+}
+
+TEST_CASE(
+    "feasibility: friction and dampers that are stiff for the steps are told, and the squat converges with what is "
+    "said") {
+  ModelParts parts = takeParts(getRsuBiped());
+  for (const char* name : {"hipy_left", "hipy_right", "knee_left", "knee_right"}) {
+    JointForce force;
+    force.friction = 4;
+    force.joint = getRsuBiped().findJoint(name);
+    force.idx_q = parts.joints[force.joint].idx_q, force.dof = parts.joints[force.joint].idx_v;
+    parts.joint_forces.push_back(force);
+  }
+  const Model stiff = ModelBuilder::restore(parts);
+  SquatOptions squat;
+  squat.depth = 0.85;
+  const std::string doubts = listDoubts(makeSquat(stiff, squat));
+  CHECK_THAT(doubts,
+             Catch::Contains("steps of 15 ms are too long for the friction of") && Catch::Contains("knee_left"));
+  // With the entries that it names in the robot's file.
+  const size_t begin = doubts.find("`joint_forces: ") + 1;
+  RobotText text = formatRobot(stiff);
+  const size_t section = text.yaml.find("joint_forces:");
+  text.yaml.erase(section, text.yaml.find("\n\n", section) - section);
+  const RobotDirectory directory;
+  const Model smooth =
+      loadRobot(
+          directory.writeRobot(text.urdf, text.yaml + doubts.substr(begin, doubts.find('`', begin) - begin) + "\n"))
+          .model;
+  REQUIRE(smooth.jointForces().size() == 4);
+  const Motion motion = makeSquat(smooth, squat);
+  CHECK(listDoubts(motion) == "");
+  CHECK(solveQuietly(motion).converged());
+
+  for (JointForce& force : parts.joint_forces) force.friction = 0, force.damping = 40;
+  const Model damped = ModelBuilder::restore(parts);
+  const std::string told = listDoubts(makeSquat(damped, squat));
+  CHECK_THAT(told, Catch::Contains("steps of 15 ms are too long for the damper of joint '"));
+  squat.time_step = std::stod(told.substr(told.find("time_step=") + 10));
+  CHECK(listDoubts(makeSquat(damped, squat)) == "");
 }
 
 TEST_CASE("feasibility: a start that cannot be evaluated is named by node and coordinate") {

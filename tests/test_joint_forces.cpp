@@ -1,5 +1,7 @@
 // Springs, dampers and friction on joints, springs and dampers between points. Oracles: an oscillator in closed form, central
 // differences, power.
+#include <Eigen/Eigenvalues>
+
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
@@ -7,6 +9,7 @@
 #include "bielle/dynamics/variation.h"
 #include "check_derivative.h"
 #include "dynamics/reduction.h"
+#include "dynamics/smooth_friction.h"
 #include "get_error.h"
 #include "selection.h"
 
@@ -215,4 +218,54 @@ TEST_CASE("joint forces: the energy falls by what dampers and friction take") {
   }
   REQUIRE(power < -0.1);
   CHECK(differentiate(VectorXd::Zero(1), 1e-3, energy)(0, 0) == Approx(power).epsilon(1e-7));
+}
+
+TEST_CASE(
+    "joint forces: friction near rest decays as fast as its damper on the inertia, and steps follow the speeds that "
+    "are found") {
+  // Two slides in line, one on the other.
+  const auto make = [](const std::vector<double>& speeds) {
+    ModelBuilder builder("slides");
+    Joint slide = makeSlide();
+    builder.addLink("first", "world", slide, {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    slide.name = "other";
+    builder.addLink("second", "first", slide, {0.5, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    JointForce force;
+    force.damping = 4, force.friction = 5, force.friction_speed = speeds[0];
+    builder.addJointForce("slide", force);
+    force.damping = 0.1, force.friction = 3, force.friction_speed = speeds[1];
+    builder.addJointForce("other", force);
+    builder.setGravity(Vector3d::Zero());
+    return builder.build();
+  };
+  const Eigen::Matrix2d M = (Eigen::Matrix2d() << 2.5, 0.5, 0.5, 0.5).finished();
+  const auto calcRate = [&](double d1, double d2) {
+    const Eigen::Matrix2d D = Eigen::Vector2d(d1, d2).asDiagonal();
+    return Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d>(D, M).eigenvalues().maxCoeff();
+  };
+  constexpr double h = 0.02;
+  const std::vector<double> given = {0.02, 0.01};
+  const Model model = make(given);
+  const SmoothFriction found = calcSmoothFriction(model, makeConstraintSet(model), VectorXd::Zero(2), h);
+  CHECK(found.rate == Approx(calcRate(4 + 5 / given[0], 0.1 + 3 / given[1])));
+  CHECK(found.damped == Approx(calcRate(4, 0.1)));
+  CHECK(model.joints()[found.joint].name == "slide");
+  REQUIRE(found.raised.size() == 2);
+  const std::vector<double> speeds = {found.raised[0].friction_speed, found.raised[1].friction_speed};
+  CHECK(calcRate(5 / speeds[0], 3 / speeds[1]) * h <= 1);
+  CHECK(calcRate(5 / speeds[0], 3 / speeds[1]) * h > 0.6);  // no larger than need be
+  const Model smooth = make(speeds);
+  CHECK(calcSmoothFriction(smooth, makeConstraintSet(smooth), VectorXd::Zero(2), h).raised.empty());
+  // Midpoint steps from next to rest: they come to rest, or never do.
+  const auto calcSpeed = [&](const Model& slides) {
+    Workspace ws(slides);
+    const auto calcAcceleration = [&](const VectorXd& v) {
+      return VectorXd(-M.inverse() * calcInverseDynamics(slides, ws, VectorXd::Zero(2), v, VectorXd::Zero(2)));
+    };
+    VectorXd v = Eigen::Vector2d(1e-4, -1e-4);
+    for (int i = 0; i < 100; ++i) v += h * calcAcceleration(v + 0.5 * h * calcAcceleration(v));
+    return v.norm();
+  };
+  CHECK(calcSpeed(smooth) < 1e-8);
+  CHECK(calcSpeed(model) > 1e-3);
 }

@@ -27,6 +27,19 @@ std::string findFrameName(const Model& model, int body, const SE3& X_BF, const s
   return made;
 }
 
+std::vector<std::pair<const char*, std::string>> getJointForceData(const JointForce& force) {
+  std::vector<std::pair<const char*, std::string>> data = {{"stiffness", formatExact(force.stiffness)}};
+  const auto add = [&data](const char* key, double value) {
+    if (value != 0) data.emplace_back(key, formatExact(value));
+  };
+  add("rest", force.rest);
+  add("preload", force.preload);
+  add("damping", force.damping);
+  add("friction", force.friction);
+  if (force.friction != 0) add("friction_speed", force.friction_speed);
+  return data;
+}
+
 void refuseToWrite(const Model& model, const std::string& element, const std::string& problem) {
   throw InputError(model.name(), element, problem + ", which its files cannot express", "change the model");
 }

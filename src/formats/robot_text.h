@@ -1,6 +1,7 @@
 #pragma once
 /// \file Numbers, and names for what has none, in the files that a robot is written as.
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bielle/model/model.h"
@@ -16,6 +17,9 @@ bool hasImpliedFreeFlyer(const Model& model);
 
 /// A frame of the model at this place; if there is none, `made`.
 std::string findFrameName(const Model& model, int body, const SE3& X_BF, const std::string& made);
+
+/// Keys and numbers of an entry of `joint_forces`: the stiffness, and what is not zero.
+std::vector<std::pair<const char*, std::string>> getJointForceData(const JointForce& force);
 
 /// Frames, visuals or shapes of a model by their bodies, in their order.
 template <typename Part>

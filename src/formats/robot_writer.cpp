@@ -154,12 +154,7 @@ class YamlWriter {
     writeMap("joint_forces", "N m, rad, s; N, m, s where prismatic", model_.jointForces(),
              [this](const JointForce& force) {
                out_ << Key << model_.joints()[force.joint].name << Value << Flow << BeginMap;
-               add("stiffness", force.stiffness);
-               addUnless(0, "rest", force.rest);
-               addUnless(0, "preload", force.preload);
-               addUnless(0, "damping", force.damping);
-               addUnless(0, "friction", force.friction);
-               if (force.friction != 0) add("friction_speed", force.friction_speed);
+               for (const auto& [key, value] : getJointForceData(force)) add(key, value);
                out_ << EndMap;
              });
   }

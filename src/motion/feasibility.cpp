@@ -5,11 +5,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/footsteps.h"
+#include "dynamics/smooth_friction.h"
+#include "formats/robot_text.h"
 #include "math/constants.h"
 #include "math/so3.h"
 #include "model/number_text.h"
@@ -70,6 +73,9 @@ class FeasibilityCheck {
   void check(const StartingPoint* given) {
     checkTrajectory(given ? given->trajectory : motion_.guess, given ? "start" : "guess");
     requireSolesApart(model_, start_.phase->contacts);
+    if (model_.nu() == 0 && model_.hasFreeFlyer())
+      throw InputError(model_.name(), "motors", "the robot has none, so nothing holds it on its feet",
+                       "name the joints that motors drive under `motors` in its YAML file");
     checkHeights();
     if (!motion_.cycle) checkStartingMotors();  // a cycle starts in motion
     if (!warn_) return;
@@ -78,6 +84,7 @@ class FeasibilityCheck {
     doubtSlopes();
     doubtTurns();
     doubtSpeed();
+    doubtDampers();
     doubtPostures();
     if (given) doubtLoops(given->trajectory);
   }
@@ -368,6 +375,50 @@ class FeasibilityCheck {
                  formatNumber(std::sqrt(gravity_ * length), "%.2g") + " m/s",
              "request a lower speed, or a run");
     }
+  }
+
+  // Whether steps can follow friction and dampers of joints near rest, with the feet of every phase.
+  void doubtDampers() const {
+    constexpr double kBorne = 2;  // rate times step
+    std::set<std::vector<int>> seen;
+    std::map<int, JointForce> raised;  // by joint
+    SmoothFriction fastest;
+    double step = 0;  // s
+    int node = 0;
+    for (const ContactPhase& phase : motion_.schedule.phases) {
+      std::vector<int> feet;
+      for (const ContactTarget& target : phase.contacts) feet.push_back(target.contact);
+      if (phase.dt > 0 && !model_.jointForces().empty() && seen.insert(feet).second) {
+        const SmoothFriction found =
+            calcSmoothFriction(model_, problem_.spec(node).constraints, getPosture(node), phase.dt);
+        if (found.rate * phase.dt > std::max(kBorne, fastest.rate * step)) fastest = found, step = phase.dt;
+        for (const JointForce& force : found.raised)
+          if (const auto at = raised.try_emplace(force.joint, force).first;
+              force.friction_speed > at->second.friction_speed)
+            at->second = force;
+      }
+      node += phase.nodes;
+    }
+    if (step == 0) return;
+    const std::string steps = formatNumber(1e3 * step, "%.3g") + " ms",
+                      borne = ", steps bear " + formatNumber(kBorne / step, "%.2g");
+    if (const double rate = raised.empty() ? fastest.rate : fastest.damped; rate * step > kBorne)
+      return tell("steps of " + steps + " are too long for the damper of " +
+                      quote("joint", model_.joints()[static_cast<size_t>(fastest.joint)].name) +
+                      ": motions near rest decay at " + formatNumber(rate, "%.2g") + "/s" + borne,
+                  "give shorter ones (--set time_step=" + formatNumber(1 / rate, "%.1g") + ")");
+    std::string names, entries;
+    for (const auto& [joint, force] : raised) {
+      const std::string& name = model_.joints()[static_cast<size_t>(joint)].name;
+      names += (names.empty() ? "" : ", ") + name;
+      entries += (entries.empty() ? "" : ", ") + name + ": {";
+      for (const auto& [key, value] : getJointForceData(force))
+        entries += std::string(key) + ": " + value + (key == std::string("friction_speed") ? "}" : ", ");
+    }
+    tell("steps of " + steps + " are too long for the friction of " + names +
+             ", which acts like a damper below its friction_speed: motions near rest decay at " +
+             formatNumber(fastest.rate, "%.2g") + "/s" + borne,
+         "give larger speeds in the robot's YAML file (`joint_forces: {" + entries + "}`)");
   }
 
   // Motors, joints and legs in the planned postures, of the guess.
