@@ -10,6 +10,7 @@
 #include "bielle/motion/motion.h"
 #include "bielle/results/robot_info.h"
 #include "bielle/robots/robot_loader.h"
+#include "dynamics/smooth_friction.h"
 #include "formats/adopt.h"
 #include "get_error.h"
 #include "math/so3.h"
@@ -336,4 +337,68 @@ TEST_CASE("feet without an upright frame are made on the lowest points of their 
       }
       CHECK(assembleReference(model, "half_sitting").status == NumericalStatus::Ok);
     }
+}
+
+TEST_CASE("friction of an adopted robot is such that steps of motions follow it near rest") {
+  const RobotDirectory directory;
+  const std::string geom = "type='box' size='.1 .04 .01' euler='0 -130 0'";
+  const LoadedRobot bare = loadRobot(directory.write(
+      "bare.xml",
+      "<mujoco><default><joint frictionloss='.3' damping='.05' armature='.002'/></default><worldbody><body "
+      "name='trunk' "
+      "pos='0 0 0.9'><freejoint/><inertial pos='0 0 0' mass='5' diaginertia='.1 .1 .1'/>" +
+          makeBareLeg("left", 0.1, geom) + makeBareLeg("right", -0.1, geom) + "</body></worldbody></mujoco>"));
+  const Adoption adoption = adoptRobot(bare, "../bare.xml");
+  CAPTURE(adoption.yaml);
+  const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+  const VectorXd q = assembleReference(model, "half_sitting").q;
+  const auto listRaised = [&](const Model& robot) {
+    return calcSmoothFriction(robot, makeConstraintSet(robot), q, 0.015).raised;
+  };
+  CHECK(listRaised(bare.model).size() == 8);
+  CHECK(listRaised(model).empty());
+  REQUIRE(model.jointForces().size() == 8);
+  for (const JointForce& force : model.jointForces()) {
+    CHECK(force.friction == 0.3);
+    CHECK(force.damping == 0.05);
+    CHECK(force.friction_speed > 0.01);
+    CHECK(force.friction_speed < 2);
+  }
+}
+
+TEST_CASE("an adopted robot stands on legs that cannot be as they are in the neutral configuration") {
+  // Legs are slides, whose feet are at the hips at zero.
+  const auto makeLeg = [](const std::string& side, const std::string& y) {
+    const auto body = [&side](const std::string& name, const std::string& place, const std::string& joints) {
+      return "<body name='" + name + "_" + side + "' pos='" + place +
+             "'><inertial pos='0 0 0' mass='1' diaginertia='.01 .01 .01'/>" + joints;
+    };
+    const auto joint = [&side](const std::string& name, const std::string& more) {
+      return "<joint name='" + name + "_" + side + "' " + more + "/>";
+    };
+    return body("thigh", "0 " + y + " 0",
+                joint("roll", "axis='1 0 0' range='-.5 .5'") + joint("pitch", "axis='0 1 0' range='-.8 .8'")) +
+           body("shank", "0 0 0", joint("length", "type='slide' axis='0 0 -1' range='.3 .7'")) +
+           body("foot", "0 0 0",
+                joint("ankle_pitch", "axis='0 1 0' range='-.8 .8'") +
+                    joint("ankle_roll", "axis='1 0 0' range='-.5 .5'")) +
+           "<geom type='box' pos='.02 0 -.03' size='.09 .035 .01'/></body></body></body>";
+  };
+  const RobotDirectory directory;
+  const std::string path = directory.write(
+      "biped.xml",
+      "<mujoco><compiler angle='radian'/><worldbody><body name='trunk' pos='0 0 .9'><freejoint/><inertial "
+      "pos='0 0 .2' mass='20' diaginertia='.5 .5 .5'/>" +
+          makeLeg("left", ".1") + makeLeg("right", "-.1") + "</body></worldbody></mujoco>");
+  const Adoption adoption = adoptRobot(loadRobot(path), "../biped.xml");
+  CAPTURE(adoption.yaml);
+  const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+  REQUIRE(model.references().size() == 1);
+  const AssemblyResult posture = assembleReference(model, "half_sitting");
+  REQUIRE(posture.status == NumericalStatus::Ok);
+  for (const char* leg : {"length_left", "length_right"}) {
+    const double length = posture.q[model.joints()[model.findJoint(leg)].idx_q];
+    CHECK(length > 0.3);
+    CHECK(length < 0.7);
+  }
 }

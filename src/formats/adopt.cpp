@@ -11,6 +11,7 @@
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
+#include "dynamics/smooth_friction.h"
 #include "formats/adopt_feet.h"
 #include "formats/robot_text.h"
 #include "math/direction.h"
@@ -50,6 +51,7 @@ class Adopter {
     writeMotors();
     writeContacts();
     writePosture();
+    writeFriction();
     writeSerialJoints();
     if (posture_.size() > 0) tellDeadPoints();
     out_ << EndMap;
@@ -219,6 +221,19 @@ class Adopter {
         reference.joints[joint.name] = {(model_.lowerLimits()[joint.idx_v] + model_.upperLimits()[joint.idx_v]) / 2};
   }
 
+  // Closed, with every joint as near to the middle of its range as loops let it; empty if they do not close.
+  VectorXd bendIntoRanges() const {
+    Reference middle;
+    preferRanges(middle);
+    AssemblyProblem problem;
+    problem.q_ref = q_;
+    problem.weights = VectorXd::Ones(model_.nv());
+    for (const auto& [name, values] : middle.joints)
+      problem.q_ref[model_.joints()[model_.findJoint(name)].idx_q] = values[0];
+    const AssemblyResult result = assemble(model_, problem);
+    return result.status == NumericalStatus::Ok ? result.q : VectorXd();
+  }
+
   // Whether it closes within the ranges of the joints; moves the base so that the centre of mass is over the feet. The base weighs
   // more than other joints that are given; if there are any, all get the values that they have there.
   bool stand(Reference& reference) {
@@ -259,6 +274,15 @@ class Adopter {
         if (within_ranges) preferRanges(r);
         if (stand(r)) return writePosture(r, share, "the neutral configuration");
       }
+    // Legs that cannot be as they are there have another height.
+    Workspace ws(model_);
+    const VectorXd bent = bendIntoRanges();
+    if (bent.size() > 0) updatePositions(model_, ws, bent);
+    for (double share = 1; share > kLowest && bent.size() > 0; share -= kStep) {
+      Reference r = makePosture(ws, share);
+      preferRanges(r);
+      if (stand(r)) return writePosture(r, share, "a configuration in the middle of all ranges");
+    }
     guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
   }
 
@@ -299,6 +323,25 @@ class Adopter {
     for (const auto& [name, place] : r.feet)
       out_ << Key << name << Value << Flow << BeginSeq << "0" << format(place.y()) << "0" << EndSeq;
     out_ << EndMap << EndMap << EndMap;
+  }
+
+  // In the air joints move the least mass, and friction near rest is stiffest.
+  void writeFriction() {
+    constexpr double kStage = 0.015;  // of a squat, the longest of all motions, s
+    const VectorXd& q = posture_.size() > 0 ? posture_ : q_;
+    const std::vector<JointForce> raised = calcSmoothFriction(model_, makeConstraintSet(model_), q, kStage).raised;
+    if (raised.empty()) return;
+    guess(
+        "Friction: below its friction_speed it acts like a damper, which steps of motions have to follow. The speeds "
+        "suit "
+        "steps of 15 ms.");
+    out_ << Key << "joint_forces" << Value << BeginMap;
+    for (const JointForce& force : raised) {
+      out_ << Key << model_.joints()[force.joint].name << Value << Flow << BeginMap;
+      for (const auto& [key, value] : getJointForceData(force)) out_ << Key << key << Value << value;
+      out_ << EndMap;
+    }
+    out_ << EndMap;
   }
 
   void writeSerialJoints() {

@@ -17,9 +17,11 @@ struct Adoption {
 ///   points of shapes; two of them, if one is the mirror image of the other;
 /// - soles: the extent of the shapes of the foot; narrow ones are edges, balls are points; without shapes, 0.1 m square;
 /// - the posture `half_sitting`: feet flat, as far apart as there and two soles at least, the centre of mass over their middle,
-///   the base at the greatest of 94, 90, .. 50 % of its height there that can be assembled within the ranges of the joints;
+///   the base at the greatest of 94, 90, .. 50 % of its height there that can be assembled within the ranges of the joints; else of
+///   that with all joints in the middle of their ranges;
 /// - motors: those of the robot; rotors of 1e-3 kg m^2 where it has none, and no limits where they could not hold its weight
 ///   on a lever of 20 mm;
+/// - friction: speeds below which it is a damper so large that steps of 15 ms follow it (dynamics/smooth_friction.h), in place of 0.01;
 /// - serial joints: those from base to foot, if they are six of one coordinate each. Dead points of their linkages that they can
 ///   reach from the posture are told, and that one lies between it and the neutral configuration.
 /// \param model  value of the key `model`: the path of the robot, as the file will name it
