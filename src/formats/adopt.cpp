@@ -32,8 +32,13 @@ double round(double length) { return std::round(length * 1e4) / 1e4; }
 
 class Adopter {
  public:
-  Adopter(const LoadedRobot& robot, const std::string& path)
-      : model_(robot.model), file_(robot.path()), path_(path), ws_(robot.model) {
+  /// \param is_bent  starts with joints in the middle of their ranges, not from the neutral configuration
+  Adopter(const LoadedRobot& robot, const std::string& path, bool is_bent)
+      : model_(robot.model),
+        file_(robot.path()),
+        path_(path),
+        start_(is_bent ? "a configuration in the middle of all ranges" : "the neutral configuration"),
+        ws_(robot.model) {
     if (!model_.hasFreeFlyer())
       fail("it has a fixed base",
            "only robots that stand on feet can be adopted; complete others by hand, with a YAML file that has the key "
@@ -41,8 +46,10 @@ class Adopter {
     const AssemblyResult closed = findClosedConfiguration(model_);
     if (closed.status != NumericalStatus::Ok) fail("its loops do not close: " + closed.message, "correct the robot");
     q_ = closed.q;
+    if (const VectorXd bent = is_bent ? bendIntoRanges() : VectorXd(); bent.size() > 0) q_ = bent;
     updatePositions(model_, ws_, q_);
   }
+  bool hasPosture() const { return posture_.size() > 0; }
 
   Adoption write() {
     nameFeet();
@@ -225,12 +232,7 @@ class Adopter {
   VectorXd bendIntoRanges() const {
     Reference middle;
     preferRanges(middle);
-    AssemblyProblem problem;
-    problem.q_ref = q_;
-    problem.weights = VectorXd::Ones(model_.nv());
-    for (const auto& [name, values] : middle.joints)
-      problem.q_ref[model_.joints()[model_.findJoint(name)].idx_q] = values[0];
-    const AssemblyResult result = assemble(model_, problem);
+    const AssemblyResult result = assemble(model_, makeReferenceProblem(model_, middle));
     return result.status == NumericalStatus::Ok ? result.q : VectorXd();
   }
 
@@ -272,17 +274,8 @@ class Adopter {
       for (double share = kHighest; share > kLowest; share -= kStep) {
         Reference r = makePosture(ws_, share);
         if (within_ranges) preferRanges(r);
-        if (stand(r)) return writePosture(r, share, "the neutral configuration");
+        if (stand(r)) return writePosture(r, share, start_);
       }
-    // Legs that cannot be as they are there have another height.
-    Workspace ws(model_);
-    const VectorXd bent = bendIntoRanges();
-    if (bent.size() > 0) updatePositions(model_, ws, bent);
-    for (double share = 1; share > kLowest && bent.size() > 0; share -= kStep) {
-      Reference r = makePosture(ws, share);
-      preferRanges(r);
-      if (stand(r)) return writePosture(r, share, "a configuration in the middle of all ranges");
-    }
     guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
   }
 
@@ -418,6 +411,7 @@ class Adopter {
 
   const Model& model_;
   const std::string file_, path_;  // of the robot: as messages name it, and from the new file
+  const std::string start_;        // what q_ is
   VectorXd q_;                     // closed
   VectorXd posture_;               // in which it stands; empty if there is none
   std::vector<std::string> serial_joints_;
@@ -431,6 +425,18 @@ class Adopter {
 
 }  // namespace
 
-Adoption adoptRobot(const LoadedRobot& robot, const std::string& model) { return Adopter(robot, model).write(); }
+// Legs that cannot be as they are in the neutral configuration have their feet elsewhere: those are tried where no posture was found.
+Adoption adoptRobot(const LoadedRobot& robot, const std::string& model) {
+  Adopter neutral(robot, model, false);
+  Adoption adoption = neutral.write();
+  if (neutral.hasPosture()) return adoption;
+  try {
+    Adopter bent(robot, model, true);
+    Adoption other = bent.write();
+    if (bent.hasPosture()) return other;
+  } catch (const InputError&) {  // without feet there
+  }
+  return adoption;
+}
 
 }  // namespace bielle
