@@ -1,6 +1,6 @@
 #!/bin/bash
 # test.sh [--all]: builds the program and runs the tests that tell whether it is right on this machine: every unit and command, one
-# solve of each motion, the pages. With --all it builds everything and runs the long tests too (tests/tiers.cmake). Installs
+# solve of each motion, pages that take seconds. With --all it builds everything and runs the long tests too (tests/tiers.cmake). Installs
 # missing packages (Debian 12).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"

@@ -1,12 +1,20 @@
 # The Python package, by pytest, one test of CTest per file.
 if(TARGET bielle_python)
   set(environment "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
-  # bielle_python_test(NAME LABEL): python/tests/test_NAME.py
+  # bielle_python_test(NAME LABEL): python/tests/test_NAME.py; and NAME_long, what is marked `long` there, if anything is.
   function(bielle_python_test name label)
-    add_test(NAME python_${name} COMMAND ${Python3_EXECUTABLE} -m pytest -q -p no:cacheprovider
-      ${PROJECT_SOURCE_DIR}/python/tests/test_${name}.py)
-    set_tests_properties(python_${name} PROPERTIES LABELS "${label}"
-      ENVIRONMENT "${environment};BIELLE_COMMAND=$<TARGET_FILE:bielle_command>")
+    set(file ${PROJECT_SOURCE_DIR}/python/tests/test_${name}.py)
+    set(run ${Python3_EXECUTABLE} -m pytest -q -p no:cacheprovider ${file})
+    add_test(NAME python_${name} COMMAND ${run} -m "not long")
+    set_tests_properties(python_${name} PROPERTIES LABELS "${label}")
+    set(names python_${name})
+    file(STRINGS ${file} marked REGEX "pytest\\.mark\\.long")
+    if(marked)
+      add_test(NAME python_${name}_long COMMAND ${run} -m long)
+      set_tests_properties(python_${name}_long PROPERTIES LABELS long)
+      list(APPEND names python_${name}_long)
+    endif()
+    set_tests_properties(${names} PROPERTIES ENVIRONMENT "${environment};BIELLE_COMMAND=$<TARGET_FILE:bielle_command>")
   endfunction()
   bielle_python_test(model unit)
   bielle_python_test(arguments unit)

@@ -1,7 +1,8 @@
 """test_place.py BIELLE [rest]: motions do not depend on where on the ground a robot stands, nor on which way it faces: moved
 and turned, it has the same cost, the same torques and the moved trajectory, and is carried out likewise. However its stance is
 given: by the places of its feet, with or without their yaws or the place of its base, by a keyframe of MuJoCo's format, by angles alone, or
-by the origin of a floating joint of a URDF. Three motions; with `rest`, all others, and other places."""
+by the origin of a floating joint of a URDF. A walk, and every way to give its stance to a squat; with `rest`, all other motions,
+other places, two levels, toes that are turned out, and terrain."""
 import json
 import math
 import os
@@ -309,22 +310,22 @@ def main():
     known = run("simulate", "squat", "--world", "none", "-o", "none", status=(106, 105, 2))
     worlds = ["bielle"] + (["mujoco"] if "mujoco" in known else [])
     with tempfile.TemporaryDirectory() as where:
-        for motion, arguments in (REST_OF_MOTIONS if REST else MOTIONS).items():
-            place = OTHERS[-1] if REST else PLACE
+        for motion, arguments in {**MOTIONS, **REST_OF_MOTIONS}.items():
+            if (motion == "walk") == REST:
+                continue
+            place = PLACE if motion in MOTIONS else OTHERS[-1]
             at_home, there = check_motion(where, "feet", make_feet, motion, arguments, [place])
-            carry_out(motion, place, at_home, there, ["bielle"] if REST or motion == "jump" else worlds)
-        if REST:
-            check_motion(where, "feet", make_feet, "walk", MOTIONS["walk"], OTHERS, "--no-check")
+            carry_out(motion, place, at_home, there, worlds if motion in ("squat", "walk") else ["bielle"])
         for way, make in WAYS.items():
             motion = "walk" if REST else "squat"
             check_motion(where, way, make, motion, MOTIONS[motion], [OTHERS[-1] if REST else PLACE], "--no-check")
         if REST:
-            walk_down(where, ["simbody"])
-        else:
+            check_motion(where, "feet", make_feet, "walk", MOTIONS["walk"], OTHERS + [PLACE], "--no-check")
             check_yaws(where)
-            check_levels(where, worlds)
-            check_free(where)
+            check_levels(where, worlds + ["simbody"])
             check_terrain(where)
+        else:
+            check_free(where)
 
 
 main()

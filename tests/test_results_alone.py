@@ -27,11 +27,11 @@ REFUSED = {
 OPTIONS = {
     "footholds": FOOTHOLDS,
     "limits": [*SQUAT, "--limit", KNEE + "=60", "--velocity-limit", KNEE + "=9", "--power-limit", KNEE + "=150"],
-    "no limits": [*SQUAT, "--no-limits"],
-    "step euler": [*SQUAT, "--step", "euler"],
     "warm start": [*SQUAT, "--warm-start", "inputs/limits"],
 }
 MORE_OPTIONS = {
+    "no limits": [*SQUAT, "--no-limits"],
+    "step euler": [*SQUAT, "--step", "euler"],
     "formulation full": [*SQUAT, "--formulation", "full"],
     "serial": [*SQUAT, "--model", "serial"],
     "serial midpoint": [*SQUAT, "--model", "serial", "--serial-armature", "reflected", "--step", "midpoint"],

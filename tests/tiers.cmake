@@ -2,12 +2,13 @@
 # machine. `scripts/test.sh --all` builds and runs everything. Labelled `long` are
 # - the tests that are listed here;
 # - NAME_long, the cases of the test NAME that are tagged [long], and those tagged [sweep] with all their mechanisms, of which
-#   NAME tries a share (tests/selection.h). CMake adds these tests where a file has such tags.
+#   NAME tries a share (tests/selection.h); in Python, what is marked `pytest.mark.long`. CMake adds these tests where a file has
+#   such tags.
 # docs/results/wait.md lists both tiers; the test `tiers` finds what would be in neither.
 set(bielle_long_tests
   # Further motions of the command: the first tier solves one of each.
   check_walk_0.3 check_walk_0.8 check_walk_full check_walk_rigid check_stairs_down check_box_down check_jump_forward check_run_fast
-  check_hops
+  check_hops check_sequence_default
   # Whole motions in the library.
   formulations objectives timed_motions envelope predictive_feet
   # Differences over every mechanism and discretization.
@@ -16,10 +17,12 @@ set(bielle_long_tests
   mutated_robots hostile_numbers remedies
   # Robots in other programs, of which the first tier has a few on the page README.md.
   validate_robots validate_springs
-  # Designs and robots of parts, of which the first tier has those of the pages.
-  design_goals design_fronts design_gradient design_constraints part_motions python_design design_page
+  # Designs and robots of parts, of which the first tier has short ones (design, design_parts, synthesize, documents_design_reference).
+  design_goals design_fronts design_gradient design_constraints part_motions python_design design_page documents_design documents_parts
   # Whole runs of commands, beside those of their pages.
-  firmware_all simulate_predictive dataset workers interruptions determinism_long place_long results_alone_long
+  firmware_all simulate_predictive dataset interruptions determinism_long place_long results_alone_long carried_goals_long
+  # Tasks on other machines, for which Work Queue must be there.
+  workers documents_workers
   # Programs that are not installed: IPOPT beside our solver, the paper, the benchmarks of loops, the examples, whose texts the
   # pages show.
   ipopt protocol_ipopt stationarity paper_claims paper_jump paper_residuals paper_study paper_walk loops_motions loops_mechanisms loops_trials
@@ -27,7 +30,7 @@ set(bielle_long_tests
   12_controller 13_beam springs_figure documents_new_motion python_notebooks
   # A few rows of each page of results.
   results_architectures results_checks results_dataset results_execution results_formulations results_loops results_motions
-  results_objectives results_scaling results_speed results_suite results_synthesis results_turn
+  results_objectives results_scaling results_speed results_suite results_synthesis results_turn results_batch
   # What is given away: packages, libraries for every machine, the pages of Doxygen.
   install package portable doxygen)
 

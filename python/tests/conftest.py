@@ -6,6 +6,10 @@ import pytest
 import bielle
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "long: of the second tier (tests/tiers.cmake)")
+
+
 @pytest.fixture(scope="session")
 def robot():
     return bielle.load_robot("bipetto")

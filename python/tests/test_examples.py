@@ -21,6 +21,7 @@ def run(*arguments, cwd=None):
     return done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_example(example, tmp_path):
     assert run(example, cwd=tmp_path).strip()
@@ -37,6 +38,7 @@ def test_page(tmp_path):
     assert "requested 0.7, achieved 0.7014" in run("page.py", cwd=tmp_path)
 
 
+@pytest.mark.long
 def test_types():
     pytest.importorskip("mypy")
     import bielle
@@ -44,6 +46,7 @@ def test_types():
     run("-m", "mypy", "--strict", "--cache-dir", os.devnull, Path(bielle.__file__).parent, *EXAMPLES)
 
 
+@pytest.mark.long
 def test_types_are_checked(tmp_path):
     pytest.importorskip("mypy")
     (tmp_path / "wrong.py").write_text("import bielle\nbielle.solve_squat('bipetto', deep=0.7)\nbielle.SE3().p.q\n")

@@ -169,6 +169,7 @@ def test_motions_pickle(model):
     assert again.summary == solution.summary and again.multipliers == solution.multipliers
 
 
+@pytest.mark.long
 def test_a_motion_is_made_again_where_its_stages_are_too_long(model):
     options = {"speed": 0.4, "single_support": 0.25, "swing_height": 0.14, "steps": 2}
     motion = bielle.Motion.make(model, bielle.Request(motion="walk", options=options))

@@ -269,12 +269,14 @@ def solve_elsewhere(arguments):
     return solve(model, residual)[1]
 
 
+@pytest.mark.long
 def test_spawned_processes(model, height):
     expected = solve(model, ComHeight(height))[1]
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         assert pool.map(solve_elsewhere, [(model, ComHeight(height))] * 2) == [expected] * 2
 
 
+@pytest.mark.long
 def test_solves_on_several_python_threads(model, height):
     expected, results = solve(model, ComHeight(height))[1], []
     threads = [

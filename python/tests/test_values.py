@@ -189,6 +189,7 @@ def read_memory():
         return int(file.read().split()[1]) * 4096
 
 
+@pytest.mark.long
 def test_nothing_leaks():
     model = bielle.load_robot("fourbar").model
     state = pickle.dumps(model)
@@ -207,6 +208,7 @@ def test_nothing_leaks():
     assert read_memory() - before < 1_000_000
 
 
+@pytest.mark.long
 def test_plans_do_not_leak():
     model = bielle.load_robot("fivebar_leg").model
     request = bielle.Request(motion="squat", options={"time_step": 0.1})

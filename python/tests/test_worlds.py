@@ -216,6 +216,7 @@ def test_predictive_control(solution, model, own_thread):
     assert controller.counts["solves"] > (0 if own_thread else 5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", ["simbody", "mujoco"])
 def test_squat_stands_in_other_engines(controller, model, engine):
     engines = pytest.importorskip("bielle._engines")
