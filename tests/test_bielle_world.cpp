@@ -177,7 +177,7 @@ TEST_CASE("bielle world: a robot is pushed, and the work of the push is booked")
   testing::checkPushed(*makeTestWorld(), getBipetto(), kBielleTolerances);
 }
 
-TEST_CASE("bielle world: soles and edges rest on the sides and corners of steps") {
+TEST_CASE("bielle world: soles and edges rest on the sides and corners of steps", "[sweep]") {
   testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
     return makeBielleWorld(model, {options, {}});
   });

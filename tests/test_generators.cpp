@@ -22,6 +22,7 @@
 #include "robots/solid.h"
 #include "robots/spring_biped.h"
 #include "robots/spring_leg.h"
+#include "selection.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -296,12 +297,14 @@ TEST_CASE("writer: robots that were read are written and read again") {
   }
 }
 
-TEST_CASE("writer: every number comes back to the last bit, attitudes to rounding") {
+TEST_CASE("writer: every number comes back to the last bit, attitudes to rounding", "[sweep]") {
   std::mt19937 rng(5);
+  Selection selection;
   for (const MechanismKind& kind : listMechanismKinds())
     for (int repeat = 0; repeat < 3; ++repeat) {
       // Universal joints about oblique axes, which its files cannot express.
-      if (kind.joint == JointKind::Universal || kind.base == MechanismBase::FreeFlyer) continue;
+      if (kind.joint == JointKind::Universal || kind.base == MechanismBase::FreeFlyer || selection.isLeftOut())
+        continue;
       CAPTURE(kind, repeat);
       const Model model = makeSprungMechanism(rng, kind.joint, kind.closure, kind.base).model;
       const RobotDirectory directory;

@@ -201,7 +201,7 @@ TEST_CASE("manifold world: a robot stands, is dropped, is pushed and meets its s
   testing::checkStopped(*makeTight(model, 1e-6), model, tolerances);
 }
 
-TEST_CASE("manifold world: soles and edges rest on the sides and corners of steps") {
+TEST_CASE("manifold world: soles and edges rest on the sides and corners of steps", "[sweep]") {
   testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
     return makeManifoldWorld(model, {options, {}, 1e-6});
   });

@@ -85,7 +85,7 @@ TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined, on
   CHECK(load == Approx(model.mass() * model.gravity().norm()).epsilon(0.02));
 }
 
-TEST_CASE("mujoco world: soles and edges rest on the side of a step") {
+TEST_CASE("mujoco world: soles and edges rest on the side of a step", "[sweep]") {
   testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
     return makeMujocoWorld(model, {options, {}});
   });

@@ -195,7 +195,7 @@ class Blinking : public Controller {
 
 }  // namespace
 
-TEST_CASE("predictive control: after a solve that fails in the middle of a swing the next one succeeds") {
+TEST_CASE("predictive control: after a solve that fails in the middle of a swing the next one succeeds", "[long]") {
   const Model& model = getBipetto();
   LocomotionOptions gait;
   gait.contact_kp = 0;

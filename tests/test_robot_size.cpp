@@ -10,6 +10,7 @@
 #include "bielle/motion/walk.h"
 #include "motion/robot_size.h"
 #include "own_robots.h"
+#include "selection.h"
 
 namespace bielle {
 namespace {
@@ -152,13 +153,15 @@ TEST_CASE("robot size: that of Bipetto is the reference") {
   for (double value : {size.length, size.time, size.torque}) CHECK(value == Approx(1).epsilon(1e-12));
 }
 
-TEST_CASE("robot size: robots of one shape have the same motions") {
+TEST_CASE("robot size: robots of one shape have the same motions", "[sweep]") {
   const std::string motion = GENERATE("squat", "walk", "jump");
   CAPTURE(motion);
   const Solution own = solve(motion, kOwn);
   REQUIRE(own.converged());
   const double torque = findLargest(own.trajectory.us);
+  testing::Selection selection(3);
   for (const Scale& s : kOthers) {
+    if (selection.isLeftOut()) continue;
     CAPTURE(s.length, s.mass, s.gravity);
     const Solution other = solve(motion, s, &own.motion.guess);
     REQUIRE(other.converged());
@@ -202,11 +205,13 @@ std::vector<VectorXd> control(const Scale& s, const ShootingTrajectory& walk) {
   return torques;
 }
 
-TEST_CASE("robot size: predictive control of robots of one shape is the same") {
+TEST_CASE("robot size: predictive control of robots of one shape is the same", "[sweep]") {
   const ShootingTrajectory walk = solve("walk", kOwn).trajectory;
   const std::vector<VectorXd> own = control(kOwn, walk);
   const double torque = findLargest(own);
+  testing::Selection selection(3);
   for (const Scale& s : kOthers) {
+    if (selection.isLeftOut()) continue;
     CAPTURE(s.length, s.mass, s.gravity);
     const std::vector<VectorXd> other = control(s, walk);
     double off = 0;

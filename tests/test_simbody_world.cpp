@@ -55,7 +55,7 @@ TEST_CASE("simbody world: a robot is pushed, and the work of the push is booked"
   testing::checkPushed(*makeSimbodyWorld(getBipetto()), getBipetto(), kSimbodyTolerances);
 }
 
-TEST_CASE("simbody world: soles and edges rest on the sides and corners of steps") {
+TEST_CASE("simbody world: soles and edges rest on the sides and corners of steps", "[sweep]") {
   testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
     SimbodyWorldOptions simbody;
     simbody.world = options;

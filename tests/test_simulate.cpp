@@ -8,6 +8,7 @@
 
 #include "bielle/results/result.h"
 #include "robot_directory.h"
+#include "selection.h"
 #include "simulate_trials.h"
 
 namespace bielle {
@@ -368,12 +369,15 @@ TEST_CASE("simulate: options that others make useless are told, and periods that
 
 TEST_CASE(
     "simulate: what a push near the end leads to is what a longer simulation shows; one that is over later is "
-    "refused") {
+    "refused",
+    "[sweep]") {
   const Scratch scratch;
   const std::string output = (scratch.path / "pushed").string();
   int stood = 0, fell = 0;
+  Selection selection(4);
   for (const double time : {0.9, 1.45, 1.7})
     for (const int impulse : {1, 3, 6, 12, 20}) {
+      if (selection.isLeftOut()) continue;
       std::vector<std::string> options = {
           "--control", "gains", "--summary-only", "--push",
           "t=" + std::to_string(time) + ",impulse=" + std::to_string(impulse) + ",direction=0"};
@@ -387,8 +391,8 @@ TEST_CASE(
             Approx(std::max(0.0, summary["duration"].get<double>() - 1.8)).margin(1e-9));
       (status == 0 ? stood : fell) += 1;
     }
-  CHECK(stood >= 3);
-  CHECK(fell >= 3);
+  CHECK(5 * stood >= stood + fell);
+  CHECK(5 * fell >= stood + fell);
   for (const auto& [options, remedy] :
        {std::pair<std::vector<std::string>, std::vector<std::string>>{{"--push", "t=1.75,impulse=1"},
                                                                       {"--hold", "2.05"}},
