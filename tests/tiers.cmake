@@ -36,8 +36,8 @@ set(bielle_long_tests
 
 # What takes longest begins first, so that no core waits for it in the end: CTest knows that by itself from the second run on.
 set(bielle_slow_tests
-  place_long parallel_bipeds_long results_alone_long results_architectures check edge_feet_long place workers report_page
-  interruptions mutated_robots reduced_long simulate_predictive check_sequence
+  place_long parallel_bipeds_long results_alone_long results_architectures check edge_feet_long workers report_page
+  interruptions mutated_robots reduced_long simulate_predictive check_sequence_default
   # Under the sanitizers.
   reduced policy bielle_world mujoco_world ocp_problem)
 
