@@ -145,18 +145,23 @@ TEST_CASE("identify: what is left of torques is that of inverse dynamics, and de
     for (const VectorXd& at : {VectorXd(VectorXd::Zero(x.size())), x}) {
       VectorXd r;
       MatrixXd J;
-      REQUIRE(fit.evaluate(at, r, &J));
+      fit.evaluate(at, r, &J);
       CHECK(0.5 * r.squaredNorm() == Approx(calcSquares(at)[0]).epsilon(1e-9));
     }
     VectorXd r;
     MatrixXd J;
-    REQUIRE(fit.evaluate(x, r, &J));
+    fit.evaluate(x, r, &J);
     checkDerivative(r.transpose() * J, differentiate(x, 1e-4, calcSquares));
     CHECK(fit.numRows() == static_cast<long>(LoadTrial::kInstants * weights.size()));
-    // A mass below zero is none.
-    VectorXd too_little = VectorXd::Zero(x.size());
-    too_little[0] = -1.01 * numbers.front().value;
-    CHECK_FALSE(fit.evaluate(too_little, r, nullptr));
+    // What is left of a robot with these numbers has a root mean square of one with these weights.
+    const Model changed = changeLoads(trial.model, numbers, x);
+    const VectorXd own = calcRowWeights(changed, trial.motion.states, trial.motion.groups, 1);
+    double squares = 0;
+    for (const VectorXd& row : balance(changed, trial.motion, 1)) squares += own.cwiseProduct(row).squaredNorm();
+    CHECK(squares == Approx(LoadTrial::kInstants * weights.size()));
+    const TorqueFit weighted(trial.model, numbers, trial.motion.states, trial.motion.groups, own);
+    weighted.evaluate(x, r, nullptr);
+    CHECK(r.squaredNorm() == Approx(squares).epsilon(1e-9));
   }
 }
 

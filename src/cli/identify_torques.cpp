@@ -1,6 +1,7 @@
 #include "cli/identify_torques.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "bielle/model/error.h"
@@ -12,6 +13,8 @@
 
 namespace bielle::cli {
 namespace {
+
+constexpr int kRounds = 3;  // of weighing
 
 // A position that a log may have: of a joint with one coordinate, or of a universal joint.
 struct Coordinate {
@@ -231,8 +234,23 @@ IdentifiedLoads identifyLoads(const Model& model, ConstVectorRef q, const Identi
                          " s apart, the linkages have a configuration near what was measured",
                      smooth_log.size() < 4 ? "give a longer log, or a shorter --window"
                                            : "check units (rad, m), signs and zeros, and take a shorter --window");
-  const TorqueFit fit(model, out.numbers, motion.states, motion.groups);
-  out.estimate = estimate(makeProblem(fit), options);
+  const TorqueFit first(model, out.numbers, motion.states, motion.groups);
+  out.estimate = estimate(makeProblem(first), options);
+  // Then each linkage and joint counts by what is left of it, so that one that hardly needs torque does not hide what others tell.
+  for (int round = 0; round < kRounds && !out.estimate.interrupted; ++round) {
+    const Model found = changeLoads(model, out.numbers, out.estimate.x);
+    const TorqueFit fit(model, out.numbers, motion.states, motion.groups,
+                        calcRowWeights(found, motion.states, motion.groups, 1));
+    out.estimate = estimate(makeProblem(fit), options);
+  }
+  const auto calcSquares = [&](const Model& of, double with) {
+    const VectorXd weights = calcRowWeights(of, motion.states, motion.groups, with);
+    return (weights.array() > 0).select(weights.array().square().inverse(), 0).sum();
+  };
+  const double torque = calcSquares(model, 0);
+  out.estimate.misfit_before = std::sqrt(calcSquares(model, 1) / torque);
+  out.estimate.misfit_after = std::sqrt(calcSquares(changeLoads(model, out.numbers, out.estimate.x), 1) / torque);
+  out.estimate.noise = out.estimate.misfit_after / kTorqueNoise;
   return out;
 }
 

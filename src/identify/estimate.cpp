@@ -114,7 +114,10 @@ EstimateProblem makeProblem(const TorqueFit& fit) {
     problem.unknowns.push_back({number.name, getName(number.kind), number.unit, number.value});
     problem.scales[i] = fit.scales()[i];
   }
-  problem.evaluate = [&fit](const VectorXd& x, VectorXd& r, MatrixXd* J) { return fit.evaluate(x, r, J); };
+  problem.evaluate = [&fit](const VectorXd& x, VectorXd& r, MatrixXd* J) {
+    fit.evaluate(x, r, J);
+    return true;
+  };
   problem.countTold = [&fit] { return fit.numRows(); };
   problem.calcMisfit = [&fit](const VectorXd& r) { return fit.calcShare(r); };
   return problem;

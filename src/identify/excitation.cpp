@@ -24,9 +24,10 @@ class Search {
     for (const MeasuredLinkage& linkage : linkages)
       for (const int dof : linkage.cluster->dofs) is_looped[static_cast<size_t>(dof)] = true;
     for (const Motor& motor : model.motors()) {
-      if (!std::isfinite(getSpeedLimit(motor)))
+      const bool slides = model.joints()[static_cast<size_t>(motor.joint)].kind == JointKind::Prismatic;
+      if (slides && !std::isfinite(getSpeedLimit(motor)))
         throw InputError(model.name(), "motor '" + motor.name + "'", "its speed has no limit",
-                         "give it one, `motors: {" + motor.name + ": {velocity: 10}}` [rad/s, m/s]");
+                         "give it one, `motors: {" + motor.name + ": {velocity: 0.2}}` [m/s]");
       if (!is_looped[static_cast<size_t>(motor.dof)])
         coordinates_.push_back({model.joints()[static_cast<size_t>(motor.joint)].idx_q, motor.dof, {}});
     }

@@ -37,7 +37,7 @@ struct Excitation {
 
 /// \param q  nq, closed; where it begins   \param linkages  with the sensors that are motors, and without motion
 /// \param period  s, of the rows that come out
-/// \throws InputError for motors without a limit of speed, and where linkages do not follow motors, or limits are exceeded, at rest
+/// \throws InputError for motors that slide without a limit of speed, and where linkages do not follow motors, or limits are exceeded, at rest
 Excitation findExcitation(const Model& model, ConstVectorRef q, const std::vector<LoadNumber>& numbers,
                           const std::vector<MeasuredLinkage>& linkages, double period,
                           const ExcitationOptions& options);

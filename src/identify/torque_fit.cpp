@@ -77,10 +77,41 @@ double calcMotorPart(const Model& model, const LoadNumber& number, const LoadedS
   return number.kind == LoadKind::Damping ? state.v[motor.dof] : state.signs[number.motor];
 }
 
+// M a + b in ws.b.
+void updateBalance(const Model& model, const LoadedState& state, Workspace& ws) {
+  updatePositions(model, ws, state.q);
+  updateVelocities<double>(model, ws, state.v);
+  updateInverseDynamics<double>(model, ws, state.a);
+  for (int m = 0; m < model.nu(); ++m) {
+    const Motor& motor = model.motors()[static_cast<size_t>(m)];
+    ws.b[motor.dof] += getJointForce(model, motor.joint).friction *
+                       (state.signs[m] - calcFrictionSign(model, motor, state.v[motor.dof]));
+  }
+}
+
 }  // namespace
 
 double calcFrictionSign(const Model& model, const Motor& motor, double speed) {
   return calcSmoothSign(speed, getJointForce(model, motor.joint).friction_speed).value;
+}
+
+VectorXd calcRowWeights(const Model& model, const std::vector<LoadedState>& states, const std::vector<int>& groups,
+                        double torques) {
+  Workspace ws(model);
+  VectorXd squares = VectorXd::Zero(states.empty() ? 0 : states.front().N.cols());
+  for (const LoadedState& state : states) {
+    updateBalance(model, state, ws);
+    squares += (state.N.transpose() * (ws.b - torques * calcMotorForces(model, state.u))).cwiseAbs2();
+  }
+  VectorXd weights = VectorXd::Zero(squares.size());
+  Eigen::Index first = 0;
+  for (const int count : groups) {
+    if (first == squares.size()) break;
+    const double mean = squares.segment(first, count).sum() / (count * static_cast<double>(states.size()));
+    if (mean > 0) weights.segment(first, count).setConstant(1 / std::sqrt(mean));
+    first += count;
+  }
+  return weights;
 }
 
 TorqueFit::TorqueFit(const Model& model, std::vector<LoadNumber> numbers, const std::vector<LoadedState>& states,
@@ -94,35 +125,13 @@ TorqueFit::TorqueFit(const Model& model, std::vector<LoadNumber> numbers, const 
   for (const LoadNumber& number : numbers_) columns_.push_back(number.bodies.empty() ? columns++ : -1);
   makeScales(model, states);
 
+  if (weights_.size() == 0) weights_ = calcRowWeights(model, states, groups, 0) / kTorqueNoise;
   Workspace ws(model);
-  const Eigen::Index size = states.empty() ? 0 : states.front().N.cols();
-  const bool is_weighted = weights_.size() > 0;
-  VectorXd squares = VectorXd::Zero(size);
-  if (!is_weighted) weights_ = VectorXd::Zero(size);
-  const auto update = [&](const LoadedState& state) {
-    updatePositions(model, ws, state.q);
-    updateVelocities<double>(model, ws, state.v);
-    updateInverseDynamics<double>(model, ws, state.a);
-    for (int m = 0; m < model.nu(); ++m) {
-      const Motor& motor = model.motors()[static_cast<size_t>(m)];
-      ws.b[motor.dof] += getJointForce(model, motor.joint).friction *
-                         (state.signs[m] - calcFrictionSign(model, motor, state.v[motor.dof]));
-    }
-  };
-  for (const LoadedState& state : states) {
-    if (is_weighted) break;
-    update(state);
-    squares += (state.N.transpose() * ws.b).cwiseAbs2();
-  }
-  for (Eigen::Index first = 0, g = 0; g < static_cast<Eigen::Index>(groups.size()); first += groups[g++]) {
-    const Eigen::Index count = groups[static_cast<size_t>(g)];
-    const double mean = squares.segment(first, count).sum() / static_cast<double>(count * states.size());
-    if (mean > 0 && !is_weighted) weights_.segment(first, count).setConstant(1 / (kTorqueNoise * std::sqrt(mean)));
-  }
+  const Eigen::Index size = weights_.size();
   factor_.resize(columns + 1 + kBlock + size, columns + 1);
   MatrixXd rows(size, columns + 1);
   for (const LoadedState& state : states) {
-    update(state);
+    updateBalance(model, state, ws);
     for (size_t i = 0; i < bodies_.size(); ++i)
       rows.middleCols<10>(10 * static_cast<Eigen::Index>(i)) = calcBodyRows(model, ws, bodies_[i], state.N);
     for (size_t i = 0; i < numbers_.size(); ++i) {
@@ -174,7 +183,7 @@ void TorqueFit::compress() {
   factor_.topRows(used_) = qr.matrixQR().topRows(used_).triangularView<Eigen::Upper>();
 }
 
-bool TorqueFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) const {
+void TorqueFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) const {
   const Eigen::Index columns = factor_.cols() - 1;
   VectorXd change = VectorXd::Zero(columns);
   MatrixXd slopes = MatrixXd::Zero(columns, x.size());
@@ -187,7 +196,6 @@ bool TorqueFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) const {
       if (!contains(number.bodies, bodies_[b])) continue;
       if (number.kind == LoadKind::Mass) {
         const double factor = 1 + x[i] / number.value;
-        if (!(factor > 0)) return false;
         at.mass *= factor, at.I_com *= factor;
       } else {
         at.com[number.axis] += x[i];
@@ -198,8 +206,9 @@ bool TorqueFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) const {
     for (Eigen::Index i = 0; i < x.size(); ++i) {
       const LoadNumber& number = numbers_[static_cast<size_t>(i)];
       if (!contains(number.bodies, bodies_[b])) continue;
+      const Inertia of_unit{given.mass / number.value, at.com, given.I_com / number.value};
       slopes.block<10, 1>(ten, i) =
-          number.kind == LoadKind::Mass ? Vector10d(pi / (number.value + x[i])) : calcComSlope(at, number.axis);
+          number.kind == LoadKind::Mass ? calcNumbers(of_unit) : calcComSlope(at, number.axis);
     }
   }
   for (Eigen::Index i = 0; i < x.size(); ++i)
@@ -207,7 +216,6 @@ bool TorqueFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) const {
   const MatrixXd F = factor_.topRows(used_);
   r = F.leftCols(columns) * change + F.col(columns);
   if (J) *J = F.leftCols(columns) * slopes;
-  return true;
 }
 
 double TorqueFit::calcShare(const VectorXd& r) const {

@@ -12,8 +12,8 @@
 /// Of the ten numbers of a body, mass m and centre c change those of its link by
 ///     pi(m, c) = (m, m c, (m / m_0) I_0 + m (c^T c 1 - c c^T)).                                                       (3)
 ///
-/// The rows of a reduced joint are over kTorqueNoise of the root mean square of N^T (M a + b) in them, so that each linkage and joint
-/// counts alike, whatever its size. Rows are many and the numbers few: only the triangular factor of the rows beside e is kept, from
+/// The rows of a reduced joint are over the noise in them: at first kTorqueNoise of the root mean square of N^T (M a + b), so that each
+/// linkage and joint counts alike, whatever its size, then what is left of them. Rows are many and the numbers few: only the triangular factor of the rows beside e is kept, from
 /// which |e|^2 and its derivatives follow for any numbers, exactly.
 #include <vector>
 
@@ -36,10 +36,14 @@ struct LoadedState {
   MatrixXd N;        ///< nv x reduced coordinates
 };
 
+/// Per reduced coordinate, 1 over the root mean square of N^T (M a + b - torques S^T u) in the rows of its group; 0 if there is none.
+VectorXd calcRowWeights(const Model& model, const std::vector<LoadedState>& states, const std::vector<int>& groups,
+                        double torques);
+
 class TorqueFit {
  public:
   /// \param groups   number of reduced coordinates of each reduced joint, in their order in N
-  /// \param weights  of the rows, as weights() of another motion; empty: by the states
+  /// \param weights  of the rows, as calcRowWeights(); empty: by kTorqueNoise
   TorqueFit(const Model& model, std::vector<LoadNumber> numbers, const std::vector<LoadedState>& states,
             const std::vector<int>& groups, VectorXd weights = {});
 
@@ -51,9 +55,9 @@ class TorqueFit {
   const VectorXd& weights() const { return weights_; }  ///< per reduced coordinate, 1 / (N m or N)
 
   /// e over the noise that is assumed, up to a rotation of all rows, for changes x of the numbers; and its derivative, if asked for.
-  /// False for a mass that is not positive.
-  bool evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) const;
-  /// Root mean square of e as a share of that of torques.
+  /// Numbers below zero are as good as others: what cannot be is for those who make a robot of them (changeLoads()).
+  void evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) const;
+  /// Root mean square of e as a share of that of torques, with the weights by kTorqueNoise.
   double calcShare(const VectorXd& r) const;
 
  private:
