@@ -1,6 +1,5 @@
 #pragma once
 // Masses, armatures and friction of a robot whose base does not move, from logged torques.
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>

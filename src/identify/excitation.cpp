@@ -1,5 +1,6 @@
 #include "identify/excitation.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bielle/dynamics/rnea.h"

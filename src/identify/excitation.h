@@ -7,10 +7,10 @@
 /// numbers (estimate.h), each of them being known to its scale before, the motion of most information has the largest
 ///     1/2 log det (1 + D J^T J D)                                                                                    (2)
 /// (Chaloner and Verdinelli, Statistical Science 10, 1995), so that numbers that no motion shows do no harm. It is looked for by SLSQP
-/// with differences, less a penalty for limits of positions, speeds (kMostTurn among them) and torques that are exceeded; in the end all a and b are
-/// scaled until none is.
+/// with differences, less a penalty for limits of positions, speeds (kMostTurn among them) and torques that are exceeded; in the end
+/// all a and b are scaled until none is.
 #include <functional>
-#include <memory>
+#include <vector>
 
 #include "identify/loaded_states.h"
 
@@ -37,7 +37,8 @@ struct Excitation {
 
 /// \param q  nq, closed; where it begins   \param linkages  with the sensors that are motors, and without motion
 /// \param period  s, of the rows that come out
-/// \throws InputError for motors that slide without a limit of speed, and where linkages do not follow motors, or limits are exceeded, at rest
+/// \throws InputError for motors that slide without a limit of speed, and where linkages do not follow motors, or limits are exceeded,
+///   at rest
 Excitation findExcitation(const Model& model, ConstVectorRef q, const std::vector<LoadNumber>& numbers,
                           const std::vector<MeasuredLinkage>& linkages, double period,
                           const ExcitationOptions& options);
