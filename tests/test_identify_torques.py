@@ -259,6 +259,31 @@ class IdentifyTorques(unittest.TestCase):
         done = run("identify", "drawn", "--motion", "5", "-o", "none", status=2)
         self.assertIn("--motion: it needs --dynamics and -o, and no LOG", done.stderr)
 
+    def test_arm(self):
+        """Without loops; while it leans on a stop, its motors do not tell."""
+        for name, factor in (("arm", 1), ("heavy", 1.1)):
+            os.makedirs(name, exist_ok=True)
+            links = "".join(
+                f'<link name="{link}"><inertial><origin xyz="0 0 -0.2"/><mass value="{mass!r}"/><inertia ixx="{inertia!r}" ixy="0" '
+                f'ixz="0" iyy="{inertia!r}" iyz="0" izz="0.001"/></inertial></link><joint name="{joint}" type="revolute"><origin '
+                f'xyz="0 0 {place}"/><parent link="{parent}"/><child link="{link}"/><axis xyz="0 1 0"/><limit lower="-3" '
+                f'upper="{upper}" effort="20" velocity="10"/></joint>'
+                for link, mass, inertia, joint, place, parent, upper in (
+                    ("upper", 1.0 * factor, 0.01 * factor, "shoulder", 0, "ground", 3),
+                    ("lower", 0.5, 0.005, "elbow", -0.4, "upper", 0.2)))
+            pathlib.Path(name, name + ".urdf").write_text(f'<robot name="{name}"><link name="ground"/>{links}</robot>')
+            pathlib.Path(name, name + ".yaml").write_text(
+                "base: fixed\nmotors: {shoulder: {effort: 20}, elbow: {effort: 20}}\nserial_joints: [shoulder, elbow]\n")
+        pathlib.Path("torques.yaml").write_text("torques:\n" + "".join(
+            f"  - {{time: {0.002 * k:.3f}, shoulder: {1.5 * math.sin(0.008 * k):.6f}, elbow: {0.4 * math.sin(0.013 * k + 1):.6f}}}\n"
+            for k in range(1000)))
+        run("simulate", "heavy", "--torques", "torques.yaml", "--duration", "2", "--record-period", "0.001", "--no-report", "-o", "swing")
+        dynamics, done = identify("arm", "swing/trajectory.csv", "--dynamics", "masses", "--window", "0.02")
+        self.assertIn("instants near which a joint is at its limit are left out", done.stderr)
+        self.assertGreater(dynamics["at_stops"], 2)
+        self.assertGreater(dynamics["instants"], 50)
+        self.check(dynamics, {"upper.mass": 1.1, "lower.mass": 0.5})
+
     def test_bad_input(self):
         draw("drawn")
         measure("log.csv", DRAWN, rows=300)

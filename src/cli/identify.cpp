@@ -28,6 +28,7 @@ namespace {
 
 constexpr double kQuiet = 0.5;     // s, before progress is told
 constexpr double kSuspicious = 5;  // noise over the one assumed
+constexpr double kBelowZero = 3;   // standard deviations, before it is told
 
 struct IdentifyArguments {
   RobotArgument robot;
@@ -181,13 +182,17 @@ void warn(const IdentifiedLoads& found, const std::string& log) {
   };
   if (found.left_out > 0)
     tell(std::to_string(found.left_out) + " instants near which a linkage has no configuration are left out");
+  if (found.at_stops > 0)
+    tell(std::to_string(found.at_stops) +
+         " instants near which a joint is at its limit are left out: its stop may bear it");
   if (found.estimate.noise > kSuspicious)
     tell("what is left is " + formatNumber(kTorqueNoise * found.estimate.noise, "%.3g") +
          " of them: other numbers than the free ones are wrong, torques are not those at the joints, or something "
          "touches it");
   for (const Unknown& unknown : found.estimate.unknowns)
-    if (unknown.is_seen && unknown.after < 0 && unknown.kind != "com")
-      tell(unknown.name + " is below zero, by what is not known of it; the robot has " +
+    if (const double margin = unknown.kind == "mass" ? 0 : kBelowZero * unknown.deviation;
+        unknown.is_seen && unknown.after < -margin && unknown.kind != "com")
+      tell(unknown.name + " is below zero; the robot has " +
            (unknown.kind == "mass" ? "a hundredth of what was drawn" : "0"));
 }
 

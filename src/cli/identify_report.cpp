@@ -140,7 +140,10 @@ Json describe(const Identified& found) {
 }
 
 Json describe(const IdentifiedLoads& found) {
-  Json json = {{"instants", found.instants}, {"left_out", found.left_out}, {"window", found.window}};
+  Json json = {{"instants", found.instants},
+               {"left_out", found.left_out},
+               {"at_stops", found.at_stops},
+               {"window", found.window}};
   json.update(describe(found.estimate));
   return json;
 }

@@ -97,6 +97,29 @@ class SmoothLog {
     centres_ = listCentres(log.time, window_);
   }
   double window() const { return window_; }
+  // Without instants in whose windows a joint is at its limit, where a stop may bear it. \returns their number
+  int leaveOutStops(const Model& model, const std::vector<Coordinate>& coordinates,
+                    const std::map<std::string, double>& offsets) {
+    std::vector<double> times;
+    for (const Coordinate& coordinate : coordinates) {
+      const int column = log_.find(coordinate.name);
+      if (column < 0) continue;
+      const auto offset = offsets.find(coordinate.name);
+      const double zero = offset == offsets.end() ? 0 : offset->second;
+      for (Eigen::Index k = 0; k < log_.time.size(); ++k)
+        if (const double q = log_.values(k, column) - zero;
+            q <= model.lowerLimits()[coordinate.dof] || q >= model.upperLimits()[coordinate.dof])
+          times.push_back(log_.time[k]);
+    }
+    std::sort(times.begin(), times.end());
+    const auto is_at_stop = [&](double centre) {
+      const auto next = std::lower_bound(times.begin(), times.end(), centre - 0.5 * window_);
+      return next != times.end() && *next <= centre + 0.5 * window_;
+    };
+    const size_t before = centres_.size();
+    centres_.erase(std::remove_if(centres_.begin(), centres_.end(), is_at_stop), centres_.end());
+    return static_cast<int>(before - centres_.size());
+  }
   Eigen::Index size() const { return static_cast<Eigen::Index>(centres_.size()); }
 
   Smoothed getMotion(const std::string& position, const std::string& speed, double offset) const {
@@ -194,8 +217,10 @@ IdentifiedLoads identifyLoads(const Model& model, ConstVectorRef q, const Identi
                               const TorqueChoice& torques, const MotionLog& log,
                               const std::map<std::string, double>& offsets, const EstimateOptions& options) {
   const TorqueTask task = makeTask(model, q, choice, log);
-  const SmoothLog smooth_log(log, torques.window);
   const std::vector<Coordinate> all = listCoordinates(model);
+  SmoothLog smooth_log(log, torques.window);
+  IdentifiedLoads out;
+  out.at_stops = smooth_log.leaveOutStops(model, all, offsets);
   std::map<std::string, std::string> speeds;
   for (const Coordinate& coordinate : all) speeds[coordinate.name] = coordinate.speed;
   const auto getMotion = [&](const std::string& name) {
@@ -221,7 +246,6 @@ IdentifiedLoads identifyLoads(const Model& model, ConstVectorRef q, const Identi
     coordinates.push_back({coordinate.position, coordinate.dof, getMotion(coordinate.name)});
   const LoadedMotion motion = findLoadedStates(model, q, linkages, coordinates, smooth_log.getTorques(model),
                                                smooth_log.getSigns(model, all), isInterrupted());
-  IdentifiedLoads out;
   out.numbers = chooseLoads(model, torques.dynamics);
   out.instants = static_cast<int>(motion.states.size());
   out.left_out = static_cast<int>(smooth_log.size()) - out.instants;
@@ -232,8 +256,9 @@ IdentifiedLoads identifyLoads(const Model& model, ConstVectorRef q, const Identi
                      "only at " + std::to_string(out.instants) + " of " + std::to_string(smooth_log.size()) +
                          " instants, half a window of " + formatNumber(out.window, "%.3g") +
                          " s apart, the linkages have a configuration near what was measured",
-                     smooth_log.size() < 4 ? "give a longer log, or a shorter --window"
-                                           : "check units (rad, m), signs and zeros, and take a shorter --window");
+                     smooth_log.size() < 4 && out.at_stops > 0 ? "log a motion away from the joints' limits"
+                     : smooth_log.size() < 4                   ? "give a longer log, or a shorter --window"
+                                             : "check units (rad, m), signs and zeros, and take a shorter --window");
   const TorqueFit first(model, out.numbers, motion.states, motion.groups);
   out.estimate = estimate(makeProblem(first), options);
   // Then each linkage and joint counts by what is left of it, so that one that hardly needs torque does not hide what others tell.

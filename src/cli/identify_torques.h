@@ -18,8 +18,8 @@ std::vector<LoadNumber> chooseLoads(const Model& model, const std::vector<std::s
 
 struct IdentifiedLoads {
   std::vector<LoadNumber> numbers;
-  int instants = 0, left_out = 0;
-  double window = 0;  // s
+  int instants = 0, left_out = 0, at_stops = 0;  // at_stops: left out, since a joint is at its limit
+  double window = 0;                             // s
   Estimate estimate;
 };
 
