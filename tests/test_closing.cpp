@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ctime>
 #include <iostream>
+#include <random>
 #include <sstream>
 
 #include "bielle/dynamics/closing.h"
@@ -255,6 +256,88 @@ TEST_CASE("closing: motors of an ankle on two rods for its joints and back, agai
   CHECK(map.reset(start));
 }
 
+TEST_CASE("closing: joints of several coordinates are held in random linkages") {
+  int met = 0;
+  for (const JointKind kind : {JointKind::Universal, JointKind::Spherical, JointKind::Planar, JointKind::FreeFlyer})
+    for (unsigned seed = 0; seed < 12; ++seed) {
+      std::mt19937 rng(seed);
+      const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::Fixed);
+      const Model& model = mechanism.model;
+      const AssemblyResult start = closeConfiguration(model, mechanism.q_closed);
+      REQUIRE(start.status == NumericalStatus::Ok);
+      for (const Joint& joint : model.joints()) {
+        if (joint.kind != kind || joint.nv == 0) continue;
+        CAPTURE(getName(kind), seed, joint.name);
+        // Where another closed configuration has it: in reach, with all that the other joints do.
+        const AssemblyResult there =
+            closeConfiguration(model, model.integrate(start.q, randomVector(rng, model.nv(), 0.05)));
+        if (there.status != NumericalStatus::Ok) continue;
+        VectorXd asked = start.q;
+        asked.segment(joint.idx_q, joint.nq) = there.q.segment(joint.idx_q, joint.nq);
+        const AssemblyResult held = closeConfiguration(model, asked, {joint.name});
+        if (held.status == NumericalStatus::NotClosed) continue;  // on another branch
+        ++met;
+        CHECK(calcGap(model, held.q) < 1e-9);
+        CHECK(held.q.segment(joint.idx_q, joint.nq) == asked.segment(joint.idx_q, joint.nq));
+        LoopCloser closer(model, start.q, {joint.name});
+        VectorXd q = asked;
+        const HeldResult result = closer.close(q);
+        if (result.status == NumericalStatus::NotClosed) continue;
+        CHECK(calcGap(model, q) < 1e-9);
+        CHECK(q.segment(joint.idx_q, joint.nq) == asked.segment(joint.idx_q, joint.nq));
+      }
+    }
+  CHECK(met > 40);
+}
+
+namespace {
+
+// A body on a ball, tied to the ground by a rod from its arm: the rod lets it turn in a cone.
+Model makeTethered() {
+  ModelBuilder builder("tethered");
+  Joint ball;
+  ball.name = "ball";
+  ball.kind = JointKind::Spherical;
+  std::mt19937 rng(1);
+  builder.addLink("body", "world", ball, randomInertia(rng));
+  builder.addFrame("arm", "body", {Matrix3d::Identity(), {0.3, 0, 0}});
+  builder.addFrame("anchor", "world", {Matrix3d::Identity(), {0.3, 0, 0.5}});
+  builder.addDistance("rod", "arm", "anchor", 0.5);
+  return builder.build();
+}
+
+}  // namespace
+
+TEST_CASE("closing: a ball that cannot be held is at the nearest rotation, which then can be as it is told") {
+  const Model model = makeTethered();
+  VectorXd q(4);
+  q << 0, 0, 0, 1;
+  REQUIRE(calcGap(model, q) < 1e-12);
+  const Eigen::Quaterniond asked(makeAxisRotation(Vector3d(0.2, 1, 0.1).normalized(), 0.4));
+  q = asked.coeffs();
+  const AssemblyResult refused = closeConfiguration(model, q, {"ball"});
+  REQUIRE(refused.status == NumericalStatus::NotClosed);
+  CHECK(calcGap(model, refused.q) < 1e-9);
+  CHECK_THAT(refused.message,
+             Catch::Contains("joint 'ball' cannot be held at (") && Catch::Contains("the nearest value in reach is ("));
+  // Nearest: no rotation beside it, along the cone, is nearer.
+  const auto calcAngle = [&](const VectorXd& at) {
+    return asked.angularDistance(Eigen::Quaterniond(Eigen::Vector4d(at.normalized())));
+  };
+  std::mt19937 rng(3);
+  for (int i = 0; i < 20; ++i) {
+    const AssemblyResult beside = closeConfiguration(model, model.integrate(refused.q, randomVector(rng, 3, 0.02)));
+    REQUIRE(beside.status == NumericalStatus::Ok);
+    CHECK(calcAngle(beside.q) > calcAngle(refused.q) - 1e-6);
+  }
+  const std::string told = refused.message.substr(refused.message.find("in reach is (") + 13);
+  std::stringstream text(told);
+  for (int k = 0; k < 4; ++k, text.ignore(1)) text >> q[k];
+  const AssemblyResult held = closeConfiguration(model, q, {"ball"});
+  CAPTURE(refused.message, held.message);
+  CHECK(held.status != NumericalStatus::NotClosed);
+}
+
 TEST_CASE("closing: no allocation, and a linkage without joints is refused") {
   const Model model = loadOwn("rsu_biped").model;
   const VectorXd start = assembleReference(model, "half_sitting").q;
@@ -272,8 +355,22 @@ TEST_CASE("closing: no allocation, and a linkage without joints is refused") {
     closer.close(q);
   }
   CHECK(num_allocations - before <= 20);  // names for getEntry()
-  CHECK_THROWS_WITH(LinkageMap(loadOwn("delta").model, findClosedConfiguration(loadOwn("delta").model).q),
-                    Catch::Contains("serial_joints"));
+  // What they move is a body: the remedy is followed.
+  for (const char* robot : {"delta", "cleobot"}) {
+    const Model parallel = loadOwn(robot).model;
+    const VectorXd closed = findClosedConfiguration(parallel).q;
+    CHECK_THROWS_WITH(LinkageMap(parallel, closed),
+                      Catch::Contains("0 serial joint(s)") && Catch::Contains("may be a body") &&
+                          Catch::Contains("serial_joints") && Catch::Contains("LoopCloser"));
+    std::vector<std::string> motors;
+    for (const Motor& motor : parallel.motors()) motors.push_back(motor.name);
+    LoopCloser held(parallel, closed, motors);
+    VectorXd moved = closed;
+    for (const Motor& motor : parallel.motors())
+      moved[parallel.joints()[static_cast<size_t>(motor.joint)].idx_q] += 0.01;
+    CHECK(held.close(moved).status != NumericalStatus::NotClosed);
+    CHECK(calcGap(parallel, moved) < 1e-9);
+  }
 }
 
 TEST_CASE("closing: time of a call", "[.time]") {

@@ -113,11 +113,10 @@ void bindClosing(py::module_& module) {
   py::class_<HeldCloser>(
       module, "LoopCloser",
       "Closes one configuration after the other while some joints are held, each from the one before it.")
-      .def(
-          py::init<std::shared_ptr<Model>, const py::object&, const std::vector<std::string>&>(), py::arg("model"),
-          py::arg("q"), py::arg("hold"),
-          "q: a closed configuration (nq,) to start from; hold: names of joints with one coordinate. Raises InputError "
-          "when q is open, or there is no such joint.")
+      .def(py::init<std::shared_ptr<Model>, const py::object&, const std::vector<std::string>&>(), py::arg("model"),
+           py::arg("q"), py::arg("hold"),
+           "q: a closed configuration (nq,) to start from; hold: names of joints of any kind. Raises InputError "
+           "when q is open, or there is no such joint.")
       .def("close", &HeldCloser::close, py::arg("q"),
            "(q closed (nq,), HeldResult): held joints stay; what is out of reach is at the nearest value in reach.")
       .def("reset", &HeldCloser::reset, py::arg("q"),

@@ -6,6 +6,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "dynamics/linkage_workspace.h"
+#include "model/joint.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 
@@ -21,22 +22,37 @@ constexpr double kLeastMotion = 0.02;  // the least that held coordinates move i
 constexpr double kOpen = 1e-8;         // m or rad
 constexpr double kWithin = 2e-5;       // of the largest value, or rad or m: several of the last digits that are told
 
+struct HeldJoint {
+  const Joint* own;  // in the model of the linkage
+  int joint;         // in the model
+  int value;         // first entry of what gives its coordinates
+};
+
 // Coordinates of one linkage.
 struct Coordinates {
-  std::vector<int> dofs, positions;  // of the cluster: entries of v and of q
-  std::vector<int> joints;           // of the model
-  std::vector<int> values;           // entries of what gives their positions
+  std::vector<HeldJoint> joints;
+  std::vector<int> dofs;    // of the linkage: entries of v
+  std::vector<int> owners;  // of each of them, in the model
 
   int size() const { return static_cast<int>(dofs.size()); }
   void add(const ReducedCluster& cluster, int joint, int value) {
     const auto at = std::find(cluster.joints.begin(), cluster.joints.end(), joint) - cluster.joints.begin();
     const Joint& own = cluster.model.joints()[static_cast<size_t>(at) + 1];  // the first one is the root
-    dofs.push_back(own.idx_v);
-    positions.push_back(own.idx_q);
-    joints.push_back(joint);
-    values.push_back(value);
+    joints.push_back({&own, joint, value});
+    for (int k = 0; k < own.nv; ++k) {
+      dofs.push_back(own.idx_v + k);
+      owners.push_back(joint);
+    }
   }
 };
+
+// From q to what is asked for, in tangent coordinates (nv); quaternions there may be rounded.
+void calcHeldGap(const Joint& joint, ConstVectorRef q, ConstVectorRef asked, VectorRef gap) {
+  Eigen::Matrix<double, 7, 1> to;
+  to.head(joint.nq) = asked;
+  if (joint.kind == JointKind::Spherical || joint.kind == JointKind::FreeFlyer) to.segment<4>(joint.nq - 4).normalize();
+  calcJointDifference(joint, q, to.head(joint.nq), gap);
+}
 
 // A linkage that follows coordinates, by Eq. (1).
 class HeldLinkage {
@@ -59,6 +75,7 @@ class HeldLinkage {
   void prepare() {
     for (const Coordinates& set : sets)
       if (set.size() > gap_.size()) gap_.resize(set.size()), trial_.resize(set.size());
+    kept_.resize(cluster_->model.nq());
     for (const Coordinates& set : sets) {
       N_X_.push_back(MatrixXd::Zero(set.size(), cluster_->size));
       svds_.emplace_back(set.size(), cluster_->size);
@@ -74,10 +91,12 @@ class HeldLinkage {
 
   // The configuration into q. What is held stays as it is to the last bit if it `is_met`.
   void write(const Model& model, bool is_met, VectorRef q) {
-    const Coordinates& set = sets[0];
-    for (int i = 0; i < set.size(); ++i) trial_[i] = q[set.values[static_cast<size_t>(i)]];
+    for (const HeldJoint& held : sets[0].joints)
+      kept_.segment(held.own->idx_q, held.own->nq) = q.segment(held.value, held.own->nq);
     scatterConfiguration(model, *cluster_, state_.basis.q, q);
-    for (int i = 0; i < set.size() && is_met; ++i) q[set.values[static_cast<size_t>(i)]] = trial_[i];
+    if (!is_met) return;
+    for (const HeldJoint& held : sets[0].joints)
+      q.segment(held.value, held.own->nq) = kept_.segment(held.own->idx_q, held.own->nq);
   }
 
   HeldResult follow(size_t which, ConstVectorRef values) {
@@ -106,7 +125,7 @@ class HeldLinkage {
     const double largest = gap_.head(n).cwiseAbs().maxCoeff(&worst);
     const double motion = calcMotion(which);
     if (largest > kMet) {
-      result = {NumericalStatus::NotClosed, largest, set.joints[static_cast<size_t>(worst)]};
+      result = {NumericalStatus::NotClosed, largest, set.owners[static_cast<size_t>(worst)]};
     } else if (motion < kLeastMotion) {
       result.status = NumericalStatus::NearDeadPoint;
     } else {
@@ -118,12 +137,14 @@ class HeldLinkage {
  private:
   // Half the squared distance.
   static double updateGap(const Coordinates& set, const ClusterState& state, ConstVectorRef values, VectorXd& gap) {
-    double sum = 0;
-    for (int i = 0; i < set.size(); ++i) {
-      gap[i] = values[set.values[static_cast<size_t>(i)]] - state.basis.q[set.positions[static_cast<size_t>(i)]];
-      sum += 0.5 * gap[i] * gap[i];
+    int row = 0;
+    for (const HeldJoint& held : set.joints) {
+      const Joint& own = *held.own;
+      calcHeldGap(own, state.basis.q.segment(own.idx_q, own.nq), values.segment(held.value, own.nq),
+                  gap.segment(row, own.nv));
+      row += own.nv;
     }
-    return sum;
+    return 0.5 * gap.head(row).squaredNorm();
   }
 
   // d of Eq. (1). False if it is nothing.
@@ -166,7 +187,7 @@ class HeldLinkage {
   ClusterState last_, state_, next_;  // last_ is regular
   MatrixXd A_;                        // of Eq. (1)
   Eigen::LDLT<MatrixXd> ldlt_;
-  VectorXd z_, d_, gap_, trial_, no_guess_;
+  VectorXd z_, d_, gap_, trial_, kept_, no_guess_;
   std::vector<MatrixXd> N_X_;
   std::vector<Eigen::JacobiSVD<MatrixXd>> svds_;
 };
@@ -182,10 +203,9 @@ int findHeldJoint(const Model& model, const std::string& name) {
   const int index = model.findJoint(name);
   std::vector<std::string> known;
   for (const Joint& joint : model.joints())
-    if (joint.nv == 1) known.push_back(joint.name);
-  if (index < 0 || model.joints()[static_cast<size_t>(index)].nv != 1)
-    throw InputError(model.name(), "joint '" + name + "'",
-                     index < 0 ? "there is no such joint" : "it has not one coordinate",
+    if (joint.nv > 0) known.push_back(joint.name);
+  if (index < 0)
+    throw InputError(model.name(), "joint '" + name + "'", "there is no such joint",
                      "choose some of: " + listItems(known));
   return index;
 }
@@ -277,11 +297,19 @@ LinkageMap::LinkageMap(const Model& model, ConstVectorRef q)
     for (int m = 0; m < model.nu(); ++m)
       if (const int joint = model.motors()[static_cast<size_t>(m)].joint; contains(cluster.joints, joint))
         linkage.sets[1].add(cluster, joint, m);
-    if (linkage.sets[0].size() != linkage.sets[1].size())
+    const std::vector<HeldJoint>& listed = linkage.sets[0].joints;
+    const bool are_single =
+        std::all_of(listed.begin(), listed.end(), [](const HeldJoint& held) { return held.own->nv == 1; });
+    if (listed.size() != linkage.sets[1].joints.size() || !are_single)
       throw InputError(model.name(), "closure '" + cluster.closures.closures.front().name + "'",
                        "its linkage has " + std::to_string(linkage.sets[1].size()) + " motor(s) and " +
-                           std::to_string(linkage.sets[0].size()) + " serial joint(s)",
-                       "list as many of its joints under `serial_joints` as it has motors");
+                           std::to_string(listed.size()) + " serial joint(s)" +
+                           (listed.empty() ? ": no joint is told for what it moves, which may be a body"
+                            : are_single   ? ""
+                                           : ", of several coordinates"),
+                       "list as many of its joints of one coordinate under `serial_joints` as it has motors; where "
+                       "motors move a body, as the platform of a delta, close the loops while they are held "
+                       "(LoopCloser), and take the place of that body");
     linkage.prepare();
     linkage.reset(model, q);
   }
@@ -309,8 +337,7 @@ HeldResult mapAll(const Model& model, std::vector<HeldLinkage>& linkages, size_t
     addWorst(linkage.follow(held, given), result);
     scatterConfiguration(model, linkage.cluster(), linkage.q(), q);
     const Coordinates& out = linkage.sets[1 - held];
-    for (int i = 0; i < out.size(); ++i)
-      wanted[out.values[static_cast<size_t>(i)]] = linkage.q()[out.positions[static_cast<size_t>(i)]];
+    for (const HeldJoint& joint : out.joints) wanted[joint.value] = linkage.q()[joint.own->idx_q];
   }
   return result;
 }
@@ -346,7 +373,7 @@ bool LinkageMap::reset(ConstVectorRef q) {
 namespace {
 
 // Of the linkage that is farthest from what is asked of it. Values in reach are told from a little within, so that they can be held
-// although they are rounded. \param nearest  with the values in reach   \param start  closed
+// although they are rounded; those of joints of several coordinates, which may have nothing but a surface in reach, by most digits. \param nearest  with the values in reach   \param start  closed
 std::string describeUnheld(const Model& model, ConstVectorRef q, const VectorXd& nearest,
                            const std::vector<std::string>& held, const VectorXd& start, const HeldResult& closed) {
   const auto getLinkage = [&model](const Joint& joint) {
@@ -354,26 +381,34 @@ std::string describeUnheld(const Model& model, ConstVectorRef q, const VectorXd&
     return std::find_if(model.clusters().begin(), model.clusters().end(), has) - model.clusters().begin();
   };
   const auto linkage = getLinkage(model.joints()[static_cast<size_t>(closed.joint)]);
-  std::vector<const Joint*> joints;
+  const auto get = [](const Joint& joint, ConstVectorRef all) { return VectorXd(all.segment(joint.idx_q, joint.nq)); };
+  const auto format = [](const VectorXd& values) {
+    std::string text;
+    for (const double value : values)
+      text += (text.empty() ? "" : ", ") + formatNumber(value, values.size() > 1 ? "%.13g" : "%.6g");
+    return values.size() > 1 ? "(" + text + ")" : text;
+  };
+  std::vector<std::pair<const Joint*, VectorXd>> joints;  // and how far beyond what is asked for
   double squares = 0, largest = 1;
   for (const std::string& name : held) {
     const Joint& joint = model.joints()[static_cast<size_t>(model.findJoint(name))];
-    const double value = nearest[joint.idx_q], gap = value - q[joint.idx_q];
-    if (getLinkage(joint) != linkage || std::abs(gap) <= kMet) continue;
-    joints.push_back(&joint);
-    squares += gap * gap;
-    largest = std::max(largest, std::abs(value));
+    VectorXd gap(joint.nv);
+    calcHeldGap(joint, get(joint, nearest), get(joint, q), gap);
+    if (getLinkage(joint) != linkage || gap.cwiseAbs().maxCoeff() <= kMet) continue;
+    joints.emplace_back(&joint, -gap);
+    squares += gap.squaredNorm();
+    largest = std::max(largest, get(joint, nearest).cwiseAbs().maxCoeff());
   }
   std::vector<std::string> names, alone;
   std::string asked, found;
-  for (const Joint* joint : joints) {
-    const double value = nearest[joint->idx_q],
-                 within = kWithin * largest * (value - q[joint->idx_q]) / std::sqrt(squares);
-    asked += (names.empty() ? "" : ", ") + formatNumber(q[joint->idx_q]);
-    found += (names.empty() ? "" : ", ") + formatNumber(value + within);
+  for (const auto& [joint, gap] : joints) {
+    VectorXd within = get(*joint, nearest);
+    if (joint->nv == 1) within[0] += kWithin * largest / std::sqrt(squares) * gap[0];
+    asked += (names.empty() ? "" : ", ") + format(get(*joint, q));
+    found += (names.empty() ? "" : ", ") + format(within);
     names.push_back(joint->name);
     VectorXd only = start;
-    only[joint->idx_q] = q[joint->idx_q];
+    only.segment(joint->idx_q, joint->nq) = get(*joint, q);
     if (LoopCloser(model, start, {joint->name}).close(only).status != NumericalStatus::NotClosed)
       alone.push_back(joint->name);
   }
@@ -392,15 +427,17 @@ AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const st
   AssemblyProblem problem;
   problem.q_ref = q;
   if (!held.empty()) problem.weights = VectorXd::Constant(model.nv(), 1e-3);
-  for (const std::string& name : held)
-    problem.weights[model.joints()[static_cast<size_t>(findHeldJoint(model, name))].idx_v] = 1;
+  for (const std::string& name : held) {
+    const Joint& joint = model.joints()[static_cast<size_t>(findHeldJoint(model, name))];
+    problem.weights.segment(joint.idx_v, joint.nv).setOnes();
+  }
   AssemblyResult result = assemble(model, problem, options);
   if (result.status != NumericalStatus::Ok || held.empty()) return result;
   const VectorXd start = result.q;
   LoopCloser closer(model, start, held);
   for (const std::string& name : held) {
     const Joint& joint = model.joints()[static_cast<size_t>(model.findJoint(name))];
-    result.q[joint.idx_q] = q[joint.idx_q];
+    result.q.segment(joint.idx_q, joint.nq) = q.segment(joint.idx_q, joint.nq);
   }
   const HeldResult closed = closer.close(result.q);
   if (closed.status != NumericalStatus::NotClosed) return result;

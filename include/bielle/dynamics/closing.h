@@ -2,7 +2,8 @@
 /// \file Closing loops while some coordinates are held; from joints to the motors that drive them, and back.
 ///
 /// On the closed configurations of a linkage with the basis N of its closed motions (linkage.h), the held coordinates q_X go
-/// to what they are asked to be, x, by least squares (Levenberg and Marquardt) along the closed motions:
+/// to what they are asked to be, x, by least squares (Levenberg and Marquardt) along the closed motions; of joints with several
+/// coordinates, x - q_X is in tangent coordinates (notation.h):
 ///     dq = N z,    (N_X^T N_X + lambda 1) z = N_X^T (x - q_X),                                                      (1)
 /// each step closed again. Without lambda it is Newton's method, or, where fewer coordinates are held than the linkage has
 /// freedoms, its shortest step. What is out of reach has a stationary distance at a dead point of what is held, where N_X
@@ -20,7 +21,7 @@ struct HeldResult {
   /// Ok; NearDeadPoint: they are, but there they hardly determine the linkage, whose other coordinates may go either way;
   /// NotClosed: they are at the nearest values in reach; NotFinite: nothing was written
   NumericalStatus status = NumericalStatus::Ok;
-  double gap = 0;  ///< the largest distance from what is asked for, rad or m
+  double gap = 0;  ///< the largest distance from what is asked for, of one tangent coordinate, rad or m
   int joint = -1;  ///< that has it, in Model::joints(); -1 if there is no gap
 };
 
@@ -29,7 +30,7 @@ struct HeldResult {
 class LoopCloser {
  public:
   /// \param q     closed configuration (nq) to start from
-  /// \param held  names of joints with one coordinate
+  /// \param held  names of joints, of any kind
   /// \throws InputError when q is open, or there is no such joint
   LoopCloser(const Model& model, ConstVectorRef q, const std::vector<std::string>& held);
   ~LoopCloser();
