@@ -161,6 +161,52 @@ TEST_CASE("assembly: the shortest steps close the same robot, and change nothing
   CHECK(assemble(model, problem, options).status == NumericalStatus::NotClosed);
 }
 
+TEST_CASE("assembly: feet that are farther apart than legs are long are refused without a step") {
+  const Model& model = getBipetto();
+  Reference reference = model.references()[0];
+  REQUIRE(reference.feet.size() == 2);
+  REQUIRE(assemble(model, makeReferenceProblem(model, reference)).status == NumericalStatus::Ok);
+  for (auto& [name, place] : reference.feet) place *= 1000;  // mm
+  const AssemblyResult feet = assemble(model, makeReferenceProblem(model, reference));
+  CHECK(feet.status == NumericalStatus::NotClosed);
+  CHECK(feet.iterations == 0);
+  CHECK_THAT(feet.message, Catch::Contains(" m from target '") && Catch::Contains("within reach, in m"));
+  // The height of a frame over the feet, likewise.
+  reference = model.references()[0];
+  if (reference.height_frame.empty()) reference.height_frame = model.bodies()[1].name, reference.height = 0.4;
+  reference.height *= 1000;
+  const AssemblyResult height = assemble(model, makeReferenceProblem(model, reference));
+  CHECK(height.iterations == 0);
+  CHECK_THAT(height.message, Catch::Contains("height of ") && Catch::Contains("within reach, in m"));
+  // At exactly the length of a stretched arm it is tried, and found; beyond, not.
+  ModelBuilder builder("arm");
+  Joint joint;
+  joint.kind = JointKind::Revolute;
+  joint.axis = Vector3d::UnitY();
+  std::mt19937 rng(1);
+  joint.name = "shoulder";
+  builder.addLink("upper", "world", joint, randomInertia(rng));
+  joint.name = "elbow";
+  joint.X_PJ.p.x() = 0.3;
+  builder.addLink("lower", "upper", joint, randomInertia(rng));
+  const Model arm = builder.build();
+  FrameTarget hand;
+  hand.name = "hand";
+  hand.body = 2;
+  hand.X_BF.p = {0.2, 0, 0};
+  hand.mask.tail<3>().setConstant(false);
+  AssemblyProblem problem;
+  problem.q_ref = VectorXd::Zero(2);
+  hand.X_WT.p = {0.5, 0, 0};
+  problem.frames = {hand};
+  CHECK(assemble(arm, problem).status == NumericalStatus::Ok);
+  problem.frames[0].X_WT.p = {0, 0, 0.51};
+  const AssemblyResult far = assemble(arm, problem);
+  CHECK(far.iterations == 0);
+  CHECK_THAT(far.message,
+             Catch::Contains("0.51 m from the origin of the world") && Catch::Contains("bridges 0.5 m at most"));
+}
+
 TEST_CASE("assembly: a loop too short to close is named, with its gap") {
   // The rods reach 0.2 m, the pins are 0.4 m apart.
   ModelBuilder builder("short");
