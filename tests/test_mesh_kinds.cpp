@@ -139,3 +139,83 @@ TEST_CASE("meshes that are cut off, empty or of no known kind give nothing") {
   }
   CHECK(readTriangles("-option.ply", files.path()).cols() == 24);
 }
+
+namespace {
+
+// The faces of a box, seen from outside.
+Eigen::Matrix3Xd makeBox(const Vector3d& low, const Vector3d& high) {
+  Eigen::Matrix3Xd corners(3, 36);
+  Eigen::Index column = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int side : {0, 1}) {
+      const auto place = [&](int u, int v) {
+        Vector3d p;
+        p[axis] = side ? high[axis] : low[axis];
+        p[(axis + 1) % 3] = u ? high[(axis + 1) % 3] : low[(axis + 1) % 3];
+        p[(axis + 2) % 3] = v ? high[(axis + 2) % 3] : low[(axis + 2) % 3];
+        return p;
+      };
+      for (const auto& [u, v] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}})
+        corners.col(column++) = side ? place(u, v) : place(v, u);
+    }
+  return corners;
+}
+
+Eigen::Matrix3Xd mirror(Eigen::Matrix3Xd corners) {
+  corners.row(0) *= -1;
+  return corners;
+}
+
+Eigen::Matrix3Xd join(const std::vector<Eigen::Matrix3Xd>& parts) {
+  Eigen::Matrix3Xd all(3, 0);
+  for (const Eigen::Matrix3Xd& part : parts) {
+    all.conservativeResize(3, all.cols() + part.cols());
+    all.rightCols(part.cols()) = part;
+  }
+  return all;
+}
+
+Eigen::Matrix3Xd turnInside(const Eigen::Matrix3Xd& corners) { return corners.rowwise().reverse(); }
+
+}  // namespace
+
+TEST_CASE("shells of one mesh: mirrored ones count as the part does, and cavities are taken off") {
+  const Eigen::Matrix3Xd part = makeBox({0, 0, 0}, {0.3, 0.2, 0.1}), far = makeBox({1, 0, 0}, {1.3, 0.2, 0.1});
+  const Eigen::Matrix3Xd inner = makeBox({0.1, 0.05, 0.02}, {0.2, 0.15, 0.08}),
+                         hollow = join({turnInside(inner), part});
+  const double V = 0.3 * 0.2 * 0.1, v = 0.1 * 0.1 * 0.06;
+  const auto calc = [](const std::vector<Eigen::Matrix3Xd>& parts) {
+    return calcMeshInertia(join(parts), MeshSolid::Enclosed).value();
+  };
+  CHECK(calc({part}).mass == Approx(V));
+  CHECK(calc({turnInside(part)}).mass == Approx(V));
+  for (const Eigen::Matrix3Xd& other : {mirror(far), mirror(part)})  // apart, and face to face
+    for (const bool is_first : {false, true}) {
+      const Inertia both = is_first ? calc({other, part}) : calc({part, other});
+      CHECK(both.mass == Approx(2 * V));
+      CHECK(both.com.x() == Approx((0.15 + other.row(0).mean()) / 2).margin(1e-12));
+    }
+  for (const bool is_mirrored : {false, true}) {
+    const Eigen::Matrix3Xd one = is_mirrored ? mirror(hollow) : hollow;
+    CHECK(calc({one}).mass == Approx(V - v));
+    CHECK(calc({one, far}).mass == Approx(2 * V - v));
+    CHECK(calc({one, mirror(far)}).mass == Approx(2 * V - v));
+    const Inertia alone = calc({hollow}), turned = calc({one});
+    CHECK(turned.com.x() == Approx(is_mirrored ? -alone.com.x() : alone.com.x()));
+    CHECK((turned.I_com.diagonal() - alone.I_com.diagonal()).norm() < 1e-12 * alone.I_com.norm());
+  }
+  CHECK(calc({part, inner}).mass == Approx(V + v));  // of another material, not a cavity
+  CHECK(calc({part, mirror(far), inner}).mass == Approx(2 * V + v));
+  // In a file, whose numbers are float.
+  const RobotDirectory files;
+  std::ostringstream stl;
+  stl << "solid two\n";
+  const Eigen::Matrix3Xd two = join({part, mirror(far)});
+  for (Eigen::Index i = 0; i < two.cols(); i += 3) {
+    stl << "facet normal 0 0 0\nouter loop\n";
+    for (int k = 0; k < 3; ++k) stl << "vertex " << two.col(i + k).transpose() << "\n";
+    stl << "endloop\nendfacet\n";
+  }
+  files.write("two.stl", stl.str() + "endsolid\n");
+  CHECK(calcMeshInertia(readTriangles("two.stl", files.path()), MeshSolid::Enclosed).value().mass == Approx(2 * V));
+}

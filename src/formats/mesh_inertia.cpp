@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "formats/mesh_shells.h"
+
 namespace bielle {
 namespace {
 
@@ -40,7 +42,8 @@ Moments addUp(const Eigen::Matrix3Xd& corners, const Vector3d& origin, MeshSolid
 
 }  // namespace
 
-std::optional<Inertia> calcMeshInertia(const Eigen::Matrix3Xd& corners, MeshSolid solid) {
+std::optional<Inertia> calcMeshInertia(const Eigen::Matrix3Xd& given, MeshSolid solid) {
+  const Eigen::Matrix3Xd corners = solid == MeshSolid::Enclosed ? turnShellsOutwards(given) : given;
   const Moments surface = addUp(corners, Vector3d::Zero(), MeshSolid::Surface);
   if (!(surface.mass > 0)) return {};
   const Vector3d middle = surface.first / surface.mass;  // of the faces

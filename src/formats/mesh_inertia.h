@@ -8,7 +8,7 @@
 namespace bielle {
 
 enum class MeshSolid {
-  Enclosed,  // of the volume inside a closed surface
+  Enclosed,  // of the volume inside closed surfaces, whichever way each is turned
   Overlapping,  // the same of convex ones; MuJoCo's default counts the parts of others that faces hide from the centre again
   Surface       // of the faces
 };
