@@ -3,6 +3,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <map>
 #include <optional>
 #include <regex>
@@ -22,6 +23,7 @@
 #include "math/so3.h"
 #include "mechanisms.h"
 #include "model/number_text.h"
+#include "own_robots.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -282,4 +284,99 @@ TEST_CASE("robots of any kind come back from MJCF, Drake's URDF, SDF and USD to 
     CHECK(robots > 0.6 * count);
   }
   CHECK(compared.size() >= 3);
+}
+
+namespace {
+
+const std::string kBetween = "\n<!-- YAML -->\n";  // of two files in one text
+
+struct Format {
+  const char *name, *file;  // and the file that is read
+  std::function<std::string(const Model&)> write;
+};
+
+std::vector<Format> listFormats() {
+  const auto close = [](const Model& model) { return findClosedConfiguration(model).q; };
+  return {{"bielle", "robot.urdf",
+           [](const Model& model) {
+             const RobotText text = formatRobot(model);
+             return text.urdf + kBetween + text.yaml;
+           }},
+          {"urdf", "robot.urdf", [](const Model& model) { return formatUrdf(model).urdf; }},
+          {"drake", "robot.urdf", [](const Model& model) { return formatDrake(model).urdf; }},
+          {"mjcf", "robot.xml", [=](const Model& model) { return formatMjcf(model, close(model)).xml; }},
+#ifdef BIELLE_READS_SDF
+          {"sdf", "robot.sdf", [=](const Model& model) { return formatSdf(model, close(model)).xml; }},
+#endif
+          {"usd", "robot.usda", [=](const Model& model) { return formatUsd(model, close(model)).usda; }}};
+}
+
+Model readBack(const Format& format, const std::string& text) {
+  const RobotDirectory directory;
+  const size_t between = text.find(kBetween);
+  if (between != std::string::npos)
+    return loadRobot(directory.writeRobot(text.substr(0, between), text.substr(between + kBetween.size()))).model;
+  return loadRobot(directory.write(format.file, text)).model;
+}
+
+// Without moments of inertia, whose axes nothing determines where two of them are nearly equal.
+std::string leaveOutMoments(const std::string& text) {
+  static const std::regex moments("<inertial|physics:diagonalInertia|physics:principalAxes");
+  std::istringstream lines(text);
+  std::string out;
+  for (std::string line; std::getline(lines, line);)
+    if (!std::regex_search(line, moments)) out += line + "\n";
+  return out;
+}
+
+// The first line of two texts that differs.
+std::string findDifference(const std::string& a, const std::string& b) {
+  std::istringstream one(a), other(b);
+  std::string x, y;
+  while (std::getline(one, x))
+    if (!std::getline(other, y) || x != y) return x + "\nand\n" + y;
+  return std::getline(other, y) ? "the end and\n" + y : "";
+}
+
+// The first number that differs by more than its last digits, if the texts are the same but for numbers.
+std::string compareNumbers(const std::string& a, const std::string& b) {
+  static const std::regex number("-?\\d+(\\.\\d+)?(e[-+]?\\d+)?");
+  if (std::regex_replace(a, number, "#") != std::regex_replace(b, number, "#")) return findDifference(a, b);
+  for (std::sregex_iterator x(a.begin(), a.end(), number), y(b.begin(), b.end(), number), end; x != end; ++x, ++y) {
+    const double one = *parseNumber(x->str()), other = *parseNumber(y->str());
+    if (!(std::abs(one - other) < 1e-13 * std::max(1.0, std::abs(one)))) return x->str() + " and " + y->str();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("what is read and written, and then read and written again, is the same but for last digits in every format",
+          "[sweep]") {
+  const int count = std::getenv("BIELLE_SWEEP") ? 300 : 30;
+  std::vector<Model> models;
+  for (const char* robot : {"bipetto", "cleobot", "belt_biped", "rsu_biped", "fivebar", "delta", "spring_leg"})
+    models.push_back(loadOwn(robot).model);
+  for (int i = 0; i < count; ++i) {
+    std::mt19937 rng(static_cast<unsigned>(i));
+    models.push_back(makeAny(rng, i).model);
+  }
+  for (const Format& format : listFormats()) {
+    int written = 0;
+    for (size_t i = 0; i < models.size(); ++i) {
+      CAPTURE(format.name, i, models[i].name());
+      std::string first;
+      try {
+        first = format.write(models[i]);
+      } catch (const InputError&) {  // a joint or closure that the format does not have
+        continue;
+      }
+      ++written;
+      const std::string second = format.write(readBack(format, first));
+      const std::string third = format.write(readBack(format, second));
+      CHECK(compareNumbers(leaveOutMoments(second), leaveOutMoments(third)) == "");
+    }
+    CAPTURE(format.name);
+    CHECK(written > static_cast<int>(models.size()) / 3);
+  }
 }

@@ -86,6 +86,10 @@ class DrakeWriter {
     for (const Closure& c : parts_.closures) is_used |= isBalls(c) && (c.body1 == 0 || c.body2 == 0);
     for (const PointSpring& spring : parts_.point_springs) is_used |= spring.body1 == 0 || spring.body2 == 0;
     if (!is_used) return;
+    for (const Frame& frame : parts_.frames)
+      if (frame.body == 0 && frame.name != "world" && frame.X_BF.p.isZero(0) && frame.X_BF.R.isIdentity(0))
+        ground_ = frame.name;
+    if (!ground_.empty()) return;
     std::set<std::string> taken;
     for (const Frame& frame : parts_.frames) taken.insert(frame.name);
     for (const Body& body : parts_.bodies) taken.insert(body.name);

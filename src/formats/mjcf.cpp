@@ -18,6 +18,9 @@ namespace {
 
 constexpr int kMjcfDegree = 4;  // of the polynomials of equalities
 
+// What is left of a difference of numbers of such a size; at a closed posture it is zero.
+double dropRounding(double difference, double size) { return std::abs(difference) < 1e-12 * size ? 0 : difference; }
+
 class MjcfWriter {
  public:
   MjcfWriter(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options)
@@ -147,7 +150,7 @@ class MjcfWriter {
     addElement(section, "tendon",
                {{"name", closure.name},
                 {"tendon1", closure.name},
-                {"polycoef", formatMjcf(closure.length - length) + " 0 0 0 0"}});
+                {"polycoef", formatMjcf(dropRounding(closure.length - length, length)) + " 0 0 0 0"}});
   }
 
   // A preload moves the rest of the spring, which MuJoCo wants to be 0 or more.
@@ -170,8 +173,13 @@ class MjcfWriter {
 
   // MuJoCo's equalities act on differences from q_ref: the length of the tendon, or y = p0 + p1 x + .. for joints 1 and 2.
   void writeCoupler(const Closure& closure, XMLElement& section) {
-    double rest = closure.offset;  // of the differences
-    for (const CouplerTerm& term : closure.terms) rest -= term.calcDerivative(0, q_ref_[term.idx_q]);
+    double rest = closure.offset, size = std::abs(rest);  // of the differences
+    for (const CouplerTerm& term : closure.terms) {
+      const double value = term.calcDerivative(0, q_ref_[term.idx_q]);
+      rest -= value;
+      size += std::abs(value);
+    }
+    rest = dropRounding(rest, size);
     const auto is_linear = [](const CouplerTerm& term) { return term.isLinear(); };
     const auto linear = std::find_if(closure.terms.begin(), closure.terms.end(), is_linear);
     if (closure.terms.size() > 2) {

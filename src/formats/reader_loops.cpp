@@ -233,8 +233,20 @@ class LoopClosuresReader {
 
 }  // namespace
 
+std::string findUrdfFrame(const UrdfFile& tree, const std::string& link, const SE3& X_LF, bool is_point,
+                          double within) {
+  const auto stands = [&](const SE3& X) {
+    return (X_LF.p - X.p).isZero(within) && (is_point || (X_LF.R - X.R).isZero(within));
+  };
+  if (stands({})) return link;
+  for (const UrdfJoint& joint : tree.joints)
+    if (joint.joint.kind == JointKind::Fixed && joint.parent == link && stands(joint.joint.X_PJ)) return joint.child;
+  return "";
+}
+
 std::string addUrdfFrame(UrdfFile& tree, std::string name, const std::string& link, const SE3& X_LF) {
-  if (X_LF.p.isZero(0) && X_LF.R.isIdentity(0)) return link;
+  const std::string known = findUrdfFrame(tree, link, X_LF, false, 0);
+  if (!known.empty()) return known;
   while (tree.links.count(name) || findTreeJoint(tree, name)) name += "_";
   UrdfJoint joint;
   joint.parent = link;

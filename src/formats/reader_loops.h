@@ -19,7 +19,11 @@
 
 namespace bielle {
 
-/// A frame of the tree with this name, or with underscores behind it if that is taken; the link itself for the identity.
+/// What stands at a place of a link: the link itself, or what is fixed to it there; empty if there is nothing.
+/// \param is_point  whether directions do not matter   \param within  m, and of entries of rotations
+std::string findUrdfFrame(const UrdfFile& tree, const std::string& link, const SE3& X_LF, bool is_point, double within);
+
+/// What stands there, or a new frame with this name, or with underscores behind it if that is taken.
 std::string addUrdfFrame(UrdfFile& tree, std::string name, const std::string& link, const SE3& X_LF);
 
 /// Empty without one.

@@ -6,6 +6,7 @@
 
 #include "bielle/model/error.h"
 #include "formats/decimals.h"
+#include "formats/reader_loops.h"
 #include "formats/xml_document.h"
 #include "model/joint.h"
 
@@ -237,12 +238,8 @@ UrdfJoint& MjcfReader::addLink(const std::string& link, const std::string& paren
 
 // The link itself or a site that stands there, else a new frame. A ball has no axes to care for.
 std::string MjcfReader::findFrame(const std::string& link, const SE3& X, bool is_ball, const std::string& made) {
-  const auto stands = [&](const SE3& other) {
-    return (X.p - other.p).isZero(kCoincident) && (is_ball || (X.R - other.R).isZero(kCoincident));
-  };
-  if (stands({})) return link;
-  for (const UrdfJoint& j : tree_.joints)
-    if (j.joint.kind == JointKind::Fixed && j.parent == link && stands(j.joint.X_PJ)) return j.child;
+  const std::string known = findUrdfFrame(tree_, link, X, is_ball, kCoincident);
+  if (!known.empty()) return known;
   const std::string name = makeName(made);
   addLink(name, link, JointKind::Fixed, name + "_frame", X);
   return name;

@@ -175,7 +175,7 @@ MjcfReader::Element MjcfReader::readJoint(const Child& child, const std::string&
     out.axis = child.X_BF.R * e.getVector("axis", out.axis);
     const double norm = out.axis.stableNorm();
     if (!(norm > 1e-12) || !std::isfinite(norm)) e.fail("its axis is not a direction", "give a non-zero vector");
-    out.axis /= norm;
+    if (std::abs(out.axis.squaredNorm() - 1) > 1e-15) out.axis /= norm;  // as it was written
     out.ref = unit * e.getNumber("ref", 0);
   } else {
     for (const char* without_meaning : {"axis", "ref"}) e.find(without_meaning);

@@ -264,11 +264,12 @@ void SdfReader::addRoot(const std::string& link) {
 SE3 SdfReader::getLinkPlace(const std::string& link) const { return X_WL_.at(link); }
 
 void SdfReader::readLink(const sdf::Link& link) {
-  const SE3 X_WS = getPlace(link.SemanticPose(), link.Name());
+  const bool is_given = link.PoseRelativeTo().empty() && moves_.empty();
+  const SE3 X_WS = is_given ? X_WM_ * toSE3(link.RawPose()) : getPlace(link.SemanticPose(), link.Name());
   SE3 X_WL = X_WS;
   const auto carrier = carriers_.find(link.Name());
   if (carrier != carriers_.end() && carrier->second->Type() != sdf::JointType::FIXED &&
-      carrier->second->Type() != sdf::JointType::PRISMATIC) {
+      carrier->second->Type() != sdf::JointType::PRISMATIC && !standsOnChild(*carrier->second)) {
     const auto frames = joint_frames_.find(carrier->second->Name());
     X_WL.p = frames == joint_frames_.end() ? getPlace(carrier->second->SemanticPose(), link.Name()).p
                                            : (moves_.at(link.Name()) * frames->second.X_WC).p;
@@ -276,7 +277,8 @@ void SdfReader::readLink(const sdf::Link& link) {
   if (carrier != carriers_.end() && carrier->second->Type() == sdf::JointType::UNIVERSAL)
     if (const auto axes = findUniversalAxes(*carrier->second)) X_WL.R = X_WS.R * *axes;
   X_WL_[link.Name()] = X_WL;
-  const SE3 X_LS = X_WL.inverse() * X_WS;
+  const SE3 X_LS = X_WL.p == X_WS.p && X_WL.R == X_WS.R ? SE3() : X_WL.inverse() * X_WS;
+  X_LS_[link.Name()] = X_LS;
   UrdfLink& out = tree_.links[link.Name()];
   out.name = link.Name();
   const auto& moments = link.Inertial().MassMatrix();
@@ -284,12 +286,34 @@ void SdfReader::readLink(const sdf::Link& link) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) I(i, j) = moments.Moi()(i, j);
   out.inertia = Inertia{moments.Mass(), Vector3d::Zero(), I}.transformed(X_LS * toSE3(link.Inertial().Pose()));
-  readShapes(link, X_LS);
+  readShapes(link);
+}
+
+// Where the file gives the numbers themselves, so that they do not go through the world and come back rounded.
+SE3 SdfReader::calcPlaceIn(const std::string& parent, const std::string& link) const {
+  const sdf::Link& own = *model_->LinkByName(link);
+  if (parent != "world" && own.PoseRelativeTo() == parent && moves_.empty())
+    return X_LS_.at(parent) * toSE3(own.RawPose()) * X_LS_.at(link).inverse();
+  return getLinkPlace(parent).inverse() * getLinkPlace(link);
+}
+
+template <typename Element>
+SE3 SdfReader::getPlaceOn(const Element& element, const std::string& link) const {
+  ignition::math::Pose3d pose = element.RawPose();
+  if (!element.PoseRelativeTo().empty() && element.PoseRelativeTo() != link)
+    check(element.SemanticPose().Resolve(pose, link));
+  return X_LS_.at(link) * toSE3(pose);
+}
+template SE3 SdfReader::getPlaceOn(const sdf::Visual&, const std::string&) const;
+template SE3 SdfReader::getPlaceOn(const sdf::Collision&, const std::string&) const;
+
+bool SdfReader::standsOnChild(const sdf::Joint& joint) const {
+  const SE3 X = toSE3(joint.RawPose());
+  return joint.PoseRelativeTo().empty() && !joint_frames_.count(joint.Name()) && X.p.isZero(0) && X.R.isIdentity(0);
 }
 
 // A frame of the tree.
-std::string SdfReader::addFrame(const std::string& name, const std::string& link, const SE3& X_WF) {
-  const SE3 X_LF = getLinkPlace(link).inverse() * X_WF;
+std::string SdfReader::addFrame(const std::string& name, const std::string& link, const SE3& X_LF) {
   UrdfJoint joint;
   joint.parent = link;
   joint.child = joint.joint.name = name;
@@ -306,7 +330,9 @@ void SdfReader::readFrame(const sdf::Frame& frame) {
   std::string link;
   check(frame.ResolveAttachedToBody(link));
   if (!X_WL_.count(link)) fail("frame '" + frame.Name() + "'", "it is not attached to a link", "attach it to one");
-  addFrame(frame.Name(), link, getPlace(frame.SemanticPose(), link));
+  const bool is_own = frame.AttachedTo() == link && frame.PoseRelativeTo().empty();
+  addFrame(frame.Name(), link,
+           is_own ? getPlaceOn(frame, link) : SE3(getLinkPlace(link).inverse() * getPlace(frame.SemanticPose(), link)));
 }
 
 // The bodies of the file stand where its loops are closed.

@@ -45,8 +45,12 @@ class SdfReader {
                const std::string& link) const;  // with all joints at zero, fixed to a link
   std::string getParent(const sdf::Joint& joint) const;
   std::string getChild(const sdf::Joint& joint) const;
-  SE3 getLinkPlace(const std::string& link) const;  // of our frame of it, in the world
-  std::string addFrame(const std::string& name, const std::string& link, const SE3& X_WF);
+  SE3 getLinkPlace(const std::string& link) const;                            // of our frame of it, in the world
+  SE3 calcPlaceIn(const std::string& parent, const std::string& link) const;  // of our frames, with all joints at zero
+  template <typename Element>  // that the file gives in a link: in our frame of it
+  SE3 getPlaceOn(const Element& element, const std::string& link) const;
+  bool standsOnChild(const sdf::Joint& joint) const;  // in its frame, as far as the file says so by itself
+  std::string addFrame(const std::string& name, const std::string& link, const SE3& X_LF);
 
   // reader_sdf_joints.cpp
   Vector3d resolveAxis(const sdf::Joint& joint, int k) const;
@@ -59,7 +63,7 @@ class SdfReader {
                   const SE3& X_W1, const std::string& link2, const SE3& X_W2);
 
   // reader_sdf_shapes.cpp
-  void readShapes(const sdf::Link& link, const SE3& X_LS);
+  void readShapes(const sdf::Link& link);
   std::optional<Visual> readGeometry(const sdf::Geometry& geometry, const std::string& element);
 
   // reader_sdf_drake.cpp
@@ -82,7 +86,7 @@ class SdfReader {
   YamlFile yaml_;
   MjcfNotes notes_;
   std::map<std::string, const sdf::Joint*> carriers_;  // by link
-  std::map<std::string, SE3> X_WL_;                    // by link
+  std::map<std::string, SE3> X_WL_, X_LS_;             // by link: our frame in the world, and that of the file in it
   std::map<std::string, std::string> parents_;         // of the links that are carried
   std::map<std::string, std::vector<const sdf::Joint*>>
       carried_;  // by the link that they are on, in the order of the file

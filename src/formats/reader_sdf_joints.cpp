@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "formats/reader_loops.h"
 #include "formats/reader_sdf.h"
 
 namespace bielle {
@@ -20,7 +21,7 @@ Vector3d SdfReader::resolveAxis(const sdf::Joint& joint, int k) const {
   const bool in_own_frame = axis && frames != joint_frames_.end() &&
                             (axis->XyzExpressedIn().empty() || axis->XyzExpressedIn() == joint.Name());
   ignition::math::Vector3d v;
-  if (in_own_frame)
+  if (in_own_frame || (axis && axis->XyzExpressedIn().empty() && standsOnChild(joint)))
     v = axis->Xyz();
   else if (axis)
     check(axis->ResolveXyz(v, getChild(joint)));
@@ -31,14 +32,12 @@ Vector3d SdfReader::resolveAxis(const sdf::Joint& joint, int k) const {
   const double norm = direction.stableNorm();
   if (!axis || !(norm > 1e-12) || !std::isfinite(norm))
     fail(describeSdf(joint), "its axis is not a direction", "give a non-zero vector");
-  return direction / norm;
+  return std::abs(direction.squaredNorm() - 1) > 1e-15 ? Vector3d(direction / norm) : direction;  // as it was written
 }
 
 // In our frame of the child.
 Vector3d SdfReader::getAxis(const sdf::Joint& joint, int k) const {
-  const std::string child = getChild(joint);
-  const Matrix3d R_WS = getPlace(model_->LinkByName(child)->SemanticPose(), child).R;
-  return getLinkPlace(child).R.transpose() * R_WS * resolveAxis(joint, k);
+  return X_LS_.at(getChild(joint)).R * resolveAxis(joint, k);
 }
 
 // Axes of a universal joint at right angles are x and y of its link, as our files and Drake's have it.
@@ -95,7 +94,7 @@ void SdfReader::addCarried(const sdf::Joint& joint) {
   out.parent = getParent(joint);
   out.child = getChild(joint);
   out.joint.name = joint.Name();
-  out.joint.X_PJ = getLinkPlace(out.parent).inverse() * getLinkPlace(out.child);
+  out.joint.X_PJ = calcPlaceIn(out.parent, out.child);
   switch (joint.Type()) {
     case sdf::JointType::FIXED:
       out.joint.kind = JointKind::Fixed;
@@ -134,11 +133,13 @@ void SdfReader::addCarried(const sdf::Joint& joint) {
 void SdfReader::addClosure(const std::string& name, ClosureKind kind, const Vector3d& axis, const std::string& link1,
                            const SE3& X_W1, const std::string& link2, const SE3& X_W2) {
   const auto frame = [&](const std::string& link, const SE3& X, const std::string& suffix) {
+    constexpr double kCoincident = 1e-10;  // the posture of the file is closed to less
     const SE3 X_LF = getLinkPlace(link).inverse() * X;
-    if (X_LF.p.isZero(1e-12) && (kind == ClosureKind::Ball3D || X_LF.R.isIdentity(1e-12))) return link;
+    const std::string known = findUrdfFrame(tree_, link, X_LF, kind == ClosureKind::Ball3D, kCoincident);
+    if (!known.empty()) return known;
     std::string made = name + suffix;
     while (!names_.insert(made).second) made += "_";
-    return addFrame(made, link, X);
+    return addFrame(made, link, X_LF);
   };
   ClosureSpec closure;
   closure.name = name;
@@ -163,7 +164,10 @@ void SdfReader::addClosure(const sdf::Joint& joint) {
   if (joint.Type() == sdf::JointType::REVOLUTE || joint.Type() == sdf::JointType::CONTINUOUS)
     kind = ClosureKind::Hinge5D;
   if (hasAxis(kind)) {
-    axis = X_WC.R.transpose() * getLinkPlace(child).R * getAxis(joint, 0);
+    const sdf::JointAxis* own = joint.Axis(0);
+    axis = own && own->XyzExpressedIn().empty() && !joint_frames_.count(joint.Name())
+               ? Vector3d(own->Xyz().X(), own->Xyz().Y(), own->Xyz().Z())
+               : Vector3d(X_WC.R.transpose() * getLinkPlace(child).R * getAxis(joint, 0));
     UrdfJoint unused;
     unused.joint.kind = kind == ClosureKind::Slider ? JointKind::Prismatic : JointKind::Revolute;
     const size_t forces = yaml_.joint_forces.size();

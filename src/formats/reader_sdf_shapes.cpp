@@ -38,13 +38,8 @@ std::optional<Visual> SdfReader::readGeometry(const sdf::Geometry& geometry, con
   return out;
 }
 
-void SdfReader::readShapes(const sdf::Link& link, const SE3& X_LS) {
+void SdfReader::readShapes(const sdf::Link& link) {
   UrdfLink& out = tree_.links.at(link.Name());
-  const auto place = [&](const sdf::SemanticPose& semantic) {
-    ignition::math::Pose3d pose;
-    check(semantic.Resolve(pose, link.Name()));
-    return X_LS * toSE3(pose);
-  };
   const auto describe = [&](const char* kind, const std::string& name) {
     return "link '" + link.Name() + "': " + kind + " '" + name + "'";
   };
@@ -52,7 +47,7 @@ void SdfReader::readShapes(const sdf::Link& link, const SE3& X_LS) {
     const sdf::Visual& visual = *link.VisualByIndex(i);
     std::optional<Visual> drawn = readGeometry(*visual.Geom(), describe("visual", visual.Name()));
     if (!drawn) continue;
-    drawn->X_BV = place(visual.SemanticPose());
+    drawn->X_BV = getPlaceOn(visual, link.Name());
     if (const sdf::Material* material = visual.Material()) {
       const auto& color = material->Diffuse();
       drawn->rgba = {color.R(), color.G(), color.B(), color.A()};
@@ -63,7 +58,7 @@ void SdfReader::readShapes(const sdf::Link& link, const SE3& X_LS) {
     const sdf::Collision& collision = *link.CollisionByIndex(i);
     std::optional<Visual> geometry = readGeometry(*collision.Geom(), describe("collision", collision.Name()));
     if (!geometry) continue;
-    geometry->X_BV = place(collision.SemanticPose());
+    geometry->X_BV = getPlaceOn(collision, link.Name());
     std::optional<Shape> shape = fitShape(*geometry);
     if (!shape) continue;
     if (collision.Geom()->CapsuleShape()) {

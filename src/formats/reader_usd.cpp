@@ -158,7 +158,7 @@ RobotFiles UsdReader::read() {
   if (up == "Y")
     M.topLeftCorner<3, 3>() = meter_ * makeAxisRotation(Vector3d::UnitX(), kPi / 2).array().round().matrix();
   bodies_[0].M = places_[nullptr] = M;
-  for (const auto& prim : layer_->root.children) collect(*prim, M, 0);
+  for (const auto& prim : layer_->root.children) collect(*prim, M, UsdTransform::Identity(), 0);
   if (bodies_.size() == 1)
     throw InputError(
         path_, "document", "it has no rigid body (PhysicsRigidBodyAPI)",
@@ -265,14 +265,18 @@ int UsdReader::addBody(const UsdPrim& prim, const UsdTransform& M) {
   return static_cast<int>(bodies_.size()) - 1;
 }
 
-// Bodies, joints and shapes, depth first. \param M  of its parent   \param body  that it is part of
-void UsdReader::collect(const UsdPrim& prim, UsdTransform M, int body) {
+// Bodies, joints and shapes, depth first. \param M  of its parent   \param B  likewise, to the body   \param body  that it is part of
+void UsdReader::collect(const UsdPrim& prim, UsdTransform M, UsdTransform B, int body) {
   if (isOmitted(prim)) return;
   bool resets = false;
   const UsdTransform own = calcUsdTransform(path_, prim, resets);
   M = resets ? UsdTransform(bodies_[0].M * own) : UsdTransform(M * own);
+  B = resets ? UsdTransform(bodies_[static_cast<size_t>(body)].M.inverse() * M) : UsdTransform(B * own);
   if (!M.allFinite()) failUsd(path_, prim, "its place is not finite", "give smaller numbers");
-  if (prim.hasApi("PhysicsRigidBodyAPI") && getFlag(prim, "physics:rigidBodyEnabled", true)) body = addBody(prim, M);
+  if (prim.hasApi("PhysicsRigidBodyAPI") && getFlag(prim, "physics:rigidBodyEnabled", true)) {
+    body = addBody(prim, M);
+    B.setIdentity();
+  }
   body_of_[&prim] = body;
   places_[&prim] = M;
   const std::string_view type = prim.type;
@@ -283,13 +287,13 @@ void UsdReader::collect(const UsdPrim& prim, UsdTransform M, int body) {
   else if (type == "MjcActuator" || type == "NewtonActuator")
     actuators_.push_back(&prim);
   else if (!type.empty() && type != "Xform" && type != "Scope" && type != "SkelRoot")
-    readShape(prim, M, body);
+    readShape(prim, M, B, body);
   if ((prim.hasApi("NewtonSiteAPI") || prim.hasApi("MjcSiteAPI") || prim.hasApi("IsaacSiteAPI")) &&
       body_of_[&prim] > 0) {
     const SE3 X_WF = calcUsdPlace(path_, prim, M);
-    sites_.push_back({makeName(prim, link_names_), body, bodies_[static_cast<size_t>(body)].X_WS.inverse() * X_WF});
+    sites_.push_back({makeName(prim, link_names_), body, calcPlaceInBody(X_WF, B, body)});
   }
-  for (const auto& child : prim.children) collect(*child, M, body);
+  for (const auto& child : prim.children) collect(*child, M, B, body);
 }
 
 void UsdReader::readScene(const UsdPrim& prim) {

@@ -66,7 +66,7 @@ class UsdReader {
   // reader_usd.cpp
   void load();
   void readLayer();
-  void collect(const UsdPrim& prim, UsdTransform M, int body);
+  void collect(const UsdPrim& prim, UsdTransform M, UsdTransform B, int body);
   bool isOmitted(const UsdPrim& prim);
   int addBody(const UsdPrim& prim, const UsdTransform& M);
   void readScene(const UsdPrim& prim);
@@ -87,7 +87,8 @@ class UsdReader {
   Inertia readInertia(const UsdBody& body);
   Inertia computeInertia(const UsdBody& body, double mass, double density) const;
   double findDensity(const UsdPrim& prim) const;
-  void readShape(const UsdPrim& prim, const UsdTransform& M, int body);
+  void readShape(const UsdPrim& prim, const UsdTransform& M, const UsdTransform& B, int body);
+  SE3 calcPlaceInBody(const SE3& X_WG, const UsdTransform& B, int body) const;
   std::optional<Visual> readGeometry(const UsdPrim& prim, const Vector3d& scale, SE3& X_GV);
   void addFrame(const std::string& name, const std::string& link, const SE3& X_LF);
 

@@ -151,8 +151,15 @@ std::optional<Visual> UsdReader::readGeometry(const UsdPrim& prim, const Vector3
   return out;
 }
 
+// By the numbers below the body alone, where it is not scaled: what goes through the world comes back rounded.
+SE3 UsdReader::calcPlaceInBody(const SE3& X_WG, const UsdTransform& B, int body) const {
+  const UsdBody& owner = bodies_[static_cast<size_t>(body)];
+  const std::optional<SE3> X = findUsdPlace(B);
+  return X && calcUsdScale(owner.M) == Vector3d::Ones() ? *X : owner.X_WS.inverse() * X_WG;
+}
+
 // What a body draws and lets collide; that of the ground is left out.
-void UsdReader::readShape(const UsdPrim& prim, const UsdTransform& M, int index) {
+void UsdReader::readShape(const UsdPrim& prim, const UsdTransform& M, const UsdTransform& B, int index) {
   if (index == 0) return;
   if (prim.hasApi("NewtonSiteAPI") || prim.hasApi("MjcSiteAPI")) {  // how large it is drawn
     for (const UsdProperty& property : prim.properties) property.is_used = true;
@@ -170,7 +177,7 @@ void UsdReader::readShape(const UsdPrim& prim, const UsdTransform& M, int index)
   solid.density = findDensity(prim);
   solid.mass = kilogram_ * getNumber(prim, "physics:mass", 0);
   if (visual) {
-    visual->X_BV = body.X_WS.inverse() * *X_WG * X_GV;
+    visual->X_BV = calcPlaceInBody(*X_WG, B, index) * X_GV;
     const Inertia own = calcSolid(prim, *visual);
     solid.inertia = Inertia{own.mass, Vector3d::Zero(), own.mass * own.I_com}.transformed(visual->X_BV);
     solid.is_known = true;

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "bielle/model/error.h"
+#include "formats/reader_loops.h"
 #include "formats/reader_usd.h"
 #include "math/constants.h"
 #include "math/so3.h"
@@ -183,6 +184,7 @@ bool hasDirections(ClosureKind kind) { return kind != ClosureKind::Ball3D && kin
 }  // namespace
 
 void UsdReader::addClosure(const UsdJoint& joint) {
+  constexpr double kRounding = 1e-12;  // of sites, which go through other matrices
   ClosureSpec closure;
   closure.name = joint.name;
   closure.kind = joint.length > 0                     ? ClosureKind::Distance
@@ -196,8 +198,8 @@ void UsdReader::addClosure(const UsdJoint& joint) {
     const UsdBody& body = bodies_[static_cast<size_t>(joint.body[end])];
     const SE3 X_LF = body.X_SL.inverse() * joint.X_SJ[end];
     std::string& frame = end == 0 ? closure.frame1 : closure.frame2;
-    frame = body.name;
-    if (X_LF.p.isZero(0) && (!hasDirections(closure.kind) || X_LF.R.isIdentity(0))) continue;
+    frame = findUrdfFrame(tree_, body.name, X_LF, !hasDirections(closure.kind), kRounding);
+    if (!frame.empty()) continue;
     frame = makeUnusedName(joint.name + "_frame" + std::to_string(end + 1),
                            [this](const std::string& made) { return link_names_.count(made) > 0; });
     link_names_.insert(frame);

@@ -151,7 +151,12 @@ UsdTransform calcUsdTransform(const std::string& path, const UsdPrim& prim, bool
   return M;
 }
 
-Vector3d calcUsdScale(const UsdTransform& M) { return M.topLeftCorner<3, 3>().colwise().norm(); }
+Vector3d calcUsdScale(const UsdTransform& M) {
+  Vector3d scale = M.topLeftCorner<3, 3>().colwise().norm();
+  for (double& factor : scale)
+    if (std::abs(factor - 1) < 1e-14) factor = 1;  // of a rotation
+  return scale;
+}
 
 std::optional<SE3> findUsdPlace(const UsdTransform& M) {
   constexpr double kSkew = 1e-5;  // of float, over a few transforms
