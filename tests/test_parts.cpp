@@ -16,6 +16,7 @@
 #include "formats/expressions.h"
 #include "leg_biped.h"
 #include "robot_directory.h"
+#include "robots/generator_entry.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -540,20 +541,29 @@ TEST_CASE("parts: errors give the file, the line, the name and what to do") {
                     Contains("it is a part of a robot"));
 }
 
-TEST_CASE("parts: parameters of parts that are not chosen are told") {
+TEST_CASE("parts: parameters of parts that are not chosen are refused, but where a design may choose them") {
   const RobotDirectory files;
-  const auto getWarnings = [&](const std::string& set) {
-    std::string all;
-    for (const std::string& warning :
-         loadRobot(files.write("legs/legs.yaml", "generator: leg_biped\nset: {" + set + "}\n")).warnings)
-      all += warning;
-    return all;
+  const auto load = [&](const std::string& set) {
+    return loadRobot(files.write("legs/legs.yaml", "generator: leg_biped\nset: {" + set + "}\n"));
   };
-  CHECK(getWarnings("knee: belt, knee_ratio: 3, thigh_length: 0.25, hip_height: 0.5").empty());
-  CHECK(getWarnings("hip: three_rrs, hip_middle: -0.5").empty());
-  CHECK_THAT(getWarnings("knee: belt, knee_crank: 0.04"),
-             Contains(files.path() + "/legs/legs.yaml: key 'set': key 'knee_crank': it changes nothing"));
-  CHECK_THAT(getWarnings("hip_middle: -0.5"), Contains("key 'hip_middle': it changes nothing"));
+  CHECK(load("knee: belt, knee_ratio: 3, thigh_length: 0.25, hip_height: 0.5").warnings.empty());
+  CHECK(load("hip: three_rrs, hip_middle: -0.5").warnings.empty());
+  CHECK_THROWS_WITH(load("knee: belt, knee_crank: 0.04"),
+                    Contains(files.path() + "/legs/legs.yaml: key 'set': key 'knee_crank' (line 2)") &&
+                        Contains("it would change nothing") && Contains("choose `knee: four_bar`"));
+  CHECK_NOTHROW(load("knee: four_bar, knee_crank: 0.04"));  // as it says
+  CHECK_THROWS_WITH(load("hip_middle: -0.5"), Contains("key 'hip_middle'") && Contains("choose `hip: three_rrs`"));
+  const auto find = [](const OptionValues& settings, const OpenChoices& open) {
+    const std::optional<UnusedParameter> unused = findUnused("leg_biped", settings, open);
+    return unused ? unused->name : "";
+  };
+  const OptionValues crank = {{"knee", std::string("belt")}, {"knee_crank", 0.04}};
+  CHECK(find(crank, {}) == "knee_crank");
+  CHECK(find(crank, {{"knee", {"serial", "belt"}}}) == "knee_crank");
+  CHECK(find(crank, {{"knee", {"belt", "four_bar"}}, {"hip", {"serial", "three_rrs"}}}) == "");
+  CHECK(find({{"knee_crank", 0.04}, {"hip_middle", -0.5}}, {{"knee", {"belt", "four_bar"}}}) == "hip_middle");
+  CHECK(find({{"knee_crank", 0.04}, {"hip_middle", -0.5}},
+             {{"knee", {"belt", "four_bar"}}, {"hip", {"serial", "three_rrs"}}}) == "");
 }
 
 TEST_CASE("expressions: numbers, points by component, and what is not one") {

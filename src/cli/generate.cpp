@@ -30,11 +30,18 @@ std::string formatParameters(const Generator& generator) {
   return text.str();
 }
 
+// A setting that the robot has.
+std::string makeExample(const std::string& robot) {
+  for (const Option& p : findGenerator(robot).parameters) return p.name + "=" + formatOption(p.value);
+  return "NAME=VALUE";
+}
+
 int generate(const GenerateArguments& arguments) {
   OptionValues values;
   std::string changes;
   for (const std::string& setting : arguments.settings) {
-    const auto [name, value] = splitSetting("--set", setting, "thigh_length=0.25");
+    const auto [name, value] =
+        splitSetting("--set", setting, setting.find('=') == std::string::npos ? makeExample(arguments.robot) : "");
     values.emplace_back(name, parseOption(value));
     changes += (changes.empty() ? " with " : ", ") + setting;
   }
@@ -42,8 +49,8 @@ int generate(const GenerateArguments& arguments) {
   OptionSet parameters = generator.parameters;
   for (const auto& [name, value] : values) parameters.set(name, value);
   const Model model = generator.make(parameters);
-  for (const std::string& name : listUnused(arguments.robot, values))
-    printWarnings({"--set " + name + ": it changes nothing: it is of a part that is not chosen"});
+  if (const std::optional<UnusedParameter> unused = findUnused(arguments.robot, values))
+    throw InputError("", "--set " + unused->name, unused->problem, unused->remedy);
   writeRobot(model, arguments.directory, "Written by `bielle generate " + arguments.robot + "`" + changes + ".");
   std::cout << model.name() << ": " << formatNumber(model.mass()) << " kg, nv " << model.nv() << ", " << model.nu()
             << " motors, " << model.closures().size() << " closures\n  " << arguments.directory << "\n";

@@ -9,6 +9,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "design/draft.h"
 #include "design/motor_change.h"
+#include "design/open_choices.h"
 #include "model/number_text.h"
 
 namespace bielle {
@@ -119,6 +120,15 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
   finish();
 }
 
+OpenChoices listOpenChoices(const OptionValues& settings, const std::vector<DesignVariable>& variables) {
+  OpenChoices open;
+  for (const auto& [name, value] : settings)
+    if (const std::string* choice = std::get_if<std::string>(&value)) open[name] = {*choice};
+  for (const DesignVariable& variable : variables)
+    if (!variable.parameter.empty() && variable.isChoice()) open[variable.parameter] = variable.choices;
+  return open;
+}
+
 Parametrization::Parametrization(const std::string& generator, OptionValues settings,
                                  std::vector<DesignVariable> variables, std::string source)
     : source_(std::move(source)),
@@ -147,6 +157,9 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
       throw InputError(source_, "variable '" + variable.name + "'",
                        "parameter '" + parameter.name + "' does not vary continuously",
                        "give it `choices`, or set it for all designs");
+    if (const auto unused =
+            findUnused(generator, {{parameter.name, parameter.value}}, listOpenChoices(settings_, variables_)))
+      throw InputError(source_, "variable '" + variable.name + "'", unused->problem, unused->remedy);
     start = *value;
     const OptionBounds& bounds = parameter.bounds;
     if (!(variable.lower >= bounds.lower && variable.upper <= bounds.upper))

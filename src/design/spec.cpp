@@ -7,10 +7,12 @@
 
 #include "bielle/model/error.h"
 #include "bielle/robots/robot_loader.h"
+#include "design/open_choices.h"
 #include "design/spec_parts.h"
 #include "formats/motor_catalogue.h"
 #include "formats/text_file.h"
 #include "model/number_text.h"
+#include "robots/generator_entry.h"
 
 namespace bielle {
 namespace {
@@ -359,6 +361,8 @@ void readRoot(const Entry& root, DesignSpec& spec) {
   if (!architecture || variables)
     for (const Entry& item : require(fields, "variables", root).getList())
       spec.variables.push_back(readVariable(item, spec, catalogue));
+  if (const Entry* set = find(fields, "set"))
+    requireUsed(spec.robot.generator, *set, listOpenChoices(spec.robot.settings, spec.variables));
   if (catalogue && std::none_of(spec.variables.begin(), spec.variables.end(),
                                 [](const DesignVariable& variable) { return !variable.types.empty(); }))
     catalogue->fail("no motor is taken from it", "give a variable with a `motor` and `choices`, or remove it");

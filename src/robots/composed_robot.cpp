@@ -56,17 +56,12 @@ ComposedRobot::ComposedRobot(const std::string& path, const std::map<std::string
   }
 }
 
-std::vector<std::string> ComposedRobot::listUsed(const OptionSet& parameters) const {
+bool ComposedRobot::uses(const std::string& parameter, PartChoices chosen) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::vector<std::string> names;
-  PartChoices chosen;
-  for (const Option& option : parameters)
-    if (const std::string* choice = std::get_if<std::string>(&option.value)) {
-      chosen[option.name] = *choice;
-      names.push_back(option.name);
-    }
-  for (const PartParameter& p : listParameters(library_, *file_, chosen)) names.push_back(p.option.name);
-  return names;
+  chosen.erase(parameter);  // which would not be listed
+  const std::vector<PartParameter>& used = listParameters(library_, *file_, chosen);
+  return std::any_of(used.begin(), used.end(),
+                     [&parameter](const PartParameter& p) { return p.option.name == parameter; });
 }
 
 RobotFiles ComposedRobot::make(const OptionSet& parameters) const {

@@ -28,8 +28,8 @@ class ComposedRobot {
   /// \throws InputError for parameters that are possible one by one, but not together
   RobotFiles make(const OptionSet& parameters) const;
 
-  /// Names of those that the parts have which they choose; the others change nothing.
-  std::vector<std::string> listUsed(const OptionSet& parameters) const;
+  /// Whether a part has a parameter. \param chosen  choices by the names of parameters; of others, any
+  bool uses(const std::string& parameter, PartChoices chosen) const;
 
  private:
   mutable std::mutex mutex_;

@@ -1,7 +1,9 @@
 #pragma once
 /// \file The generated robot that a YAML file names, with the parameters that it sets.
+#include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "bielle/robots/robot_loader.h"
 #include "formats/yaml_entry.h"
@@ -25,8 +27,19 @@ std::string locateBeside(const YamlEntry& entry);
 /// \throws InputError naming file, line, parameter and remedy
 GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settings);
 
-/// Parameters among `settings` of parts that are not chosen, which change nothing.
-std::vector<std::string> listUnused(const std::string& generator, const OptionValues& settings);
+/// Choices that are left open, by the names of their parameters.
+using OpenChoices = std::map<std::string, std::vector<std::string>>;
+
+/// A parameter that would change nothing, since no part has it that is chosen or may be.
+struct UnusedParameter {
+  std::string name, problem, remedy;
+};
+
+/// The first among `settings`.
+std::optional<UnusedParameter> findUnused(const std::string& generator, const OptionValues& settings,
+                                          const OpenChoices& open = {});
+/// \param settings  as of readGeneratorEntry()   \throws InputError naming file and line of one that is not used
+void requireUsed(const std::string& generator, const YamlEntry& settings, const OpenChoices& open = {});
 
 /// That of a robot's file: one that names a generator, or composes a robot of parts; none for any other.
 std::optional<GeneratorEntry> readGeneratorOf(const std::string& file);

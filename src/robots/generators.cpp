@@ -118,18 +118,51 @@ bool isCompiled(const std::string& name) {
   return std::any_of(generators.begin(), generators.end(), [&name](const Generator& g) { return g.name == name; });
 }
 
+// Whether some choice of what is open leads to a part with the parameter.
+bool mayUse(const ComposedRobot& robot, const std::string& parameter, PartChoices chosen, OpenChoices open) {
+  if (!robot.uses(parameter, chosen)) return false;
+  if (open.empty()) return true;
+  const auto first = *open.begin();
+  open.erase(open.begin());
+  return std::any_of(first.second.begin(), first.second.end(), [&](const std::string& choice) {
+    chosen[first.first] = choice;
+    return mayUse(robot, parameter, chosen, open);
+  });
+}
+
+// What else to choose for a parameter to be used, as `knee: belt`; empty if one choice does not do.
+std::string findChoice(const ComposedRobot& robot, const OptionSet& parameters, const std::string& parameter,
+                       const PartChoices& chosen, const OpenChoices& open) {
+  for (const Option& option : parameters)
+    for (const std::string& choice : option.choices) {
+      PartChoices other = chosen;
+      OpenChoices others = open;
+      other[option.name] = choice;
+      others.erase(option.name);
+      if (mayUse(robot, parameter, other, others)) return "`" + option.name + ": " + choice + "`";
+    }
+  return "";
+}
+
 }  // namespace
 
-std::vector<std::string> listUnused(const std::string& generator, const OptionValues& settings) {
+std::optional<UnusedParameter> findUnused(const std::string& generator, const OptionValues& settings,
+                                          const OpenChoices& open) {
   if (isCompiled(generator)) return {};
   const auto robot = makeComposed(findComposedFile(generator), settings);
   OptionSet parameters = robot->parameters();
   for (const auto& [name, value] : settings) parameters.set(name, value);
-  const std::vector<std::string> used = robot->listUsed(parameters);
-  std::vector<std::string> unused;
-  for (const auto& [name, value] : settings)
-    if (!contains(used, name)) unused.push_back(name);
-  return unused;
+  PartChoices chosen;
+  for (const Option& option : parameters)
+    if (const std::string* choice = std::get_if<std::string>(&option.value))
+      if (!open.count(option.name)) chosen[option.name] = *choice;
+  for (const auto& [name, value] : settings) {
+    if (mayUse(*robot, name, chosen, open)) continue;
+    const std::string choice = findChoice(*robot, parameters, name, chosen, open);
+    return UnusedParameter{name, "it would change nothing: it is a parameter of a part that is not chosen",
+                           choice.empty() ? "remove it" : "remove it, or choose " + choice};
+  }
+  return {};
 }
 
 std::vector<Generator> listGenerators() {

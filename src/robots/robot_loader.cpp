@@ -30,15 +30,9 @@ Model makeModel(const YamlFile& yaml) {
 // As if they had been written and read again: a generated robot is the same by its generator and from its files, and
 // whatever completes a robot, or fixes its base, has the same meaning for it.
 RobotFiles generate(const YamlFile& yaml) {
-  RobotFiles files = parseRobotText(formatRobot(makeModel(yaml)), yaml.path);
-  if (!yaml.settings) return files;
-  OptionValues settings;
-  for (const auto& [name, value] : yaml.settings->getMap())
-    settings.emplace_back(name, parseOption(locateBeside(value)));
-  for (const std::string& name : listUnused(locateBeside(*yaml.generator), settings))
-    files.yaml.warnings.push_back(yaml.path + ": key 'set': key '" + name +
-                                  "': it changes nothing: it is of a part that is not chosen");
-  return files;
+  const Model model = makeModel(yaml);
+  if (yaml.settings) requireUsed(locateBeside(*yaml.generator), *yaml.settings);
+  return parseRobotText(formatRobot(model), yaml.path);
 }
 
 }  // namespace

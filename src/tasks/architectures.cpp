@@ -12,6 +12,7 @@
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "results/output_place.h"
+#include "robots/generator_entry.h"
 
 namespace bielle::tasks {
 namespace {
@@ -33,6 +34,7 @@ std::vector<Architecture> readRobots(const Entry& entry) {
     if (name.empty() || name[0] == '.' || name.find('/') != std::string::npos)
       item.fail("'" + name + "' cannot be the name of a directory", "use a plain word");
     robots.push_back({name, readRobotSpec(fields, item)});
+    if (const Entry* set = find(fields, "set")) requireUsed(robots.back().robot.generator, *set);
   }
   if (robots.empty()) entry.fail("there are none", "name at least one");
   return robots;
