@@ -15,7 +15,7 @@
 namespace bielle::cli {
 namespace {
 
-constexpr const char *kRods = "rods", *kNoiseExample = "crank_joint=2e-4";
+constexpr const char *kRods = "rods", *kNoiseExample = "*=2e-4";
 constexpr double kStill = 1e-9;  // rad or m
 
 bool matches(const std::string& pattern, const std::string& name) {

@@ -366,7 +366,7 @@ void parseOptions(SimulateArguments& arguments) {
     throw InputError("", "--world " + arguments.world, "a world is given twice", "give it once");
   std::set<std::string> names;
   if (arguments.speed) names.insert("speed");
-  requireOnce("--set", arguments.settings, "steps=8", names);
+  requireOnce("--set", arguments.settings, "com_weight=1e5", names);
 }
 
 void addOptions(CLI::App& app, SimulateArguments& a) {

@@ -33,7 +33,7 @@ namespace {
 
 constexpr double kOwnTolerance = 1e-9, kSimbodyTolerance = 1e-6;
 constexpr double kDuration = 2, kRecordPeriod = 0.01;  // s
-constexpr const char* kSpringExample = "stiffness=50,damping=1,motor=crank,angle=0.3";
+constexpr const char* kSpringExample = "stiffness=50,damping=1";
 const YamlKeys kTorquesKeys("torques", "", {"torques"});
 const YamlKeys kTorqueKeys("torques", "torques[]", {"time", "MOTOR"});
 
@@ -57,7 +57,9 @@ std::vector<TimedTorques> readTorques(const Model& model, const std::string& pat
           value.fail("the robot has no such motor", "its motors are: " + listItems(getNames(model.motors())));
         next.u[motor] = value.getNumber();
       }
-      if (!has_time) entry.fail("it has no time", "e.g. {time: 0.5, crank: 3}, in s and N m or N");
+      if (!has_time)
+        entry.fail("it has no time", "e.g. {time: 0.5, " + (model.nu() > 0 ? model.motors()[0].name : "MOTOR") +
+                                         ": 3}, in s and N m or N");
       if (next.time < torques.back().time || (torques.size() > 1 && next.time == torques.back().time))
         entry.fail("its time is not later than that of the previous entry", "list torques in order of time");
       torques.push_back(next);
@@ -76,7 +78,7 @@ int findPushedBody(const Model& model, const std::string& name) {
                    "name a link that moves");
 }
 
-// E.g. kSpringExample; without a motor, all of them; without an angle, where it starts.
+// E.g. stiffness=50,damping=1,motor=crank,angle=0.3; without a motor, all of them; without an angle, where it starts.
 void addSprings(const Model& model, const std::string& text, const VectorXd& q, std::vector<MotorSpring>& springs) {
   MotorSpring spring;
   std::string name;

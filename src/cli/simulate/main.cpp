@@ -72,7 +72,7 @@ Plan obtainPlan(const SimulateArguments& arguments) {
                       arguments.belief.value_or(Belief::Closed)};
   if (arguments.speed) request.settings.emplace_back("speed", *arguments.speed);
   for (const std::string& setting : arguments.settings) {
-    const auto [name, value] = splitSetting("--set", setting, "steps=8");
+    const auto [name, value] = splitSetting("--set", setting, "com_weight=1e5");
     request.settings.emplace_back(name, parseOption(value));
   }
   if (!arguments.commands.empty()) return makeCommandedPlan(request, arguments.commands);
