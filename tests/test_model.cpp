@@ -192,11 +192,11 @@ TEST_CASE("what cannot be a robot is refused by name") {
              named("contact 'k'") && Contains("sole"));
   CHECK_THAT(getErrorOf([](B& b) { b.setGravity(Vector3d::Constant(kInf)); }), named("gravity"));
   CHECK_THAT(getErrorOf([](B& b) {
-               b.addReference({"r", {{"ja2", {0}}}, "", 0, {}});
+               b.addReference({"r", {{"ja2", {0}}}, "", 0, {}, {}});
              }),
              named("reference 'r'") && Contains("1 value(s)"));
   CHECK_THAT(getErrorOf([](B& b) {
-               b.addReference({"r", {{"jb2", {0, 0, 0, 0}}}, "", 0, {}});
+               b.addReference({"r", {{"jb2", {0, 0, 0, 0}}}, "", 0, {}, {}});
              }),
              named("reference 'r'") && Contains("unit length"));
   CHECK_THROWS_AS(ModelBuilder("empty").build(), InputError);
