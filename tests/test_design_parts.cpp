@@ -240,22 +240,28 @@ objective: [{measure: mass}]
 
 TEST_CASE("design: parameters of parts that a design does not have are no part of its page") {
   const RobotDirectory directory;
-  const std::string spec = directory.write("spec.yaml", R"(generator: leg_biped
+  const auto design = [&](const std::string& variable) {
+    const std::string spec = directory.write("spec.yaml", R"(generator: leg_biped
 architecture: [three_rrs, serial_hip, belt]
 variables:
   - {name: middle, parameter: hip_middle, unit: rad, bounds: [-1, 0]}
-  - {name: arm, parameter: knee_arm, bounds: [0.04, 0.06]}
   - {name: thigh, parameter: thigh_length, bounds: [0.2, 0.24]}
+)" + variable + R"(
 objective: [{measure: mass}]
 search: {searches: 1, stages: [{algorithm: sbplx, evaluations: 3}]}
 )");
-  const std::string out = directory.path() + "/out";
-  const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", out});
+    return runCommand({BIELLE_COMMAND, "design", spec, "-o", directory.path() + "/out"});
+  };
+  const CommandResult refused =
+      design("  - {name: arm, parameter: knee_arm, bounds: [0.04, 0.06]}");  // no design has it
+  CHECK(refused.status == 2);
+  CHECK_THAT(refused.err, Contains("variable 'arm'") && Contains("`knee: ball_screw`"));
+
+  const CommandResult result = design("");
   INFO(result.err);
   REQUIRE(result.status == 0);
-  const std::string page = readFile(out + "/design.md");
-  CHECK_THAT(page, Contains("| middle | rad | -1 .. 0 | – |"));      // the start has serial hips
-  CHECK_THAT(page, Contains("| arm | m | 0.04 .. 0.06 | – | – |"));  // of belts
+  const std::string page = readFile(directory.path() + "/out/design.md");
+  CHECK_THAT(page, Contains("| middle | rad | -1 .. 0 | – |"));  // the start has serial hips
   CHECK_THAT(page, Contains("| thigh | m | 0.2 .. 0.24 | 0.22 | 0.2"));
 }
 
