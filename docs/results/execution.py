@@ -373,8 +373,8 @@ stage takes 12 ms and has as many solves as fit into it."""),
 without that margin. It saves one walk of 48 and no climb."""),
     ("Unknown ground", "unknown", lambda: f"""Bipetto walks for 20 s at 0.2 m/s on tiles of 25 cm, up to 2 cm above
 and below the planned ground, with masses off by up to 10 %, rods by up to 0.5 mm, and friction as in the table; its
-plan assumes 0.4. In real time, two runs at once on two cores: {share("unknown")}. Those that fell stepped on the edge of a tile
-with the middle of a sole, and it is a matter of chance: with a friction that differs by 0.002, six of the nine stand, and so do all
+plan assumes 0.4. In real time, two runs at once on two cores: {share("unknown")}. One that was looked at stood
+with the middle of a sole on the edge of a tile. Falls are a matter of chance: with a friction that differs by 0.002, six of the nine stand, and so do all
 of them in MuJoCo's world (in simulated time). At commit 2ae571a6 157 stood, on soles that bore half of the moment about their normal."""),
     ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
 two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls. Bipetto's
