@@ -1,4 +1,5 @@
-// Robots out into every format that is also read, and in again, with the same loops and numbers. Random mechanisms, and plane four-bars and parallelograms of hinges anywhere in space, whose rows are redundant.
+// Robots out into every format that is also read, and in again, with the same loops and numbers. Random mechanisms,
+// and plane four-bars and parallelograms of hinges anywhere in space, whose rows are redundant.
 #include <catch2/catch.hpp>
 #include <cctype>
 #include <cmath>

@@ -373,7 +373,8 @@ bool LinkageMap::reset(ConstVectorRef q) {
 namespace {
 
 // Of the linkage that is farthest from what is asked of it. Values in reach are told from a little within, so that they can be held
-// although they are rounded; those of joints of several coordinates, which may have nothing but a surface in reach, by most digits. \param nearest  with the values in reach   \param start  closed
+// although they are rounded; those of joints of several coordinates, which may have nothing but a surface in reach, by most digits.
+// \param nearest  with the values in reach   \param start  closed
 std::string describeUnheld(const Model& model, ConstVectorRef q, const VectorXd& nearest,
                            const std::vector<std::string>& held, const VectorXd& start, const HeldResult& closed) {
   const auto getLinkage = [&model](const Joint& joint) {

@@ -18,7 +18,8 @@ struct Smoothed {
 std::vector<double> listCentres(const VectorXd& time, double& window);
 
 /// At each instant the polynomial of kPolynomialDegree in time that is nearest to the samples within half a window of it. It does not
-/// delay, and is exact for motions that are such polynomials. Where a window has less than kLeastSamples, it takes those that are next to it.
+/// delay, and is exact for motions that are such polynomials. Where a window has less than kLeastSamples, it takes those that are next
+/// to it.
 /// \param samples  K x columns, at the instants `time`
 Smoothed smooth(const VectorXd& time, const MatrixXd& samples, const std::vector<double>& centres, double window);
 

@@ -8,15 +8,13 @@
 /// matrices E_p that make them up, Y_i = sum_p pi_ip E_p, and in the frame of the body
 ///     de/dpi_ip = (J_i N)^T (E_p A_i + V_i x* E_p V_i),                                                              (2)
 /// as well as in armatures, by N^T 1_m a_m, damping, by N^T 1_m v_m, and friction, by N^T 1_m s_m, s_m being the smooth sign of
-/// v_m. Where a motor turns back, s_m jumps, and what
-/// smooths the torque must smooth s_m as well.
+/// v_m. Where a motor turns back, s_m jumps, and what smooths the torque must smooth s_m as well.
 /// Of the ten numbers of a body, mass m and centre c change those of its link by
 ///     pi(m, c) = (m, m c, (m / m_0) I_0 + m (c^T c 1 - c c^T)).                                                       (3)
 ///
 /// The rows of a reduced joint are over the noise in them: at first kTorqueNoise of the root mean square of N^T (M a + b), so that each
-/// linkage and joint counts alike, whatever its size, then what is left of them. Rows are many and
-/// the numbers few: only the triangular factor of the rows beside e is kept, from
-/// which |e|^2 and its derivatives follow for any numbers, exactly.
+/// linkage and joint counts alike, whatever its size, then what is left of them. Rows are many and the numbers few: only the triangular
+/// factor of the rows beside e is kept, from which |e|^2 and its derivatives follow for any numbers, exactly.
 #include <vector>
 
 #include "identify/loads.h"
