@@ -284,6 +284,16 @@ class IdentifyTorques(unittest.TestCase):
         self.assertGreater(dynamics["instants"], 50)
         self.check(dynamics, {"upper.mass": 1.1, "lower.mass": 0.5})
 
+    def test_spin(self):
+        """A crank without friction whose torque does not turn with it: where it is too fast for the window, it does not tell."""
+        run("generate", "fourbar_chain", "--set", "count=1", "-o", "spun")
+        pathlib.Path("torques.yaml").write_text("torques:\n  - {time: 0, crank1: 0.5}\n")
+        run("simulate", "spun", "--torques", "torques.yaml", "--duration", "4", "--record-period", "0.001", "--no-report", "-o", "spin")
+        dynamics, done = identify("spun", "spin/trajectory.csv", "--dynamics", "masses", "--window", "0.05")
+        self.assertIn("instants at which a joint turns by more than 1.2 rad within 0.05 s are left out", done.stderr)
+        self.assertGreater(dynamics["too_fast"], 50)
+        self.assertLess(dynamics["misfit_before"], 0.1)  # with all instants 1, though the robot is the one that was simulated
+
     def test_bad_input(self):
         draw("drawn")
         measure("log.csv", DRAWN, rows=300)

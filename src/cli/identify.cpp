@@ -17,6 +17,7 @@
 #include "cli/identify_report.h"
 #include "cli/table.h"
 #include "formats/text_file.h"
+#include "identify/loaded_states.h"
 #include "model/listing.h"
 #include "results/interrupt.h"
 #include "results/output_place.h"
@@ -185,6 +186,10 @@ void warn(const IdentifiedLoads& found, const std::string& log) {
   if (found.at_stops > 0)
     tell(std::to_string(found.at_stops) +
          " instants near which a joint is at its limit are left out: its stop may bear it");
+  if (found.too_fast > 0)
+    tell(std::to_string(found.too_fast) + " instants at which a joint turns by more than " +
+         formatNumber(kMostTurnInWindow) + " rad within " + formatNumber(found.window, "%.3g") +
+         " s are left out; a shorter --window takes them in");
   if (found.estimate.noise > kSuspicious)
     tell("what is left is " + formatNumber(kTorqueNoise * found.estimate.noise, "%.3g") +
          " of them: other numbers than the free ones are wrong, torques are not those at the joints, or something "

@@ -85,12 +85,13 @@ int findMotion(const Model& model, ConstVectorRef q, const IdentifyChoice& choic
   write("motion.csv", formatMotion(model, motion));
   write("torques.yaml", formatTorques(model, motion));
   write("start.json", formatStart(model, motion.states.front()));
-  std::cout << "information " << formatNumber(motion.gain_before, "%.4g") << " of small motions, "
-            << formatNumber(motion.gain, "%.4g") << " of this one, which takes "
-            << formatNumber(motion.share_of_limits, "%.2g") << " of the limits\n  " << directory
-            << "/motion.csv\n  bielle simulate " << robot << " --state " << directory << "/start.json --torques "
-            << directory << "/torques.yaml --duration " << formatNumber(duration, "%g")
-            << " --record-period 0.001 -o OUTPUT\n";
+  std::cout
+      << "information " << formatNumber(motion.gain_before, "%.4g") << " of small motions, "
+      << formatNumber(motion.gain, "%.4g") << " of this one, which takes "
+      << formatNumber(motion.share_of_limits, "%.2g") << " of the limits\n  " << directory
+      << "/motion.csv, for a controller that tracks it; without one, where the motion is stable:\n  bielle simulate "
+      << robot << " --state " << directory << "/start.json --torques " << directory << "/torques.yaml --duration "
+      << formatNumber(duration, "%g") << " --record-period 0.001 -o OUTPUT\n";
   if (isInterrupted())
     std::cerr << "bielle: error: interrupted; what is written is the best motion so far" << std::endl;
   return isInterrupted() ? kFailed : kOk;

@@ -143,6 +143,7 @@ Json describe(const IdentifiedLoads& found) {
   Json json = {{"instants", found.instants},
                {"left_out", found.left_out},
                {"at_stops", found.at_stops},
+               {"too_fast", found.too_fast},
                {"window", found.window}};
   json.update(describe(found.estimate));
   return json;

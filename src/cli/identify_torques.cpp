@@ -244,8 +244,8 @@ IdentifiedLoads identifyLoads(const Model& model, ConstVectorRef q, const Identi
   std::vector<MeasuredCoordinate> coordinates;
   for (const Coordinate& coordinate : task.coordinates)
     coordinates.push_back({coordinate.position, coordinate.dof, getMotion(coordinate.name)});
-  const LoadedMotion motion = findLoadedStates(model, q, linkages, coordinates, smooth_log.getTorques(model),
-                                               smooth_log.getSigns(model, all), isInterrupted());
+  LoadedMotion motion = findLoadedStates(model, q, linkages, coordinates, smooth_log.getTorques(model),
+                                         smooth_log.getSigns(model, all), isInterrupted());
   out.numbers = chooseLoads(model, torques.dynamics);
   out.instants = static_cast<int>(motion.states.size());
   out.left_out = static_cast<int>(smooth_log.size()) - out.instants;
@@ -259,6 +259,13 @@ IdentifiedLoads identifyLoads(const Model& model, ConstVectorRef q, const Identi
                      smooth_log.size() < 4 && out.at_stops > 0 ? "log a motion away from the joints' limits"
                      : smooth_log.size() < 4                   ? "give a longer log, or a shorter --window"
                                              : "check units (rad, m), signs and zeros, and take a shorter --window");
+  out.too_fast = leaveOutFast(model, out.window, motion);
+  out.instants -= out.too_fast;
+  if (out.instants < 2)
+    throw InputError(log.path, log.rows.front(),
+                     "at every instant a joint turns by more than " + formatNumber(kMostTurnInWindow) + " rad within " +
+                         formatNumber(out.window, "%.3g") + " s, over which torques are smoothed",
+                     "give a shorter --window, or log a slower motion");
   const TorqueFit first(model, out.numbers, motion.states, motion.groups);
   out.estimate = estimate(makeProblem(first), options);
   // Then each linkage and joint counts by what is left of it, so that one that hardly needs torque does not hide what others tell.

@@ -18,8 +18,9 @@ std::vector<LoadNumber> chooseLoads(const Model& model, const std::vector<std::s
 
 struct IdentifiedLoads {
   std::vector<LoadNumber> numbers;
-  int instants = 0, left_out = 0, at_stops = 0;  // at_stops: left out, since a joint is at its limit
-  double window = 0;                             // s
+  // Instants that are used; that are left out, since a linkage has no configuration, a joint is at its limit, or too fast for the window.
+  int instants = 0, left_out = 0, at_stops = 0, too_fast = 0;
+  double window = 0;  // s
   Estimate estimate;
 };
 

@@ -171,6 +171,7 @@ Excitation findExcitation(const Model& model, ConstVectorRef q, const std::vecto
     throw InputError(model.name(), "motors", "its linkages do not follow them by a tenth of a rad from where it begins",
                      "give it another first reference posture, away from dead points");
   out.gain_before = search.calcGain(first);
+  double best = out.gain_before;
   SlsqpOptions steps;
   steps.tolerance = 1e-4, steps.max_evaluations = options.evaluations;
   x = minimizeBySlsqp(
@@ -180,7 +181,8 @@ Excitation findExcitation(const Model& model, ConstVectorRef q, const std::vecto
             if (gradient)
               for (Eigen::Index i = 0; i < at.size(); ++i)
                 (*gradient)[i] = (calcCost(at + kStep * VectorXd::Unit(at.size(), i)) - cost) / kStep;
-            if (options.progress) goes_on = goes_on && options.progress(-cost);
+            best = std::max(best, -cost);
+            if (options.progress) goes_on = goes_on && options.progress(best);
             return cost;
           },
           steps)

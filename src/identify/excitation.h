@@ -24,7 +24,7 @@ struct ExcitationOptions {
   double duration = 10;  ///< s, one period
   double window = 0.1;   ///< s, of the polynomials (local_polynomial.h)
   int evaluations = 50;  ///< with derivatives, at most
-  /// Called at each of them; false asks for the end, and the best so far is the result.
+  /// Called at each of them with the largest gain so far; false asks for the end, and the best so far is the result.
   std::function<bool(double gain)> progress = {};
 };
 

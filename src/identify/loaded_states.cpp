@@ -1,5 +1,7 @@
 #include "identify/loaded_states.h"
 
+#include <algorithm>
+
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "math/decompositions.h"
@@ -65,6 +67,22 @@ class ClusterMotion {
 };
 
 }  // namespace
+
+int leaveOutFast(const Model& model, double window, LoadedMotion& motion) {
+  size_t kept = 0;
+  for (size_t i = 0; i < motion.states.size(); ++i) {
+    double fastest = 0;  // rad/s
+    for (const Joint& joint : model.joints())
+      if (joint.kind != JointKind::Prismatic && joint.nv > 0)
+        fastest = std::max(fastest, motion.states[i].v.segment(joint.idx_v, joint.nv).lpNorm<Eigen::Infinity>());
+    if (fastest * window > kMostTurnInWindow) continue;
+    if (kept != i) motion.states[kept] = std::move(motion.states[i]), motion.instants[kept] = motion.instants[i];
+    ++kept;
+  }
+  const auto left_out = static_cast<int>(motion.states.size() - kept);
+  motion.states.resize(kept), motion.instants.resize(kept);
+  return left_out;
+}
 
 LoadedMotion findLoadedStates(const Model& model, ConstVectorRef q, const std::vector<MeasuredLinkage>& linkages,
                               const std::vector<MeasuredCoordinate>& coordinates, const MatrixXd& torques,

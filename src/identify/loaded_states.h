@@ -36,6 +36,12 @@ struct LoadedMotion {
   std::vector<int> groups;  ///< of TorqueFit
 };
 
+/// Largest turn [rad] of a joint within a window: torques that are smoothed over more are not those in the middle.
+inline constexpr double kMostTurnInWindow = 1.2;
+
+/// Leaves out states in which a joint turns by more than kMostTurnInWindow. \param window  s   \return their number
+int leaveOutFast(const Model& model, double window, LoadedMotion& motion);
+
 /// \param q        nq, closed, for what stands still
 /// \param torques  instants x nu   \param signs  LoadedState::signs, likewise; empty: those of the speeds that are found
 /// \return without states if `interrupt` asked for the end
