@@ -374,8 +374,10 @@ without that margin. It saves one walk of 48 and no climb."""),
     ("Unknown ground", "unknown", lambda: f"""Bipetto walks for 20 s at 0.2 m/s on tiles of 25 cm, up to 2 cm above
 and below the planned ground, with masses off by up to 10 %, rods by up to 0.5 mm, and friction as in the table; its
 plan assumes 0.4. In real time, two runs at once on two cores: {share("unknown")}. One that was looked at stood
-with the middle of a sole on the edge of a tile. Falls are a matter of chance: with a friction that differs by 0.002, six of the nine stand, and so do all
-of them in MuJoCo's world (in simulated time). At commit 2ae571a6 157 stood, on soles that bore half of the moment about their normal."""),
+with the middle of a sole on the edge of a tile. Falls are partly a matter of chance: with a friction that differs by 0.002, six of the
+nine stand, and so do all of them in MuJoCo's world (in simulated time). At commit 2ae571a6 157 stood. Soles have changed since then:
+with those of that time, 25 equal points that bear half of the moment about their normal, 144 stand by today's program (in simulated
+time), so that what was lost is predictive control's."""),
     ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
 two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls. Bipetto's
 fall did not recur: the same descent stood in five further runs."""),
