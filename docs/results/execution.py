@@ -377,7 +377,7 @@ plan assumes 0.4. In real time, two runs at once on two cores: {share("unknown")
 with the middle of a sole on the edge of a tile. Falls are partly a matter of chance: with a friction that differs by 0.002, six of the
 nine stand, and so do all of them in MuJoCo's world (in simulated time). At commit 2ae571a6 157 stood. Soles have changed since then:
 with those of that time, 25 equal points that bear half of the moment about their normal, 144 stand by today's program (in simulated
-time), so that what was lost is predictive control's."""),
+time): soles are not what lost them."""),
     ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
 two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls. Bipetto's
 fall did not recur: the same descent stood in five further runs."""),
