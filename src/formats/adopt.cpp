@@ -326,8 +326,7 @@ class Adopter {
     if (raised.empty()) return;
     guess(
         "Friction: below its friction_speed it acts like a damper, which steps of motions have to follow. The speeds "
-        "suit "
-        "steps of 15 ms.");
+        "suit steps of 15 ms.");
     out_ << Key << "joint_forces" << Value << BeginMap;
     for (const JointForce& force : raised) {
       out_ << Key << model_.joints()[force.joint].name << Value << Flow << BeginMap;
