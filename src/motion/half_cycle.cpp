@@ -154,18 +154,12 @@ bool HalfCycle::compare(const ShootingTrajectory& guess, std::string& why) {
 }
 
 MatrixXd HalfCycle::differentiateMap(const VectorXd& x) const {
-  constexpr double kStep = 1e-3;
-  const int h = problem_->numStages(), n = problem_->tangentSize(h);
+  const int h = problem_->numStages();
   RobotEvaluator from(*problem_), to(*whole_);
   from.evaluate(h, x);
   to.evaluate(whole_->numStages(), mapState(x));
-  MatrixXd out(n, n);
-  const auto calc = [&](int i, double step) -> VectorXd {
-    return to.difference(mapState(from.integrate(step * VectorXd::Unit(n, i))));
-  };
-  for (int i = 0; i < n; ++i)
-    out.col(i) = (8 * (calc(i, kStep) - calc(i, -kStep)) - calc(i, 2 * kStep) + calc(i, -2 * kStep)) / (12 * kStep);
-  return out;
+  return bielle::differentiateMap([this](const VectorXd& state) { return mapState(state); }, problem_->tangentSize(h),
+                                  from, to);
 }
 
 StartingPoint HalfCycle::take(const StartingPoint& start) const {

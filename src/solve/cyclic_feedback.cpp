@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <optional>
 
 #include "math/decompositions.h"
 #include "solve/lq_sweep.h"
@@ -7,77 +9,45 @@
 namespace bielle {
 namespace {
 
-// Models of all nodes about a solution, with the constraints that hold there as equations.
-class CycleModels {
- public:
-  CycleModels(const ShootingProblem& problem, const ShootingTrajectory& solution, const Multipliers& multipliers)
-      : problem_(problem), N_(problem.numStages()), scratch_(problem.makeScratch()), models_(N_ + 1), weights_(N_ + 1) {
-    for (int k = 0; k <= N_; ++k) {
-      nodes_.push_back(problem.makeEvaluation());
-      EvaluateTask task{k, &solution.xs[k], k < N_ ? &solution.us[k] : nullptr, nullptr, nodes_.back().get()};
-      problem.evaluate(&task, 1, scratch_.get());
-      if (nodes_.back()->status != NumericalStatus::Ok) return;
-    }
-    for (int k = 0; k < N_; ++k)
-      if (!linearize(k, multipliers)) return;
-    models_[N_].resize(problem.tangentSize(N_), 0, 0);
-    ok_ = true;
+// Of constraints that hold at a solution as equations.
+ConstraintWeights makeWeights(const Multipliers& multipliers, size_t node, int rows) {
+  ConstraintWeights weights{VectorXd::Zero(rows), VectorXd::Zero(rows)};
+  if (multipliers.values.size() > node && multipliers.values[node].size() >= rows) {
+    weights.gradient = multipliers.values[node].head(rows);
+    weights.hessian = (weights.gradient.array() != 0).select(VectorXd::Constant(rows, multipliers.penalty), 0.0);
   }
+  return weights;
+}
 
-  bool ok() const { return ok_; }
-  std::vector<StageModel>& models() { return models_; }
-  const std::vector<ConstraintWeights>& weights() const { return weights_; }
-
-  // Derivative of S^{-1} at the end, from that of S at the beginning, by central differences of fourth order.
-  MatrixXd calcReturn(const StateMap& map) const {
-    constexpr double kStep = 1e-3;
-    const int n = problem_.tangentSize(0);
-    const auto calc = [&](int column, double step) {
-      const VectorXd dx = step * VectorXd::Unit(n, column);
-      VectorXd x(problem_.stateSize()), out(n);
-      const IntegrateTask sum{0, nodes_.front().get(), &dx, &x};
-      problem_.integrate(&sum, 1, scratch_.get());
-      x = map(x);
-      const DifferenceTask difference{N_, nodes_.back().get(), &x, &out};
-      problem_.difference(&difference, 1, scratch_.get());
-      return out;
-    };
-    MatrixXd by_start(n, n);
-    for (int i = 0; i < n; ++i)
-      by_start.col(i) =
-          (8 * (calc(i, kStep) - calc(i, -kStep)) - calc(i, 2 * kStep) + calc(i, -2 * kStep)) / (12 * kStep);
-    return by_start.fullPivLu().inverse();
-  }
-
- private:
-  bool linearize(int k, const Multipliers& multipliers) {
-    const int rows = problem_.constraintSize(k);
-    ConstraintWeights& weights = weights_[k];
-    weights = {VectorXd::Zero(rows), VectorXd::Zero(rows)};
-    if (static_cast<int>(multipliers.values.size()) > k && multipliers.values[k].size() >= rows) {
-      weights.gradient = multipliers.values[k].head(rows);
-      weights.hessian = (weights.gradient.array() != 0).select(VectorXd::Constant(rows, multipliers.penalty), 0.0);
-    }
-    models_[k].resize(problem_.tangentSize(k), problem_.controlSize(k), problem_.tangentSize(k + 1), rows);
-    const std::vector<char> all(rows, true);
-    LinearizeTask task;
-    task.node = k;
-    task.at = nodes_[k].get();
-    task.next = nodes_[k + 1].get();
-    task.rows = &all;
-    task.out = &models_[k];
-    problem_.linearize(&task, 1, scratch_.get());
-    return task.status == NumericalStatus::Ok;
-  }
-
-  const ShootingProblem& problem_;
-  const int N_;
-  std::unique_ptr<ProblemScratch> scratch_;
-  std::vector<StageModel> models_;
-  std::vector<ConstraintWeights> weights_;  // none of the last node
-  std::vector<std::unique_ptr<NodeEvaluation>> nodes_;
-  bool ok_ = false;
+// About a solution.
+struct CycleModels {
+  std::vector<StageModel> nodes;           // the last one is zero
+  std::vector<ConstraintWeights> weights;  // none of the last one
+  MatrixXd E;                              // derivative of S^{-1} at the end
 };
+
+// None if a node cannot be evaluated or linearized.
+std::optional<CycleModels> makeModels(const ShootingProblem& problem, const StateMap& map,
+                                      const ShootingTrajectory& solution, const Multipliers& multipliers) {
+  const int N = problem.numStages(), n = problem.tangentSize(0);
+  std::array<NodeEvaluator, 2> evaluators{NodeEvaluator(problem), NodeEvaluator(problem)};  // of even, odd nodes
+  const auto evaluate = [&](NodeEvaluator& evaluator, size_t k) {
+    const VectorXd u = k < solution.us.size() ? solution.us[k] : VectorXd();
+    return evaluator.evaluate(static_cast<int>(k), solution.xs[k], u).status == NumericalStatus::Ok;
+  };
+  CycleModels out{std::vector<StageModel>(solution.xs.size()), std::vector<ConstraintWeights>(solution.xs.size()), {}};
+  out.nodes.back().resize(problem.tangentSize(N), 0, 0);
+  for (size_t k = solution.xs.size(); k-- > 0;) {
+    NodeEvaluator &at = evaluators[k % 2], &next = evaluators[(k + 1) % 2];
+    if (!evaluate(at, k)) return {};
+    if (k == solution.us.size()) continue;
+    out.weights[k] = makeWeights(multipliers, k, problem.constraintSize(static_cast<int>(k)));
+    if (at.linearize(&next.evaluation(), out.nodes[k]) != NumericalStatus::Ok) return {};
+  }
+  evaluate(evaluators[1], solution.us.size());
+  out.E = differentiateMap(map, n, evaluators[0], evaluators[1]).fullPivLu().inverse();
+  return out;
+}
 
 std::vector<ControlBox> listBoxes(const ShootingProblem& problem, const ShootingTrajectory& solution) {
   std::vector<ControlBox> boxes(problem.hasControlBounds() ? solution.us.size() : 0);
@@ -93,16 +63,27 @@ std::vector<ControlBox> listBoxes(const ShootingProblem& problem, const Shooting
 
 }  // namespace
 
+MatrixXd differentiateMap(const StateMap& map, int size, NodeEvaluator& from, NodeEvaluator& to) {
+  constexpr double kStep = 1e-3;
+  const auto calc = [&](int i, double step) {
+    return to.difference(map(from.integrate(step * VectorXd::Unit(size, i))));
+  };
+  MatrixXd out(size, size);
+  for (int i = 0; i < size; ++i)
+    out.col(i) = (8 * (calc(i, kStep) - calc(i, -kStep)) - calc(i, 2 * kStep) + calc(i, -2 * kStep)) / (12 * kStep);
+  return out;
+}
+
 CyclicFeedback calcCyclicFeedback(const ShootingProblem& inner, const StateMap& map, const ShootingTrajectory& solution,
                                   const Multipliers& multipliers) {
   constexpr int kMostCycles = 200;
   constexpr double kChange = 1e-9;  // of the value function, over itself
   CyclicFeedback out;
-  CycleModels cycle(inner, solution, multipliers);
-  if (!cycle.ok()) return out;
-  std::vector<StageModel>& models = cycle.models();
+  std::optional<CycleModels> cycle = makeModels(inner, map, solution, multipliers);
+  if (!cycle) return out;
+  std::vector<StageModel>& models = cycle->nodes;
   const int n = inner.tangentSize(0);
-  const MatrixXd E = cycle.calcReturn(map);
+  const MatrixXd& E = cycle->E;
   // At a solution the value falls along S(x_0) (-) x_N as the multiplier of (3) says.
   if (!multipliers.values.empty() && multipliers.values.back().size() >= n)
     models.back().lx = -multipliers.values.back().tail(n);
@@ -111,7 +92,7 @@ CyclicFeedback calcCyclicFeedback(const ShootingProblem& inner, const StateMap& 
   MatrixXd value = MatrixXd::Zero(n, n);
   for (int i = 0; i < kMostCycles; ++i) {
     models.back().lxx() = E.transpose() * value * E;
-    const LqResult result = sweep.update(models, {}, boxes, cycle.weights());
+    const LqResult result = sweep.update(models, {}, boxes, cycle->weights);
     if (result.status != NumericalStatus::Ok) {
       out.status = result.status;
       return out;

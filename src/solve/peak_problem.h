@@ -15,13 +15,12 @@
 /// solution vanishes, unless w_i is at a bound and does not move. The cost is quadratic in s to give the model of s its
 /// curvature.
 #include <cmath>
-#include <memory>
 
-#include "bielle/solve/shooting_problem.h"
+#include "solve/wrapped_problem.h"
 
 namespace bielle {
 
-class PeakProblem : public ShootingProblem {
+class PeakProblem : public WrappedProblem {
  public:
   /// \param inner  must outlive it
   /// \param limits  L, of the first controls of every stage; controls after them do not count
@@ -29,24 +28,13 @@ class PeakProblem : public ShootingProblem {
   /// \throws std::invalid_argument when limits are not positive, none is finite, or weight or `most` is not positive
   PeakProblem(const ShootingProblem& inner, const VectorXd& limits, double weight, double most);
 
-  int numStages() const override { return inner_.numStages(); }
-  int stateSize() const override { return inner_.stateSize() + 1; }
-  int tangentSize(int node) const override { return inner_.tangentSize(node) + (node > 0 ? 1 : 0); }
   int controlSize(int stage) const override { return inner_.controlSize(stage) + (stage > 0 ? 0 : 1); }
-  const VectorXd& initialState() const override { return x0_; }
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
   int constraintSize(int node) const override { return inner_.constraintSize(node); }
   void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const override {
     inner_.getConstraintBounds(node, lower, upper);
   }
   std::string getConstraintName(int node, int row) const override { return inner_.getConstraintName(node, row); }
-  std::unique_ptr<NodeEvaluation> makeEvaluation() const override;
-  std::unique_ptr<ProblemScratch> makeScratch() const override;
-  void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override;
-  void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override;
-  void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override;
-  void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override;
-  int batchSize() const override { return inner_.batchSize(); }
 
   /// The largest |u_i| / L_i of a trajectory of the inner problem.
   double calcPeak(const ShootingTrajectory& inner) const;
@@ -60,14 +48,13 @@ class PeakProblem : public ShootingProblem {
   }
   bool counts(Eigen::Index control) const { return control < limits_.size() && std::isfinite(limits_[control]); }
   double getFactor(Eigen::Index control, double share) const { return counts(control) ? share * limits_[control] : 1; }
-  void setModel(int node, const NodeEvaluation& at, const NodeEvaluation* next, const StageModel& inner,
-                StageModel& out) const;
+  void setControls(int node, WrappedEvaluation& at) const override;
+  void finish(int node, WrappedEvaluation& at, ProblemScratch* inner) const override;
+  void setModel(LinearizeTask& task, const StageModel* model, ProblemScratch* inner) const override;
   void setHessian(int node, const NodeEvaluation& at, const StageModel& inner, StageModel& out) const;
 
-  const ShootingProblem& inner_;
   VectorXd limits_;
   double weight_, most_;
-  VectorXd x0_;
 };
 
 }  // namespace bielle

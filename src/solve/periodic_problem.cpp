@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "solve/wrapped_problem.h"
-
 namespace bielle {
 namespace {
 
@@ -14,17 +12,14 @@ namespace {
 // cycles take half as many iterations more, with 10 to 100 about the same number.
 constexpr double kClosingScale = 100;
 
-WrappedScratch& getScratch(ProblemScratch* memory) { return static_cast<WrappedScratch&>(*memory); }
-
 }  // namespace
 
 PeriodicProblem::PeriodicProblem(const ShootingProblem& inner, StateMap map)
-    : inner_(inner), map_(std::move(map)), n_(inner.tangentSize(0)) {
+    : WrappedProblem(inner, 1, inner.tangentSize(0)), map_(std::move(map)), n_(inner.tangentSize(0)) {
   const int N = inner.numStages();
   if (inner.tangentSize(N) != n_)
     throw std::invalid_argument("PeriodicProblem: first and last node have tangent spaces of different size");
-  start_.setZero(stateSize());
-  start_.head(inner.stateSize()) = inner.initialState();
+  start_.tail(n_).setZero();
   reference_ = inner.makeEvaluation();
   const VectorXd u = VectorXd::Zero(inner.controlSize(0));
   EvaluateTask task{0, &inner.initialState(), &u, nullptr, reference_.get()};
@@ -57,12 +52,6 @@ std::string PeriodicProblem::getConstraintName(int node, int row) const {
                     : "end of the cycle against its beginning, row " + std::to_string(row - rows);
 }
 
-std::unique_ptr<NodeEvaluation> PeriodicProblem::makeEvaluation() const { return wrapEvaluation(inner_); }
-
-std::unique_ptr<ProblemScratch> PeriodicProblem::makeScratch() const {
-  return std::make_unique<WrappedScratch>(inner_);
-}
-
 // Eq. (2)
 VectorXd PeriodicProblem::calcStart(ConstVectorRef theta, ProblemScratch* inner) const {
   const VectorXd dx = theta;
@@ -81,44 +70,24 @@ VectorXd PeriodicProblem::calcError(const VectorXd& theta, const NodeEvaluation&
   return kClosingScale * error;
 }
 
-void PeriodicProblem::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memory) const {
-  WrappedScratch& scratch = getScratch(memory);
-  std::vector<EvaluateTask>& inner = scratch.evaluations;
-  inner.clear();
-  for (int i = 0; i < count; ++i) {
-    const EvaluateTask& task = tasks[i];
-    auto& at = static_cast<WrappedEvaluation&>(*task.out);
-    at.x = *task.x;
-    if (task.node < numStages()) at.u = *task.u;
-    if (task.node == 0) continue;
-    at.inner->x = getState(at.x);
-    if (task.node < numStages()) at.inner->u = at.u;
-    const NodeEvaluation* previous = task.node > 1 ? getInner(task.previous) : nullptr;
-    inner.push_back({task.node - 1, &at.inner->x, &at.inner->u, previous, at.inner.get()});
+void PeriodicProblem::setControls(int, WrappedEvaluation& at) const { at.inner->u = at.u; }
+
+void PeriodicProblem::finish(int node, WrappedEvaluation& at, ProblemScratch* inner) const {
+  if (node == 0) {
+    at.cost = 0;
+    at.x_next.resize(stateSize());
+    at.x_next << calcStart(at.u, inner), at.u;
+    at.status = at.x_next.allFinite() ? NumericalStatus::Ok : NumericalStatus::NotFinite;
+    at.failure = at.status == NumericalStatus::Ok ? "" : "there is no such beginning of the cycle";
+    return;
   }
-  inner_.evaluate(inner.data(), static_cast<int>(inner.size()), scratch.inner.get());
-  for (int i = 0; i < count; ++i) {
-    auto& at = static_cast<WrappedEvaluation&>(*tasks[i].out);
-    if (tasks[i].node == 0) {
-      at.cost = 0;
-      at.x_next.resize(stateSize());
-      at.x_next << calcStart(at.u, scratch.inner.get()), at.u;
-      at.status = at.x_next.allFinite() ? NumericalStatus::Ok : NumericalStatus::NotFinite;
-      at.failure = at.status == NumericalStatus::Ok ? "" : "there is no such beginning of the cycle";
-      continue;
-    }
-    at.status = at.inner->status;
-    at.failure = at.inner->failure;
-    at.cost = at.inner->cost;
-    at.constraints = at.inner->constraints;
-    if (at.status != NumericalStatus::Ok) continue;
-    if (tasks[i].node < numStages()) {
-      at.x_next.resize(stateSize());
-      at.x_next << at.inner->x_next, at.x.tail(n_);
-    } else {
-      at.constraints.resize(at.inner->constraints.size() + n_);
-      at.constraints << at.inner->constraints, calcError(at.x.tail(n_), *at.inner, scratch.inner.get());
-    }
+  if (at.status != NumericalStatus::Ok) return;
+  if (node < numStages()) {
+    at.x_next.resize(stateSize());
+    at.x_next << at.inner->x_next, at.x.tail(n_);
+  } else {
+    at.constraints.resize(at.inner->constraints.size() + n_);
+    at.constraints << at.inner->constraints, calcError(at.x.tail(n_), *at.inner, inner);
   }
 }
 
@@ -146,41 +115,6 @@ MatrixXd PeriodicProblem::differentiate(const VectorXd& theta, bool maps, const 
   return by_theta;
 }
 
-void PeriodicProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* memory) const {
-  WrappedScratch& scratch = getScratch(memory);
-  std::vector<LinearizeTask>& inner = scratch.linearizations;
-  inner.clear();
-  scratch.models.takeBack();
-  for (int i = 0; i < count; ++i) {
-    const int node = tasks[i].node - 1;
-    if (node < 0) continue;
-    const bool running = node < inner_.numStages();
-    LinearizeTask task;
-    task.node = node;
-    task.at = getInner(tasks[i].at);
-    task.next = getInner(tasks[i].next);
-    task.rows = tasks[i].rows;
-    task.out = &scratch.takeModel(inner_.tangentSize(node), running ? inner_.controlSize(node) : 0,
-                                  running ? inner_.tangentSize(node + 1) : 0, inner_.constraintSize(node));
-    inner.push_back(task);
-  }
-  inner_.linearize(inner.data(), static_cast<int>(inner.size()), scratch.inner.get());
-  auto done = inner.begin();
-  for (int i = 0; i < count; ++i) {
-    if (tasks[i].node == 0) {
-      linearizeStart(tasks[i], scratch.inner.get());
-      continue;
-    }
-    tasks[i].status = done->status;
-    tasks[i].failure = done->failure;
-    if (done->status == NumericalStatus::Ok) {
-      setModel(tasks[i], *done->out);
-      if (tasks[i].node == numStages() && tasks[i].rows) setClosing(tasks[i], scratch.inner.get());
-    }
-    ++done;
-  }
-}
-
 void PeriodicProblem::linearizeStart(LinearizeTask& task, ProblemScratch* inner) const {
   const NodeEvaluation& next = *getInner(task.next);
   StageModel& out = *task.out;
@@ -198,7 +132,9 @@ void PeriodicProblem::linearizeStart(LinearizeTask& task, ProblemScratch* inner)
 }
 
 // In the order (u, x, theta).
-void PeriodicProblem::setModel(const LinearizeTask& task, const StageModel& inner) const {
+void PeriodicProblem::setModel(LinearizeTask& task, const StageModel* model, ProblemScratch* scratch) const {
+  if (!model) return linearizeStart(task, scratch);
+  const StageModel& inner = *model;
   const Eigen::Index size = inner.lu.size() + inner.lx.size(), n = inner.gap.size();
   StageModel& out = *task.out;
   out.cost = inner.cost;
@@ -208,7 +144,10 @@ void PeriodicProblem::setModel(const LinearizeTask& task, const StageModel& inne
   out.hessian().topLeftCorner(size, size) = inner.hessian();
   out.Ct().topLeftCorner(size, inner.Ct().cols()) = inner.Ct();
   out.Ct().bottomRows(n_).setZero();
-  if (n == 0) return;
+  if (task.node == numStages()) {
+    if (task.rows) setClosing(task, scratch);
+    return;
+  }
   out.gap << inner.gap, task.at->x.tail(n_) - task.next->x.tail(n_);
   out.Ft().setZero();
   out.Ft().topLeftCorner(size, n) = inner.Ft();
@@ -220,45 +159,6 @@ void PeriodicProblem::setClosing(const LinearizeTask& task, ProblemScratch* inne
   auto Ct = task.out->Ct().rightCols(n_);
   Ct.topRows(n_) = -kClosingScale * MatrixXd::Identity(n_, n_);
   Ct.bottomRows(n_) = kClosingScale * differentiate(task.at->x.tail(n_), true, *getInner(task.at), inner).transpose();
-}
-
-void PeriodicProblem::integrate(const IntegrateTask* tasks, int count, ProblemScratch* memory) const {
-  WrappedScratch& scratch = getScratch(memory);
-  std::vector<IntegrateTask>& inner = scratch.integrations;
-  inner.clear();
-  scratch.vectors.takeBack();
-  for (int i = 0; i < count; ++i) {
-    if (tasks[i].node == 0) continue;
-    VectorXd& dx = scratch.takeVector(tasks[i].dx->size() - n_);
-    dx = tasks[i].dx->head(dx.size());
-    inner.push_back({tasks[i].node - 1, getInner(tasks[i].at), &dx, &scratch.takeVector(inner_.stateSize())});
-  }
-  inner_.integrate(inner.data(), static_cast<int>(inner.size()), scratch.inner.get());
-  auto done = inner.begin();
-  for (int i = 0; i < count; ++i) {
-    if (tasks[i].node == 0)
-      *tasks[i].x_out = start_;
-    else
-      *tasks[i].x_out << *done++->x_out, tasks[i].at->x.tail(n_) + tasks[i].dx->tail(n_);
-  }
-}
-
-void PeriodicProblem::difference(const DifferenceTask* tasks, int count, ProblemScratch* memory) const {
-  WrappedScratch& scratch = getScratch(memory);
-  std::vector<DifferenceTask>& inner = scratch.differences;
-  inner.clear();
-  scratch.vectors.takeBack();
-  for (int i = 0; i < count; ++i) {
-    if (tasks[i].node == 0) continue;
-    VectorXd& x1 = scratch.takeVector(inner_.stateSize());
-    x1 = getState(*tasks[i].x1);
-    inner.push_back(
-        {tasks[i].node - 1, getInner(tasks[i].at), &x1, &scratch.takeVector(inner_.tangentSize(tasks[i].node - 1))});
-  }
-  inner_.difference(inner.data(), static_cast<int>(inner.size()), scratch.inner.get());
-  auto done = inner.begin();
-  for (int i = 0; i < count; ++i)
-    if (tasks[i].node > 0) *tasks[i].dx << *done++->dx, tasks[i].x1->tail(n_) - tasks[i].at->x.tail(n_);
 }
 
 ShootingTrajectory PeriodicProblem::wrap(const ShootingTrajectory& inner) const {

@@ -18,38 +18,27 @@
 /// Derivatives by theta, of (2) and (3), are central differences of fourth order of (+) and (-), at two nodes of all. That of c
 /// by x_N is taken as -1, which it is where c vanishes.
 #include <functional>
-#include <memory>
 
 #include "bielle/solve/fddp.h"
+#include "solve/wrapped_problem.h"
 
 namespace bielle {
 
 /// S of Eq. (1): how a state of the inner problem appears a cycle later. The program may call it from several threads.
 using StateMap = std::function<VectorXd(const VectorXd& x)>;
 
-class PeriodicProblem : public ShootingProblem {
+class PeriodicProblem : public WrappedProblem {
  public:
   /// \param inner  must outlive it
   /// \throws std::invalid_argument when its first and last node have tangent spaces of different size, or its initial state cannot
   /// be evaluated
   PeriodicProblem(const ShootingProblem& inner, StateMap map);
 
-  int numStages() const override { return inner_.numStages() + 1; }
-  int stateSize() const override { return inner_.stateSize() + n_; }
-  int tangentSize(int node) const override { return node > 0 ? inner_.tangentSize(node - 1) + n_ : 0; }
   int controlSize(int stage) const override { return stage > 0 ? inner_.controlSize(stage - 1) : n_; }
-  const VectorXd& initialState() const override { return start_; }
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
   int constraintSize(int node) const override;
   void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const override;
   std::string getConstraintName(int node, int row) const override;
-  std::unique_ptr<NodeEvaluation> makeEvaluation() const override;
-  std::unique_ptr<ProblemScratch> makeScratch() const override;
-  void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override;
-  void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override;
-  void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override;
-  void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override;
-  int batchSize() const override { return inner_.batchSize(); }
 
   /// The same trajectory here, and back; likewise multipliers, of which those of (3), without its scale, are the last of the last node.
   ShootingTrajectory wrap(const ShootingTrajectory& inner) const;
@@ -62,16 +51,20 @@ class PeriodicProblem : public ShootingProblem {
   VectorXd calcStart(ConstVectorRef theta, ProblemScratch* inner) const;
   VectorXd calcError(const VectorXd& theta, const NodeEvaluation& last, ProblemScratch* inner) const;
   MatrixXd differentiate(const VectorXd& theta, bool maps, const NodeEvaluation& at, ProblemScratch* inner) const;
+  void setControls(int node, WrappedEvaluation& at) const override;
+  void finish(int node, WrappedEvaluation& at, ProblemScratch* inner) const override;
+  void setModel(LinearizeTask& task, const StageModel* model, ProblemScratch* inner) const override;
   void linearizeStart(LinearizeTask& task, ProblemScratch* inner) const;
-  void setModel(const LinearizeTask& task, const StageModel& inner) const;
   void setClosing(const LinearizeTask& task, ProblemScratch* inner) const;
 
-  const ShootingProblem& inner_;
   StateMap map_;
   int n_;
-  VectorXd start_;
   std::unique_ptr<NodeEvaluation> reference_;  // of the inner problem at x_r
 };
+
+/// Derivative of a map from the tangent space, of that size, at the last evaluation of `from` to that at the one of `to`, by central
+/// differences of fourth order.
+MatrixXd differentiateMap(const StateMap& map, int size, NodeEvaluator& from, NodeEvaluator& to);
 
 /// A cycle repeated for ever, near a solution of (1): gains, and what deviations become.
 struct CyclicFeedback {

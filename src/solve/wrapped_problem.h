@@ -1,5 +1,5 @@
 #pragma once
-// What problems that wrap another one have in common: they hand tasks on, and so keep evaluations and memory of the inner problem.
+/// \file A problem made of another one, the inner problem: it hands tasks on, and keeps evaluations and memory of that one.
 #include <algorithm>
 #include <memory>
 #include <vector>
@@ -11,14 +11,6 @@ namespace bielle {
 struct WrappedEvaluation : NodeEvaluation {
   std::unique_ptr<NodeEvaluation> inner;
 };
-inline NodeEvaluation* getInner(const NodeEvaluation* at) {
-  return at ? static_cast<const WrappedEvaluation*>(at)->inner.get() : nullptr;
-}
-inline std::unique_ptr<NodeEvaluation> wrapEvaluation(const ShootingProblem& inner) {
-  auto out = std::make_unique<WrappedEvaluation>();
-  out->inner = inner.makeEvaluation();
-  return out;
-}
 
 // Things of various sizes that a scratch memory keeps.
 template <typename T>
@@ -60,12 +52,54 @@ struct WrappedScratch : ProblemScratch {
     return vectors.take([size](const VectorXd& v) { return v.size() == size; },
                         [size](VectorXd& v) { v.resize(size); });
   }
-  StageModel& takeModel(int ndx, int nu, int ndx_next, int rows) {
-    StageModel& out = models.take([=](const StageModel& model) { return model.hasSizes(ndx, nu, ndx_next); },
-                                  [=](StageModel& model) { model.resize(ndx, nu, ndx_next); });
-    out.setRows(rows);
-    return out;
+  // For a node of the inner problem.
+  StageModel& takeModel(const ShootingProblem& problem, int node);
+};
+
+/// States have numbers after those of the inner problem, and so have tangent vectors of all nodes but the first; there may be a node
+/// before those of the inner problem, whose tangent space is empty. What all that does is said by the derived class.
+class WrappedProblem : public ShootingProblem {
+ public:
+  int numStages() const override { return inner_.numStages() + before_; }
+  int stateSize() const override { return inner_.stateSize() + added_; }
+  int tangentSize(int node) const override {
+    if (node == 0) return before_ > 0 ? 0 : inner_.tangentSize(0);
+    return inner_.tangentSize(node - before_) + added_;
   }
+  const VectorXd& initialState() const override { return start_; }
+  std::unique_ptr<NodeEvaluation> makeEvaluation() const override;
+  std::unique_ptr<ProblemScratch> makeScratch() const override;
+  void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override;
+  void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override;
+  void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override;
+  void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override;
+  int batchSize() const override { return inner_.batchSize(); }
+
+ protected:
+  /// \param inner  must outlive it   \param before  0 or 1: nodes before those of the inner problem
+  /// \param added  numbers after a state of the inner problem
+  WrappedProblem(const ShootingProblem& inner, int before, int added)
+      : inner_(inner), start_(inner.stateSize() + added), before_(before), added_(added) {
+    start_.head(inner.stateSize()) = inner.initialState();
+  }
+
+  static NodeEvaluation* getInner(const NodeEvaluation* at) {
+    return at ? static_cast<const WrappedEvaluation*>(at)->inner.get() : nullptr;
+  }
+
+  const ShootingProblem& inner_;
+  VectorXd start_;  // what was added is the derived class's to set
+
+ private:
+  /// Controls of the inner problem at an evaluation whose x and u are known.
+  virtual void setControls(int node, WrappedEvaluation& at) const = 0;
+  /// Everything about an evaluation but x and u. Status, failure, cost and constraints of a node of the inner problem are those of
+  /// the latter. \param inner  scratch of the inner problem, here and below
+  virtual void finish(int node, WrappedEvaluation& at, ProblemScratch* inner) const = 0;
+  /// \param model  of the inner problem; null at the node before
+  virtual void setModel(LinearizeTask& task, const StageModel* model, ProblemScratch* inner) const = 0;
+
+  int before_, added_;
 };
 
 }  // namespace bielle
