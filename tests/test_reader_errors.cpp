@@ -5,6 +5,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/robots/robot_loader.h"
+#include "formats/yaml_progress.h"
 #include "get_error.h"
 #include "robot_directory.h"
 
@@ -351,6 +352,15 @@ TEST_CASE("XML entities are refused for what they are") {
     CHECK(getErrorOfLoading(path).find(path + ": <!DOCTYPE> (line 2): it declares entities, which are not read; ") ==
           0);
   }
+}
+
+// Texts on which yaml-cpp 0.7 does so are not needed: this is what it tells then.
+TEST_CASE("a YAML document that begins where the last one did is an error") {
+  YamlProgress progress;
+  YAML::Mark mark;
+  for (mark.pos = 0; mark.pos < 3; ++mark.pos) progress.OnDocumentStart(mark);
+  --mark.pos;
+  CHECK_THROWS_WITH(progress.OnDocumentStart(mark), Catch::Contains("nothing can begin here"));
 }
 
 // For any bytes, loadRobot returns a model or throws a InputError.

@@ -6,14 +6,23 @@
 #include <cctype>
 #include <cmath>
 #include <set>
+#include <sstream>
 
 #include "bielle/model/error.h"
 #include "formats/text_file.h"
+#include "formats/yaml_progress.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 
 namespace bielle {
 namespace {
+
+void requireProgress(const std::string& text) {
+  std::istringstream in(text);
+  YAML::Parser parser(in);
+  YamlProgress progress;
+  while (parser.HandleNextDocument(progress)) continue;
+}
 
 // Rows of the table, which constants make before main().
 std::set<std::string>& getKeyRows() {
@@ -164,6 +173,7 @@ void readYamlDocument(const std::string& path, const std::string& text,
                       const std::function<void(const YamlEntry&)>& read) {
   requireUtf8(text, path);
   try {
+    requireProgress(text);
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
     for (size_t i = 1; i < documents.size(); ++i)
       if (!documents[i].IsNull())
