@@ -554,7 +554,9 @@ TEST_CASE("parts: parameters of parts that are not chosen are refused, but where
   CHECK_NOTHROW(load("knee: four_bar, knee_crank: 0.04"));  // as it says
   CHECK_THROWS_WITH(load("hip_middle: -0.5"), Contains("key 'hip_middle'") && Contains("choose `hip: three_rrs`"));
   const auto find = [](const OptionValues& settings, const OpenChoices& open) {
-    const std::optional<UnusedParameter> unused = findUnused("leg_biped", settings, open);
+    std::vector<std::string> names;
+    for (const auto& [name, value] : settings) names.push_back(name);
+    const std::optional<UnusedParameter> unused = findUnused("leg_biped", names, settings, open);
     return unused ? unused->name : "";
   };
   const OptionValues crank = {{"knee", std::string("belt")}, {"knee_crank", 0.04}};

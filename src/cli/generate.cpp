@@ -38,10 +38,12 @@ std::string makeExample(const std::string& robot) {
 
 int generate(const GenerateArguments& arguments) {
   OptionValues values;
+  std::vector<std::string> names;
   std::string changes;
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] =
         splitSetting("--set", setting, setting.find('=') == std::string::npos ? makeExample(arguments.robot) : "");
+    names.push_back(name);
     values.emplace_back(name, parseOption(value));
     changes += (changes.empty() ? " with " : ", ") + setting;
   }
@@ -49,7 +51,7 @@ int generate(const GenerateArguments& arguments) {
   OptionSet parameters = generator.parameters;
   for (const auto& [name, value] : values) parameters.set(name, value);
   const Model model = generator.make(parameters);
-  if (const std::optional<UnusedParameter> unused = findUnused(arguments.robot, values))
+  if (const std::optional<UnusedParameter> unused = findUnused(arguments.robot, names, values))
     throw InputError("", "--set " + unused->name, unused->problem, unused->remedy);
   writeRobot(model, arguments.directory, "Written by `bielle generate " + arguments.robot + "`" + changes + ".");
   std::cout << model.name() << ": " << formatNumber(model.mass()) << " kg, nv " << model.nv() << ", " << model.nu()

@@ -120,15 +120,6 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
   finish();
 }
 
-OpenChoices listOpenChoices(const OptionValues& settings, const std::vector<DesignVariable>& variables) {
-  OpenChoices open;
-  for (const auto& [name, value] : settings)
-    if (const std::string* choice = std::get_if<std::string>(&value)) open[name] = {*choice};
-  for (const DesignVariable& variable : variables)
-    if (!variable.parameter.empty() && variable.isChoice()) open[variable.parameter] = variable.choices;
-  return open;
-}
-
 Parametrization::Parametrization(const std::string& generator, OptionValues settings,
                                  std::vector<DesignVariable> variables, std::string source)
     : source_(std::move(source)),
@@ -136,6 +127,7 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
       settings_(std::move(settings)),
       variables_(std::move(variables)) {
   const OptionSet parameters = getParameters();
+  std::vector<std::string> varied;
   start_ = VectorXd::Zero(static_cast<Eigen::Index>(variables_.size()));
   for (size_t i = 0; i < variables_.size(); ++i) {
     const DesignVariable& variable = variables_[i];
@@ -157,9 +149,7 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
       throw InputError(source_, "variable '" + variable.name + "'",
                        "parameter '" + parameter.name + "' does not vary continuously",
                        "give it `choices`, or set it for all designs");
-    if (const auto unused =
-            findUnused(generator, {{parameter.name, parameter.value}}, listOpenChoices(settings_, variables_)))
-      throw InputError(source_, "variable '" + variable.name + "'", unused->problem, unused->remedy);
+    varied.push_back(parameter.name);
     start = *value;
     const OptionBounds& bounds = parameter.bounds;
     if (!(variable.lower >= bounds.lower && variable.upper <= bounds.upper))
@@ -170,6 +160,10 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
                            (parameter.unit == "1" ? "" : " " + parameter.unit),
                        "narrow them");
   }
+  if (const auto unused = findUnused(generator, varied, settings_, listOpenChoices(settings_, variables_)))
+    for (const DesignVariable& variable : variables_)
+      if (variable.parameter == unused->name)
+        throw InputError(source_, "variable '" + variable.name + "'", unused->problem, unused->remedy);
   finish();
 }
 

@@ -35,9 +35,9 @@ struct UnusedParameter {
   std::string name, problem, remedy;
 };
 
-/// The first among `settings`.
-std::optional<UnusedParameter> findUnused(const std::string& generator, const OptionValues& settings,
-                                          const OpenChoices& open = {});
+/// The first among `names`, where `settings` are made.
+std::optional<UnusedParameter> findUnused(const std::string& generator, const std::vector<std::string>& names,
+                                          const OptionValues& settings, const OpenChoices& open = {});
 /// \param settings  as of readGeneratorEntry()   \throws InputError naming file and line of one that is not used
 void requireUsed(const std::string& generator, const YamlEntry& settings, const OpenChoices& open = {});
 

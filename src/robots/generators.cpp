@@ -146,8 +146,8 @@ std::string findChoice(const ComposedRobot& robot, const OptionSet& parameters, 
 
 }  // namespace
 
-std::optional<UnusedParameter> findUnused(const std::string& generator, const OptionValues& settings,
-                                          const OpenChoices& open) {
+std::optional<UnusedParameter> findUnused(const std::string& generator, const std::vector<std::string>& names,
+                                          const OptionValues& settings, const OpenChoices& open) {
   if (isCompiled(generator)) return {};
   const auto robot = makeComposed(findComposedFile(generator), settings);
   OptionSet parameters = robot->parameters();
@@ -156,7 +156,7 @@ std::optional<UnusedParameter> findUnused(const std::string& generator, const Op
   for (const Option& option : parameters)
     if (const std::string* choice = std::get_if<std::string>(&option.value))
       if (!open.count(option.name)) chosen[option.name] = *choice;
-  for (const auto& [name, value] : settings) {
+  for (const std::string& name : names) {
     if (mayUse(*robot, name, chosen, open)) continue;
     const std::string choice = findChoice(*robot, parameters, name, chosen, open);
     return UnusedParameter{name, "it would change nothing: it is a parameter of a part that is not chosen",

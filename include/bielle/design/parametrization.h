@@ -26,8 +26,6 @@ struct ShiftChange {
   Vector3d along = Vector3d::UnitX();  ///< unit vector
 };
 
-/// One number. With several lengths, the first one is the value and the others change by the same amount (left and
-/// right legs, which need not be equal to the last digit); all shifts are by the value, relative to the given robot.
 /// What a gear costs whose ratio i is larger than that of the motor as it comes, with i in units of that ratio. It loses the share
 ///     loss (1 - 1/i)                                                                                                   (1)
 /// of the power in both directions, that which rolls in a planetary stage of ratio i, while the rest turns with the
@@ -40,6 +38,8 @@ struct GearCost {
   double mass_per_effort = 0.0054;  ///< kg per N m
 };
 
+/// One number. With several lengths, the first one is the value and the others change by the same amount (left and
+/// right legs, which need not be equal to the last digit); all shifts are by the value, relative to the given robot.
 struct DesignVariable {
   std::string name, unit = "m";
   double lower = 0, upper = 0;
