@@ -408,3 +408,13 @@ TEST_CASE("linkages of three and four decimals move, or are told with the roundi
     }
   CHECK(told > 0);
 }
+
+TEST_CASE("a linkage with too many motors whose rows are next to nothing is told, however its numbers are taken") {
+  // Of the seed of the fuzzer: between those that count and those of `rounding: 0` lie singular values of two loops that share joints.
+  const std::string toy = std::string(BIELLE_SOURCE_DIR) + "/tests/fuzz/toy.usda";
+  const RobotDirectory directory;
+  for (const std::string& path : {toy, directory.write("exact.yaml", "model: " + toy + "\nrounding: 0\n")}) {
+    const LoadedRobot robot = loadRobot(path);
+    CHECK(countWarnings(robot, "is less than the 2 motors in its loops (shoulder, slide)") == 1);
+  }
+}

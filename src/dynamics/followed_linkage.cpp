@@ -194,6 +194,50 @@ void FollowedLinkage::addChanges(int c, MatrixXd& P) const {
   }
 }
 
+namespace {
+
+// The singular value decomposition of J, by that of the triangle of a QR decomposition where J has more rows than columns: large
+// linkages have several times as many, and the rows of U beyond the rank are only asked for in the end.
+class RowDecomposition {
+ public:
+  explicit RowDecomposition(const MatrixXd& J) : rows_(J.rows()), is_tall_(J.rows() > J.cols()) {
+    if (!is_tall_) {
+      svd_.compute(J, Eigen::ComputeFullU | Eigen::ComputeFullV);
+      return;
+    }
+    const Eigen::Index n = J.cols();
+    qr_.compute(J);
+    const MatrixXd triangle = qr_.matrixR().topLeftCorner(n, n).triangularView<Eigen::Upper>();
+    svd_.compute(triangle * qr_.colsPermutation().transpose(), Eigen::ComputeFullU | Eigen::ComputeFullV);
+  }
+  const VectorXd& sigma() const { return svd_.singularValues(); }
+  const MatrixXd& V() const { return svd_.matrixV(); }
+
+  // U_m^T r
+  VectorXd project(VectorXd r, Eigen::Index m) const {
+    if (is_tall_) r.applyOnTheLeft(qr_.householderQ().adjoint());
+    return svd_.matrixU().leftCols(m).transpose() * r.head(svd_.matrixU().rows());
+  }
+  // The columns of U from m on.
+  MatrixXd calcRest(Eigen::Index m) const {
+    const MatrixXd& own = svd_.matrixU();
+    const Eigen::Index n = own.rows();
+    MatrixXd rest = MatrixXd::Zero(rows_, rows_ - m);
+    rest.topLeftCorner(n, n - m) = own.rightCols(n - m);
+    rest.bottomRightCorner(rows_ - n, rows_ - n).setIdentity();
+    if (is_tall_) rest.applyOnTheLeft(qr_.householderQ());
+    return rest;
+  }
+
+ private:
+  Eigen::Index rows_;
+  bool is_tall_;
+  Eigen::ColPivHouseholderQR<MatrixXd> qr_;
+  Eigen::JacobiSVD<MatrixXd> svd_;
+};
+
+}  // namespace
+
 std::optional<LinkageFit> fitLinkage(FollowedLinkage& linkage, VectorXd q, int m, double least) {
   constexpr int kMost = 40;
   constexpr double kLongest = 0.3;
@@ -201,24 +245,19 @@ std::optional<LinkageFit> fitLinkage(FollowedLinkage& linkage, VectorXd q, int m
   for (int i = 0; i < kMost; ++i) {
     const FollowedLinkage::Rows rows = linkage.calcRows(q, false);
     if (!rows.r.allFinite() || !rows.J.allFinite()) return {};
-    const Eigen::JacobiSVD<MatrixXd> svd(rows.J, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const VectorXd& sigma = svd.singularValues();
+    const RowDecomposition svd(rows.J);
+    const VectorXd& sigma = svd.sigma();
     const int rank = m >= 0 ? m : static_cast<int>((sigma.array() > least).count());
     if (rank > sigma.size() || (rank > 0 && !(sigma[rank - 1] > 1e-9))) return {};
-    const VectorXd along = svd.matrixU().leftCols(rank).transpose() * rows.r;
+    const VectorXd along = svd.project(rows.r, rank);
     const double error = along.norm(), damping = error < 1e-3 ? 0 : 0.3 * std::min(0.1, error);
     VectorXd step =
-        -svd.matrixV().leftCols(rank) *
+        -svd.V().leftCols(rank) *
         (along.array() * sigma.head(rank).array() / (sigma.head(rank).array().square() + damping * damping)).matrix();
     const double size = calcLargest(step);
     if (size < 1e-14 || (size < 1e-11 && size > 0.3 * last)) {
-      const Eigen::Index n = rows.J.cols(), all = rows.J.rows();
-      return LinkageFit{q,
-                        sigma,
-                        svd.matrixV().rightCols(n - rank),
-                        svd.matrixU().rightCols(all - rank),
-                        rows.r,
-                        calcLargest(rows.r)};
+      return LinkageFit{
+          q, sigma, svd.V().rightCols(rows.J.cols() - rank), svd.calcRest(rank), rows.r, calcLargest(rows.r)};
     }
     if (size > kLongest) step *= kLongest / size;
     q = linkage.move(q, step);

@@ -188,11 +188,11 @@ Finding examine(FollowedLinkage& linkage, const std::vector<VectorXd>& starts,
   }
   found.rank = found.written = -1;
   if (!start) return found;
-  const int least = static_cast<int>((start->sigma.array() > opening).count());
+  found.q = start->q;
   found.written = static_cast<int>((start->sigma.array() > 1e-9).count());
+  const int least = std::min(found.written, static_cast<int>((start->sigma.array() > opening).count()));
   for (int m = least; m <= found.written; ++m) {
     found.rank = m;
-    found.q = start->q;
     if (m == linkage.numRows()) {
       found.exact = true;  // no row is redundant
       return found;

@@ -17,6 +17,7 @@ if [ ! -e "$build/seeds/done" ]; then
   mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,sdf,usd,loops,mesh,json,npz}
   cp "$root"/robots/*/*.urdf "$build/seeds/urdf"
   cp "$root"/robots/*/*.yaml "$root"/tests/fuzz/toy.yaml "$build/seeds/yaml"
+  for kind in usda sdf; do cp "$root/tests/fuzz/toy.$kind" "$build/seeds/${kind%a}"; done
   sed 's/^  ak80-9:/  m:/' "$root/robots/motors.yaml" >"$build/seeds/motors/all.yaml"
   printf 'motors: {m: {source: s, ratio: 9, rotor_inertia: 1e-5, torque_constant: 0.1, resistance: 0.2, voltage: 48, current: 20, continuous_current: 9, efficiency: 0.9, back_efficiency: 0.8, mass: 0.5, effort: 10, velocity: 40}}\n' >"$build/seeds/motors/one.yaml"
   # A triangle as STL, binary (a header of 80 bytes, the number of triangles) and text, and as OBJ.
