@@ -12,6 +12,7 @@ struct Robot {
   std::shared_ptr<Model> model;  // shared with all that is made of it
   std::string file, directory;   // empty: not from files
   std::vector<std::string> warnings;
+  std::vector<LockedLoops> locked = {};
 
   /// \throws ValueError when it was made without one
   const Model& get() const {
@@ -20,6 +21,8 @@ struct Robot {
   }
 };
 
-inline LoadedRobot toLoaded(const Robot& robot) { return {robot.get(), robot.warnings, robot.directory, robot.file}; }
+inline LoadedRobot toLoaded(const Robot& robot) {
+  return {robot.get(), robot.warnings, robot.directory, robot.file, robot.locked};
+}
 
 }  // namespace bielle::python

@@ -19,7 +19,9 @@ Robot load(const std::string& name, const std::optional<std::string>& base) {
   LoadedRobot loaded = loadRobot(name, options);
   const std::vector<std::string> moved = checkReferences(loaded);
   loaded.warnings.insert(loaded.warnings.end(), moved.begin(), moved.end());
-  return {name, std::make_shared<Model>(std::move(loaded.model)), loaded.file, loaded.directory, loaded.warnings};
+  return {
+      name,         std::make_shared<Model>(std::move(loaded.model)), loaded.file, loaded.directory, loaded.warnings,
+      loaded.locked};
 }
 
 Robot generate(const std::string& name, const std::string& directory,

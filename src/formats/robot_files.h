@@ -183,9 +183,13 @@ RobotFiles parseRobotText(const RobotText& text, const std::string& path);
 /// UrdfFile::harmless of the file of a robot. \throws InputError as loadRobot() does
 std::vector<std::string> listHarmless(const std::string& file);
 
+/// UrdfJoint::effort of the joints of the file of a robot that have one, by name, whether a motor drives them or not.
+/// \throws InputError as loadRobot() does
+std::map<std::string, double> listEfforts(const std::string& file);
+
 /// The model of both files. Of what is harmless, the warnings give the number.
-/// \param base  overrides the file's key   \param warnings  receives what is valid but suspicious; null for none
-Model combineFiles(RobotFiles files, std::optional<BaseKind> base, std::vector<std::string>* warnings);
+/// \param base  overrides the file's key   \param told  receives warnings and locked loops; null for none
+Model combineFiles(RobotFiles files, std::optional<BaseKind> base, LoadedRobot* told);
 
 /// What other libraries add to loadRobot() when a program that links them starts (model/missing_part.h).
 struct RobotSources {

@@ -16,7 +16,6 @@
 #include "dynamics/loop_problem.h"
 #include "dynamics/point_spring.h"
 #include "dynamics/regular_mobility.h"
-#include "dynamics/rounded_linkages.h"
 #include "math/constants.h"
 #include "model/frame_name.h"
 #include "model/number_text.h"
@@ -164,20 +163,21 @@ Json describePointSprings(const Model& model, const std::vector<Posture>& postur
 }
 
 // Freedoms that rows of closures take over a way, though they say the same in a posture: linkages that are rounded too much.
-int countLocked(const Model& model, ConstVectorRef q) {
+// \param least  singular values of the whole robot below it count as zero
+int countLocked(const LoadedRobot& robot, ConstVectorRef q, double least) {
   int locked = 0;
-  for (const RoundedLinkage& linkage : findRoundedLinkages(model, {}).locked) {
-    if (linkage.written < 0) continue;
-    int dofs = 0;
-    for (int joint : linkage.joints) dofs += model.joints()[joint].nv;
-    const int rank = calcMobility(selectClosures(model, linkage.closures), q).rank;
-    locked += std::max(0, dofs - linkage.written - rank);
+  for (const LockedLoops& loops : robot.locked) {
+    const Model part = selectClosures(robot.model, loops.closures);
+    const int dofs = static_cast<int>(part.clusters().front().dofs.size());
+    const auto rank = static_cast<int>((calcMobility(part, q).singular_values.array() > least).count());
+    locked += std::max(0, dofs - loops.mobility - rank);
   }
   return locked;
 }
 
 // At the first reference that closes, else at a closed configuration near neutral; beside it where it is singular.
-Json describeMobility(const Model& model, const std::vector<Posture>& postures) {
+Json describeMobility(const LoadedRobot& robot, const std::vector<Posture>& postures) {
+  const Model& model = robot.model;
   std::string place = "closed neutral";
   const AssemblyResult found = findClosedConfiguration(model);
   VectorXd q = found.q;
@@ -185,7 +185,7 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
   for (size_t i = postures.size(); i-- > 1;)
     if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
   const Mobility mobility = calcMobility(model, q), regular = closed ? calcRegularMobility(model, q) : mobility;
-  const int locked = closed ? countLocked(model, q) : 0;
+  const int locked = closed && regular.rows > 0 ? countLocked(robot, q, kRankTolerance * regular.singular_values[0]) : 0;
   if (regular.rank > mobility.rank)
     place += " (singular: rank " + std::to_string(mobility.rank) + " there, this beside it)";
   return {{"posture", place},
@@ -349,7 +349,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"nv", model.nv()},
                {"nu", model.nu()},
                {"closure_rows", model.numClosureRows()},
-               {"mobility", describeMobility(model, postures)},
+               {"mobility", describeMobility(robot, postures)},
                {"joints", Json::array()},
                {"closures", describeClosures(model, postures)},
                {"clusters", Json::array()},

@@ -99,7 +99,8 @@
 ///
 /// ## USD files (.usda), by the schema UsdPhysics
 /// One layer in text form, which refers to no other file. Joints have their own places, with coordinates in degrees or units of the
-/// file; where the bodies stand is the reference `initial`. Joints with excludeFromArticulation close loops; where loops remain,
+/// file; joints of six coordinates of which several are free are chains. Where the bodies stand is the reference `initial`. Joints with
+/// excludeFromArticulation close loops; where loops remain,
 /// first balls, then hinges without a range close them. Bodies that nothing ties to the world are free, kinematic ones stand. The
 /// frame of a body keeps its directions and has its origin on its joint, where that turns. Drives are motors without their servos.
 #include <optional>
@@ -116,12 +117,19 @@ struct LoadOptions {
   std::optional<BaseKind> base;  ///< overrides the file's `base` key; without both: free
 };
 
+/// Loops that are locked by what is more than rounding (docs/modelling.md), though in single postures their rows may say the same.
+struct LockedLoops {
+  std::vector<int> closures;  ///< those of one cluster
+  int mobility = 0;           ///< what is left of it
+};
+
 struct LoadedRobot {
   Model model;
   std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
   std::string directory;              ///< where the files were found
   std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
-  std::string path() const;           ///< of the same file in `directory`, as messages name it
+  std::vector<LockedLoops> locked;
+  std::string path() const;  ///< of the same file in `directory`, as messages name it
 };
 
 /// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf, bipetto.yaml or .xml in the directories of
