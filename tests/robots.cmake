@@ -11,7 +11,7 @@ bielle_command_test(parallel_bipeds SOURCES test_parallel_bipeds.cpp LIBS bielle
 bielle_test(published SOURCES test_published.cpp LIBS bielle_results)
 set_tests_properties(published PROPERTIES LABELS system)
 bielle_command_test(part_motions SOURCES test_part_motions.cpp LIBS bielle_design)
-bielle_test(usd SOURCES test_usd.cpp LIBS bielle_results)
+bielle_test(usd SOURCES test_usd.cpp test_usd_reader.cpp LIBS bielle_results)
 bielle_test(round_trips SOURCES test_round_trips.cpp LIBS bielle_robots)
 get_property(reads_sdf GLOBAL PROPERTY BIELLE_READS_SDF)
 if(reads_sdf)

@@ -45,6 +45,8 @@ struct UsdJoint {
   const UsdPrim* prim = nullptr;
   std::string name;
   std::string coordinate;  // as drives and limits call it: angular, linear, rotX, ...; empty without a single one
+  std::vector<int> axes;   // of a joint of six coordinates, those that are free, but for balls
+  std::vector<std::string> siblings;  // coordinates of all joints of its chain; empty without one
   JointKind kind = JointKind::Fixed;
   int body[2] = {0, 0};  // 0 is the world
   SE3 X_SJ[2];           // frames of the joint in the bodies of the file
@@ -95,7 +97,6 @@ class UsdReader {
   // reader_usd_joints.cpp
   void readJoint(const UsdPrim& prim);
   bool readKind(UsdJoint& joint);
-  bool readSix(UsdJoint& joint);
   void readFrame(UsdJoint& joint, int end);
   void readRange(UsdJoint& joint, std::string_view lower, std::string_view upper) const;
   void readDrive(UsdJoint& joint);
@@ -107,6 +108,12 @@ class UsdReader {
   /// Of a torque or a force, and of angles or lengths, in SI.
   double getForceUnit(const UsdJoint& joint) const;
   double getCoordinateUnit(const UsdJoint& joint) const;
+
+  // reader_usd_six.cpp
+  bool readSix(UsdJoint& joint);
+  void readAxis(UsdJoint& joint, int axis) const;
+  void addChain(const UsdJoint& whole);
+  [[noreturn]] void failForSeveral(const UsdJoint& joint) const;
 
   // reader_usd_tree.cpp
   void chooseCarriers();

@@ -5,11 +5,10 @@
 #include "bielle/model/error.h"
 #include "formats/reader_usd.h"
 #include "math/constants.h"
+#include "model/listing.h"
 
 namespace bielle {
 namespace {
-
-constexpr const char* kAxes[] = {"transX", "transY", "transZ", "rotX", "rotY", "rotZ"};
 
 bool isAngular(const UsdJoint& joint) { return joint.kind == JointKind::Revolute; }
 
@@ -42,9 +41,10 @@ void UsdReader::readJoint(const UsdPrim& prim) {
   for (const char* limit : {"physics:breakForce", "physics:breakTorque"})
     if (std::isfinite(getNumber(prim, limit, HUGE_VAL, true)))
       note(prim.line, std::string(limit), "left out: joints do not break here");
+  joint.name = makeName(prim, joint_names_);
+  if (joint.axes.size() > 1) return addChain(joint);
   readDrive(joint);
   readExtensions(joint);
-  joint.name = makeName(prim, joint_names_);
   joints_.push_back(std::move(joint));
 }
 
@@ -86,47 +86,6 @@ bool UsdReader::readKind(UsdJoint& joint) {
           type.find("Gear") != std::string_view::npos || type.find("Rack") != std::string_view::npos
               ? "couple the two joints by NewtonMimicAPI or PhysxMimicJointAPI in its place"
               : "replace it by revolute, prismatic, spherical and fixed joints");
-}
-
-// A joint of six coordinates, of which limits lock some: those whose lower one is above the upper one.
-bool UsdReader::readSix(UsdJoint& joint) {
-  const UsdPrim& prim = *joint.prim;
-  std::vector<int> free;
-  std::string names;
-  bool has_range = false;
-  for (int i = 0; i < 6; ++i) {
-    const std::string prefix = "limit:" + std::string(kAxes[i]) + ":physics:";
-    if (prim.hasApi("PhysicsLimitAPI:" + std::string(kAxes[i]))) {
-      const double low = getNumber(prim, prefix + "low", -HUGE_VAL, true),
-                   high = getNumber(prim, prefix + "high", HUGE_VAL, true);
-      if (low > high) continue;
-      has_range = has_range || std::isfinite(low) || std::isfinite(high);
-    }
-    free.push_back(i);
-    names += (names.empty() ? "" : ", ") + std::string(kAxes[i]);
-  }
-  if (prim.hasApi("PhysicsLimitAPI:distance"))
-    failUsd(path_, prim, "it limits a distance, which is not supported",
-            "put a rod with a ball at each end in its place");
-  if (free.empty()) return true;
-  if (free.size() == 6) {
-    note(prim.line, "PhysicsJoint that locks nothing");
-    return false;
-  }
-  if (free == std::vector<int>{3, 4, 5}) {
-    joint.kind = JointKind::Spherical;
-    if (has_range) note(prim.line, "PhysicsLimitAPI of a ball", "the limits of a ball are left out");
-    return true;
-  }
-  if (free.size() != 1)
-    failUsd(path_, prim, "it leaves " + names + " free: such a joint is not supported",
-            "put a chain of revolute and prismatic joints with small bodies in between in its place");
-  joint.kind = free[0] < 3 ? JointKind::Prismatic : JointKind::Revolute;
-  joint.axis = Vector3d::Unit(free[0] % 3);
-  joint.coordinate = kAxes[free[0]];
-  const std::string prefix = "limit:" + joint.coordinate + ":physics:";
-  if (prim.hasApi("PhysicsLimitAPI:" + joint.coordinate)) readRange(joint, prefix + "low", prefix + "high");
-  return true;
 }
 
 void UsdReader::readRange(UsdJoint& joint, std::string_view lower, std::string_view upper) const {
@@ -175,6 +134,8 @@ void UsdReader::readDrive(UsdJoint& joint) {
     if (schema.rfind(kDrive, 0) != 0) continue;
     const std::string name = schema.substr(kDrive.size()), prefix = "drive:" + name + ":physics:";
     if (joint.coordinate.empty() || (name != joint.coordinate)) {
+      if (!joint.siblings.empty() && (contains(joint.siblings, name) || joint.coordinate != joint.siblings[0]))
+        continue;
       note(prim.line, schema, "left out: it does not drive the one coordinate of its joint");
       for (const char* key :
            {"maxForce", "stiffness", "damping", "type", "targetPosition", "targetVelocity", "maxVelocity"})
@@ -237,7 +198,7 @@ void UsdReader::readActuator(const UsdPrim& prim) {
                input = getNumber(prim, "mjc:ctrlRange:max", 0, true);
   const std::string bias = getUsdText(prim, "mjc:biasType");
   for (const UsdProperty& property : prim.properties) property.is_used = true;
-  if (!joint || joint->coordinate.empty())
+  if (!joint || joint->coordinate.empty() || !joint->siblings.empty())
     return note(prim.line, kind, "it is left out: motors can only drive joints with one coordinate");
   joint->is_driven = true;
   const bool is_servo = kind == "NewtonActuator" || (!bias.empty() && bias != "none");
@@ -253,7 +214,8 @@ void UsdReader::readActuator(const UsdPrim& prim) {
 void UsdReader::chainJoints() {
   std::map<std::pair<int, int>, UsdJoint*> last;
   for (UsdJoint& joint : joints_) {
-    if (!joint.prim->hasApi("MjcJointAPI") || joint.coordinate.empty() || joint.is_excluded) continue;
+    if (!joint.prim->hasApi("MjcJointAPI") || joint.coordinate.empty() || joint.is_excluded || !joint.siblings.empty())
+      continue;
     UsdJoint*& before = last[{joint.body[0], joint.body[1]}];
     if (before) {
       UsdBody between;
@@ -298,11 +260,11 @@ void UsdReader::readMimic(const UsdJoint& joint) {
   }
   if (!leader) return;
   const UsdJoint* other = findJoint(leader);
-  if (!other || other->coordinate.empty() || !other->is_carrying)
+  if (!other || other->coordinate.empty() || !other->is_carrying || !other->siblings.empty())
     failUsd(path_, prim,
             "the joint that it follows, <" + leader->getPath() + ">, closes a loop or has not one coordinate",
             "name another one");
-  if (joint.coordinate.empty() || !joint.is_carrying)
+  if (joint.coordinate.empty() || !joint.is_carrying || !joint.siblings.empty())
     failUsd(path_, prim, "it follows another joint, but closes a loop or has not one coordinate", "remove its mimic");
   const auto found = std::find_if(tree_.joints.begin(), tree_.joints.end(),
                                   [&](const UrdfJoint& j) { return j.joint.name == joint.name; });

@@ -59,6 +59,7 @@ void UsdReader::chooseCarriers() {
   std::vector<std::string> chosen;
   for (const UsdJoint& joint : joints_) {
     if (joint.is_carrying) continue;
+    if (!joint.siblings.empty()) failForSeveral(joint);
     if (joint.is_driven)
       failUsd(path_, *joint.prim, "all joints of its loop have drives", "remove the drive of one joint of the loop");
     if (!joint.is_excluded) chosen.push_back(joint.name);
