@@ -1,4 +1,5 @@
 // Robots from SDF files: what is written comes back, and what others write is read or refused with a remedy.
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/assembly.h"
@@ -367,8 +368,35 @@ TEST_CASE("SDF files that are no robot are errors with a remedy") {
   CHECK_THAT(getSdfError(makeFourBar("<link name=\"d\"/>" + universal + replaceOnce(universal, "r1", "r2"))),
              Catch::Contains(
                  "joint 'r2': its child 'd' hangs on another joint too, and it cannot close a loop; cut the loop"));
+  CHECK_THAT(getSdfError(makeFourBar("<link name=\"d\"/><joint name=\"u\" type=\"universal\"><parent>a</parent><child>d"
+                                     "</child></joint>")),
+             Catch::Contains("joint 'u'") && Catch::Contains("it has no <axis>, or too few; give its direction"));
   CHECK_THAT(getSdfError(makeFourBar("<model name=\"n\"><link name=\"l\"/></model>")),
              Catch::Contains("it contains other models; put"));
+}
+
+TEST_CASE("colours, frictions, sensors and plugins that libsdformat refuses do not keep a mechanism from being read") {
+  // In files of Gazebo Classic; whole files were refused for them.
+  const std::string strange = R"(<visual name="v"><geometry><sphere><radius>0.1</radius></sphere></geometry>
+<material><script><name>Gazebo/Red</name></script><diffuse>1 0.5 0 1</diffuse></material></visual>
+<collision name="c"><geometry><sphere><radius>0.1</radius></sphere></geometry>
+<surface><!-- </surface> > --><friction><ode><mu>-1</mu></ode></friction><surface/></surface></collision>
+<sensor name="s" type="nonsense"/><sensor name="t" type="ray"><sensor>
+</sensor></sensor></link>)";
+  const std::string whole = makeFourBar("<plugin name=\"p\"><link/></plugin>");
+  const size_t at = whole.find("</link>");
+  const LoadedRobot robot = loadSdf(whole.substr(0, at) + strange + whole.substr(at + 7));
+  CHECK(robot.model.mass() == 6);
+  CHECK(robot.model.closures().size() == 1);
+  REQUIRE(robot.model.visuals().size() == 1);
+  CHECK(robot.model.visuals()[0].rgba == Eigen::Vector4d(1, 0.5, 0, 1));
+  CHECK(robot.model.shapes().size() == 1);
+  // Errors behind them keep their lines.
+  const std::string wrong =
+      replaceOnce(whole.substr(0, at) + strange + whole.substr(at + 7), "<pose>1 0 0 0 0 0</pose>", "<pose>1 x</pose>");
+  const auto line = 1 + std::count(wrong.begin(), wrong.begin() + static_cast<long>(wrong.find("<pose>1 x")), '\n');
+  CHECK_THAT(getError([&] { loadSdf(wrong); }),
+             Catch::Contains("robot.sdf: line " + std::to_string(line) + ": libsdformat says: "));
 }
 
 TEST_CASE("joints of Drake that name a frame on either link join these frames, wherever their links are drawn") {

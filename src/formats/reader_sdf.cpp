@@ -1,14 +1,12 @@
 #include "formats/reader_sdf.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 
 #include "bielle/model/error.h"
 #include "formats/decimals.h"
 #include "formats/log_capture.h"
 #include "formats/reader_dialects.h"
-#include "model/number_text.h"
 
 namespace fs = std::filesystem;
 
@@ -20,6 +18,40 @@ constexpr size_t kMostSdfJoints = 3000, kMostSdfBytes = 16'000'000;
 bool canClose(sdf::JointType type) {
   return type == sdf::JointType::REVOLUTE || type == sdf::JointType::CONTINUOUS || type == sdf::JointType::BALL ||
          type == sdf::JointType::FIXED || type == sdf::JointType::PRISMATIC;
+}
+
+// Up to the end of what begins at `at`: a comment, or a tag with its brackets.
+size_t findEndOfTag(const std::string& xml, size_t at) {
+  const auto behind = [&](const char* mark) {
+    const size_t end = xml.find(mark, at);
+    return end == std::string::npos ? xml.size() : end + std::char_traits<char>::length(mark);
+  };
+  return behind(xml.compare(at, 4, "<!--") == 0 ? "-->" : xml.compare(at, 9, "<![CDATA[") == 0 ? "]]>" : ">");
+}
+
+// Without what takes no part in a mechanism, lines kept: libsdformat refuses whole files for a colour or a friction that it does not
+// like. \param xml  well-formed
+std::string blankForMechanism(std::string xml) {
+  static const std::set<std::string> left_out = {"surface", "script", "sensor", "plugin"};
+  size_t begin = 0;
+  std::string open;  // the element that is being left out
+  int depth = 0;     // of elements of its name in each other
+  for (size_t at = xml.find('<'); at != std::string::npos; at = xml.find('<', at)) {
+    const size_t end = findEndOfTag(xml, at);
+    const bool closes = xml.compare(at, 2, "</") == 0;
+    const size_t name_at = at + (closes ? 2 : 1);
+    const std::string name = xml.substr(name_at, xml.find_first_of(" \t\r\n/>", name_at) - name_at);
+    if (open.empty() && !closes && left_out.count(name)) open = name, begin = at, depth = 0;
+    if (!open.empty() && name == open) depth += closes ? -1 : xml[end - 2] == '/' ? 0 : 1;
+    if (!open.empty() && depth == 0) {
+      std::replace_if(
+          xml.begin() + static_cast<long>(begin), xml.begin() + static_cast<long>(end),
+          [](char c) { return c != '\n'; }, ' ');
+      open.clear();
+    }
+    at = end;
+  }
+  return xml;
 }
 
 // Files that it includes: beside the file, or below a directory of that name.
@@ -116,7 +148,7 @@ void SdfReader::load(const std::string& xml) {
   bool is_read = true;
   const LogCapture capture;  // libsdformat tries whether what is no SDF is a URDF
   try {
-    errors = root_.LoadSdfString(xml, config);
+    errors = root_.LoadSdfString(blankForMechanism(xml), config);
   } catch (const sdf::Exception&) {
     is_read = false;
   } catch (const std::exception&) {
@@ -352,104 +384,6 @@ void SdfReader::addStart() {
     if (q.empty()) reference.joints.erase(joint.joint.name);
   }
   yaml_.references.push_back(reference);
-}
-
-// What is not read, by its line.
-void SdfReader::noteElements(const XMLElement& element) {
-  static const std::map<std::string, std::set<std::string>> read = {
-      {"model", {"link", "joint", "frame", "pose", "static", "include"}},
-      {"link", {"pose", "inertial", "visual", "collision"}},
-      {"inertial", {"pose", "mass", "inertia"}},
-      {"joint", {"parent", "child", "pose", "axis", "axis2", "drake:parent_frame", "drake:child_frame"}},
-      {"axis", {"xyz", "limit", "dynamics", "mimic", "use_parent_model_frame"}},
-      {"axis2", {"xyz", "limit", "dynamics", "use_parent_model_frame"}},
-      {"limit", {"lower", "upper", "effort", "velocity"}},
-      {"dynamics", {"damping", "friction", "spring_reference", "spring_stiffness"}}};
-  static const std::set<std::string> harmless = {
-      "sensor",    "light",        "battery",     "audio_source",       "audio_sink", "particle_emitter",
-      "projector", "self_collide", "enable_wind", "allow_auto_disable", "physics"};
-  const std::string& tag = getTag(element);
-  for (const XMLElement* e : getChildren(element)) {
-    const std::string& own = getTag(*e);
-    if (own.rfind("drake:", 0) == 0 && tag == "model") continue;  // reader_sdf_drake.cpp
-    if (harmless.count(own))
-      notes_.addHarmless(path_, "<" + tag + "> <" + own + ">", e->GetLineNum());
-    else if (own == "plugin" && e->FirstChildElement("joint") && e->FirstChildElement("mimicJoint"))  // is read
-      continue;
-    else if (!read.at(tag).count(own))
-      notes_.add(path_, "<" + tag + "> <" + own + ">", e->GetLineNum(), "left out");
-    else if (read.count(own))
-      noteElements(*e);
-  }
-}
-
-// libsdformat reads files of later versions without an error, and leaves out what it does not know.
-void SdfReader::checkVersion(const XMLElement& root) {
-  const std::string version = getAttribute(&root, "version");
-  if (version.empty())
-    fail("<sdf> (line " + std::to_string(root.GetLineNum()) + ")", "it has no version",
-         "give the one that it was written for, e.g. version=\"" SDF_PROTOCOL_VERSION "\"");
-  const auto parse = [](const std::string& text) {
-    int major = 0, minor = 0;
-    std::sscanf(text.c_str(), "%d.%d", &major, &minor);
-    return std::pair(major, minor);
-  };
-  if (parse(version) > parse(SDF_PROTOCOL_VERSION))
-    tree_.warnings.push_back(path_ + ": version " + version + " is later than " + SDF_PROTOCOL_VERSION +
-                             ", the last one that libsdformat " SDF_MAJOR_VERSION_STR
-                             " reads: elements that came after it have "
-                             "no effect, but for <mimic>");
-}
-
-// What the specification puts where a file says nothing of a link's inertia, which is hardly ever meant.
-void SdfReader::checkInertia(const XMLElement& link) {
-  const std::string name = "link '" + getAttribute(&link, "name") + "'";
-  const XMLElement* inertial = link.FirstChildElement("inertial");
-  if (inertial)
-    for (const char* computed : {"auto", "density", "auto_inertia_params"})
-      if (inertial->Attribute(computed) || inertial->FirstChildElement(computed))
-        fail(name + " (line " + std::to_string(inertial->GetLineNum()) + ")",
-             "its inertia is to be computed from its shapes (<inertial> " + std::string(computed) +
-                 "), which libsdformat " SDF_MAJOR_VERSION_STR " does not do",
-             "give <mass> and <inertia>; `gz sdf --print --expand-auto-inertials` of a later version writes them");
-  std::string missing;
-  if (!inertial)
-    missing = "it has no <inertial>: its mass is 1 kg and its moments of inertia are 1 kg m²";
-  else if (!inertial->FirstChildElement("mass"))
-    missing = "its <inertial> has no <mass>: it is 1 kg";
-  else if (!inertial->FirstChildElement("inertia"))
-    missing = "its <inertial> has no <inertia>: its moments are 1 kg m²";
-  if (!missing.empty())
-    tree_.warnings.push_back(path_ + ": " + name + " (line " + std::to_string(link.GetLineNum()) + "): " + missing +
-                             ", by the specification of SDF");
-}
-
-// q = multiplier (q of the other joint - reference) + offset, of SDF 1.11.
-void SdfReader::readMimic(const XMLElement& joint) {
-  const XMLElement* axis = joint.FirstChildElement("axis");
-  const XMLElement* mimic = axis ? axis->FirstChildElement("mimic") : nullptr;
-  if (!mimic) return;
-  const std::string name = getAttribute(&joint, "name"), other = getAttribute(mimic, "joint");
-  const std::string element = "joint '" + name + "': <mimic> (line " + std::to_string(mimic->GetLineNum()) + ")";
-  const auto find = [this](const std::string& sought) {
-    return std::find_if(tree_.joints.begin(), tree_.joints.end(),
-                        [&sought](const UrdfJoint& candidate) { return candidate.joint.name == sought; });
-  };
-  const auto follower = find(name), leader = find(other);
-  const auto is_single = [this](auto found) { return found != tree_.joints.end() && getNv(found->joint.kind) == 1; };
-  if (!is_single(leader)) fail(element, "'" + other + "' is no joint with one coordinate", "name one");
-  if (!is_single(follower)) fail(element, "this joint closes a loop or has not one coordinate", "remove it");
-  const auto get = [&](const char* tag, double usual) {
-    const XMLElement* e = mimic->FirstChildElement(tag);
-    if (!e) return usual;
-    std::vector<double> numbers;
-    if (!parseNumbers(e->GetText() ? e->GetText() : "", numbers) || numbers.size() != 1)
-      fail(element, std::string("<") + tag + "> is not a finite number", "correct it");
-    return numbers[0];
-  };
-  follower->mimicked = other;
-  follower->multiplier = get("multiplier", 1);
-  follower->offset = get("offset", 0) - follower->multiplier * get("reference", 0);
 }
 
 RobotFiles readSdf(const std::string& path) { return SdfReader(path).read(); }

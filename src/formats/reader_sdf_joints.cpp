@@ -30,7 +30,9 @@ Vector3d SdfReader::resolveAxis(const sdf::Joint& joint, int k) const {
     direction =
         getPlace(model_->LinkByName(getChild(joint))->SemanticPose()).R.transpose() * frames->second.X_WC.R * direction;
   const double norm = direction.stableNorm();
-  if (!axis || !(norm > 1e-12) || !std::isfinite(norm))
+  if (!axis)
+    fail(describeSdf(joint), "it has no <axis>, or too few", "give its direction, e.g. <axis><xyz>0 0 1</xyz></axis>");
+  if (!(norm > 1e-12) || !std::isfinite(norm))
     fail(describeSdf(joint), "its axis is not a direction", "give a non-zero vector");
   return std::abs(direction.squaredNorm() - 1) > 1e-15 ? Vector3d(direction / norm) : direction;  // as it was written
 }
