@@ -285,6 +285,15 @@ TEST_CASE("URDF dialects: balls, a world of another name, ends of loops, and ele
   const LoadedRobot open = loadUrdf(ends);
   const std::string remedy = "closures: [{name: c, type: 3d, frames: [closing_c_1, closing_c_2]}]";
   CHECK(says(open, remedy));
+  // Megabot's names: two loops, one warning.
+  std::string others = ends;
+  for (size_t at = 0; (at = others.find("closing_c_", at)) != std::string::npos;) others.replace(at, 10, "l1_cl4_");
+  CHECK(says(loadUrdf(others), "closures: [{name: l1_cl4, type: 3d, frames: [l1_cl4_1, l1_cl4_2]}]"));
+  for (const char* name : {"l1_clip_", "l1_clip4_", "closing_"}) {
+    std::string named = ends;
+    for (size_t at = 0; (at = named.find("closing_c_", at)) != std::string::npos;) named.replace(at, 10, name);
+    CHECK_FALSE(says(loadUrdf(named), "look like the ends"));
+  }
   const LoadedRobot closed = loadUrdf(ends, remedy + "\n");
   CHECK(closed.warnings.empty());
   checkMobility(closed.model, 1);

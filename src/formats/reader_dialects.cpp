@@ -410,31 +410,4 @@ bool readMimicPlugin(const XMLElement& plugin, UrdfFile& tree) {
   return true;
 }
 
-void warnOfOpenLoops(UrdfFile& tree, const YamlFile& settings) {
-  const auto mimics = [](const UrdfJoint& joint) { return !joint.mimicked.empty(); };
-  if (!tree.dependent.empty() && settings.closures.empty() &&
-      std::none_of(tree.joints.begin(), tree.joints.end(), mimics))
-    tree.warnings.push_back(
-        tree.path + ": joint '" + tree.dependent.front() +
-        (tree.dependent.size() > 1 ? "' and " + std::to_string(tree.dependent.size() - 1) + " others are" : "' is") +
-        " said to depend on others (independent=\"false\"), but no <loop> or <coupling> says how, so "
-        "that they move freely here; give `closures` in the robot's YAML file");
-  const std::string prefix = "closing_";
-  for (const auto& [name, link] : tree.links) {
-    if (name.rfind(prefix, 0) != 0 || name.size() < prefix.size() + 3 || name.substr(name.size() - 2) != "_1") continue;
-    const std::string base = name.substr(0, name.size() - 2), other = base + "_2";
-    const auto is_named =
-        [&name = name](const ClosureSpec& closure) {  // clang 14 does not capture a structured binding by itself
-          return closure.frame1 == name || closure.frame2 == name;
-        };
-    if (!tree.links.count(other) || std::any_of(settings.closures.begin(), settings.closures.end(), is_named)) continue;
-    tree.warnings.push_back(
-        tree.path + ": links '" + name + "' and '" + other +
-        "': they look like the ends of a loop, which is open here; close it in the robot's YAML file, for "
-        "example by `closures: [{name: " +
-        base.substr(prefix.size()) + ", type: 3d, frames: [" + name + ", " + other +
-        "]}]` (3d a ball, 5d a hinge about z, 6d a weld)");
-  }
-}
-
 }  // namespace bielle

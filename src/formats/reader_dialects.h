@@ -34,8 +34,8 @@ void readDialects(const XMLElement& robot, bool for_drake, UrdfFile& tree, YamlF
 /// unless the file has a <mimic> of it. \returns whether it is one \throws InputError naming the line for names that do not exist
 bool readMimicPlugin(const XMLElement& plugin, UrdfFile& tree);
 
-/// onshape-to-robot marks the ends of loops by frames closing_NAME_1 and closing_NAME_2, and by nothing else: those that no closure
-/// names are told; and so are dependent joints of URDF+ without any closure.
+/// onshape-to-robot marks the ends of loops by frames closing_NAME_1 and closing_NAME_2, others by frames ..cl4_1 and ..cl4_2 (or loop,
+/// closure), and by nothing else: those that no closure names are told; and so are dependent joints of URDF+ without any closure.
 void warnOfOpenLoops(UrdfFile& tree, const YamlFile& settings);
 
 }  // namespace bielle
