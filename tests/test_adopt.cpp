@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <set>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -401,4 +402,88 @@ TEST_CASE("an adopted robot stands on legs that cannot be as they are in the neu
     CHECK(length > 0.3);
     CHECK(length < 0.7);
   }
+}
+
+namespace {
+
+// A machine of MuJoCo on legs of a roll, a pitch and a knee, with balls for feet, at these places below the trunk.
+std::string makeBalls(const std::vector<Vector3d>& hips) {
+  std::string legs;
+  for (size_t i = 0; i < hips.size(); ++i) {
+    const std::string number = std::to_string(i);
+    const auto begin = [&number](const std::string& name, const std::string& place, const std::string& axis) {
+      return "<body name='" + name + number + "' pos='" + place +
+             "'><inertial pos='0 0 -.1' mass='.5' diaginertia='.01 .01 .01'/>" + "<joint name='" + name + number +
+             "' axis='" + axis + "'/>";
+    };
+    legs += begin("roll", std::to_string(hips[i].x()) + " " + std::to_string(hips[i].y()) + " 0", "1 0 0") +
+            begin("pitch", "0 0 0", "0 1 0") + begin("knee", "0 0 -.2", "0 1 0' range='5 120") +
+            "<geom type='sphere' size='.02' pos='0 0 -.2'/></body></body></body>";
+  }
+  return "<mujoco><worldbody><body name='trunk' pos='0 0 .5'><freejoint/><inertial pos='0 0 0' mass='8' "
+         "diaginertia='.1 .2 .2'/>"
+         "<geom type='box' size='.3 .1 .05'/>" +
+         legs + "</body></worldbody></mujoco>";
+}
+
+}  // namespace
+
+TEST_CASE("a robot of more than two legs is adopted with a point for each foot, and motors where none are given") {
+  struct Case {
+    std::vector<Vector3d> hips;
+    std::vector<std::string> names;
+  };
+  for (const Case& c :
+       {Case{{{-0.25, 0.1, 0}, {0.25, -0.1, 0}, {-0.25, -0.1, 0}, {0.25, 0.1, 0}},
+             {"foot_back_left", "foot_front_right", "foot_back_right", "foot_front_left"}},
+        Case{{{0, -0.2, 0}, {0.25, 0, 0}, {0, 0.2, 0}, {-0.25, 0, 0}}, {"foot_3", "foot_1", "foot_2", "foot_4"}}}) {
+    const RobotDirectory directory;
+    const Adoption adoption = adoptRobot(loadRobot(directory.write("bare.xml", makeBalls(c.hips))), "../bare.xml");
+    CAPTURE(adoption.yaml);
+    const LoadedRobot robot = loadRobot(directory.write("mine/mine.yaml", adoption.yaml));
+    const Model& model = robot.model;
+    REQUIRE(model.contacts().size() == 4);
+    CHECK(model.nu() == 12);
+    const AssemblyResult posture = assembleReference(model, "half_sitting");
+    REQUIRE(posture.status == NumericalStatus::Ok);
+    Workspace ws(model);
+    updatePositions(model, ws, posture.q);
+    for (size_t i = 0; i < 4; ++i) {
+      CAPTURE(c.names[i]);
+      const int k = model.findContact(c.names[i]);
+      REQUIRE(k >= 0);
+      const ContactFrame& contact = model.contacts()[static_cast<size_t>(k)];
+      CHECK(model.bodies()[static_cast<size_t>(contact.body)].name == "knee" + std::to_string(i));
+      CHECK(contact.kind == ContactKind::Point3D);
+      const Vector3d place = getPlacement(ws, contact.body, contact.X_BF).p;
+      CHECK((place - c.hips[i]).norm() < 1e-9);  // on the ground, where the hips were
+    }
+  }
+}
+
+TEST_CASE(
+    "motors that are guessed move a robot as its mobility is, in loops by their cranks, with the efforts of the file") {
+  // A biped without its motors: joints of knees that four-bars drive, and free ones.
+  const OptionValues values = {{"knee", "four_bar"}, {"ankle", "serial"}};
+  const Generator generator = findGenerator("leg_biped", values);
+  OptionSet parameters = generator.parameters;
+  for (const auto& [name, value] : values) parameters.set(name, value);
+  const Model whole = generator.make(parameters);
+  ModelParts parts = takeParts(whole);
+  parts.motors.clear();
+  const RobotText bare = formatRobot(ModelBuilder::restore(parts));
+  const RobotDirectory directory;
+  std::string urdf = bare.urdf;
+  const size_t effort = urdf.find("effort=\"") + 8;
+  urdf.replace(effort, urdf.find('"', effort) - effort, "47");
+  const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(urdf, bare.yaml)), "../robot.urdf");
+  CAPTURE(adoption.yaml);
+  CHECK(adoption.guesses[0].rfind("Motors: none are given; these 12 joints", 0) == 0);
+  const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+  std::set<std::string> guessed, own;
+  for (const Motor& motor : model.motors()) guessed.insert(motor.name);
+  for (const Motor& motor : whole.motors()) own.insert(motor.name);
+  CHECK(guessed == own);
+  CHECK(std::count_if(model.motors().begin(), model.motors().end(),
+                      [](const Motor& motor) { return motor.effort_limit == 47; }) == 1);
 }

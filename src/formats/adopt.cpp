@@ -4,15 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/ratio.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "dynamics/smooth_friction.h"
+#include "formats/adopt_dead_points.h"
 #include "formats/adopt_feet.h"
+#include "formats/adopt_freedoms.h"
+#include "formats/robot_files.h"
 #include "formats/robot_text.h"
 #include "math/direction.h"
 
@@ -24,6 +27,7 @@ using YAML::BeginMap, YAML::BeginSeq, YAML::EndMap, YAML::EndSeq, YAML::Flow, YA
 constexpr double kHighest = 0.94, kLowest = 0.5, kStep = 0.04;  // shares of the height of the base
 constexpr double kOver = 0.005;                                 // from the centre of mass to the middle of the feet, m
 constexpr int kShifts = 20;
+constexpr double kMostWork = 1e9;  // iterations times nv^3 for a posture: some ten seconds
 constexpr double kRotor = 1e-3, kLever = 0.02, kSole = 0.1;
 
 std::string format(double value) { return formatNumber(std::abs(value) < 1e-9 ? 0.0 : value, "%.4g"); }
@@ -36,6 +40,7 @@ class Adopter {
   Adopter(const LoadedRobot& robot, const std::string& path, bool is_bent)
       : model_(robot.model),
         file_(robot.path()),
+        robot_file_(robot.file),
         path_(path),
         start_(is_bent ? "a configuration in the middle of all ranges" : "the neutral configuration"),
         ws_(robot.model) {
@@ -80,12 +85,12 @@ class Adopter {
   // its file has it from.
   void nameFeet() {
     feet_ = findFeet(model_, ws_);
-    if (feet_.size() != 2) {
+    if (feet_.size() < 2) {
       const VectorXd q = carryHome(q_);
       Workspace home(model_);
       updatePositions(model_, home, q);
       const std::vector<FoundFoot> feet = findFeet(model_, home);
-      if (feet.size() == 2 || feet_.empty()) feet_ = feet, is_carried_ = true, updatePositions(model_, ws_, q);
+      if (feet.size() > 1 || feet_.empty()) feet_ = feet, is_carried_ = true, updatePositions(model_, ws_, q);
     }
     if (feet_.empty())
       fail("no frame on a leg has its z axis up in the closed neutral configuration, and no body has a shape",
@@ -106,30 +111,50 @@ class Adopter {
     return q;
   }
 
+  // Four feet are named by their quarters, if there is one in each.
   std::string getContactName(size_t i) const {
-    return feet_.size() == 1 ? "foot" : i == 0 ? "foot_left" : "foot_right";
+    if (feet_.size() == 1) return "foot";
+    if (feet_.size() == 2) return i == 0 ? "foot_left" : "foot_right";
+    static const char* const quarters[] = {"foot_front_left", "foot_front_right", "foot_back_left", "foot_back_right"};
+    const double middle = std::accumulate(feet_.begin(), feet_.end(), 0.0, [this](double sum, const FoundFoot& foot) {
+      return sum + foot.X_WF.p.x() / static_cast<double>(feet_.size());
+    });
+    bool is_by_quarters = feet_.size() == 4;
+    for (size_t k = 0; k < feet_.size() && is_by_quarters; ++k)
+      is_by_quarters = (feet_[k].X_WF.p.x() > middle) == (k < 2) && (feet_[k].X_WF.p.y() > 0) == (k % 2 == 0);
+    return is_by_quarters ? quarters[i] : "foot_" + std::to_string(i + 1);
+  }
+
+  std::string describeFeet() const {
+    return feet_.size() == 1   ? ": only one, without a mirror image."
+           : feet_.size() == 2 ? ", mirror images of each other; left is where y is positive."
+                               : ", one on each of " + std::to_string(feet_.size()) + " legs that reach as low.";
   }
 
   void writeMotors() {
-    if (model_.motors().empty())
-      return guess("Motors: none are given, and none are guessed. Name joints under `motors`.");
+    const bool is_given = !model_.motors().empty();
+    motors_ = is_given ? model_.motors() : guessMotors(model_, q_, feet_, listEfforts(robot_file_));
+    if (motors_.empty())
+      return guess("Motors: none are given, and no joint could have one. Name joints under `motors`.");
     const double least = model_.mass() * 9.81 * kLever;
     bool unlimited = false, guessed = false;
-    for (const Motor& motor : model_.motors()) {
+    for (const Motor& motor : motors_) {
       unlimited |= motor.effort_limit < least;
       guessed |= motor.armature == 0;
     }
-    guess("Motors: those of the robot." +
-          std::string(
-              guessed
-                  ? " Rotors of 1e-3 kg m^2 where none are given, so that light linkages do not accelerate too fast."
-                  : "") +
-          (unlimited ? " Limits below " + format(least) +
-                           " N m, which could not hold the weight on 20 mm, are taken for "
-                           "placeholders."
-                     : ""));
+    guess(
+        (is_given ? "Motors: those of the robot."
+                  : "Motors: none are given; these " + std::to_string(motors_.size()) +
+                        " joints, in loops those nearest to the base, move all others. Leave out what is not driven.") +
+        std::string(
+            guessed ? " Rotors of 1e-3 kg m^2 where none are given, so that light linkages do not accelerate too fast."
+                    : "") +
+        (unlimited ? " Limits below " + format(least) +
+                         " N m, which could not hold the weight on 20 mm, are taken for "
+                         "placeholders."
+                   : ""));
     out_ << Key << "motors" << Value << BeginMap;
-    for (const Motor& motor : model_.motors()) {
+    for (const Motor& motor : motors_) {
       const bool is_weak = motor.effort_limit < least;
       const auto limit = [&](double value) { return is_weak || std::isinf(value) ? ".inf" : format(value); };
       out_ << Key << motor.name << Value << Flow << BeginMap;
@@ -159,7 +184,7 @@ class Adopter {
   }
 
   void writeContacts() {
-    bool is_measured = true, is_flat = true;
+    bool is_measured = true, is_flat = true, is_held = false;
     ModelParts parts = takeParts(model_);
     parts.contacts.clear();
     parts.references.clear();
@@ -169,6 +194,10 @@ class Adopter {
       is_measured &= contact.has_value();
       if (!contact) contact = ContactFrame{"", foot.body, foot.X_BF, ContactKind::Surface6D, kSole / 2, kSole / 2};
       contact->name = getContactName(i);
+      if (contact->kind == ContactKind::Surface6D && !canTurn(model_, q_, foot)) {
+        *contact = {contact->name, foot.body, foot.X_BF, ContactKind::Point3D, 0, 0};
+        is_held = true;
+      }
       is_flat &= contact->kind == ContactKind::Surface6D;
       parts.contacts.push_back(*contact);
     }
@@ -176,11 +205,14 @@ class Adopter {
                                        : "Feet: the lowest frames with z up" +
                                              std::string(feet_[0].is_named ? " that are named like feet"
                                                                            : ", although not named like feet")) +
-          (feet_.size() == 2 ? ", mirror images of each other; left is where y is positive."
-                             : ": only one, without a mirror image."));
-    guesses_.push_back(is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
-                                   : "Soles: 0.1 m square, because the feet have no readable shapes.");
-    if (!is_flat) guesses_.back() += " Narrow or round ones are edges (5d) or points (3d), which roll.";
+          describeFeet());
+    guesses_.push_back(is_held       ? "Soles: points (3d), since the legs cannot turn their feet about them."
+                       : is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
+                                     : "Soles: 0.1 m square, because the feet have no readable shapes.");
+    if (!is_flat && !is_held) guesses_.back() += " Narrow or round ones are edges (5d) or points (3d), which roll.";
+    if (!is_measured && !has_made_frames_ && !feet_[0].is_named)
+      guesses_.back() +=
+          " Where legs reach below these frames, add a link without mass under each foot, z up and x forward.";
     with_feet_ = ModelBuilder::restore(std::move(parts));
     out_ << YAML::Newline << YAML::Comment(guesses_.back());
     if (has_made_frames_) writeFrames();
@@ -199,8 +231,9 @@ class Adopter {
     out_ << EndMap;
   }
 
-  // The posture of a workspace at this share of the height of the base over the feet.
-  Reference makePosture(const Workspace& ws, double share) const {
+  // The posture of a workspace at this share of the height of the base over the feet. \param least  of the distance of two feet from
+  // their middle, in widths of their soles
+  Reference makePosture(const Workspace& ws, double share, double least) const {
     const SE3& base = ws.X_WB[1];
     std::vector<Vector3d> places;
     Vector3d middle = Vector3d::Zero();
@@ -213,10 +246,14 @@ class Adopter {
     reference.height_frame = model_.bodies()[1].name;
     double apart = 0;  // from the middle
     for (size_t i = 0; i < feet_.size() && feet_.size() == 2; ++i)
-      apart = std::max({apart, std::abs(places[i].y() - middle.y()), 2 * with_feet_->contacts()[i].half_width});
+      apart = std::max({apart, std::abs(places[i].y() - middle.y()), 2 * least * with_feet_->contacts()[i].half_width});
     reference.height = round(share * (base.p.z() - middle.z()));
-    for (size_t i = 0; i < feet_.size(); ++i)
-      reference.feet[getContactName(i)] = {0, (i == 0 ? 1 : -1) * round(apart), 0};
+    for (size_t i = 0; i < feet_.size(); ++i) {
+      const Vector3d place = places[i] - middle;
+      reference.feet[getContactName(i)] = feet_.size() > 2
+                                              ? Vector3d(round(place.x()), round(place.y()), 0)
+                                              : Vector3d(0, (i == 0 ? 1 : -1) * (least < 1 ? apart : round(apart)), 0);
+    }
     reference.joints[model_.joints()[1].name] = {round(base.p.x() - middle.x()), 0, reference.height, 0, 0, 0, 1};
     return reference;
   }
@@ -247,6 +284,7 @@ class Adopter {
       AssemblyProblem problem = makeReferenceProblem(*with_feet_, reference);
       problem.weights.tail(model_.nv() - 6) = problem.weights.tail(model_.nv() - 6).cwiseMin(kJointWeight);
       const AssemblyResult result = assemble(*with_feet_, problem);
+      work_ += result.iterations * std::pow(model_.nv(), 3);
       if (result.status != NumericalStatus::Ok) return false;
       for (const Joint& joint : model_.joints())
         if (joint.nv == 1 && (result.q[joint.idx_q] < model_.lowerLimits()[joint.idx_v] ||
@@ -270,12 +308,15 @@ class Adopter {
 
   void writePosture() {
     if (!model_.references().empty() && writeGivenPosture(model_.references().front())) return;
-    for (bool within_ranges : {false, true})
-      for (double share = kHighest; share > kLowest; share -= kStep) {
-        Reference r = makePosture(ws_, share);
-        if (within_ranges) preferRanges(r);
-        if (stand(r)) return writePosture(r, share, start_);
-      }
+    const bool may_be_nearer = feet_.size() == 2 && with_feet_->contacts()[0].half_width > 0;
+    for (const double least : {1.0, 0.5})  // legs without a roll of the ankle stand where they are alone, to all digits
+      for (const bool within_ranges : {false, true})
+        for (double share = kHighest; share > kLowest && work_ < kMostWork && (least == 1 || may_be_nearer);
+             share -= kStep) {
+          Reference r = makePosture(ws_, share, least);
+          if (within_ranges) preferRanges(r);
+          if (stand(r)) return writePosture(r, share, start_, least);
+        }
     guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
   }
 
@@ -287,18 +328,21 @@ class Adopter {
     Workspace ws(model_);
     updatePositions(model_, ws, is_carried_ ? carryHome(posture.q) : posture.q);
     for (double share = 1 - kStep; share > kLowest; share -= kStep) {
-      Reference r = makePosture(ws, share);
+      Reference r = makePosture(ws, share, 1);
       for (const Joint& joint : model_.joints())
         if (joint.nv == 1) r.joints[joint.name] = {posture.q[joint.idx_q]};
       if (!stand(r)) continue;
-      writePosture(r, share, "the posture '" + given.name + "' of the robot");
+      writePosture(r, share, "the posture '" + given.name + "' of the robot", 1);
       return true;
     }
     return false;
   }
 
-  void writePosture(const Reference& r, double share, const std::string& source) {
-    guess("Posture: feet flat below the centre of mass, as far apart as in " + source + " but at least two soles;");
+  void writePosture(const Reference& r, double share, const std::string& source, double least) {
+    guess("Posture: feet flat below the centre of mass, as far apart as in " + source +
+          (feet_.size() > 2 ? ";"
+           : least < 1      ? " but at least a sole;"
+                            : " but at least two soles;"));
     const std::string more =
         "the base at " + format(100 * share) +
         " % of its height there. Its loops close; angles under `joints` determine how the legs bend.";
@@ -314,7 +358,7 @@ class Adopter {
     out_ << EndMap << Key << "height" << Value << Flow << BeginMap << Key << "frame" << Value << r.height_frame;
     out_ << Key << "value" << Value << format(r.height) << EndMap << Key << "feet" << Value << BeginMap;
     for (const auto& [name, place] : r.feet)
-      out_ << Key << name << Value << Flow << BeginSeq << "0" << format(place.y()) << "0" << EndSeq;
+      out_ << Key << name << Value << Flow << BeginSeq << format(place.x()) << formatExact(place.y()) << "0" << EndSeq;
     out_ << EndMap << EndMap << EndMap;
   }
 
@@ -347,7 +391,7 @@ class Adopter {
       }
       if (!is_simple || joints.size() != 6)
         return guess("Serial joints: none guessed, because " + std::to_string(joints.size()) +
-                     " joints lead from the base to a foot. Name six per leg under `serial_joints`.");
+                     " joints lead from the base to a foot, not six.");
       all.insert(all.end(), joints.begin(), joints.end());
     }
     guess("Serial joints: all from the base to the feet.");
@@ -355,29 +399,12 @@ class Adopter {
     serial_joints_ = all;
   }
 
-  // Of linkages: whether one lies between the neutral configuration and the posture, and those that their joints can reach.
   void tellDeadPoints() {
     ModelParts parts = takeParts(*with_feet_);
+    parts.motors = motors_;
     parts.serial_joints.clear();
     for (const std::string& name : serial_joints_) parts.serial_joints.push_back(model_.findJoint(name));
-    const Model model = ModelBuilder::restore(std::move(parts));
-    std::vector<std::string> lines;
-    try {
-      for (const Linkage& linkage : listLinkages(model, posture_)) {
-        if (linkage.isDirect()) continue;
-        if (calcTransmission(linkage, model, q_) < 0)
-          lines.push_back(linkage.output + " is on the other side of a dead point than in the neutral configuration");
-        const DeadPoint nearest = findDeadPoint(linkage, model, posture_);
-        if (linkage.joints.empty() && nearest.kind != DeadPointKind::None)
-          lines.push_back(linkage.output + ": one of the " + getName(nearest.kind) + ", " + formatDistance(nearest) +
-                          " (rad or m) away");
-        for (size_t j = 0; j < linkage.joints.size(); ++j)
-          for (const RatioSample& sample : listDeadPoints(sweepRatio(model, linkage, posture_, static_cast<int>(j))))
-            lines.push_back(describe(linkage, j, sample, posture_[model.joints()[linkage.joints[j]].idx_q]));
-      }
-    } catch (const InputError& error) {  // the posture is one itself
-      lines.push_back(error.element() + ": " + error.problem());
-    }
+    const std::vector<std::string> lines = describeDeadPoints(ModelBuilder::restore(std::move(parts)), q_, posture_);
     if (lines.empty()) return;
     guess("Dead points, where motor and joint do not move each other, as seen from the posture:");
     for (const std::string& line : lines) {
@@ -386,37 +413,17 @@ class Adopter {
     }
   }
 
-  // Those of a kind at one angle, as a linkage passes them on several ways, are one.
-  static std::vector<RatioSample> listDeadPoints(const RatioSweep& sweep) {
-    constexpr double kSame = 1e-3;  // rad or m
-    std::vector<RatioSample> out;
-    for (const RatioSample& sample : sweep.samples) {
-      const bool is_known = std::any_of(out.begin(), out.end(), [&](const RatioSample& other) {
-        return other.dead == sample.dead && std::abs(other.joints[sweep.joint] - sample.joints[sweep.joint]) < kSame;
-      });
-      if ((sample.dead != DeadPointKind::None || sample.loses_rank) && !is_known) out.push_back(sample);
-    }
-    return out;
-  }
-
-  static std::string describe(const Linkage& linkage, size_t joint, const RatioSample& dead, double posture) {
-    const double angle = dead.joints[static_cast<Eigen::Index>(joint)];
-    return linkage.joint_names[joint] + " at " + format(angle) + ", " + format(std::abs(angle - posture)) +
-           " (rad or m) away: " +
-           (dead.dead == DeadPointKind::Motors   ? "the motors cannot hold it"
-            : dead.dead == DeadPointKind::Output ? "it turns back"
-                                                 : "its loops can go on in several ways");
-  }
-
   const Model& model_;
-  const std::string file_, path_;  // of the robot: as messages name it, and from the new file
-  const std::string start_;        // what q_ is
-  VectorXd q_;                     // closed
-  VectorXd posture_;               // in which it stands; empty if there is none
+  const std::string file_, robot_file_, path_;  // of the robot: as messages name it, absolute, and from the new file
+  const std::string start_;                     // what q_ is
+  VectorXd q_;                                  // closed
+  VectorXd posture_;                            // in which it stands; empty if there is none
   std::vector<std::string> serial_joints_;
   Workspace ws_;
   std::vector<FoundFoot> feet_;
+  std::vector<Motor> motors_;
   bool has_made_frames_ = false, is_carried_ = false;
+  double work_ = 0;  // on postures
   std::optional<Model> with_feet_;
   YAML::Emitter out_;
   std::vector<std::string> guesses_;

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kUpright = 0.9;                      // least cosine between the z axis of a sole and up
 constexpr double kMirror = 0.06, kSameHeight = 0.02;  // of a pair of feet, m: published models are not quite symmetric
+constexpr double kLevel = 0.01;                       // of the feet of a robot with more than two legs, m
 constexpr double kTouching = 0.005;  // m; shapes of a foot that reach as low as this over its lowest point are its sole
 constexpr double kRound = 1.05;      // extent of a round shape across, over its radius
 constexpr double kBelow = 0.01;      // m; a foot that reaches lower under a frame does not stand on it
@@ -100,6 +101,35 @@ std::vector<FoundFoot> makeSoleFrames(const Model& model, const Workspace& ws) {
   return feet;
 }
 
+// By body: what is left of the robot without its base, held together by joints and closures, is a leg or an arm. 0: the base itself.
+std::vector<int> findLegs(const Model& model) {
+  std::vector<int> legs(static_cast<size_t>(model.numBodies()), 0);
+  for (int i = 2; i < model.numBodies(); ++i) {
+    const int parent = model.joints()[static_cast<size_t>(i)].parent;
+    legs[static_cast<size_t>(i)] = parent > 1 ? legs[static_cast<size_t>(parent)] : i;
+  }
+  for (const Closure& closure : model.closures()) {
+    const int a = legs[static_cast<size_t>(closure.body1)], b = legs[static_cast<size_t>(closure.body2)];
+    if (closure.kind != ClosureKind::Coupler && a != 0 && b != 0) std::replace(legs.begin(), legs.end(), a, b);
+  }
+  return legs;
+}
+
+// The lowest candidate of each leg that reaches as low as the lowest of all. \param candidates  the lowest first
+std::vector<FoundFoot> listLowest(const Model& model, const std::vector<FoundFoot>& candidates) {
+  const std::vector<int> legs = findLegs(model);
+  std::vector<FoundFoot> lowest;
+  for (const FoundFoot& foot : candidates) {
+    const auto is_of_leg = [&](const FoundFoot& other) {
+      return legs[static_cast<size_t>(other.body)] == legs[static_cast<size_t>(foot.body)];
+    };
+    if (foot.X_WF.p.z() < candidates.front().X_WF.p.z() + kLevel &&
+        std::none_of(lowest.begin(), lowest.end(), is_of_leg))
+      lowest.push_back(foot);
+  }
+  return lowest;
+}
+
 }  // namespace
 
 std::vector<FoundFoot> findFeet(const Model& model, const Workspace& ws) {
@@ -113,6 +143,15 @@ std::vector<FoundFoot> findFeet(const Model& model, const Workspace& ws) {
   if (candidates.empty()) return {};
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const FoundFoot& a, const FoundFoot& b) { return a.X_WF.p.z() < b.X_WF.p.z(); });
+  if (std::vector<FoundFoot> many = listLowest(model, candidates); many.size() > 2) {
+    const auto isBefore = [](const FoundFoot& a, const FoundFoot& b) {  // from the front on, and from the left
+      const Vector3d apart = a.X_WF.p - b.X_WF.p;
+      return std::abs(apart.x()) > kMirror ? apart.x() > 0 : apart.y() > 0;
+    };
+    for (size_t i = 1; i < many.size(); ++i)  // few; no order that sorting needs, where rows of feet are oblique
+      for (size_t k = i; k > 0 && isBefore(many[k], many[k - 1]); --k) std::swap(many[k], many[k - 1]);
+    return many;
+  }
   const FoundFoot& first = candidates.front();
   std::vector<FoundFoot> feet = {first};
   double nearest = kMirror;

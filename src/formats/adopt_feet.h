@@ -15,7 +15,8 @@ struct FoundFoot {
   bool is_named = false;
 };
 
-/// One foot, or the left and the right one, which are mirror images of each other, in the posture of the workspace:
+/// One foot, or the left and the right one, which are mirror images of each other, in the posture of the workspace; or one on each of
+/// more than two legs that reach as low, from the front on, the left ones first. Legs are what hangs together without the base.
 /// - frames with z up that are named foot or sole, the lowest ones, unless shapes of their bodies reach below them: then they are
 ///   ankles;
 /// - otherwise new frames on the bodies whose shapes reach lowest, below the middle of what touches the ground there: z along
