@@ -11,10 +11,11 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/results/robot_info.h"
-#include "bielle/robots/robot_loader.h"
+#include "bielle/robots/generate.h"
 #include "check_derivative.h"
 #include "formats/expressions.h"
 #include "leg_biped.h"
+#include "model/listing.h"
 #include "robot_directory.h"
 #include "robots/generator_entry.h"
 
@@ -554,10 +555,8 @@ TEST_CASE("parts: parameters of parts that are not chosen are refused, but where
   CHECK_NOTHROW(load("knee: four_bar, knee_crank: 0.04"));  // as it says
   CHECK_THROWS_WITH(load("hip_middle: -0.5"), Contains("key 'hip_middle'") && Contains("choose `hip: three_rrs`"));
   const auto find = [](const OptionValues& settings, const OpenChoices& open) {
-    std::vector<std::string> names;
-    for (const auto& [name, value] : settings) names.push_back(name);
-    const std::optional<UnusedParameter> unused = findUnused("leg_biped", names, settings, open);
-    return unused ? unused->name : "";
+    const std::optional<UnusedParameters> unused = findUnused("leg_biped", settings, open);
+    return unused ? listItems(unused->names) : "";
   };
   const OptionValues crank = {{"knee", std::string("belt")}, {"knee_crank", 0.04}};
   CHECK(find(crank, {}) == "knee_crank");
@@ -566,6 +565,21 @@ TEST_CASE("parts: parameters of parts that are not chosen are refused, but where
   CHECK(find({{"knee_crank", 0.04}, {"hip_middle", -0.5}}, {{"knee", {"belt", "four_bar"}}}) == "hip_middle");
   CHECK(find({{"knee_crank", 0.04}, {"hip_middle", -0.5}},
              {{"knee", {"belt", "four_bar"}}, {"hip", {"serial", "three_rrs"}}}) == "");
+  // All that went with a part are one error, whose remedy helps all of them.
+  const OptionValues two = {{"knee", std::string("belt")}, {"knee_crank", 0.04}, {"knee_arm", 0.055}};
+  CHECK_THROWS_WITH(generateRobot("leg_biped", two), Contains("leg_biped: parameter 'knee_crank'") &&
+                                                         Contains("knee_crank, knee_arm would change nothing") &&
+                                                         Contains("remove them, or choose `knee: four_bar`"));
+  CHECK_NOTHROW(generateRobot("leg_biped", {two.begin() + 1, two.end()}));
+  CHECK(find({{"knee", std::string("belt")}, {"knee_crank", 0.04}, {"hip_middle", -0.5}}, {}) ==
+        "knee_crank, hip_middle");
+  std::vector<DesignVariable> variables(2);
+  variables[0].name = "crank", variables[0].parameter = "knee_crank";
+  variables[1].name = "arm", variables[1].parameter = "knee_arm";
+  for (DesignVariable& variable : variables) variable.lower = 0.04, variable.upper = 0.06;
+  const auto design = [&](const std::string& knee) { Parametrization("leg_biped", {{"knee", knee}}, variables); };
+  CHECK_NOTHROW(design("four_bar"));
+  CHECK_THROWS_WITH(design("belt"), Contains("variables 'crank', 'arm'") && Contains("choose `knee: four_bar`"));
 }
 
 TEST_CASE("expressions: numbers, points by component, and what is not one") {

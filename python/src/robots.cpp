@@ -4,7 +4,7 @@
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
 #include "bielle/results/robot_info.h"
-#include "bielle/robots/robot_loader.h"
+#include "bielle/robots/generate.h"
 #include "bind.h"
 #include "robot.h"
 
@@ -26,10 +26,7 @@ Robot load(const std::string& name, const std::optional<std::string>& base) {
 
 Robot generate(const std::string& name, const std::string& directory,
                const std::map<std::string, OptionValue>& parameters) {
-  const Generator generator = findGenerator(name, {parameters.begin(), parameters.end()});
-  OptionSet options = generator.parameters;
-  for (const auto& [parameter, value] : parameters) options.set(parameter, value);
-  auto model = std::make_shared<Model>(generator.make(options));
+  auto model = std::make_shared<Model>(generateRobot(name, {parameters.begin(), parameters.end()}));
   if (directory.empty()) return {name, std::move(model), "", "", {}};
   writeRobot(*model, directory);
   return load(directory, {});

@@ -261,6 +261,10 @@ def test_generated_robots(tmp_path):
     assert short.file.endswith("short.urdf") and short.model.nq == bielle.generate_robot("cleobot").model.nq
     with pytest.raises(bielle.InputError):
         bielle.generate_robot("cleobot", upper_length=-1)
+    # As the command does: what would change nothing is refused.
+    assert bielle.generate_robot("leg_biped", knee="four_bar", knee_crank=0.04).model
+    with pytest.raises(bielle.InputError, match="knee_crank.*would change nothing.*choose `knee: four_bar`"):
+        bielle.generate_robot("leg_biped", knee="belt", knee_crank=0.04)
 
 
 def test_joints_are_held_while_loops_close(model):

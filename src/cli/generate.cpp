@@ -5,11 +5,10 @@
 
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
-#include "bielle/robots/robot_loader.h"
+#include "bielle/robots/generate.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "results/setting.h"
-#include "robots/generator_entry.h"
 
 namespace bielle::cli {
 namespace {
@@ -38,21 +37,14 @@ std::string makeExample(const std::string& robot) {
 
 int generate(const GenerateArguments& arguments) {
   OptionValues values;
-  std::vector<std::string> names;
   std::string changes;
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] =
         splitSetting("--set", setting, setting.find('=') == std::string::npos ? makeExample(arguments.robot) : "");
-    names.push_back(name);
     values.emplace_back(name, parseOption(value));
     changes += (changes.empty() ? " with " : ", ") + setting;
   }
-  const Generator generator = findGenerator(arguments.robot, values);
-  OptionSet parameters = generator.parameters;
-  for (const auto& [name, value] : values) parameters.set(name, value);
-  const Model model = generator.make(parameters);
-  if (const std::optional<UnusedParameter> unused = findUnused(arguments.robot, names, values))
-    throw InputError("", "--set " + unused->name, unused->problem, unused->remedy);
+  const Model model = generateRobot(arguments.robot, values);
   writeRobot(model, arguments.directory, "Written by `bielle generate " + arguments.robot + "`" + changes + ".");
   std::cout << model.name() << ": " << formatNumber(model.mass()) << " kg, nv " << model.nv() << ", " << model.nu()
             << " motors, " << model.closures().size() << " closures\n  " << arguments.directory << "\n";

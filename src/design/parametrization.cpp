@@ -10,6 +10,7 @@
 #include "design/draft.h"
 #include "design/motor_change.h"
 #include "design/open_choices.h"
+#include "model/listing.h"
 #include "model/number_text.h"
 
 namespace bielle {
@@ -127,7 +128,7 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
       settings_(std::move(settings)),
       variables_(std::move(variables)) {
   const OptionSet parameters = getParameters();
-  std::vector<std::string> varied;
+  std::vector<std::string> continuous;
   start_ = VectorXd::Zero(static_cast<Eigen::Index>(variables_.size()));
   for (size_t i = 0; i < variables_.size(); ++i) {
     const DesignVariable& variable = variables_[i];
@@ -149,7 +150,7 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
       throw InputError(source_, "variable '" + variable.name + "'",
                        "parameter '" + parameter.name + "' does not vary continuously",
                        "give it `choices`, or set it for all designs");
-    varied.push_back(parameter.name);
+    continuous.push_back(parameter.name);
     start = *value;
     const OptionBounds& bounds = parameter.bounds;
     if (!(variable.lower >= bounds.lower && variable.upper <= bounds.upper))
@@ -160,10 +161,13 @@ Parametrization::Parametrization(const std::string& generator, OptionValues sett
                            (parameter.unit == "1" ? "" : " " + parameter.unit),
                        "narrow them");
   }
-  if (const auto unused = findUnused(generator, varied, settings_, listOpenChoices(settings_, variables_)))
+  if (const auto unused = findUnused(generator, continuous, settings_, listOpenChoices(settings_, variables_))) {
+    std::vector<std::string> names;
     for (const DesignVariable& variable : variables_)
-      if (variable.parameter == unused->name)
-        throw InputError(source_, "variable '" + variable.name + "'", unused->problem, unused->remedy);
+      if (contains(unused->names, variable.parameter)) names.push_back("'" + variable.name + "'");
+    throw InputError(source_, (names.size() == 1 ? "variable " : "variables ") + listItems(names), unused->problem,
+                     unused->remedy);
+  }
   finish();
 }
 

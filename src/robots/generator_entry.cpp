@@ -56,15 +56,11 @@ GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settin
 
 void requireUsed(const std::string& generator, const YamlEntry& settings, const OpenChoices& open) {
   OptionValues values;
-  std::vector<std::string> names;
-  for (const auto& [name, value] : settings.getMap()) {
-    names.push_back(name);
-    values.emplace_back(name, parseOption(locateBeside(value)));
-  }
-  const std::optional<UnusedParameter> unused = findUnused(generator, names, values, open);
+  for (const auto& [name, value] : settings.getMap()) values.emplace_back(name, parseOption(locateBeside(value)));
+  const std::optional<UnusedParameters> unused = findUnused(generator, values, open);
   if (!unused) return;
   for (const auto& [name, value] : settings.getMap())
-    if (name == unused->name) value.fail(unused->problem, unused->remedy);
+    if (name == unused->names.front()) value.fail(unused->problem, unused->remedy);
 }
 
 OptionValues GeneratorEntry::listChanges() const {

@@ -30,15 +30,19 @@ GeneratorEntry readGeneratorEntry(const YamlEntry& name, const YamlEntry* settin
 /// Choices that are left open, by the names of their parameters.
 using OpenChoices = std::map<std::string, std::vector<std::string>>;
 
-/// A parameter that would change nothing, since no part has it that is chosen or may be.
-struct UnusedParameter {
-  std::string name, problem, remedy;
+/// Parameters that would change nothing, since no part has them that is chosen or may be.
+struct UnusedParameters {
+  std::vector<std::string> names;
+  std::string problem, remedy;
 };
 
-/// The first among `names`, where `settings` are made.
-std::optional<UnusedParameter> findUnused(const std::string& generator, const std::vector<std::string>& names,
-                                          const OptionValues& settings, const OpenChoices& open = {});
-/// \param settings  as of readGeneratorEntry()   \throws InputError naming file and line of one that is not used
+/// All among `names`, where `settings` are made; none if there are none.
+std::optional<UnusedParameters> findUnused(const std::string& generator, const std::vector<std::string>& names,
+                                           const OptionValues& settings, const OpenChoices& open = {});
+/// All among `settings`.
+std::optional<UnusedParameters> findUnused(const std::string& generator, const OptionValues& settings,
+                                           const OpenChoices& open = {});
+/// \param settings  as of readGeneratorEntry()   \throws InputError naming file and line of the first one that is not used
 void requireUsed(const std::string& generator, const YamlEntry& settings, const OpenChoices& open = {});
 
 /// That of a robot's file: one that names a generator, or composes a robot of parts; none for any other.

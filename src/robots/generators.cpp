@@ -4,6 +4,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"
+#include "bielle/robots/generate.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/robot_files.h"
 #include "model/listing.h"
@@ -130,8 +131,8 @@ bool mayUse(const ComposedRobot& robot, const std::string& parameter, PartChoice
   });
 }
 
-// What else to choose for a parameter to be used, as `knee: belt`; empty if one choice does not do.
-std::string findChoice(const ComposedRobot& robot, const OptionSet& parameters, const std::string& parameter,
+// What else to choose for all of them to be used, as `knee: belt`; empty if one choice does not do.
+std::string findChoice(const ComposedRobot& robot, const OptionSet& parameters, const std::vector<std::string>& unused,
                        const PartChoices& chosen, const OpenChoices& open) {
   for (const Option& option : parameters)
     for (const std::string& choice : option.choices) {
@@ -139,15 +140,23 @@ std::string findChoice(const ComposedRobot& robot, const OptionSet& parameters, 
       OpenChoices others = open;
       other[option.name] = choice;
       others.erase(option.name);
-      if (mayUse(robot, parameter, other, others)) return "`" + option.name + ": " + choice + "`";
+      const auto is_used = [&](const std::string& name) { return mayUse(robot, name, other, others); };
+      if (std::all_of(unused.begin(), unused.end(), is_used)) return "`" + option.name + ": " + choice + "`";
     }
   return "";
 }
 
 }  // namespace
 
-std::optional<UnusedParameter> findUnused(const std::string& generator, const std::vector<std::string>& names,
-                                          const OptionValues& settings, const OpenChoices& open) {
+std::optional<UnusedParameters> findUnused(const std::string& generator, const OptionValues& settings,
+                                           const OpenChoices& open) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : settings) names.push_back(name);
+  return findUnused(generator, names, settings, open);
+}
+
+std::optional<UnusedParameters> findUnused(const std::string& generator, const std::vector<std::string>& names,
+                                           const OptionValues& settings, const OpenChoices& open) {
   if (isCompiled(generator)) return {};
   const auto robot = makeComposed(findComposedFile(generator), settings);
   OptionSet parameters = robot->parameters();
@@ -156,13 +165,27 @@ std::optional<UnusedParameter> findUnused(const std::string& generator, const st
   for (const Option& option : parameters)
     if (const std::string* choice = std::get_if<std::string>(&option.value))
       if (!open.count(option.name)) chosen[option.name] = *choice;
-  for (const std::string& name : names) {
-    if (mayUse(*robot, name, chosen, open)) continue;
-    const std::string choice = findChoice(*robot, parameters, name, chosen, open);
-    return UnusedParameter{name, "it would change nothing: it is a parameter of a part that is not chosen",
-                           choice.empty() ? "remove it" : "remove it, or choose " + choice};
-  }
-  return {};
+  std::vector<std::string> unused;
+  for (const std::string& name : names)
+    if (!mayUse(*robot, name, chosen, open) && !contains(unused, name)) unused.push_back(name);
+  if (unused.empty()) return {};
+  const bool one = unused.size() == 1;
+  const std::string choice = findChoice(*robot, parameters, unused, chosen, open);
+  return UnusedParameters{
+      unused,
+      one ? "it would change nothing: it is a parameter of a part that is not chosen"
+          : listItems(unused) + " would change nothing: no part that is chosen has them",
+      std::string(one ? "remove it" : "remove them") + (choice.empty() ? "" : ", or choose " + choice)};
+}
+
+Model generateRobot(const std::string& name, const OptionValues& settings) {
+  const Generator generator = findGenerator(name, settings);
+  OptionSet parameters = generator.parameters;
+  for (const auto& [parameter, value] : settings) parameters.set(parameter, value);
+  Model model = generator.make(parameters);
+  if (const std::optional<UnusedParameters> unused = findUnused(name, settings))
+    throw InputError(name, "parameter '" + unused->names.front() + "'", unused->problem, unused->remedy);
+  return model;
 }
 
 std::vector<Generator> listGenerators() {
