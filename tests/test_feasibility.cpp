@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <cmath>
 #include <limits>
+#include <random>
 
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
@@ -18,7 +20,7 @@
 #include "change_model.h"
 #include "get_error.h"
 #include "math/so3.h"
-#include "model/number_text.h"
+#include "model/rounded_text.h"
 #include "motion/feasibility.h"
 #include "motion/footholds.h"
 #include "motion/obstacles.h"
@@ -472,7 +474,30 @@ TEST_CASE("feasibility: a walk beyond the speed of walks is doubtful") {
   WalkOptions walk;
   walk.speed = 2.5;
   walk.gait.timing.single = 0.1;
-  CHECK_THAT(listDoubts(makeWalk(getRsuBiped(), walk)), Catch::Contains("Froude number") && Catch::Contains("run"));
+  const std::string doubt = listDoubts(makeWalk(getRsuBiped(), walk));
+  REQUIRE_THAT(doubt, Catch::Contains("Froude number") && Catch::Contains("run"));
+  walk.speed = std::stod(doubt.substr(doubt.find("up to ") + 6));
+  CHECK_THAT(listDoubts(makeWalk(getRsuBiped(), walk)), !Catch::Contains("Froude number"));
+  CHECK(walk.speed > 1.8);
+}
+
+TEST_CASE("feasibility: bounds in remedies are on their own side, whatever their last digit") {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> exponent(-4, 4);
+  for (int i = 0; i < 2000; ++i) {
+    const double value = (i % 2 ? -1 : 1) * std::pow(10, exponent(random));
+    for (int digits : {1, 2, 3}) {
+      CAPTURE(value, digits);
+      const double below = *parseNumber(formatBelow(value, digits)), above = *parseNumber(formatAbove(value, digits)),
+                   unit = std::pow(10, std::floor(std::log10(std::abs(value))) + 1 - digits);
+      CHECK((below <= value && value < below + 1.000001 * unit));
+      CHECK((above >= value && value > above - 1.000001 * unit));
+      CHECK(*parseNumber(formatNumber(below, ("%." + std::to_string(digits) + "g").c_str())) == Approx(below));
+    }
+  }
+  CHECK(formatBelow(0.3, 1) == "0.3");
+  CHECK(formatAbove(0.7, 2) == "0.7");
+  CHECK(formatBelow(0, 2) == "0");
 }
 
 TEST_CASE("feasibility: feet that planned postures leave off their places are doubtful") {

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "formats/text_file.h"
-#include "model/number_text.h"
+#include "model/rounded_text.h"
 #include "results/plot.h"
 
 namespace fs = std::filesystem;
@@ -16,12 +16,6 @@ namespace {
 
 constexpr double kImpedance = 0.9999;  // the most that MuJoCo takes
 constexpr double kMargin = 0.95;       // of what is promised
-
-// A number with two digits, not above x.
-double roundDown(double x) {
-  const double unit = std::pow(10, std::floor(std::log10(x)) - 1);
-  return *parseNumber(formatNumber(std::floor(x / unit + 1e-9) * unit, "%.2g"));
-}
 
 double read(const Json& row, const char* key) {
   return row.contains(key) && row.at(key).is_number() ? row.at(key).get<double>() : NAN;
@@ -139,7 +133,7 @@ SoftnessAdvice advise(const std::vector<Json>& rows, double within, double time_
   advice.within = within;
   advice.time_step = time_step;
   if (const double needed = std::sqrt(kMargin * within / opening) / 2; needed < time_step)
-    advice.time_step = roundDown(needed);
+    advice.time_step = *parseNumber(formatBelow(needed, 2));
   const double time = 2 * advice.time_step;
   advice.settings = {{time, 1}, {kImpedance, kImpedance, 0.001, 0.5, 2}};
   advice.gap = opening * time * time;

@@ -15,7 +15,7 @@
 #include "formats/robot_text.h"
 #include "math/constants.h"
 #include "math/so3.h"
-#include "model/number_text.h"
+#include "model/rounded_text.h"
 #include "motion/applied_options.h"
 #include "motion/com_reach.h"
 #include "motion/motor_scale.h"
@@ -331,8 +331,7 @@ class FeasibilityCheck {
     if (most > motion_.ground.friction)
       tell(getContact(steepest->contacts[0]).name +
                " would slip on an inclined foothold on which it stands alone: it needs a friction of " +
-               formatNumber(most, "%.3g") +
-               " (with the pyramids and the margin of docs/constraints.md), the ground has " +
+               formatAbove(most, 3) + " (with the pyramids and the margin of docs/constraints.md), the ground has " +
                formatNumber(motion_.ground.friction),
            "give a less inclined foothold, or `friction`");
   }
@@ -372,7 +371,7 @@ class FeasibilityCheck {
       if (froude > 1)
         tell("a walk of " + formatNumber(goal.requested) + " m/s has a Froude number of " +
                  formatNumber(froude, "%.2g") + ", walks have less than 1: up to " +
-                 formatNumber(std::sqrt(gravity_ * length), "%.2g") + " m/s",
+                 formatBelow(std::sqrt(gravity_ * length), 2) + " m/s",
              "request a lower speed, or a run");
     }
   }
@@ -449,7 +448,7 @@ class FeasibilityCheck {
            "request shorter, lower or less turned steps");
     if (friction.needed > friction.allowed)
       tell(getContact(friction.moment.phase->contacts[0]).name + " would slip: the weight, as planned " +
-               friction.moment.describe() + ", needs a friction of " + formatNumber(friction.needed, "%.2g") +
+               friction.moment.describe() + ", needs a friction of " + formatAbove(friction.needed, 2) +
                " at least, the ground has " + formatNumber(friction.allowed),
            "request a slower motion or shorter steps, or give `friction` if the ground has more");
     tellEfforts(efforts);
@@ -572,7 +571,7 @@ void requireGravity(const Model& model, double friction) {
   if (g.norm() > kMost) refuse("it is " + formatNumber(g.norm()) + " m/s^2");
   const double slope = g.z() < 0 ? std::hypot(g.x(), g.y()) / -g.z() : std::numeric_limits<double>::infinity();
   if (slope > friction)
-    refuse(g.z() < 0 ? "it points aside: on level ground feet need a friction of " + formatNumber(slope, "%.3g") +
+    refuse(g.z() < 0 ? "it points aside: on level ground feet need a friction of " + formatAbove(slope, 3) +
                            ", the ground has " + formatNumber(friction)
                      : std::string("it does not point down"));
 }
@@ -586,7 +585,7 @@ void requireSolesApart(const Model& model, const std::vector<ContactTarget>& sol
       const double distance = calcSoleDistance(a, soles[j].X_WT, b, soles[i].X_WT);
       if (distance < -kTouching)
         throw InputError(model.name(), "contacts '" + a.name + "' and '" + b.name + "'",
-                         "their soles overlap by " + formatNumber(-distance, "%.3g") + " m where the robot starts",
+                         "their soles overlap by " + formatAbove(-distance, 3) + " m where the robot starts",
                          "place the feet farther apart in the reference, by as much, or give narrower soles");
     }
 }

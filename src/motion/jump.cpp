@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
-#include "model/number_text.h"
+#include "model/rounded_text.h"
 #include "motion/com_reach.h"
 #include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
@@ -174,7 +174,7 @@ void checkLength(const JumpScene& scene, double gravity) {
   requireOption(
       std::abs(o.length) <= most, "length",
       "in a flight of " + formatNumber(f.flight) + " s feet with a friction of " + formatNumber(o.friction) +
-          " and legs of " + formatNumber(reach, "%.3g") + " m carry it at most " + formatNumber(most, "%.3g") + " m",
+          " and legs of " + formatNumber(reach, "%.3g") + " m carry it at most " + formatBelow(most, 3) + " m",
       "give a length, e.g. " + formatNumber(std::copysign(most / 3, o.length), "%.1g") + ", or a longer flight");
 }
 
