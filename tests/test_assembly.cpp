@@ -4,7 +4,9 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/target_reach.h"
 #include "math/constants.h"
+#include "math/so3.h"
 #include "mechanisms.h"
 #include "own_robots.h"
 #include "selection.h"
@@ -205,6 +207,47 @@ TEST_CASE("assembly: feet that are farther apart than legs are long are refused 
   CHECK(far.iterations == 0);
   CHECK_THAT(far.message,
              Catch::Contains("0.51 m from the origin of the world") && Catch::Contains("bridges 0.5 m at most"));
+  // With its direction given, too, the joint at the hand has its place, which what is before it has to bridge.
+  problem.frames[0].mask.setConstant(true);
+  problem.frames[0].X_WT.p = {0.15, 0, 0};
+  problem.frames[0].X_WT.R = makeAxisRotation(Vector3d::UnitZ(), 3.0);
+  const AssemblyResult turned = assemble(arm, problem);
+  CHECK(turned.iterations == 0);
+  CHECK_THAT(turned.message, Catch::Contains("stays open by at least 0.049"));
+}
+
+TEST_CASE("assembly: places that a robot takes are never called out of reach, and those beyond its length are") {
+  std::mt19937 rng(5);
+  for (int i = 0; i < 300; ++i) {
+    CAPTURE(i);
+    ModelBuilder builder("tree");
+    const int bodies = 3 + i % 4;
+    double length = 0;
+    for (int k = 0; k < bodies; ++k) {
+      Joint joint;
+      joint.name = "joint" + std::to_string(k);
+      joint.kind = k % 3 == 2 ? JointKind::Spherical : JointKind::Revolute;
+      joint.axis = randomVector(rng, 3).normalized();
+      joint.X_PJ = randomPlacement(rng);
+      length += joint.X_PJ.p.norm();
+      const int parent = std::uniform_int_distribution<int>(-1, k - 1)(rng);
+      builder.addLink("body" + std::to_string(k), parent < 0 ? "world" : "body" + std::to_string(parent), joint,
+                      randomInertia(rng));
+    }
+    const Model model = builder.build();
+    Workspace ws(model);
+    updatePositions(model, ws, model.integrate(model.makeNeutral(), randomVector(rng, model.nv(), 3)));
+    std::vector<FrameTarget> targets(3);
+    for (FrameTarget& target : targets) {
+      target.body = std::uniform_int_distribution<int>(1, bodies)(rng);
+      target.X_BF = randomPlacement(rng);
+      target.X_WT = getPlacement(ws, target.body, target.X_BF);
+    }
+    targets[2].mask.tail<3>().setConstant(false);
+    CHECK(findTargetsApart(model, targets).second == "");
+    targets[i % 3].X_WT.p += (2 * length + 10) * randomVector(rng, 3).normalized();
+    CHECK(findTargetsApart(model, targets).second != "");
+  }
 }
 
 TEST_CASE("assembly: a loop too short to close is named, with its gap") {

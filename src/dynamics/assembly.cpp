@@ -10,6 +10,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "dynamics/assembly_refinement.h"
+#include "dynamics/target_reach.h"
 #include "dynamics/whole_turns.h"
 #include "math/decompositions.h"
 #include "math/largest.h"
@@ -156,42 +157,6 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
     error = (conditions.h - offset).norm();
   }
   return conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;
-}
-
-// At most how far apart two points of bodies can be, whatever the joints between them do; without a bound where one slides.
-double calcSpan(const Model& model, int body1, const Vector3d& p1, int body2, const Vector3d& p2) {
-  double span = p1.norm() + p2.norm();
-  while (body1 != body2) {
-    int& outer = body1 > body2 ? body1 : body2;  // bodies come after those that carry them
-    const Joint& joint = model.joints()[outer];
-    if (joint.kind == JointKind::Prismatic || joint.kind == JointKind::Planar || joint.kind == JointKind::FreeFlyer)
-      return HUGE_VAL;
-    span += joint.X_PJ.p.norm();
-    outer = joint.parent;
-  }
-  return span;
-}
-
-// A target that is out of reach of another one, without a step, and what says so: often they are in other units. Empty if none is.
-std::pair<std::string, std::string> findTargetsApart(const Model& model, const std::vector<FrameTarget>& frames) {
-  FrameTarget world;
-  world.body = 0;
-  for (size_t i = 0; i < frames.size(); ++i)
-    for (size_t k = i + 1; k <= frames.size(); ++k) {
-      const FrameTarget &one = frames[i], &other = k < frames.size() ? frames[k] : world;
-      Vector3d apart = one.X_WT.p - other.X_WT.p;
-      for (int r = 0; r < 3; ++r)
-        if (!one.mask[r] || !other.mask[r]) apart[r] = 0;
-      const double span = calcSpan(model, one.body, one.X_BF.p, other.body, other.X_BF.p);
-      if (!(apart.norm() > (1 + 1e-9) * span)) continue;
-      TextStream text;
-      const std::string name = "target '" + one.name + "'";
-      text << name << " stays open by at least " << apart.norm() - span << " m: it would be " << apart.norm()
-           << " m from " << (&other == &world ? "the origin of the world" : "target '" + other.name + "'")
-           << ", and what is between them bridges " << span << " m at most; give places within reach, in m";
-      return {name, text.str()};
-    }
-  return {};
 }
 
 }  // namespace

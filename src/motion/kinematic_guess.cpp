@@ -26,17 +26,27 @@ class FeetPlacer {
     options_.continuation_steps = 0;
   }
 
-  VectorXd place(const PlannedPosture& planned, const VectorXd& before) {
-    constexpr std::array<bool, 2> kBoth{true, true}, kNone{false, false};
-    constexpr double kNear = 0.06, kFar = 0.24;  // of the base, over the height of the centre of mass
-    if (std::optional<VectorXd> q = placeNear(planned, kBoth, before, kNear, kEasyTransmission)) return std::move(*q);
-    if (planned.stands != kBoth)
-      if (std::optional<VectorXd> q = placeNear(planned, planned.stands, before, kNear, kEasyTransmission))
-        return std::move(*q);
-    if (std::optional<VectorXd> q = placeNear(planned, planned.stands, before, kFar, kLeastTransmission))
-      return std::move(*q);
+  // None where no posture is found, after dozens of assemblies.
+  std::optional<VectorXd> place(const PlannedPosture& planned, const VectorXd& before) {
+    constexpr std::array<bool, 2> kBoth{true, true};
+    constexpr double kNear = 0.06;  // of the base, over the height of the centre of mass
+    const std::vector<const VectorXd*> starts = {&before, &stance_.q};
+    std::optional<VectorXd> q = placeNear(planned, kBoth, starts, kNear, kEasyTransmission);
+    if (!q && planned.stands != kBoth) q = placeNear(planned, planned.stands, starts, kNear, kEasyTransmission);
+    if (!q) q = placeNear(planned, planned.stands, starts, kFar, kLeastTransmission);
+    return q;
+  }
+
+  // Whether there is such a posture, as far as that of the stance leads to it.
+  bool reaches(const PlannedPosture& planned) {
+    return placeNear(planned, planned.stands, {&stance_.q}, kFar, kLeastTransmission).has_value();
+  }
+
+  // With soles as they come to lie, or those of the stance.
+  VectorXd hang(const PlannedPosture& planned) {
     const VectorXd base = planned.q.head<7>();
-    if (std::optional<Posture> posture = assemble(base, planned.feet, kNone, stance_.q)) return std::move(posture->q);
+    if (std::optional<Posture> posture = assemble(base, planned.feet, {false, false}, stance_.q))
+      return std::move(posture->q);
     VectorXd q = stance_.q;
     q.head<7>() = base;
     return q;
@@ -88,6 +98,7 @@ class FeetPlacer {
 
  private:
   static constexpr double kEasyTransmission = 0.5;  // well before the dead points
+  static constexpr double kFar = 0.24;              // of the base, over the height of the centre of mass
 
   struct Posture {
     VectorXd q;
@@ -97,13 +108,13 @@ class FeetPlacer {
   // With the base as little raised or lowered as can be; the first whose transmission is easy enough, else the first.
   // \param most  of the way of the base, over the height of the centre of mass
   std::optional<VectorXd> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
-                                    const VectorXd& before, double most, double easy) {
+                                    const std::vector<const VectorXd*>& starts, double most, double easy) {
     const double step = most / 4;
     std::optional<VectorXd> first;
     for (int i = 0; i <= 4; i = i > 0 ? -i : 1 - i) {
       VectorXd base = planned.q.head<7>();
       base[2] -= i * step * height_;
-      for (const VectorXd* start : {&before, &stance_.q}) {
+      for (const VectorXd* start : starts) {
         std::optional<Posture> posture = assemble(base, planned.feet, flat, *start);
         if (posture && posture->transmission > easy) return std::move(posture->q);
         if (posture && !first) first = std::move(posture->q);
@@ -160,9 +171,26 @@ class FeetPlacer {
 }  // namespace
 
 std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const std::vector<PlannedPosture>& postures) {
+  constexpr size_t kStride = 8;
   FeetPlacer placer(model, stance);
   std::vector<VectorXd> qs;
-  for (const PlannedPosture& planned : postures) qs.push_back(placer.place(planned, qs.empty() ? stance.q : qs.back()));
+  size_t tried = 0;
+  bool found = true;
+  while (qs.size() < postures.size()) {
+    // Beside a posture that is not found others mostly are not, either: one of several is tried, and those between are like it.
+    if (!found && qs.size() >= tried) {
+      tried = std::min(qs.size() + kStride, postures.size());
+      if (!placer.reaches(postures[tried - 1])) {
+        while (qs.size() < tried) qs.push_back(placer.hang(postures[qs.size()]));
+        continue;
+      }
+    }
+    const PlannedPosture& planned = postures[qs.size()];
+    std::optional<VectorXd> q;
+    if (found || placer.reaches(planned)) q = placer.place(planned, qs.empty() ? stance.q : qs.back());
+    found = q.has_value();
+    qs.push_back(found ? std::move(*q) : placer.hang(planned));
+  }
   return qs;
 }
 
