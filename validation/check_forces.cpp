@@ -205,10 +205,10 @@ void addLimitRows(CheckContext& context) {
           speed.add(record.v(k, dof), model.velocityLimits()[dof], "", k, record.v_names[dof]);
       }
   context.add(range, "joints: beyond their range", "rad, m", context.bounds.range, "no limits given");
-  context.add(speed.worst(), "joints: velocity over limit", "1", 1, "no limits given");
-  context.add(effort.worst(), "motors: effort over limit", "1", 1, "no limits given");
-  context.add(velocity.worst(), "motors: velocity over limit", "1", 1, "no limits given");
-  context.add(voltage.worst(), "motors: voltage over supply", "1", context.bounds.voltage, "no windings given");
+  context.add(speed.worst(), "joints: velocity over limit", "1", context.bounds.limit, "no limits given");
+  context.add(effort.worst(), "motors: effort over limit", "1", context.bounds.limit, "no limits given");
+  context.add(velocity.worst(), "motors: velocity over limit", "1", context.bounds.limit, "no limits given");
+  context.add(voltage.worst(), "motors: voltage over supply", "1", context.bounds.limit, "no windings given");
   context.add(heat.worst(), "motors: rms torque over thermal", "1", 1, "no thermal limits given");
 }
 

@@ -236,6 +236,23 @@ TEST_CASE("check: limits of joints and motors, and soles that overlap") {
         Names{"distance of the soles"});
 }
 
+TEST_CASE("check: a limit may be exceeded by what a converged solver leaves, and by no more") {
+  CheckedMotion motion = getSquat().checked;
+  const int m = motion.model.findMotor("motor_knee_left"), dof = motion.model.motors()[m].dof;
+  const double torque = motion.record.u.col(m).cwiseAbs().maxCoeff(),
+               speed = motion.record.v.col(dof).cwiseAbs().maxCoeff();
+  const auto check = [&](double effort, double velocity) {
+    ModelParts parts = takeParts(getSquat().checked.model);
+    parts.motors[m].effort_limit = effort;
+    parts.motors[m].velocity_limit = velocity;
+    motion.model = ModelBuilder::restore(parts);
+    return getFailures(checkMotion(motion));
+  };
+  CHECK(check((1 - 1e-8) * torque, (1 - 1e-8) * speed) == Names());
+  CHECK(check((1 - 1e-5) * torque, speed) == Names{"motors: effort over limit"});
+  CHECK(check(torque, (1 - 1e-5) * speed) == Names{"motors: velocity over limit"});
+}
+
 TEST_CASE("check: voltages and heat of motors, where their windings are known") {
   CheckedMotion motion = getMidpointSquat().checked;
   const char *voltage = "motors: voltage over supply", *heat = "motors: rms torque over thermal";
