@@ -100,7 +100,8 @@ struct CheckBounds {
   double point_moment = 1e-9;  ///< N m, on a point contact
   double force_in_air = 1e-9;  ///< N or N m
   double range = 1e-6;         ///< m or rad beyond a limit
-  /// Of speeds, torques and voltages, over what joint or motor allows: constraints that the solver keeps to its tolerance.
+  /// Of speeds, torques and voltages, over what joint or motor allows: constraints that the solver keeps to its
+  /// tolerance.
   double limit = 1 + 1e-6;
   double goal = 1e-9;          ///< between the summary's value of a goal and the measured one, in the goal's unit
   double interval_energy = 2;  ///< left side of (8) or (12) over its right side, which terms of higher order may exceed

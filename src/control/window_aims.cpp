@@ -6,11 +6,12 @@
 //     s.r + 1/2 w r.r = 1/2 w |r + s/w|^2 + constant                                                                (1)
 // is the cost of the distance from a point beside it, at which the foot aims. The curvature stays w, so a foot that a push sends
 // elsewhere is drawn back no more than before. The slopes are the multipliers of fixed footholds in the window that begins early in the
-// swing. Later windows of the same swing would need others; so the motion is then walked through by its own predictions, until feet land
-// where they should. A foot that lands off by r takes the next one about half as far with it. So with r' of the one before, s grows by
-//     g w (r - r' / 2)                                                                                               (2)
-// where the gain g is first 4, then what the last change of s has made of the distance (a secant), for each step and axis. What has
-// brought feet nearest is kept.
+// swing. Later windows of the same swing would need others; so the motion is then walked through by its own
+// predictions, until feet land where they should. A foot that lands off by r takes the next one about half as far with
+// it. So with r' of the one before, s grows by
+//     g w (r - r' / 2)                                                                                          (2)
+// where the gain g is first 4, then what the last change of s has made of the distance (a secant), for each step and
+// axis. What has brought feet nearest is kept.
 #include <algorithm>
 #include <limits>
 
@@ -143,7 +144,8 @@ void WindowPlanner::aim(const AimedLanding& landing) {
   problem_.replaceStage(horizon_->getNode(landing.stage), std::move(spec));
 }
 
-// Follows the predictions, without measurements, until the last of these feet has landed; finds where each lands, or false.
+// Follows the predictions, without measurements, until the last of these feet has landed; finds where each lands, or
+// false.
 bool WindowPlanner::walkThrough(std::vector<AimedLanding>& landings) {
   for (AimedLanding& landing : landings) landing.off.setZero();
   startFromGuess(0);

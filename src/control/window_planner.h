@@ -97,7 +97,8 @@ class WindowPlanner {
   struct AimedLanding {
     int stage = 0, contact = 0;
     StageSpec free;  // as it was made
-    // s of window_aims.cpp Eq. (1), 1/m; from the foothold, where the foot lands, m: both along x and y, of the foothold and of the world.
+    // s of window_aims.cpp Eq. (1), 1/m; from the foothold, where the foot lands, m: both along x and y, of the
+    // foothold and of the world.
     Eigen::Vector2d slope = Eigen::Vector2d::Zero(), off = Eigen::Vector2d::Zero();
     // Of Eq. (2), along x and y of the foothold: g, the distance in brackets, and by how much s grew last.
     Eigen::Vector2d gain = Eigen::Vector2d::Constant(4), error = Eigen::Vector2d::Zero(),

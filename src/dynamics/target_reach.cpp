@@ -15,8 +15,8 @@ struct Apart {
   bool at_joints = false;         // the points are those of the joints next to the targets
 };
 
-// Of two targets. Where one gives a body its whole place, the joints at that body have their places, too: the legs between hip and ankle
-// reach less far than those between trunk and sole.
+// Of two targets. Where one gives a body its whole place, the joints at that body have their places, too: the legs
+// between hip and ankle reach less far than those between trunk and sole.
 Apart calcApart(const Model& model, const FrameTarget& one, const FrameTarget& other) {
   Apart apart;
   std::array<Vector3d, 2> ends = {one.X_WT.p, other.X_WT.p};

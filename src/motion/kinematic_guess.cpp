@@ -177,7 +177,8 @@ std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const 
   size_t tried = 0;
   bool found = true;
   while (qs.size() < postures.size()) {
-    // Beside a posture that is not found others mostly are not, either: one of several is tried, and those between are like it.
+    // Beside a posture that is not found others mostly are not, either: one of several is tried, and those between are
+    // like it.
     if (!found && qs.size() >= tried) {
       tried = std::min(qs.size() + kStride, postures.size());
       if (!placer.reaches(postures[tried - 1])) {

@@ -42,7 +42,8 @@ std::optional<UnusedParameters> findUnused(const std::string& generator, const s
 /// All among `settings`.
 std::optional<UnusedParameters> findUnused(const std::string& generator, const OptionValues& settings,
                                            const OpenChoices& open = {});
-/// \param settings  as of readGeneratorEntry()   \throws InputError naming file and line of the first one that is not used
+/// \param settings  as of readGeneratorEntry()   \throws InputError naming file and line of the first one that is not
+/// used
 void requireUsed(const std::string& generator, const YamlEntry& settings, const OpenChoices& open = {});
 
 /// That of a robot's file: one that names a generator, or composes a robot of parts; none for any other.
