@@ -11,6 +11,7 @@
 #include "dynamics/reduction.h"
 #include "dynamics/smooth_friction.h"
 #include "get_error.h"
+#include "model/stiction.h"
 #include "selection.h"
 
 using namespace bielle;
@@ -57,6 +58,57 @@ TEST_CASE("a mass on a spring with damper, preload and friction: its force in cl
   refuse("none", force, "no moving joint");
   refuse("ball", force, "spherical joint of 3 coordinates");
   refuse("slide", force, "declared twice");
+}
+
+TEST_CASE("joint forces: friction that is larger at rest, in closed form and against differences") {
+  const auto make = [](const WholeJointForce& whole) {
+    ModelBuilder builder("oscillator");
+    builder.addLink("mass", "world", makeSlide(), {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    for (const JointForce& force : splitJointForce(whole)) builder.addJointForce("slide", force);
+    builder.setGravity(Vector3d::Zero());
+    return builder.build();
+  };
+  WholeJointForce whole;
+  whole.force.stiffness = 50, whole.force.damping = 4, whole.force.friction = 5, whole.force.friction_speed = 0.01;
+  whole.stiction = 8, whole.stribeck_speed = 0.3;
+  const Model model = make(whole);
+  REQUIRE(model.jointForces().size() == 2);
+  const std::vector<WholeJointForce> joined = joinJointForces(model);
+  REQUIRE(joined.size() == 1);
+  CHECK((joined[0].force.friction == 5 && joined[0].force.friction_speed == 0.01 && joined[0].force.stiffness == 50));
+  CHECK((joined[0].stiction == 8 && joined[0].stribeck_speed == 0.3));
+  Workspace ws(model);
+  const auto calcForce = [&](double v) {
+    return calcInverseDynamics(model, ws, VectorXd::Zero(1), VectorXd::Constant(1, v), VectorXd::Zero(1))[0];
+  };
+  // At 0.4: 4/5 of what falls; at 0.01: 1/sqrt(2) of all, and 1/30 of that; far away: that of sliding.
+  CHECK(calcForce(0.4) == Approx(4 * 0.4 + 8 * 0.4 / std::hypot(0.4, 0.01) - 3 * 0.8).epsilon(1e-14));
+  CHECK(calcForce(-0.01) == Approx(-(4 * 0.01 + 8 / std::sqrt(2) - 3 * 0.01 / std::hypot(0.01, 0.3))).epsilon(1e-14));
+  CHECK(calcForce(30) == Approx(4 * 30 + 5).epsilon(1e-5));
+  CHECK(calcForce(0.05) > calcForce(0.3));  // it falls
+  for (const double v : {0.005, 0.1, -0.3}) {
+    calcForce(v);
+    updateInverseDynamicsDerivatives(model, ws, {});
+    const MatrixXd slope = ws.dID_dv;
+    checkDerivative(slope, differentiate(VectorXd::Constant(1, v), 1e-4, [&](const VectorXd& x) {
+                      return VectorXd::Constant(1, calcForce(x[0])).eval();
+                    }));
+  }
+  CHECK(splitJointForce({whole.force, 5}).size() == 1);
+
+  const auto refuse = [&](double fall, double speed, const char* problem) {
+    ModelBuilder builder("oscillator");
+    builder.addLink("mass", "world", makeSlide(), {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    builder.addJointForce("slide", whole.force);
+    JointForce second;
+    second.friction = -fall, second.friction_speed = speed;
+    CHECK_THAT(getError([&] { builder.addJointForce("slide", second); }), Catch::Contains(problem));
+    second.friction = -1, second.friction_speed = 0.5;
+    builder.addJointForce("slide", second);
+    CHECK_THAT(getError([&] { builder.addJointForce("slide", second); }), Catch::Contains("declared twice"));
+  };
+  refuse(5.1, 0.3, "falls below zero");
+  refuse(1, 0.005, "less than its friction_speed");
 }
 
 TEST_CASE("refused numbers of joint forces") {

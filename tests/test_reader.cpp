@@ -7,11 +7,13 @@
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "bielle/formats/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/robot_loader.h"
 #include "get_error.h"
 #include "infinity.h"
+#include "model/stiction.h"
 #include "robot_directory.h"
 #include "toy_robot.h"
 
@@ -252,6 +254,35 @@ TEST_CASE("springs, dampers and friction arrive, each number in its place") {
   CHECK(second.damping == 7);
   CHECK(second.friction == 0);
   CHECK(second.friction_speed == 0.01);
+}
+
+TEST_CASE("friction that is larger at rest arrives, and is written as it is read") {
+  const Model model = loadWith(
+      "joint_forces: {shoulder: {damping: 4, friction: 5, stiction: 8, stribeck_speed: 0.25}, rod_joint: {stiction: "
+      "1}}");
+  REQUIRE(model.jointForces().size() == 4);
+  const std::vector<WholeJointForce> read = joinJointForces(model);
+  REQUIRE(read.size() == 2);
+  CHECK((read[0].force.friction == 5 && read[0].force.damping == 4 && read[0].stiction == 8));
+  CHECK((read[0].stribeck_speed == 0.25 && read[0].force.friction_speed == 0.01));
+  CHECK((read[1].force.friction == 0 && read[1].stiction == 1 && read[1].stribeck_speed == 0.1));
+  const RobotText text = formatRobot(model);
+  CHECK_THAT(text.yaml, Catch::Contains("friction: 5, stiction: 8, stribeck_speed: 0.25, friction_speed: 0.01"));
+  const Model back = load(text.urdf, text.yaml);
+  REQUIRE(back.jointForces().size() == 4);
+  for (size_t i = 0; i < 4; ++i) {
+    CHECK(back.jointForces()[i].friction == model.jointForces()[i].friction);
+    CHECK(back.jointForces()[i].friction_speed == model.jointForces()[i].friction_speed);
+  }
+
+  // A file that completes the robot replaces both parts.
+  const RobotDirectory directory;
+  directory.write("own/own.yaml",
+                  "model: " + directory.path() + "/robot.urdf\njoint_forces: {shoulder: {friction: 1, stiction: 2}}\n");
+  directory.writeRobot(kToyUrdf, "joint_forces: {shoulder: {friction: 5, stiction: 8}}");
+  const std::vector<WholeJointForce> own = joinJointForces(loadRobot(directory.path() + "/own").model);
+  REQUIRE(own.size() == 1);
+  CHECK((own[0].force.friction == 1 && own[0].stiction == 2));
 }
 
 TEST_CASE("damping and friction of <dynamics> are those of the joint, unless the YAML file says others") {

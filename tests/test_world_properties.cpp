@@ -8,6 +8,7 @@
 #include "bielle/model/builder.h"
 #include "bielle/worlds/bielle_world.h"
 #include "mechanisms.h"
+#include "model/stiction.h"
 #include "selection.h"
 #ifdef BIELLE_WITH_MUJOCO
 #include "worlds/mujoco_world.h"
@@ -154,6 +155,12 @@ std::vector<Property> listForces() {
   addForce("damping of a joint", makeForce(0, 0, 0, 0.5));
   addForce("friction of a joint", makeForce(0, 0, 0, 0, 0.5));
   addForce("friction speed of a joint", makeForce(0, 0, 0, 0, 1, 1), makeForce(0, 0, 0, 0, 1, 0.05));
+  const auto addSticking = [](ModelBuilder& b) {
+    for (const JointForce& force : splitJointForce({makeForce(0, 0, 0, 0.1, 0.2), 0.8, 0.5}))
+      b.addJointForce("elbow", force);
+  };
+  out.push_back(makeOfArm("stiction of a joint", addSticking,
+                          [](ModelBuilder& b) { b.addJointForce("elbow", makeForce(0, 0, 0, 0.1, 0.2)); }));
   const auto addSpring = [&](const std::string& name, const PointSpring& with, const PointSpring& without) {
     const auto add = [](const PointSpring& spring) {
       return [&spring](ModelBuilder& b) { b.addPointSpring("world", "lower", spring); };

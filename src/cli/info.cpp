@@ -49,8 +49,9 @@ void printInfo(const Json& robot) {
   printSection(
       robot, "drives", "windings and gears of motors (N m/A, ohm, V, A, N m; kg, part of the links)",
       {"name", "type", "ratio", "torque_constant", "resistance", "voltage", "current", "continuous_effort", "mass"});
-  printSection(robot, "joint_forces", "springs, dampers and friction on joints (N m, rad, s; N, m, s where prismatic)",
-               {"name", "stiffness", "rest", "preload", "damping", "friction", "friction_speed"});
+  printSection(
+      robot, "joint_forces", "springs, dampers and friction on joints (N m, rad, s; N, m, s where prismatic)",
+      {"name", "stiffness", "rest", "preload", "damping", "friction", "friction_speed", "stiction", "stribeck_speed"});
   printSection(robot, "point_springs", "springs and dampers between points (N/m, m, N, N s/m)",
                {"name", "body1", "body2", "stiffness", "rest", "preload", "damping"});
   printSection(robot, "contacts", "contacts (length and width in m)", {"name", "kind", "body", "sole"});

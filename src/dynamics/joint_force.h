@@ -32,13 +32,14 @@ T calcJointForce(const JointForce& force, const WorkspaceOf<T>& ws) {
   return spring + calcDissipativeForce<T>(force, ws.v[force.dof]);
 }
 
-/// -dtau/dv; -dtau/dq is the stiffness.
+/// -dtau/dv at the rate v; -dtau/dq is the stiffness.
 template <typename T>
-T calcResistance(const JointForce& force, const WorkspaceOf<T>& ws) {
+T calcResistance(const JointForce& force, const T& v) {
   T out = force.damping;
-  if (force.friction != 0) out += force.friction * calcSmoothSign(ws.v[force.dof], force.friction_speed).slope;
+  if (force.friction != 0) out += force.friction * calcSmoothSign(v, force.friction_speed).slope;
   return out;
 }
+inline bool isDissipative(const JointForce& force) { return force.damping != 0 || force.friction != 0; }
 
 /// Derivatives of the force by stiffness, rest, preload, damping and friction: Eq. (11) of variation.h.
 inline Eigen::Matrix<double, 5, 1> calcJointForceSlopes(const JointForce& force, const Workspace& ws) {

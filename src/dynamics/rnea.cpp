@@ -133,9 +133,10 @@ template <typename T>
 void updateInverseDynamicsFactors(const Model& model, WorkspaceOf<T>& ws,
                                   const typename ArgumentsOf<T>::Wrenches& f_ext) {
   requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsFactors", "updateAccelerations");
+  for (const JointForce& force : model.jointForces()) ws.stiffness[force.dof] = ws.resistance[force.dof] = T(0);
   for (const JointForce& force : model.jointForces()) {
-    ws.stiffness[force.dof] = force.stiffness;
-    ws.resistance[force.dof] = calcResistance(force, ws);
+    ws.stiffness[force.dof] += force.stiffness;
+    ws.resistance[force.dof] += calcResistance<T>(force, ws.v[force.dof]);
   }
   for (int i = 1; i < model.numBodies(); ++i) {
     ws.F[i] = calcBodyForce(ws, i, ws.A[i]);

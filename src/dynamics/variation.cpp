@@ -264,7 +264,8 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
   VectorXd out = model.armature().cwiseProduct(motion.a) + change.armature.cwiseProduct(ws.a);
   for (size_t f = 0; f < model.jointForces().size(); ++f) {
     const JointForce& force = model.jointForces()[f];
-    out[force.dof] += force.stiffness * motion.q[force.dof] + calcResistance(force, ws) * motion.v[force.dof] -
+    out[force.dof] += force.stiffness * motion.q[force.dof] +
+                      calcResistance(force, ws.v[force.dof]) * motion.v[force.dof] -
                       change.joint_forces[f].dot(calcJointForceSlopes(force, ws));
   }
   for (size_t c = 0; c < constraints.closures.size(); ++c)

@@ -374,7 +374,7 @@ class Adopter {
     out_ << Key << "joint_forces" << Value << BeginMap;
     for (const JointForce& force : raised) {
       out_ << Key << model_.joints()[force.joint].name << Value << Flow << BeginMap;
-      for (const auto& [key, value] : getJointForceData(force)) out_ << Key << key << Value << value;
+      for (const auto& [key, value] : getJointForceData({force, force.friction})) out_ << Key << key << Value << value;
       out_ << EndMap;
     }
     out_ << EndMap;

@@ -115,8 +115,8 @@ class BodyWriter {
                                 {"axis", formatMjcf(axis)},
                                 {"ref", formatMjcf(q_ref_[joint.idx_q + k])},
                                 {"armature", formatMjcf(model_.armature()[dof])}});
-    for (const JointForce& force : model_.jointForces())
-      if (force.dof == dof) writeJointForce(joint, force, e);
+    for (const WholeJointForce& whole : joinJointForces(model_))
+      if (whole.force.dof == dof) writeJointForce(joint, whole, e);
     if (std::isfinite(lower) || std::isfinite(upper)) {
       constexpr double kFar = 1e10;  // for limits on one side; and a range must not be empty
       lower = std::max(lower, -kFar), upper = std::max(std::min(upper, kFar), lower + 1e-9);
@@ -125,7 +125,9 @@ class BodyWriter {
   }
 
   // A preload moves the rest of the spring.
-  void writeJointForce(const Joint& joint, const JointForce& force, XMLElement& e) {
+  void writeJointForce(const Joint& joint, const WholeJointForce& whole, XMLElement& e) {
+    const JointForce& force = whole.force;
+    if (whole.sticks()) warn("joint '" + joint.name + "'", kStictionLost);
     const double stiffness = force.stiffness == 0 && force.preload != 0 ? kMjcfPreloadStiffness : force.stiffness;
     if (stiffness != 0)
       setAttributes(

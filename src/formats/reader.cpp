@@ -48,8 +48,8 @@ void complete(const YamlFile& own, YamlFile& yaml) {
     const auto is_same = [&spec](const JointForceSpec& other) { return other.joint == spec.joint; };
     yaml.joint_forces.erase(std::remove_if(yaml.joint_forces.begin(), yaml.joint_forces.end(), is_same),
                             yaml.joint_forces.end());
-    yaml.joint_forces.push_back(spec);
   }
+  yaml.joint_forces.insert(yaml.joint_forces.end(), own.joint_forces.begin(), own.joint_forces.end());
   replace(own.point_springs, yaml.point_springs);
   replace(own.contacts, yaml.contacts);
   replace(own.references, yaml.references);

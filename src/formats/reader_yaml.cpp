@@ -10,6 +10,7 @@
 #include "formats/robot_text.h"
 #include "formats/yaml_entry.h"
 #include "math/direction.h"
+#include "model/stiction.h"
 
 namespace bielle {
 namespace {
@@ -32,7 +33,8 @@ const YamlKeys kRobotKeys("robot", "", listRobotKeys());
 const YamlKeys kClosureKeys(kRobotOrPart, "closures[]",
                             {"name", "frames", "type", "axis", "length", "joints", "offset", "kp", "kd"});
 const YamlKeys kJointForceKeys(kRobotOrPart, "joint_forces.JOINT",
-                               {"stiffness", "rest", "preload", "damping", "friction", "friction_speed"});
+                               {"stiffness", "rest", "preload", "damping", "friction", "friction_speed", "stiction",
+                                "stribeck_speed"});
 const YamlKeys kPointSpringKeys(kRobotOrPart, "point_springs.NAME",
                                 {"frames", "points", "stiffness", "rest", "preload", "damping"});
 const YamlKeys kContactKeys(kRobotOrPart, "contacts.NAME", {"frame", "type", "sole", "length"});
@@ -231,17 +233,30 @@ void readJointForces(const Entry& map, YamlFile& file) {
   addKeys(RobotName::Kind::Joint, map, file);
   for (const auto& [joint, entry] : map.getMap()) {
     const Fields fields = entry.getFields(kJointForceKeys);
-    JointForceSpec spec{joint, {}};
+    WholeJointForce whole;
+    JointForce& force = whole.force;
     const auto read = [&fields](const char* key, double& value) {
       if (const Entry* found = find(fields, key)) value = found->getNumber();
     };
-    read("stiffness", spec.force.stiffness);
-    read("rest", spec.force.rest);
-    read("preload", spec.force.preload);
-    read("damping", spec.force.damping);
-    read("friction", spec.force.friction);
-    read("friction_speed", spec.force.friction_speed);
-    file.joint_forces.push_back(spec);
+    read("stiffness", force.stiffness);
+    read("rest", force.rest);
+    read("preload", force.preload);
+    read("damping", force.damping);
+    read("friction", force.friction);
+    read("friction_speed", force.friction_speed);
+    whole.stiction = force.friction;
+    read("stiction", whole.stiction);
+    read("stribeck_speed", whole.stribeck_speed);
+    if (const Entry* found = find(fields, "stiction"); found && !(whole.stiction >= force.friction))
+      found->fail("it is less than the friction of sliding", "give what it takes to set the joint in motion");
+    if (const Entry* found = find(fields, "stribeck_speed")) {
+      if (!(whole.stiction > force.friction))
+        found->fail("there is no stiction above the friction", "add `stiction`, or remove it");
+      if (!(whole.stribeck_speed > force.friction_speed))
+        found->fail("it is not above the friction_speed",
+                    "give the speed at which friction has fallen to that of sliding");
+    }
+    for (const JointForce& part : splitJointForce(whole)) file.joint_forces.push_back({joint, part});
   }
 }
 

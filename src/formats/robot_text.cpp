@@ -27,7 +27,8 @@ std::string findFrameName(const Model& model, int body, const SE3& X_BF, const s
   return made;
 }
 
-std::vector<std::pair<const char*, std::string>> getJointForceData(const JointForce& force) {
+std::vector<std::pair<const char*, std::string>> getJointForceData(const WholeJointForce& whole) {
+  const JointForce& force = whole.force;
   std::vector<std::pair<const char*, std::string>> data = {{"stiffness", formatExact(force.stiffness)}};
   const auto add = [&data](const char* key, double value) {
     if (value != 0) data.emplace_back(key, formatExact(value));
@@ -36,7 +37,11 @@ std::vector<std::pair<const char*, std::string>> getJointForceData(const JointFo
   add("preload", force.preload);
   add("damping", force.damping);
   add("friction", force.friction);
-  if (force.friction != 0) add("friction_speed", force.friction_speed);
+  if (whole.sticks()) {
+    add("stiction", whole.stiction);
+    add("stribeck_speed", whole.stribeck_speed);
+  }
+  if (whole.stiction != 0) add("friction_speed", force.friction_speed);
   return data;
 }
 

@@ -6,6 +6,7 @@
 
 #include "bielle/model/model.h"
 #include "model/number_text.h"
+#include "model/stiction.h"
 
 namespace bielle {
 
@@ -18,8 +19,10 @@ bool hasImpliedFreeFlyer(const Model& model);
 /// A frame of the model at this place; if there is none, `made`.
 std::string findFrameName(const Model& model, int body, const SE3& X_BF, const std::string& made);
 
+/// Told where files have no place for it.
+inline constexpr const char* kStictionLost = "its stiction is left out: it has the friction of sliding";
 /// Keys and numbers of an entry of `joint_forces`: the stiffness, and what is not zero.
-std::vector<std::pair<const char*, std::string>> getJointForceData(const JointForce& force);
+std::vector<std::pair<const char*, std::string>> getJointForceData(const WholeJointForce& whole);
 
 /// Frames, visuals or shapes of a model by their bodies, in their order.
 template <typename Part>

@@ -151,10 +151,10 @@ class YamlWriter {
   }
 
   void writeJointForces() {
-    writeMap("joint_forces", "N m, rad, s; N, m, s where prismatic", model_.jointForces(),
-             [this](const JointForce& force) {
-               out_ << Key << model_.joints()[force.joint].name << Value << Flow << BeginMap;
-               for (const auto& [key, value] : getJointForceData(force)) add(key, value);
+    writeMap("joint_forces", "N m, rad, s; N, m, s where prismatic", joinJointForces(model_),
+             [this](const WholeJointForce& whole) {
+               out_ << Key << model_.joints()[whole.force.joint].name << Value << Flow << BeginMap;
+               for (const auto& [key, value] : getJointForceData(whole)) add(key, value);
                out_ << EndMap;
              });
   }

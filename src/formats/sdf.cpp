@@ -177,11 +177,13 @@ class SdfWriter {
     if (std::isfinite(model_.velocityLimits()[dof]))
       addText(limit, "velocity", formatExact(model_.velocityLimits()[dof]));
     if (limit.NoChildren()) e.DeleteChild(&limit);
-    for (const JointForce& force : model_.jointForces())
-      if (force.dof == dof) writeJointForce(joint, force, q, e);
+    for (const WholeJointForce& whole : joinJointForces(model_))
+      if (whole.force.dof == dof) writeJointForce(joint, whole, q, e);
   }
 
-  void writeJointForce(const Joint& joint, const JointForce& force, double q, XMLElement& axis) {
+  void writeJointForce(const Joint& joint, const WholeJointForce& whole, double q, XMLElement& axis) {
+    const JointForce& force = whole.force;
+    if (whole.sticks()) warn("joint '" + joint.name + "'", kStictionLost);
     XMLElement& dynamics = addElement(axis, "dynamics");
     addText(dynamics, "damping", formatExact(force.damping));
     addText(dynamics, "friction", formatExact(force.friction));

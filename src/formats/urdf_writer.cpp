@@ -220,13 +220,15 @@ class UrdfWriter {
                  {{"joint", model_.joints()[it->second.joint].name},
                   {"multiplier", formatExact(it->second.multiplier)},
                   {"offset", formatExact(it->second.offset)}});
-    for (const JointForce& force : model_.jointForces()) {
+    for (const WholeJointForce& whole : joinJointForces(model_)) {
+      const JointForce& force = whole.force;
       if (force.joint != i) continue;
       const std::string element = "joint '" + model_.joints()[i].name + "'";
       if (force.damping != 0 || force.friction != 0)
         addElement(e, "dynamics", {{"damping", formatExact(force.damping)}, {"friction", formatExact(force.friction)}});
       if (force.friction != 0 && force.friction_speed != JointForce().friction_speed)
         warn(element, "its friction_speed is left out");
+      if (whole.sticks()) warn(element, kStictionLost);
       if (force.friction != 0 && for_drake_) warn(element, "its friction is written, but Drake ignores it");
       if (force.stiffness != 0 || force.preload != 0) warn(element, "its spring is left out");
     }

@@ -288,8 +288,8 @@ class UsdWriter {
       if (schemas.empty() || schemas.back() != "PhysxJointAPI") schemas.push_back("PhysxJointAPI");
       properties.push_back({"float physxJoint:maxJointVelocity", formatExact(velocity / unit)});
     }
-    for (const JointForce& force : model_.jointForces())
-      if (force.dof == dof) addForce(joint, force, unit, schemas, properties);
+    for (const WholeJointForce& whole : joinJointForces(model_))
+      if (whole.force.dof == dof) addForce(joint, whole, unit, schemas, properties);
     if (const auto coupler = couplers_.find(dof); coupler != couplers_.end())
       addMimic(*coupler->second, dof, axis.token, schemas, properties);
     writeTie({name, turns ? "PhysicsRevoluteJoint" : "PhysicsPrismaticJoint", parent, child,
@@ -297,8 +297,10 @@ class UsdWriter {
              schemas, properties);
   }
 
-  void addForce(const Joint& joint, const JointForce& force, double unit, std::vector<std::string>& schemas,
+  void addForce(const Joint& joint, const WholeJointForce& whole, double unit, std::vector<std::string>& schemas,
                 Properties& properties) {
+    const JointForce& force = whole.force;
+    if (whole.sticks()) warn("joint '" + joint.name + "'", kStictionLost);
     if (force.stiffness != 0 || force.preload != 0)
       warn("joint '" + joint.name + "'", "its spring is left out: a drive with a stiffness would be read as a servo");
     if (force.damping == 0 && force.friction == 0) return;

@@ -32,6 +32,13 @@ JointForce getJointForce(const Model& model, int joint) {
   return none;
 }
 
+// Without what is more at rest.
+double getSlidingFriction(const Model& model, int joint) {
+  double sum = 0;
+  for (const JointForce& force : model.jointForces()) sum += force.joint == joint ? force.friction : 0;
+  return sum;
+}
+
 std::vector<LoadNumber> listLoads(const Model& model) {
   std::vector<LoadNumber> numbers;
   const std::vector<int> group = groupBodies(model);
@@ -56,7 +63,7 @@ std::vector<LoadNumber> listLoads(const Model& model) {
     };
     add(LoadKind::Armature, slides ? "kg" : "kg m^2", motor.armature);
     add(LoadKind::Damping, slides ? "N s/m" : "N m s/rad", force.damping);
-    add(LoadKind::Friction, slides ? "N" : "N m", force.friction);
+    add(LoadKind::Friction, slides ? "N" : "N m", getSlidingFriction(model, motor.joint));
   }
   return numbers;
 }
@@ -88,7 +95,8 @@ Model changeLoads(const Model& model, const std::vector<LoadNumber>& numbers, Co
     const auto is_own = [&motor](const JointForce& force) { return force.joint == motor.joint; };
     auto force = std::find_if(parts.joint_forces.begin(), parts.joint_forces.end(), is_own);
     if (force == parts.joint_forces.end()) force = parts.joint_forces.insert(force, getJointForce(model, motor.joint));
-    (number.kind == LoadKind::Damping ? force->damping : force->friction) = value;
+    // The friction of sliding: what is more at rest stays as it is.
+    (number.kind == LoadKind::Damping ? force->damping : force->friction) += value - number.value;
   }
   return ModelBuilder::restore(std::move(parts));
 }

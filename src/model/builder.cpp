@@ -165,9 +165,18 @@ void ModelBuilder::addJointForce(const std::string& joint, JointForce force) {
   if (j.nv != 1)
     fail(element, "it is a " + std::string(getName(j.kind)) + " joint of " + std::to_string(j.nv) + " coordinates",
          "springs, dampers and friction act on revolute, continuous or prismatic joints");
-  for (const JointForce& other : model_.jointForces())
-    if (other.joint == index) fail(element, "it is declared twice", "add its forces up");
-  for (double value : {force.stiffness, force.damping, force.friction})
+  // A second one is what the friction of the first loses with speed (model/stiction.h), and nothing else.
+  const JointForce* whole = nullptr;
+  for (const JointForce& other : model_.jointForces()) {
+    if (other.joint != index) continue;
+    if (whole || !(force.friction < 0)) fail(element, "it is declared twice", "add its forces up");
+    whole = &other;
+  }
+  const bool falls = whole && force.stiffness == 0 && force.preload == 0 && force.damping == 0;
+  if (falls && !(-force.friction <= whole->friction && force.friction_speed > whole->friction_speed))
+    fail(element, "its friction falls below zero, or at less than its friction_speed",
+         "give a stiction of at least the friction, and a stribeck_speed above the friction_speed");
+  for (double value : {force.stiffness, force.damping, falls ? 0 : force.friction})
     if (!(value >= 0) || std::isinf(value))
       fail(element, "its stiffness, damping or friction is not a finite number of 0 or more", "correct it");
   if (!std::isfinite(force.rest) || !std::isfinite(force.preload))

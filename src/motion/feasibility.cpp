@@ -407,11 +407,16 @@ class FeasibilityCheck {
                       ": motions near rest decay at " + formatNumber(rate, "%.2g") + "/s" + borne,
                   "give shorter ones (--set time_step=" + formatNumber(1 / rate, "%.1g") + ")");
     std::string names, entries;
-    for (const auto& [joint, force] : raised) {
+    for (WholeJointForce whole : joinJointForces(model_)) {
+      const auto at = raised.find(whole.force.joint);
+      if (at == raised.end()) continue;
+      const int joint = at->first;
+      whole.force.friction_speed = at->second.friction_speed;
+      whole.stribeck_speed = std::max(whole.stribeck_speed, 2 * whole.force.friction_speed);
       const std::string& name = model_.joints()[static_cast<size_t>(joint)].name;
       names += (names.empty() ? "" : ", ") + name;
       entries += (entries.empty() ? "" : ", ") + name + ": {";
-      for (const auto& [key, value] : getJointForceData(force))
+      for (const auto& [key, value] : getJointForceData(whole))
         entries += std::string(key) + ": " + value + (key == std::string("friction_speed") ? "}" : ", ");
     }
     tell("steps of " + steps + " are too long for the friction of " + names +

@@ -19,6 +19,7 @@
 #include "math/constants.h"
 #include "model/frame_name.h"
 #include "model/number_text.h"
+#include "model/stiction.h"
 #include "results/json_text.h"
 
 namespace bielle {
@@ -132,14 +133,16 @@ Json describeLengths(const Model& model) {
 
 Json describeJointForces(const Model& model) {
   Json forces = Json::array();
-  for (const JointForce& force : model.jointForces())
+  for (const auto& [force, stiction, stribeck_speed] : joinJointForces(model))
     forces.push_back({{"name", model.joints()[force.joint].name},
                       {"stiffness", force.stiffness},
                       {"rest", force.rest},
                       {"preload", force.preload},
                       {"damping", force.damping},
                       {"friction", force.friction},
-                      {"friction_speed", force.friction_speed}});
+                      {"friction_speed", force.friction_speed},
+                      {"stiction", stiction},
+                      {"stribeck_speed", stribeck_speed}});
   return forces;
 }
 

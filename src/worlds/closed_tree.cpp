@@ -5,6 +5,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "dynamics/energy.h"
+#include "dynamics/joint_force.h"
 #include "dynamics/whole_turns.h"
 #include "math/small_dense.h"
 #include "model/joint.h"
@@ -305,6 +306,8 @@ void ClosedTreeOf<T>::updateLoads(const Vector& tau, const Vector& dw, const Mas
   }
   updateInverseDynamics<T>(model_, ws_, a_d_);
   v_foreseen_ = tau - ws_.b;
+  for (const JointForce& force : model_.jointForces())
+    v_foreseen_[force.dof] -= calcDissipativeForce<T>(force, ws_.v[force.dof]);
   for (size_t i = 0; i < clusters_.size(); ++i) {
     Cluster& c = clusters_[i];
     gather(c.cluster.dofs, v_foreseen_, c.d);

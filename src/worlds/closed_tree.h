@@ -59,7 +59,8 @@ class ClosedTreeOf {
   void restore(const Mask& which);
   /// M^, and the columns of the tips, at q.
   void updateMassMatrix();
-  /// The part N^T (tau - b - M a_d) of Eq. (1) at the velocity w + dw (size), and the drift for the next drift() of those of the mask.
+  /// The part N^T (tau - b - M a_d) of Eq. (1) at the velocity w + dw (size), less dampers and friction of joints, and the
+  /// drift for the next drift() of those of the mask.
   void updateLoads(const Vector& tau, const Vector& dw, const Mask& which);
   /// w <- w + dw
   void kick(const Vector& dw, const Mask& which);

@@ -425,6 +425,35 @@ void LeapfrogOf<T>::addForces(const Vector& w, Vector& loads, MatrixX<T>* dampin
   }
   addContacts(w, loads, damping);
   addStops(w, loads, damping);
+  addJoints(w, loads, damping);
+}
+
+// Of a coordinate.
+template <typename T>
+T LeapfrogOf<T>::calcRate(int dof, const Vector& w) const {
+  T v = 0;
+  tree_.visitRow(dof, [&](int k, const T& entry) { v += entry * w[k]; });
+  return v;
+}
+
+// A force on a coordinate, and its resistance if there is a matrix for it.
+template <typename T>
+void LeapfrogOf<T>::addRow(int dof, const T& force, const T& resistance, Vector& loads, MatrixX<T>* damping) {
+  if (damping) slides_ = slides_ || any(resistance < T(0));
+  tree_.visitRow(dof, [&](int k, const T& entry) {
+    loads[k] += entry * force;
+    if (damping) tree_.visitRow(dof, [&](int l, const T& other) { (*damping)(k, l) += entry * resistance * other; });
+  });
+}
+
+// Dampers and friction of joints.
+template <typename T>
+void LeapfrogOf<T>::addJoints(const Vector& w, Vector& loads, MatrixX<T>* damping) {
+  for (const JointForce& force : model_.jointForces()) {
+    if (!isDissipative(force)) continue;
+    const T v = calcRate(force.dof, w);
+    addRow(force.dof, calcDissipativeForce<T>(force, v), damping ? calcResistance<T>(force, v) : T(0), loads, damping);
+  }
 }
 
 template <typename T>
@@ -484,21 +513,12 @@ void LeapfrogOf<T>::addStops(const Vector& w, Vector& loads, MatrixX<T>* damping
   for (size_t i = 0; i < contacts_.stops.size(); ++i) {
     const JointStop& stop = contacts_.stops[i];
     const T q = tree_.configuration()[stop.coordinate];
-    T before = 0, v = 0;  // in the first half of the step, and in all of it
-    tree_.visitRow(stop.dof, [&](int k, const T& entry) {
-      before += entry * tree_.reducedVelocity()[k];
-      v += entry * w[k];
-    });
-    StopForceOf<T> force = calcStopForce<T>(stop, q, v, {moment_.length, before});
+    const T before = calcRate(stop.dof, tree_.reducedVelocity());  // in the first half of the step
+    StopForceOf<T> force = calcStopForce<T>(stop, q, calcRate(stop.dof, w), {moment_.length, before});
     for (T StopForceOf<T>::*part : {&StopForceOf<T>::force, &StopForceOf<T>::elastic, &StopForceOf<T>::damping})
       force.*part *= mass_ratio_;
     stop_forces_[i] = force.force;
-    if (!any(force.elastic > T(0))) continue;
-    tree_.visitRow(stop.dof, [&](int k, const T& entry) {
-      loads[k] += entry * force.force;
-      if (damping)
-        tree_.visitRow(stop.dof, [&](int l, const T& other) { (*damping)(k, l) += entry * force.damping * other; });
-    });
+    if (any(force.elastic > T(0))) addRow(stop.dof, force.force, force.damping, loads, damping);
   }
 }
 
@@ -506,14 +526,9 @@ void LeapfrogOf<T>::addStops(const Vector& w, Vector& loads, MatrixX<T>* damping
 template <typename T>
 void LeapfrogOf<T>::book(const T& h) {
   WorksOf<T>& works = moment_.works;
-  const auto calcRate = [this](int dof) {
-    T v = 0;
-    tree_.visitRow(dof, [&](int k, const T& entry) { v += entry * w_mean_[k]; });
-    return v;
-  };
-  for (int m = 0; m < model_.nu(); ++m) works.motor += h * u_[m] * calcRate(model_.motors()[m].dof);
+  for (int m = 0; m < model_.nu(); ++m) works.motor += h * u_[m] * calcRate(model_.motors()[m].dof, w_mean_);
   for (const JointForce& force : model_.jointForces()) {
-    const T rate = calcRate(force.dof);
+    const T rate = calcRate(force.dof, w_mean_);
     works.joint += h * calcDissipativeForce<T>(force, rate) * rate;
   }
   int tip = static_cast<int>(model_.contacts().size()) + 1;
@@ -528,7 +543,7 @@ void LeapfrogOf<T>::book(const T& h) {
   }
   for (size_t i = 0; i < stop_forces_.size(); ++i)
     if (any(stop_forces_[i] < T(0) || stop_forces_[i] > T(0)))
-      works.stop += h * stop_forces_[i] * calcRate(contacts_.stops[i].dof);
+      works.stop += h * stop_forces_[i] * calcRate(contacts_.stops[i].dof, w_mean_);
   if (is_pushed_) {
     const Vector6<T> twist = calcTwist(static_cast<int>(model_.contacts().size()), w_mean_);
     works.push += h * push_.dot(Vector3<T>(linear(twist) + angular(twist).cross(com_)));

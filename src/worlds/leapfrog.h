@@ -87,6 +87,9 @@ class LeapfrogOf {
   void addForces(const Vector& w, Vector& loads, MatrixX<T>* damping);
   void addContacts(const Vector& w, Vector& loads, MatrixX<T>* damping);
   void addStops(const Vector& w, Vector& loads, MatrixX<T>* damping);
+  void addJoints(const Vector& w, Vector& loads, MatrixX<T>* damping);
+  T calcRate(int dof, const Vector& w) const;
+  void addRow(int dof, const T& force, const T& resistance, Vector& loads, MatrixX<T>* damping);
   Vector6<T> calcTwist(int tip, const Vector& w) const;
   void addWrench(int tip, const Vector6<T>& wrench, Vector& loads) const;
   Mask takeStep(const T& h, const Mask& which);
@@ -118,7 +121,7 @@ class LeapfrogOf {
   bool is_pushed_ = false;
   Vector w_mean_, dw_, correction_, residual_, start_, loads_, product_;  // size
   MatrixX<T> damping_, system_;                                           // size x size
-  bool slides_ = false;                                                   // whether damping_ is not symmetric
+  bool slides_ = false;  // whether damping_ is not symmetric, or negative
   Eigen::LLT<MatrixXd> factors_;
   std::vector<typename LogicOf<T>::Index> pivots_;  // size; of system_
   Moment moment_, moment_kept_, moment_before_;

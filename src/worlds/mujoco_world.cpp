@@ -129,9 +129,10 @@ bool MujocoWorld::takeStep() {
   const mjModel& mj = *mujoco_.get();
   q_before_ = Eigen::Map<const VectorXd>(data_->qpos, mj.nq);
   v_before_ = Eigen::Map<const VectorXd>(data_->qvel, mj.nv);
+  for (const JointForce& force : model_.jointForces()) mj.dof_damping[mujoco_.getDof(force.joint)] = 0;
   for (const JointForce& force : model_.jointForces()) {
     const int dof = mujoco_.getDof(force.joint);
-    mj.dof_damping[dof] = force.damping + force.friction / std::hypot(v_before_[dof], force.friction_speed);
+    mj.dof_damping[dof] += force.damping + force.friction / std::hypot(v_before_[dof], force.friction_speed);
   }
   try {
     mj_step(&mj, data_.get());
