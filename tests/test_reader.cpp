@@ -11,6 +11,7 @@
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/robot_loader.h"
+#include "formats/robot_files.h"
 #include "get_error.h"
 #include "infinity.h"
 #include "model/stiction.h"
@@ -283,6 +284,21 @@ TEST_CASE("friction that is larger at rest arrives, and is written as it is read
   const std::vector<WholeJointForce> own = joinJointForces(loadRobot(directory.path() + "/own").model);
   REQUIRE(own.size() == 1);
   CHECK((own[0].force.friction == 1 && own[0].stiction == 2));
+}
+
+TEST_CASE("play is for worlds: the robot is the one without, and a file that completes it has the last word") {
+  const RobotDirectory directory;
+  const std::string armature = std::string(kToyYaml) + "armature: {shoulder: 0.01}\n";
+  const std::string file = loadRobot(directory.writeRobot(kToyUrdf, armature + "play: {shoulder: 0.002}")).file;
+  CHECK(loadRobot(file).model.nv() == load(kToyUrdf, armature).nv());
+  const std::vector<Play> plays = listPlays(file);
+  REQUIRE(plays.size() == 1);
+  CHECK((plays[0].name == "shoulder" && plays[0].size == 0.002));
+  CHECK(addPlay(loadRobot(file).model, plays).nv() == loadRobot(file).model.nv() + 1);
+  directory.write("own/own.yaml", "model: " + directory.path() + "/robot.urdf\nplay: {\"sh*\": 0.001}\n");
+  const LoadedRobot own = loadRobot(directory.path() + "/own");
+  const Model played = addPlay(own.model, listPlays(own.file));
+  CHECK(played.upperLimits()[played.joints()[played.findJoint("shoulder.play")].idx_v] == 0.0005);
 }
 
 TEST_CASE("damping and friction of <dynamics> are those of the joint, unless the YAML file says others") {

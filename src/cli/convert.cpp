@@ -17,13 +17,16 @@
 #include "formats/drake.h"
 #include "formats/mjcf.h"
 #include "formats/process.h"
+#include "formats/robot_files.h"
 #include "formats/sdf.h"
 #include "formats/text_file.h"
 #include "formats/usd.h"
 #include "model/number_text.h"
 #include "model/payload.h"
+#include "model/play.h"
 #include "results/option_flags.h"
 #include "results/output_place.h"
+#include "results/setting.h"
 #include "results/workshop_sheet.h"
 #include "results/workshop_solids.h"
 
@@ -35,6 +38,7 @@ struct ConvertArguments {
   std::string format = "bielle", joints, output;
   double payload = 0, hole = 8;
   std::vector<double> payload_at;
+  std::vector<std::string> plays;
   bool is_single = false, is_serial = false;
   int postures = FirmwareOptions().postures;
   std::vector<std::string> ranges;  // joint, low, high, ..
@@ -46,6 +50,9 @@ void describe(OptionFields& f, ConvertArguments& a) {
   f.integer("postures", a.postures, {100, 10000000},
             "with maps of linkages: at how many of each linkage errors are measured");
   f.number("payload", a.payload, "kg", {0, 1e6}, "mass fixed to the trunk");
+  f.texts("play", a.plays,
+          "NAME=SIZE, e.g. closure_ankle*=0.0003: play of a joint or of the rod that a closure ties, a free coordinate "
+          "between two stops [rad, m]; * stands for any text; may be repeated");
   f.flag("serial", a.is_serial,
          "with --to mjcf or urdf: the chain of the serial joints, with motors on them, for trainers; beside it, in "
          "NAME.linkages.json, inertia, limits and friction of its linkages over their postures");
@@ -117,10 +124,18 @@ int convert(const ConvertArguments& arguments) {
                      "add --to mjcf or --to urdf, or leave it out");
   LoadedRobot robot = arguments.robot.load();
   requireApart(arguments.output, listFiles(robot));
+  std::vector<Play> plays;
+  for (const std::string& text : arguments.plays) {
+    const auto [name, size] = parseSetting("--play", text, "closure_ankle*=0.0003");
+    plays.push_back({name, size});
+  }
+  for (const Play& play : listPlays(robot.file))
+    if (plays.empty())
+      warn({"its play of '" + play.name + "' is left out: add --play " + play.name + "=" + formatNumber(play.size)});
   Payload payload;
   payload.mass = arguments.payload;
   if (!arguments.payload_at.empty()) payload.at = Eigen::Map<const Vector3d>(arguments.payload_at.data());
-  robot.model = addPayload(robot.model, payload);
+  robot.model = addPlay(addPayload(robot.model, payload), plays);
   std::optional<SerialFiles> serial;
   const std::filesystem::path tables = std::filesystem::path(arguments.output).replace_extension(".linkages.json");
   if (arguments.is_serial) {

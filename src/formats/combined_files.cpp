@@ -312,10 +312,16 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, LoadedR
                           " --verbose` lists them)");
   }
   RoundedLinkages linkages = findRoundedLinkages(builder.build(warnings), findTolerance(urdf, yaml));
+  const std::string& settings = yaml.path.empty() ? urdf.path : yaml.path;
   if (told) {
-    warnOfRounding(linkages, urdf.path, yaml.path.empty() ? urdf.path : yaml.path, *warnings);
+    warnOfRounding(linkages, urdf.path, settings, *warnings);
     for (const RoundedLinkage& linkage : linkages.locked)
       if (linkage.written >= 0) told->locked.push_back({linkage.closures, linkage.written});
+  }
+  try {
+    addPlay(linkages.model, yaml.plays);
+  } catch (const InputError& error) {  // which knows no file
+    throw InputError(settings, error.element(), error.problem(), error.remedy());
   }
   return std::move(linkages.model);
 }

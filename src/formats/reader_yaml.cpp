@@ -24,7 +24,7 @@ std::vector<std::string> listRobotKeys() {
   std::vector<std::string> keys = {"closed_loop", "type", "closure_name", "name_mot"};
   keys.insert(keys.end(), listSharedKeys().begin(), listSharedKeys().end());
   keys.insert(keys.end(),
-              {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set", "rounding"});
+              {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set", "rounding", "play"});
   return keys;
 }
 
@@ -197,6 +197,13 @@ void readFrames(const Entry& map, YamlFile& file) {
     if (const Entry* place = find(fields, "place")) frame.X_LF.p = place->getVector3();
     if (const Entry* rpy = find(fields, "rpy")) frame.X_LF.R = makeRotation(rpy->getVector3());
     file.frames.push_back(frame);
+  }
+}
+
+void readPlays(const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) {
+    file.plays.push_back({name, entry.getNumber()});
+    if (!(file.plays.back().size >= 0)) entry.fail("it is negative", "give the way from stop to stop, rad or m");
   }
 }
 
@@ -395,6 +402,7 @@ void readRoot(const Entry& root, YamlFile& file) {
                   "give by how much angles (rad) and lengths (m) are rounded; 0: not at all");
   }
   if (const Entry* entry = find(fields, "frames")) readFrames(*entry, file);
+  if (const Entry* entry = find(fields, "play")) readPlays(*entry, file);
   if (const Entry* entry = find(fields, "model"))
     file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};
   readGenerator(fields, file);

@@ -10,6 +10,9 @@ namespace {
 constexpr double kTurn = 0.02, kShift = 1e-3;
 constexpr double kLeastGravity = 1;   // m/s^2; where there is less, soles and stops are as hard as on Earth
 constexpr double kStopDamping = 0.5;  // s/rad; s/m of sliding joints is longer by their ratio of speeds, about 10
+// A narrower range is play, rad or m: it gives way by this share of it instead, and what leaves a stop crosses it in a second at
+// the fastest: by Eq. (1) nothing rebounds faster than at 1/c.
+constexpr double kTurnOfPlay = 0.05, kShiftOfPlay = 5e-3, kShareOfPlay = 0.05, kCrossing = 1;
 
 // The ground is at a place of a sole that is at most so far above it, or as deep in it, m.
 constexpr double kOver = 2e-4, kUnder = 5e-3;
@@ -272,8 +275,12 @@ std::vector<JointStop> makeJointStops(const Model& model) {
       const double lower = model.lowerLimits()[dof], upper = model.upperLimits()[dof];
       if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
       const bool slides = joint.kind == JointKind::Prismatic;
-      stops.push_back({dof, joint.idx_q + k, lower, upper, weight / (slides ? kShift : kTurn),
-                       slides ? 10 * kStopDamping : kStopDamping});
+      const double range = upper - lower;
+      if (range > 0 && range < (slides ? kShiftOfPlay : kTurnOfPlay))
+        stops.push_back({dof, joint.idx_q + k, lower, upper, weight / (kShareOfPlay * range), kCrossing / range});
+      else
+        stops.push_back({dof, joint.idx_q + k, lower, upper, weight / (slides ? kShift : kTurn),
+                         slides ? 10 * kStopDamping : kStopDamping});
     }
   }
   return stops;

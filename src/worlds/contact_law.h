@@ -137,7 +137,8 @@ struct JointStop {
 };
 /// Whether limits of such a joint are stops: its coordinates are angles or lengths, and change at its velocities.
 bool hasStops(JointKind kind);
-/// Of all limits of these joints. Without gravity they are as hard as on Earth.
+/// Of all limits of these joints. Without gravity they are as hard as on Earth. A range of less than 0.05 rad or 5 mm is play: its
+/// ends are harder, and nothing rebounds from them.
 std::vector<JointStop> makeJointStops(const Model& model);
 
 template <typename T>

@@ -5,6 +5,7 @@
 #ifdef BIELLE_WITH_MUJOCO
 #include "worlds/mujoco_world.h"
 #endif
+#include "worlds/play_world.h"
 #include "worlds/simbody_world.h"
 
 namespace bielle::worlds {
@@ -52,11 +53,12 @@ std::vector<std::string> listWorlds() {
 
 bool controlsError(const std::string& name) { return getEntry(name).controls_error; }
 
-std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options) {
+std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options,
+                                 const std::vector<Play>& plays) {
   const Entry& entry = getEntry(name);
   if (options.tolerance > 0 && !entry.controls_error)
     throw InputError("", "tolerance of world '" + name + "'", "its steps are of a fixed length", "give a time step");
-  return entry.make(model, options);
+  return makePlayWorld(model, plays, options, entry.make);
 }
 
 }  // namespace bielle::worlds

@@ -8,6 +8,7 @@
 
 #include "bielle/model/error.h"
 #include "control/clock.h"
+#include "formats/robot_files.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "results/option_flags.h"
@@ -152,6 +153,10 @@ void describeWorld(OptionFields& fields, SimulateArguments& a) {
   fields.text("payload_at", a.payload_at,
               "its place, LINK,x,y,z in the frame of a link [m], or x,y,z in that of the trunk (default: the trunk's "
               "centre of mass)");
+  fields.texts(
+      "play", a.plays,
+      "NAME=SIZE, e.g. closure_ankle*=0.0003: play of a joint or of the rod that a closure ties, the way from stop to "
+      "stop [rad, m]; * stands for any text. Of the simulated robot alone; may be repeated");
   fields.number("mass_error", a.errors.mass, "1", {0, 0.99},
                 "largest relative error of masses: the simulated robot's masses and inertias are the "
                 "controller's, times a random factor within 1 plus or minus this");
@@ -248,6 +253,15 @@ Payload makePayload(const SimulateArguments& arguments) {
     (*payload.at)[axis] = *value;
   }
   return payload;
+}
+
+std::vector<Play> makePlays(const SimulateArguments& arguments, const std::string& file) {
+  std::vector<Play> plays = file.empty() ? std::vector<Play>() : listPlays(file);
+  for (const std::string& text : arguments.plays) {
+    const auto [name, size] = parseSetting("--play", text, "closure_ankle*=0.0003");
+    plays.push_back({name, size});
+  }
+  return plays;
 }
 
 std::string getName(PlanControl control) { return kControls[static_cast<size_t>(control)]; }
@@ -361,6 +375,7 @@ void parseOptions(SimulateArguments& arguments) {
   if (is_real) arguments.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
   makeGround(arguments, {});
   makePayload(arguments);
+  makePlays(arguments, "");
   const std::vector<std::string> worlds = splitWorlds(arguments.world);
   if (std::set<std::string>(worlds.begin(), worlds.end()).size() < worlds.size())
     throw InputError("", "--world " + arguments.world, "a world is given twice", "give it once");

@@ -7,6 +7,7 @@
 
 #include "bielle/model/options.h"
 #include "model/payload.h"
+#include "model/play.h"
 #include "worlds/execution.h"
 #include "worlds/robot_errors.h"
 #include "worlds/standing_place.h"
@@ -30,9 +31,10 @@ struct SimulateArguments {
   double friction = 0;  // 0: that of the plan
   double accuracy = 0;  // 0: that of the world
   double time_step = 0;
-  std::string world_robot;  // file or directory; empty: the robot of the plan
-  double payload = 0;       // kg
-  std::string payload_at;   // LINK,x,y,z or x,y,z
+  std::string world_robot;         // file or directory; empty: the robot of the plan
+  double payload = 0;              // kg
+  std::string payload_at;          // LINK,x,y,z or x,y,z
+  std::vector<std::string> plays;  // name=size
   RobotErrors errors;
   std::vector<std::string> pushes;
   unsigned seed = 1;
@@ -81,6 +83,8 @@ void parseOptions(SimulateArguments& arguments);
 
 /// What the robot of the world carries, and a plan does not know. \throws InputError
 Payload makePayload(const SimulateArguments& arguments);
+/// Those of the robot's file, and of the options, which take precedence.
+std::vector<Play> makePlays(const SimulateArguments& arguments, const std::string& file);
 
 /// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01".
 struct WorldGround {

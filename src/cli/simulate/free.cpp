@@ -316,7 +316,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
                                 : name == "simbody"    ? kSimbodyTolerance
                                                        : kOwnTolerance;
     world_options.pushed_body = pushed_body;
-    const std::unique_ptr<World> world = makeWorld(name, model, world_options);
+    const std::unique_ptr<World> world = makeWorld(name, model, world_options, makePlays(arguments, robot.file));
     FreeRun run{name, names.size() > 1 ? (fs::path(arguments.output) / name).string() : arguments.output, idle, {}};
     for (const std::string& warning : world->warnings()) {
       run.warnings.push_back("world " + name + ": " + warning);

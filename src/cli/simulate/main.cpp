@@ -230,8 +230,9 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   for (const std::string& each : listOddGround(plan, ground, place, start)) warnings.push_back(each);
   const LoadedRobot robot = loadWorldRobot(plan, arguments);
   const double tolerance = controlsError(arguments.world) ? arguments.accuracy : 0;
-  const auto world = makeWorld(arguments.world, addErrors(plan, robot.model, arguments.errors),
-                               {ground, arguments.time_step, &isInterrupted(), tolerance});
+  const auto world =
+      makeWorld(arguments.world, addErrors(plan, robot.model, arguments.errors),
+                {ground, arguments.time_step, &isInterrupted(), tolerance}, makePlays(arguments, robot.file));
   for (const std::string& each : listIdleInPlan(arguments, plan, *world)) warnings.push_back(each);
   for (const std::string& each : world->warnings()) warnings.push_back("world " + arguments.world + ": " + each);
   tell(warnings);
