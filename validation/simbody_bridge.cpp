@@ -276,7 +276,7 @@ VectorXd SimbodyBridge::calcDissipativeForces() const {
   VectorXd out = VectorXd::Zero(s_->model.nv());
   for (const JointForce& force : s_->model.jointForces()) {
     const double v = s_->bodies[force.joint].getOneU(s_->state, 0);
-    out[force.dof] = -force.damping * v - force.friction * v / std::hypot(v, force.friction_speed);
+    out[force.dof] -= force.damping * v + force.friction * v / std::hypot(v, force.friction_speed);
   }
   SimTK::Vector_<SimTK::SpatialVec> body_forces(s_->matter.getNumBodies(), SimTK::SpatialVec(SimTK::Vec3(0)));
   for (const PointSpring& spring : s_->model.pointSprings()) {

@@ -75,7 +75,7 @@ class MujocoComparison {
   VectorXd calcFriction(const VectorXd& v) const {
     VectorXd out = VectorXd::Zero(oracle_.nv());
     for (const JointForce& force : oracle_.jointForces())
-      out[force.dof] = -force.friction * v[force.dof] / std::hypot(v[force.dof], force.friction_speed);
+      out[force.dof] -= force.friction * v[force.dof] / std::hypot(v[force.dof], force.friction_speed);
     return out;
   }
 

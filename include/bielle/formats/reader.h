@@ -26,7 +26,7 @@
 ///   PLANAR, FLOATING. An absent joint gives a warning.
 ///
 /// ## The YAML, our keys (all optional; an unknown key is an error)
-/// - `base: free | fixed`
+/// - `base: free | fixed`; `play: {joint or closure: rad or m, ...}` of the robot in worlds (docs/execution.md)
 /// - `frames: {name: {link, place: [x, y, z], rpy: [roll, pitch, yaw]}, ...}` further frames, placed in a link of the tree, m and
 ///   rad (default 0); a robot that is completed keeps its own
 /// - `closures: [{name, frames: [A, B], type, axis, length, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge or
@@ -44,7 +44,7 @@
 ///   robots. A catalogue is `motors: {NAME: {source: where its figures are from, ...}, ...}` with the keys of winding and gear, and
 ///   `effort` and `velocity` at the shaft of its gear
 /// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
-/// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed}, ...}` as in model.h; `{}` for none
+/// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed, stiction, stribeck_speed}, ...}`; `{}`: none
 /// - `point_springs: {name: {frames: [A, B], points: [[x, y, z], [x, y, z]], stiffness, rest, preload, damping}, ...}`
 ///   between a point of A and one of B (m, default their origins), links or joints as in `closed_loop`; PointSpring in
 ///   model.h

@@ -73,7 +73,7 @@ class ModelBuilder {
   /// A motor on the joint of its name; its indices are filled here. Limits, armature and loss that are not given follow
   /// from its drive: limits are the smaller of both, and an armature of 0 counts as not given.
   void addMotor(Motor motor);
-  /// Spring, damper and friction on a joint of one coordinate; its indices are filled here. Not kept if all are zero.
+  /// Spring, damper and friction on a joint of one coordinate, or what its friction loses with speed (model/stiction.h).
   void addJointForce(const std::string& joint, JointForce force);
   /// Spring and damper between two bodies. Its points are given in frames 1 and 2 (links are frames too); its bodies and
   /// dofs are filled here.
