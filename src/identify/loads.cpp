@@ -96,7 +96,8 @@ Model changeLoads(const Model& model, const std::vector<LoadNumber>& numbers, Co
     auto force = std::find_if(parts.joint_forces.begin(), parts.joint_forces.end(), is_own);
     if (force == parts.joint_forces.end()) force = parts.joint_forces.insert(force, getJointForce(model, motor.joint));
     // The friction of sliding: what is more at rest stays as it is.
-    (number.kind == LoadKind::Damping ? force->damping : force->friction) += value - number.value;
+    double& own = number.kind == LoadKind::Damping ? force->damping : force->friction;
+    own = value + (own - number.value);
   }
   return ModelBuilder::restore(std::move(parts));
 }

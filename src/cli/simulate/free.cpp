@@ -185,6 +185,7 @@ std::vector<std::string> writeRun(const SimulateArguments& arguments, const Load
   summary["integration"] = listIntegration(e.integration);
   summary["warnings"] = run.warnings;
   summary["pushes"] = listPushes(arguments.execution.pushes);
+  for (const Play& play : makePlays(arguments, robot.file)) summary["play"][play.name] = play.size;
   const int pushed = findPushedBody(model, arguments.push_body);
   const Vector3d& com = model.bodies()[pushed].inertia.com;
   summary["pushed_body"] = {{"index", pushed}, {"com", std::vector<double>(com.data(), com.data() + 3)}};
