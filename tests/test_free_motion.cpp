@@ -46,6 +46,27 @@ const std::string kFreeFourbar = BIELLE_SOURCE_DIR "/robots/fourbar",
 
 }  // namespace
 
+TEST_CASE(
+    "free motion: the play of a rod lets a linkage rattle alike in two worlds, and is refused where there is no rod") {
+  const FreeScratch scratch;
+  const CommandResult result =
+      move(kFreeFourbar, scratch.path / "worn",
+           {"--play", "coupler=0.002", "--world", "bielle,simbody", "--duration", "0.5", "--no-report"});
+  CAPTURE(result.out, result.err);
+  REQUIRE(result.status == 0);
+  const MotionRecord own = readRecord((scratch.path / "worn/bielle/trajectory.npz").string()),
+                     other = readRecord((scratch.path / "worn/simbody/trajectory.npz").string());
+  const Eigen::Index last = own.q.rows() - 1;
+  CHECK((own.q.row(last) - own.q.row(0)).cwiseAbs().maxCoeff() > 0.1);
+  CHECK((own.q.row(last) - other.q.row(last)).cwiseAbs().maxCoeff() < 1e-5);
+  const nlohmann::json summary = parseFreeSummary(scratch.path / "worn/bielle");
+  CHECK(summary["play"]["coupler"] == 0.002);
+  CHECK(summary["books"]["stop_loss_J"].get<double>() > 1e-3);
+  const CommandResult wrong = move(kFreeFourbar, scratch.path / "wrong", {"--play", "rope=0.002"});
+  CHECK(wrong.status == 2);
+  CHECK_THAT(wrong.err, Catch::Contains("play of 'rope': there is no such joint or closure"));
+}
+
 TEST_CASE("free motion: a linkage swings from a state, and keeps its energy and its loops") {
   const FreeScratch scratch;
   const std::string state = scratch.write("state.json", R"({"joints": {"crank_joint": {"q": 1.2, "v": 3}}})");
