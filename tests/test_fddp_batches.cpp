@@ -1,6 +1,7 @@
 // FDDP on problems that process several tasks at once: results do not depend on batches or threads, and evaluations are
 // kept.
 #include <catch2/catch.hpp>
+#include <random>
 
 #include "batched_problem.h"
 #include "count_solver_allocations.h"
@@ -152,6 +153,40 @@ TEST_CASE("in a receding horizon steps of all lengths are rolled out in segments
   options.gradient_tolerance = makeTightOptions().gradient_tolerance;
   options.iterations = 300;
   checkOptimal(problem, Receding(problem, options).step(t), t);
+}
+
+// Gaps of any size, twice: after four steps there are new ones.
+TEST_CASE("a receding horizon that goes on cuts fewer steps short than one whose weight of gaps starts anew") {
+  const auto problem = makeCartPole();
+  const ShootingTrajectory optimum = solve(problem, makeLine(problem)).trajectory;
+  RecedingOptions options;
+  options.initial_regularization = options.min_regularization = 1e-6;
+  std::vector<NodeSource> stays(optimum.xs.size());
+  for (size_t k = 0; k < stays.size(); ++k) stays[k] = {static_cast<int>(k), 1, false};
+  const auto countShort = [&](unsigned seed, bool goes_on) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0, 0.1);
+    ShootingTrajectory t = optimum;
+    Receding going(problem, options);
+    int num_short = 0;
+    for (int i = 0; i < 8; ++i) {
+      if (i % 4 == 0)
+        for (size_t k = 1; k < t.xs.size(); ++k) t.xs[k] += t.xs[k].unaryExpr([&](double) { return noise(random); });
+      if (i > 0) going.move(stays);
+      Receding anew(problem, options);
+      const FddpSummary summary = (goes_on ? going : anew).step(t);
+      num_short += summary.log.empty() || summary.log[0].step < 1;
+    }
+    return num_short;
+  };
+  int going = 0, anew = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    going += countShort(seed, true);
+    anew += countShort(seed, false);
+  }
+  CAPTURE(going, anew);
+  CHECK(anew > 20);
+  CHECK(going < 0.7 * anew);
 }
 
 TEST_CASE("a horizon that advances evaluates only what is new, with the same bytes as one that evaluates all") {

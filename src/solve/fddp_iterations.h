@@ -116,6 +116,7 @@ class FddpIterations {
   std::optional<double> model_error_;                     // of the decrease by the last step, if it was a full one
   Foreseen foreseen_;                                     // by the sweep
   double first_step_ = 1, last_step_ = 1;  // alpha that the next line search starts with; of the iteration before
+  double gap_weight_ = 0, least_gap_weight_ = 0;  // nu of Eq. (5), and the least that the next search takes
   FddpSummary summary_;
 
  private:
@@ -132,7 +133,7 @@ class FddpIterations {
   Clock::time_point start_ = Clock::now();
   int threads_ = 1;
   std::optional<Team::Shift> shift_;
-  double gap_sum_ = 0, gap_weight_ = 0;  // c, of the gaps that count as open, and nu of Eq. (5)
+  double gap_sum_ = 0;  // c, of the gaps that count as open
   double accepted_merit_ = 0, last_gradient_ = 0;
   int failed_node_ = -1;  // where the first failed trial of a line search failed, and why
   std::string failure_;

@@ -39,7 +39,8 @@ double FddpIterations::calcRounding() const {
 RolloutInput FddpIterations::startSearch() {
   accepted_ = nullptr;
   const double penalized = std::max(0.0, foreseen_.slope + 0.5 * std::max(0.0, foreseen_.curvature) + foreseen_.excess);
-  gap_weight_ = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
+  gap_weight_ =
+      std::max(least_gap_weight_, gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0);  // Eq. (5)
   return {problem_,
           trajectory_,
           memory_.evaluations,

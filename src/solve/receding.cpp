@@ -32,9 +32,10 @@ class RecedingStep : private FddpIterations {
   }
 
   /// \param regularization  of the first sweep, if the initial one is less; then what the next step starts with: more after a
-  /// search in vain, else less
-  void run(bool prepared, double& regularization, Foresight* foresight) {
+  /// search in vain, else less   \param gap_weight  of the last search, then of this one's
+  void run(bool prepared, double& regularization, double& gap_weight, Foresight* foresight) {
     foresight_ = foresight;
+    gap_weight_ = gap_weight;
     if (prepared)
       resume();
     else
@@ -42,6 +43,7 @@ class RecedingStep : private FddpIterations {
     regularization_ = std::max(regularization_, regularization);
     finish(iterate());
     regularization = rejected_ > 0 ? regularization_ : regularization / options_.regularization_decrease;
+    gap_weight = gap_weight_;
   }
 
  private:
@@ -112,6 +114,7 @@ class RecedingStep : private FddpIterations {
 
   // There is no time for rollouts in one piece, except at the end.
   bool searchLine() {
+    least_gap_weight_ = kGapWeightKept * gap_weight_;
     const RolloutInput input = startSearch();
     const int segments = getNumSegments(kShortestSegment);
     if (segments == 1) return searchInOnePiece(input);
@@ -129,7 +132,8 @@ class RecedingStep : private FddpIterations {
     return false;
   }
 
-  static constexpr int kShortestSegment = 3;  // stages; 48 then make two full batches of segments
+  static constexpr int kShortestSegment = 3;     // stages; 48 then make two full batches of segments
+  static constexpr double kGapWeightKept = 0.9;  // Eq. (15)
 
   FddpSummary& last_;
   Foresight* foresight_ = nullptr;  // still to be filled
@@ -147,9 +151,10 @@ Receding::Receding(Receding&&) noexcept = default;
 Receding& Receding::operator=(Receding&&) noexcept = default;
 
 const FddpSummary& Receding::step(ShootingTrajectory& trajectory, const FddpObserver& observer, Foresight* foresight) {
-  if (!std::exchange(advanced_, false)) regularization_ = 0;
+  if (!std::exchange(advanced_, false)) regularization_ = gap_weight_ = 0;
   const bool prepared = std::exchange(prepared_, false);
-  RecedingStep(options_, *problem_, trajectory, observer, *memory_, summary_).run(prepared, regularization_, foresight);
+  RecedingStep(options_, *problem_, trajectory, observer, *memory_, summary_)
+      .run(prepared, regularization_, gap_weight_, foresight);
   return summary_;
 }
 

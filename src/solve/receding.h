@@ -1,7 +1,7 @@
 #pragma once
 /// \file FDDP for a receding horizon: a few iterations per step, each about as long as the last, on a window that moves.
 ///
-/// Iterations are those of fddp.h, with four differences. Each tries only a few step lengths, 1, 1/4, 1/16 and 1/64: where the
+/// Iterations are those of fddp.h, with five differences. Each tries only a few step lengths, 1, 1/4, 1/16 and 1/64: where the
 /// gaps that a push leaves are large, only short ones succeed, and more regularization does not shorten the others. If none is
 /// acceptable, the trajectory and its multipliers stay as they are, and the next iteration, in this step() or after advance(),
 /// is regularized more. None closes the gaps for its own sake: steps of all lengths are rolled out in segments, which run at
@@ -13,6 +13,10 @@
 ///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (14)
 /// With Eq. (10) alone a violated row moves inside by as much as it was violated. There it is free, since it is farther from
 /// its bound than y_k / rho, and is then violated again: in a walk's window, wrench cones by 0.5 in every other iteration.
+/// The weight of gaps falls by a tenth at most from one search to the next, until the horizon starts anew:
+///     nu <- max(Eq. (5), 0.9 nu).                                                                                  (15)
+/// What a foot leaves that landed early is cheaper with its gaps than without. Eq. (5) alone, which asks for a descent direction
+/// only, is then zero, and steps that close gaps were cut to a quarter for as long as a whole swing.
 #include <functional>
 #include <memory>
 
@@ -99,6 +103,7 @@ class Receding {
   std::vector<NodeSource> sources_;  // of advance()
   FddpSummary summary_;              // of the last step()
   double regularization_ = 0;        // that the last step ended with
+  double gap_weight_ = 0;            // nu of its last search
   bool advanced_ = false;            // since then
   bool prepared_ = false;            // the next one
 };
