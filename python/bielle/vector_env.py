@@ -78,8 +78,11 @@ class VectorEnv:
     Actions (num_envs, nu) are torques of the motors, N m or N, held for a period, s; or those of `action_space`, a Box for one
     robot, of which `torques(actions, readings)` makes torques at each of `repeat` periods. Observations are what sensors of the
     robot read (Sensors): positions of the motors, their differences over the last period per second, the torques that acted, and,
-    of a robot that no joint holds, the IMU's angular velocity, rad/s, and specific force, m/s^2. `reward(state, torques)` and `termination(state)` are functions of arrays: the WorldState and torques (num_envs, nu).
-    `start(generator)` gives their first states, by default those of StartStates. Episodes are truncated after a duration, s, and terminated also where physics break off. `worlds` are theirs (World.set()).
+    of a robot that no joint holds, the IMU's angular velocity, rad/s, and specific force, m/s^2. `reward(state, torques)` and
+    `termination(state)` are functions of arrays: the WorldState and torques (num_envs, nu).
+    `start(generator)` gives their first states, by default those of StartStates, and `push(state)` the forces on their trunks
+    (num_envs, 3), N, during the period to come. Episodes are truncated after a duration, s, and terminated also where physics break
+    off. `worlds` are theirs, of the `engine` (World, World.set()).
 
     Autoreset "NextStep": the step after the last one of an episode starts the next one, whatever the action, with reward 0.
     Each robot has random numbers of its own: its episodes are the same, bit by bit, for any number of robots and of threads.
@@ -99,6 +102,7 @@ class VectorEnv:
         action_space: Optional[Box] = None,
         torques: Optional[Callable[[Array, Readings], npt.ArrayLike]] = None,
         start: Optional[Callable[[np.random.Generator], Tuple[Array, Array]]] = None,
+        push: Optional[Callable[[WorldState], npt.ArrayLike]] = None,
         period: float = 0.01,
         repeat: int = 1,
         duration: float = 10.0,
@@ -106,13 +110,14 @@ class VectorEnv:
         ground: Ground = Ground(),
         time_step: float = 0.0,
         threads: int = 0,
+        engine: str = "bielle",
     ) -> None:
         if repeat < 1 or not duration > 0:
             raise ValueError("repeat, duration: expected at least one period, and a positive number of seconds")
-        self.worlds = World(model, count=num_envs, ground=ground, time_step=time_step, threads=threads)
+        self.worlds = World(model, count=num_envs, ground=ground, time_step=time_step, threads=threads, engine=engine)
         self.model, self.num_envs, self.noise = model, num_envs, noise
         self.period, self.repeat, self.duration = period, repeat, duration
-        self._reward, self._termination, self._torques = reward, termination, torques
+        self._reward, self._termination, self._torques, self._push = reward, termination, torques, push
         self._start = start or StartStates(model, height=ground.height).draw
         self.render_mode: Optional[str] = None
         self._generators: List[np.random.Generator] = []
@@ -153,7 +158,8 @@ class VectorEnv:
         for _ in range(self.repeat):
             if self._torques is not None:
                 torques = np.asarray(self._torques(actions, self._readings), dtype=float)
-            self._state = self.worlds.step(torques, self.period)
+            force = np.zeros(3) if self._push is None else self._push(self._state)
+            self._state = self.worlds.step(torques, self.period, force)
             self._read()
         ended: Mask = self._state.ok == 0
         if self._termination is not None:

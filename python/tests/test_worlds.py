@@ -356,6 +356,24 @@ def test_vector_env_makes_torques_of_targets(model):
     assert (rewards < 0).all() and np.abs(state["q"][:, at] - stand[at]).max() < 0.05
 
 
+@pytest.mark.parametrize("engine", ["bielle", "mujoco"])
+def test_vector_env_pushes_in_any_world(model, engine):
+    """Each period of a push gives the momentum that its force says, to that robot alone."""
+    if engine == "mujoco":
+        pytest.importorskip("bielle._engines")
+    start = model.standing()
+    start[2] += 0.3  # in the air
+    push = lambda state: np.where(state.time < 0.0199, 1, 0)[:, None] * [[0, 50, 0], [0, 0, 0]]
+    env = bielle.VectorEnv(model, 2, lambda state, torques: state.v[:, 0], start=lambda generator: (start, np.zeros(model.nv)), push=push,
+                           engine=engine)  # fmt: skip
+    env.reset(seed=1)
+    for k in range(3):
+        *_, state = env.step(np.zeros((2, model.nu)))
+        momentum = model.mass * model.com_velocity(state["q"], state["v"])
+        assert momentum[:, 1] == pytest.approx([0.5 * min(k + 1, 2), 0], abs=5e-3)
+    assert momentum[:, 2] == pytest.approx(-9.81 * model.mass * 0.03, rel=0.01)
+
+
 def test_start_states_are_closed_and_stand_on_the_ground(model):
     starts, generator = bielle.StartStates(model, spread=0.2, speed=0.5, height=0.1), np.random.default_rng(1)
     for _ in range(5):
