@@ -38,6 +38,11 @@ if(BIELLE_BUILD_VALIDATION)
       set_tests_properties(results_${page} PROPERTIES LABELS system)
     endforeach()
   endif()
+  if(TARGET bielle_engines)
+    add_test(NAME results_learn COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/learn.py --quick
+      --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
+    set_tests_properties(results_learn PROPERTIES LABELS system)
+  endif()
   if(TARGET bielle-batch-speed)
     add_test(NAME results_batch COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/batch.py --quick
       --bielle ${PROJECT_BINARY_DIR}/bin/bielle)

@@ -92,4 +92,6 @@ class Walks:
             total += np.where(alive, rewards, 0)
             if watch is not None:
                 watch(self.plan.instant(infos["time"]), alive, infos)
+            if not alive.any():
+                break
         return total / (self.plan.num_instants - 1), alive
