@@ -86,8 +86,9 @@ def scale_masses(robot, factor, directory):
 def make_conditions(model, pushes):
     angle = np.radians([angle for _, angle in pushes])
     count = len(pushes)
-    return episodes.Conditions(np.ones((count, len(model.bodies))), np.ones(count), np.zeros(count), np.array([[time] for time, _ in pushes]),
-                               IMPULSE * np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, None])  # fmt: skip
+    impulses = IMPULSE * np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, None]
+    times = np.array([[time] for time, _ in pushes])
+    return episodes.Conditions(np.ones((count, len(model.bodies))), np.ones(count), np.zeros(count), times, impulses)
 
 
 def count_of_command(runner, plan, robot, pushes, *options):
@@ -96,8 +97,9 @@ def count_of_command(runner, plan, robot, pushes, *options):
     for time, angle in pushes:
         directory = runner.place()
         print("simulate", *options, time, angle, file=sys.stderr, flush=True)
-        runner.run("simulate", plan, "--robot", robot, "-o", directory, "--world", "mujoco", "--summary-only", "--threads", 1, *options, "--push",
-                   f"t={time},impulse={IMPULSE:g},direction={angle},duration={episodes.PUSH}")  # fmt: skip
+        push = f"t={time},impulse={IMPULSE:g},direction={angle},duration={episodes.PUSH}"
+        runner.run("simulate", plan, "--robot", robot, "-o", directory, "--world", "mujoco", "--summary-only",
+                   "--threads", 1, *options, "--push", push)  # fmt: skip
         stood += json.loads((pathlib.Path(directory) / "summary.json").read_text(encoding="utf-8"))["outcome"] == "stood"
     return stood
 
@@ -176,8 +178,10 @@ def draw_curves(curves):
 
 
 def describe_learning(run):
-    curve = [[round(row["seconds"] / 60, 2), row["measured return"], row["measured stood"]] for row in run.rows if "measured stood" in row]
-    return {"iterations": run.rows[-1]["iteration"], "minutes": round(run.rows[-1]["seconds"] / 60, 1), "settings": run.settings, "curve": curve}
+    keys, minutes = ("measured return", "measured stood"), lambda row, digits: round(row["seconds"] / 60, digits)
+    curve = [[minutes(row, 2), *(row[key] for key in keys)] for row in run.rows if keys[0] in row]
+    last = run.rows[-1]
+    return {"iterations": last["iteration"], "minutes": minutes(last, 1), "settings": run.settings, "curve": curve}
 
 
 def measure(what, runner, runs, pushes, masses, count):
@@ -190,7 +194,8 @@ def measure(what, runner, runs, pushes, masses, count):
 
 
 def learn_quickly(directory, *options):
-    train.main([str(directory), "--iterations", "1", "--pairs", "2", "--best", "1", "--steps", "2", "--imitated", "4", *options])
+    few = ["--iterations", "1", "--pairs", "2", "--best", "1", "--steps", "2", "--imitated", "4"]
+    train.main([str(directory), *few, *options])
     return Learned(directory)
 
 
@@ -202,11 +207,11 @@ def main():
     import_example(arguments.bielle)
     runner, now = common.Runner(arguments.bielle), common.describe_run(arguments.commit)
     if (arguments.measure in ("own", "mujoco")) * 2 != len(arguments.directories):
-        parser.error("expected two directories of examples/learn/train.py with --measure own and mujoco, and only there")
+        parser.error("expected two directories of train.py with --measure own and mujoco, and only there")
     if arguments.quick:
         with tempfile.TemporaryDirectory() as place:
-            runs = [learn_quickly(pathlib.Path(place) / name, *options) for name, options in (("closed", []), ("serial", ["--serial"]))]
-            data = {what: {"run": now, **measure(what, runner, runs, PUSHES[:1], MASSES[1:2], 2)} for what in MEASURED}
+            runs = [learn_quickly(pathlib.Path(place) / name, *more) for name, more in (("a", []), ("b", ["--serial"]))]
+            data = {what: {"run": now, **measure(what, runner, runs, PUSHES[:1], MASSES[:1], 2)} for what in MEASURED}
     else:
         measured = {}
         if arguments.measure:
@@ -224,37 +229,40 @@ def main():
 
 def tell_learning(name, run):
     first, last = run["curve"][0], run["curve"][-1]
-    return (f"On the {name}: {run['iterations']} iterations in {run['minutes']:g} min of processor time. Of the same {2 * run['settings']['pairs']} "
-            f"walks {first[2]:.0%} stood in the beginning and {last[2]:.0%} in the last measurement, with mean rewards of {first[1]:.3f} and "
-            f"{last[1]:.3f}.")  # fmt: skip
+    return f"""On the {name}: {run['iterations']} iterations in {run['minutes']:g} min of processor time. Of the same
+{2 * run['settings']['pairs']} walks {first[2]:.0%} stood in the beginning and {last[2]:.0%} in the last measurement, with
+mean rewards of {first[1]:.3f} and {last[1]:.3f}."""
 
 
 def write_page(data, quick):
     own, mujoco, controllers = data["own"], data["mujoco"], data["controllers"]
     s = own["learning"]["closed robot"]["settings"]
     page = common.Page(__file__, "A walk that was learned", own["run"])
-    page.add(f"""[`examples/learn`](../../examples/learn/README.md) learns where Bipetto's feet should be, other than on Bielle's own
-walk of {s['speed']:g} m/s in {s['steps']} steps, from what encoders and an IMU read, under pushes of up to {s['impulse']:g} N s from all sides, one in
-each 1.5 s, with masses off by up to 10 %, friction of 0.6 to 1 and delays of up to 4 ms. It begins with the solver's gains, imitated from
-sensors alone. The goal is two cores for one hour, 120 min of processor time.""")
+    page.add(f"""[`examples/learn`](../../examples/learn/README.md) learns where Bipetto's feet should be, other than on
+Bielle's own walk of {s['speed']:g} m/s in {s['steps']} steps, from what encoders and an IMU read, under pushes of up to
+{s['impulse']:g} N s from all sides, one in each 1.5 s, with masses off by up to 10 %, friction of 0.6 to 1 and delays of
+up to 4 ms. It begins with the solver's gains, imitated from sensors alone. The goal is two cores for one hour, 120 min of
+processor time.""")
     page.heading("Learning")
     for name, run in own["learning"].items():
         page.add(tell_learning(name, run))
     shortest = min(run["minutes"] for run in own["learning"].values())
     if shortest < 119:
-        page.add(f"""Learning was cut short at {shortest:g} of 120 min of processor time: other programs had the machine. The same command goes on
-from there.""")
+        page.add(f"""Learning was cut short at {shortest:g} of 120 min of processor time: other programs had the machine. The
+same command goes on from there.""")
     page.lines += ["", "![mean rewards and shares that stand, by processor time](../images/learn.svg)"]
     page.heading("Carried out under the conditions of learning")
-    page.add(f"""Other robots and pushes than those of learning, in Bielle's world with steps of 1 ms: how many of {own['count']} walks stand, and their
-mean reward. What was learned on the serial model goes to the closed robot's motors by the ratios of its loops, or by constant ones.""")
+    page.add(f"""Other robots and pushes than those of learning, in Bielle's world with steps of 1 ms: how many of
+{own['count']} walks stand, and their mean reward. What was learned on the serial model goes to the closed robot's motors
+by the ratios of its loops, or by constant ones.""")
     page.table(["policy", "stood", "mean reward"], own["rows"])
     page.heading("Carried out in MuJoCo's world")
-    page.add(f"""Walks of {len(PUSHES)} that stand, under a push of {IMPULSE:g} N s at {PUSHES[0][0]:g} s each, forward, to both sides and backward, by masses over
-those that plan and controllers know. Predictive control and gains get the true state, or that of the estimator, every millisecond, by
-`bielle simulate` (*{controllers["run"]}*); policies read encoders and an IMU every 4 ms, and count as fallen sooner: a trunk that is turned by
-0.6 rad or below 0.75 of its height, instead of 0.8 rad and 0.6. With real sensors gains look 36 ms ahead, as the imitated ones do; with
-the true state they do not, and grow before each landing.""")
+    page.add(f"""Walks of {len(PUSHES)} that stand, under a push of {IMPULSE:g} N s at {PUSHES[0][0]:g} s each, forward, to
+both sides and backward, by masses over those that plan and controllers know. Predictive control and gains get the true
+state, or that of the estimator, every millisecond, by `bielle simulate` (*{controllers["run"]}*); policies read encoders
+and an IMU every 4 ms, and count as fallen sooner: a trunk that is turned by 0.6 rad or below 0.75 of its height, instead
+of 0.8 rad and 0.6. With real sensors gains look 36 ms ahead, as the imitated ones do; with the true state they do not,
+and grow before each landing.""")
     rows = [[str(cell) for cell in row] for row in controllers["rows"] + mujoco["rows"]]
     page.table(["control", *(f"masses × {factor:g}" for factor in MASSES[: len(rows[0]) - 1])], rows)
     page.write(quick)

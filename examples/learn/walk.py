@@ -1,15 +1,16 @@
 """A walk of Bielle's own as arrays over instants of control, and a policy about it that sees what sensors of the robot see.
 
-The policy is linear, and follows the time t of the plan. With what the motors and the IMU read beside what they would read on the plan,
+The policy is linear, and follows the time t of the plan. With what the motors and the IMU read beside what they would read
+on the plan,
 
     e = [motors; their speeds; attitude; angular velocity; 1],                                                          (1)
     u = u*(t) + W(t) (e - [L(t) d; L(t) dd/dt; 0]),                 z = [V(t) e; attitude; angular velocity],           (2)
     dd/dt = (a - d) / TAU,                    a = sum_b psi_b(t) Theta_b (z - mean) / deviation.                        (3)
 
 W and V are fitted to the gains of the solver, which see the true state, and to the place and velocity of the trunk over the
-standing foot (imitate.py); they are tables by 24 ms of a step on either foot, and of the time before and after all steps. Theta is
-what is learned (ars.py): where the feet should be, relative to the trunk, other than on the plan. L are the motors' positions by those
-of the feet, from the loops. Steps on the right foot are mirrored ones on the left: they share Theta, which is in two parts, for
+standing foot (imitate.py); they are tables by 24 ms of a step on either foot, and of the time before and after all steps.
+Theta is what is learned (ars.py): where the feet should be, relative to the trunk, other than on the plan. L are the motors'
+positions by those of the feet, from the loops. Steps on the right foot are mirrored ones on the left: they share Theta, which is in two parts, for
 motion forward and to the side. Theta = 0 is the imitated feedback.
 """
 
