@@ -74,22 +74,6 @@ TEST_CASE("simulate: the speed in steady steps is told beside that of the whole;
   CHECK(parseSummary(output)["steady_speed"].is_null());
 }
 
-TEST_CASE("simulate: runs are as fast under predictive control as planned, within 2 %", "[long]") {
-  const Scratch scratch;
-  for (const char* name : {"rsu_biped", "bipetto"}) {
-    const std::string plan = (scratch.path / name).string(), output = plan + "-ran";
-    REQUIRE(runCommand({BIELLE_COMMAND, "solve", "run", "--robot", std::string(BIELLE_SOURCE_DIR "/robots/") + name,
-                        "-o", plan, "--quiet", "--no-report", "--no-check"})
-                .status == 0);
-    const CommandResult ran = runCommand({BIELLE_COMMAND, "simulate", plan, "-o", output, "--summary-only"});
-    CAPTURE(name, ran.out, ran.err);
-    REQUIRE(ran.status == 0);
-    const nlohmann::json summary = parseSummary(output), goal = parseSummary(plan)["goals"][0];
-    REQUIRE(goal["name"] == "speed");
-    CHECK(summary["steady_speed"].get<double>() == Approx(goal["achieved"].get<double>()).epsilon(0.02));
-  }
-}
-
 TEST_CASE("simulate: the plan is not overwritten, and a motion carried out is no plan") {
   const Scratch scratch;
   const std::string plan = (scratch.path / "plan").string(), link = (scratch.path / "link").string();

@@ -6,14 +6,9 @@
 //     s.r + 1/2 w r.r = 1/2 w |r + s/w|^2 + constant                                                                (1)
 // is the cost of the distance from a point beside it, at which the foot aims. The curvature stays w, so a foot that a push sends
 // elsewhere is drawn back no more than before. The slopes are the multipliers of fixed footholds in the window that begins early in the
-// swing. Later windows of the same swing would need others; so the motion is then walked through by its own
-// predictions, until feet land where they should. A foot that lands off by r takes the next one about half as far with
-// it. So with r' of the one before, s grows by
-//     g w (r - r' / 2)                                                                                          (2)
-// where the gain g is first 4, then what the last change of s has made of the distance (a secant), for each step and
-// axis. What has brought feet nearest is kept.
+// swing. Later windows of the same swing would need others; so the motion is then walked through by its own predictions, and where a foot
+// lands off by d, s grows by 3 w d. This is done twice.
 #include <algorithm>
-#include <limits>
 
 #include "bielle/dynamics/kinematics.h"
 #include "control/window_planner.h"
@@ -24,9 +19,8 @@ namespace {
 
 constexpr int kAimIterations = 10;  // of a window with fixed footholds
 constexpr double kSwingLeft = 0.9;  // of the swing that is then left
-constexpr int kMostWalks = 5;
-constexpr double kNear = 0.004;  // of its foothold, of the reference robot (motion/robot_size.h), m
-constexpr double kCarried = 0.5, kLeastGain = 2, kMostGain = 12;
+constexpr int kWalks = 2;
+constexpr double kGain = 3;
 // Landings that are walked through. The steps of a longer walk are alike: later ones are corrected like the same foot's before.
 constexpr size_t kMostLandings = 12;
 
@@ -71,21 +65,14 @@ void WindowPlanner::aimFootholds() {
   }
   for (AimedLanding& landing : landings) landing.slope = findSlope(landing);
   for (const AimedLanding& landing : landings) aim(landing);
-  std::vector<Eigen::Vector2d> best;
-  for (const AimedLanding& landing : landings) best.push_back(landing.slope);
-  double least = std::numeric_limits<double>::infinity();
-  for (int walk = 0; walk < kMostWalks && least > kNear * size_.length && !landings.empty(); ++walk) {
-    if (walk > 0) correct(landings);
-    if (!walkThrough(landings)) break;
-    double most = 0;
-    for (const AimedLanding& landing : landings) most = std::max(most, landing.off.lpNorm<Eigen::Infinity>());
-    if (!(most < least)) continue;
-    least = most;
-    for (size_t i = 0; i < landings.size(); ++i) best[i] = landings[i].slope;
-  }
-  for (size_t i = 0; i < landings.size(); ++i) {
-    landings[i].slope = best[i];
-    aim(landings[i]);
+  for (int walk = 0; walk < kWalks && !landings.empty(); ++walk) {
+    walkThrough(landings);
+    for (size_t i = 0; i < landings.size(); ++i) {
+      AimedLanding& landing = landings[i];
+      if (i >= kMostLandings) landing.off = landings[i - 2].off;
+      landing.slope += kGain * calcWeights(landing.free).cwiseProduct(landing.off);
+      aim(landing);
+    }
   }
   past_us_.clear();
   solver_ = makeSolver(options_.iterations);
@@ -112,26 +99,6 @@ Eigen::Vector2d WindowPlanner::findSlope(const AimedLanding& landing) {
   return Eigen::Vector2d::Zero();
 }
 
-// By Eq. (2).
-void WindowPlanner::correct(std::vector<AimedLanding>& landings) {
-  for (size_t i = 0; i < landings.size(); ++i) {
-    AimedLanding& landing = landings[i];
-    Vector3d off(landing.off.x(), landing.off.y(), 0);
-    if (i > 0) off.head<2>() -= kCarried * landings[i - 1].off;
-    const Matrix3d& R = getFoothold(landing.stage, landing.contact).R;
-    const Eigen::Vector2d error = i < kMostLandings ? (R.transpose() * off).head<2>().eval() : landings[i - 2].error;
-    const Eigen::Vector2d weights = calcWeights(landing.free);
-    for (int k = 0; k < 2; ++k) {
-      const double secant = -landing.change[k] / (weights[k] * (error[k] - landing.error[k]));
-      if (secant > 0) landing.gain[k] = std::clamp(secant, kLeastGain, kMostGain);
-      landing.change[k] = landing.gain[k] * weights[k] * error[k];
-    }
-    landing.slope += landing.change;
-    landing.error = error;
-    aim(landing);
-  }
-}
-
 // By Eq. (1).
 void WindowPlanner::aim(const AimedLanding& landing) {
   const ContactFrame& contact = model_.contacts()[landing.contact];
@@ -144,9 +111,8 @@ void WindowPlanner::aim(const AimedLanding& landing) {
   problem_.replaceStage(horizon_->getNode(landing.stage), std::move(spec));
 }
 
-// Follows the predictions, without measurements, until the last of these feet has landed; finds where each lands, or
-// false.
-bool WindowPlanner::walkThrough(std::vector<AimedLanding>& landings) {
+// Follows the predictions, without measurements, until the last of these feet has landed; finds where each lands.
+void WindowPlanner::walkThrough(std::vector<AimedLanding>& landings) {
   for (AimedLanding& landing : landings) landing.off.setZero();
   startFromGuess(0);
   solver_ = makeSolver(options_.iterations);
@@ -163,11 +129,10 @@ bool WindowPlanner::walkThrough(std::vector<AimedLanding>& landings) {
     const ContactFrame& contact = model_.contacts()[landing.contact];
     updatePlacements<double>(model_, feet_, trajectory_.xs[1].head(model_.nq()));
     const SE3& X_WT = getFoothold(landing.stage, landing.contact);
-    landing.off = (getPlacement(feet_, contact.body, contact.X_BF).p - X_WT.p).head<2>();
+    landing.off = X_WT.inverseTimes(getPlacement(feet_, contact.body, contact.X_BF)).p.head<2>();
     ++next;
   }
   grid_.clear();
-  return next == end;
 }
 
 }  // namespace bielle

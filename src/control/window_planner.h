@@ -97,18 +97,13 @@ class WindowPlanner {
   struct AimedLanding {
     int stage = 0, contact = 0;
     StageSpec free;  // as it was made
-    // s of window_aims.cpp Eq. (1), 1/m; from the foothold, where the foot lands, m: both along x and y, of the
-    // foothold and of the world.
+    // Along x and y of the foothold: s of window_aims.cpp Eq. (1), 1/m, and where the foot lands, m.
     Eigen::Vector2d slope = Eigen::Vector2d::Zero(), off = Eigen::Vector2d::Zero();
-    // Of Eq. (2), along x and y of the foothold: g, the distance in brackets, and by how much s grew last.
-    Eigen::Vector2d gain = Eigen::Vector2d::Constant(4), error = Eigen::Vector2d::Zero(),
-                    change = Eigen::Vector2d::Zero();
   };
   void aimFootholds();
   Eigen::Vector2d findSlope(const AimedLanding& landing);
   void aim(const AimedLanding& landing);
-  void correct(std::vector<AimedLanding>& landings);
-  bool walkThrough(std::vector<AimedLanding>& landings);
+  void walkThrough(std::vector<AimedLanding>& landings);
 
   // window_feet.cpp
   bool stands(int stage, int contact) const;
