@@ -7,7 +7,7 @@
 
 namespace bielle::python {
 
-/// As worlds::makeWorld.
+/// As worlds::makeWorld, without play.
 using MakeWorld = std::unique_ptr<worlds::World> (*)(const std::string& name, const Model& model,
                                                      const worlds::WorldOptions& options);
 

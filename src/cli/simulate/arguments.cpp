@@ -256,7 +256,12 @@ Payload makePayload(const SimulateArguments& arguments) {
 }
 
 std::vector<Play> makePlays(const SimulateArguments& arguments, const std::string& file) {
-  std::vector<Play> plays = file.empty() ? std::vector<Play>() : listPlays(file);
+  std::vector<Play> plays;
+  try {
+    if (!file.empty()) plays = listPlays(file);
+  } catch (const InputError&) {
+    // Results keep their robot, which serves where its file can no longer be read, as its warning says; but not the file's play.
+  }
   for (const std::string& text : arguments.plays) {
     const auto [name, size] = parseSetting("--play", text, "closure_ankle*=0.0003");
     plays.push_back({name, size});
