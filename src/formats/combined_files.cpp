@@ -319,7 +319,7 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, LoadedR
       if (linkage.written >= 0) told->locked.push_back({linkage.closures, linkage.written});
   }
   try {
-    addPlay(linkages.model, yaml.plays);
+    addPlay(linkages.model, yaml.plays);  // only to check them: worlds have play, the model does not
   } catch (const InputError& error) {  // which knows no file
     throw InputError(settings, error.element(), error.problem(), error.remedy());
   }
