@@ -1,11 +1,12 @@
 // bielle generate: a robot from named numbers.
+#include "bielle/robots/generate.h"
+
 #include <filesystem>
 #include <iostream>
 #include <sstream>
 
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
-#include "bielle/robots/generate.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "results/setting.h"

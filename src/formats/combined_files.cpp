@@ -320,7 +320,7 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, LoadedR
   }
   try {
     addPlay(linkages.model, yaml.plays);  // only to check them: worlds have play, the model does not
-  } catch (const InputError& error) {  // which knows no file
+  } catch (const InputError& error) {     // which knows no file
     throw InputError(settings, error.element(), error.problem(), error.remedy());
   }
   return std::move(linkages.model);

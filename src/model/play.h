@@ -25,9 +25,8 @@ std::string getPlayName(const std::string& name);
 
 /// The robot with play; bodies, joints and motors of the model keep their names and their order among each other.
 /// \param plays  names may have `*`, which stands for any text; of several for one joint or closure, the last one holds
-/// \throws InputError for a name that nothing has, a size that is negative, a joint of several coordinates or
-///   without an armature, and closures that
-///   are no rods: a coupler, a distance, a slider, or one between two bodies that both carry others
+/// \throws InputError for a name that nothing has, a size that is negative, a joint of several coordinates or without an armature,
+///   and closures that are no rods: a coupler, a distance, a slider, or one between two bodies that both carry others
 Model addPlay(const Model& model, const std::vector<Play>& plays);
 
 }  // namespace bielle

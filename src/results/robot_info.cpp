@@ -188,7 +188,8 @@ Json describeMobility(const LoadedRobot& robot, const std::vector<Posture>& post
   for (size_t i = postures.size(); i-- > 1;)
     if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
   const Mobility mobility = calcMobility(model, q), regular = closed ? calcRegularMobility(model, q) : mobility;
-  const int locked = closed && regular.rows > 0 ? countLocked(robot, q, kRankTolerance * regular.singular_values[0]) : 0;
+  const int locked =
+      closed && regular.rows > 0 ? countLocked(robot, q, kRankTolerance * regular.singular_values[0]) : 0;
   if (regular.rank > mobility.rank)
     place += " (singular: rank " + std::to_string(mobility.rank) + " there, this beside it)";
   return {{"posture", place},
