@@ -10,8 +10,8 @@ on the plan,
 W and V are fitted to the gains of the solver, which see the true state, and to the place and velocity of the trunk over the
 standing foot (imitate.py); they are tables by 24 ms of a step on either foot, and of the time before and after all steps.
 Theta is what is learned (ars.py): where the feet should be, relative to the trunk, other than on the plan. L are the motors'
-positions by those of the feet, from the loops. Steps on the right foot are mirrored ones on the left: they share Theta, which is in two parts, for
-motion forward and to the side. Theta = 0 is the imitated feedback.
+positions by those of the feet, from the loops. Steps on the right foot are mirrored ones on the left: they share Theta,
+which is in two parts, for motion forward and to the side. Theta = 0 is the imitated feedback.
 """
 
 import dataclasses
