@@ -273,7 +273,7 @@ class Model {
   const std::vector<Closure>& closures() const { return data_->closures; }
   const std::vector<LoopCluster>& clusters() const { return data_->clusters; }
   const std::vector<Motor>& motors() const { return data_->motors; }
-  const std::vector<JointForce>& jointForces() const { return data_->joint_forces; }  ///< one a joint, or two (stiction.h)
+  const std::vector<JointForce>& jointForces() const { return data_->joint_forces; }  ///< one a joint, or two
   const std::vector<PointSpring>& pointSprings() const { return data_->point_springs; }
   const std::vector<ContactFrame>& contacts() const { return data_->contacts; }
   const std::vector<Reference>& references() const { return data_->references; }
