@@ -122,14 +122,15 @@ def run(bielle, entry, solved, start, output, options, longest):
     command = [bielle, "solve", entry["motion"], "--robot", summary["robot_file"], "--warm-start", start, "-o", output,
                "--threads", "1", "--max-iterations", ITERATIONS, "--quiet", "--no-check", "--no-report", *options]
     for name, value in summary["options"].items():
-        if name != "dead-point-margin":
+        if not name.startswith("dead-point-margin"):
             command += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
     status, seconds = run_or_end(command, longest)
     if status == -signal.SIGXCPU:
         return {**NONE, "end": "too late"}
     result = json.loads((output / "summary.json").read_text(encoding="utf-8"))
-    if result["options"] != {**summary["options"], **{key: result["options"][key] for key in ("dead-point-margin",)
-                                                      if key in result["options"]}}:
+    def list_others(options):
+        return {name: value for name, value in options.items() if not name.startswith("dead-point-margin")}
+    if list_others(result["options"]) != list_others(summary["options"]):
         return {**NONE, "end": "other stages"}  # the solver made them shorter: another problem
     return {"converged": result["converged"], "cost": result["cost"],
             "violation": result["constraints"]["largest_violation"], "iterations": result["iterations"],

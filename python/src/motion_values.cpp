@@ -16,6 +16,7 @@ void bindProblemOptions(py::module_& module) {
       .field("efforts", &LimitOptions::efforts, "by motor, N m or N, instead of the model's")
       .field("velocities", &LimitOptions::velocities, "by motor, rad/s or m/s, instead of the model's")
       .field("powers", &LimitOptions::powers, "by motor, W; driving or braking")
+      .field("dead_point_margins", &LimitOptions::dead_point_margins, "by linkage, where larger than dead_point_margin")
       .described();
   Value<TimingBounds>(module, "TimingBounds", "Bounds of a duration relative to the nominal one.")
       .field("lower", &TimingBounds::lower, "1")

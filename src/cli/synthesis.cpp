@@ -68,7 +68,7 @@ YamlTree makeMotion(const Json& summary) {
   const OptionSet usual = findMotion("", motion).request.options;
   OptionSet options = usual;
   for (const auto& [name, value] : summary.at("options").items()) {
-    if (name == kDeadPointMargin) continue;  // designs have one of their own, and constraints
+    if (name.rfind(kDeadPointMargin, 0) == 0) continue;  // designs have one of their own, and constraints
     const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
     options.set(name, parseOption(text));
     if (options.get(name).value != usual.get(name).value) node["set"][name] = text;

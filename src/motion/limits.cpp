@@ -100,12 +100,18 @@ std::vector<PathConstraint> listVoltages(const Model& model) {
   return bounds;
 }
 
-std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd& q0, double margin) {
+std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd& q0, const LimitOptions& options) {
   std::vector<PathConstraint> bounds;
+  std::map<std::string, double> margins = options.dead_point_margins;
   for (const Linkage& linkage : listLinkages(model, q0)) {
+    double margin = options.dead_point_margin;
+    if (const auto own = margins.extract(linkage.output)) margin = std::max(margin, own.mapped());
     bounds.push_back(makeBound("dead points of " + linkage.output, margin, 1 / margin, makeTransmission(linkage)));
     bounds.back().scale[0] = 1;
   }
+  if (!margins.empty())
+    requireOption(false, "dead_point_margins", "there is no linkage of '" + margins.begin()->first + "'",
+                  "see `bielle info`");
   return bounds;
 }
 
@@ -118,12 +124,15 @@ void append(const std::vector<PathConstraint>& bounds, std::vector<PathConstrain
 Limits::Limits(const Model& model, const LimitOptions& options, const VectorXd& q0)
     : efforts_(VectorXd::Constant(model.nu(), kNone)) {
   if (!options.enforced) return;
-  const double margin = options.dead_point_margin;
-  requireOption(margin >= 0 && margin < 1, "dead_point_margin", "it is outside 0 .. 1", "give a share, e.g. 0.15");
+  const auto requireShare = [](double margin) {
+    requireOption(margin >= 0 && margin < 1, "dead_point_margin", "it is outside 0 .. 1", "give a share, e.g. 0.15");
+  };
+  requireShare(options.dead_point_margin);
+  for (const auto& [linkage, margin] : options.dead_point_margins) requireShare(margin);
   efforts_ = getEffortLimits(model, options);
   states_ = listRanges(model, q0);
   append(listVelocities(model, options), states_);
-  if (margin > 0) append(listTransmissions(model, q0, margin), states_);
+  if (options.dead_point_margin > 0) append(listTransmissions(model, q0, options), states_);
   powers_ = listPowers(model, options);
   voltages_ = listVoltages(model);
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
@@ -67,24 +69,48 @@ bool isNearDeadPoint(const Motion& motion, const MotionRecord& record, Eigen::In
   return false;
 }
 
-// The least margin with which linkages would keep kNearDeadPoint from the dead points that they come nearer to; 0 where none does, or
-// where the start itself is no farther.
-double findMargin(const Motion& motion, const MotionRecord& record) {
-  const Model& model = motion.problem->model();
-  constexpr double kReserve = 1.05;  // transmissions are not straight lines over the distance
+// The share of the transmission at the start that a linkage has kNearDeadPoint from the dead point that it comes nearer to around a
+// node, the larger one of before and after; 0 if it starts and ends nearer, or never comes so near.
+double findMargin(const Linkage& linkage, const Model& model, const MatrixXd& q, const VectorXd& shares,
+                  Eigen::Index nearest) {
+  const auto calcDistance = [&](Eigen::Index k) {
+    return findDeadPoint(linkage, model, q.row(k).transpose()).distance;
+  };
+  const double least = calcDistance(nearest);
   double margin = 0;
-  for (const Linkage& linkage : listLinkages(model, motion.problem->initialState().head(model.nq()))) {
-    double share = 1;
-    Eigen::Index nearest = 0;
-    for (Eigen::Index k = 0; k < record.q.rows(); ++k) {
-      const double value = calcTransmission(linkage, model, record.q.row(k).transpose());
-      if (std::min(value, 1 / value) < share) share = std::min(value, 1 / value), nearest = k;
+  for (const int direction : {-1, 1}) {
+    double last = least, distance = least;
+    for (Eigen::Index k = nearest + direction; last < kNearDeadPoint && k >= 0 && k < q.rows(); k += direction) {
+      distance = std::min(calcDistance(k), kFarthestDeadPoint);
+      if (distance >= kNearDeadPoint) {
+        const double part = (kNearDeadPoint - last) / (distance - last);
+        margin = std::max(margin, shares[k - direction] + part * (shares[k] - shares[k - direction]));
+      }
+      last = distance;
     }
-    const double distance = findDeadPoint(linkage, model, record.q.row(nearest).transpose()).distance;
-    const double needed = kReserve * share * kNearDeadPoint / distance;
-    if (distance < kNearDeadPoint && needed < 1) margin = std::max(margin, needed);
   }
   return margin;
+}
+
+// By linkage, the margins with which they would keep kNearDeadPoint from the dead points that they come nearer to.
+std::map<std::string, double> findMargins(const Motion& motion, const MotionRecord& record) {
+  const Model& model = motion.problem->model();
+  constexpr double kReserve = 1.05, kDigits = 1e3;  // mirror images have the same margin
+  std::map<std::string, double> margins;
+  for (const Linkage& linkage : listLinkages(model, motion.problem->initialState().head(model.nq()))) {
+    VectorXd shares(record.q.rows());
+    for (Eigen::Index k = 0; k < shares.size(); ++k) {
+      const double value = calcTransmission(linkage, model, record.q.row(k).transpose());
+      shares[k] = std::min(value, 1 / value);
+    }
+    double margin = 0;
+    for (Eigen::Index k = 1; k + 1 < shares.size(); ++k)
+      if (shares[k] <= shares[k - 1] && shares[k] < shares[k + 1])
+        margin = std::max(margin, findMargin(linkage, model, record.q, shares, k));
+    margin = std::round(kReserve * margin * kDigits) / kDigits;
+    if (margin > 0 && margin < 1) margins[linkage.output] = margin;
+  }
+  return margins;
 }
 
 }  // namespace
@@ -134,12 +160,12 @@ std::optional<Motion> avoidDeadPoints(const Motion& solved, const MotionRecord& 
 std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const MotionRecord& record) {
   const Model& model = solved.problem->model();
   ProblemOptions problem = solved.problem_options;
-  double& margin = problem.limits.dead_point_margin;
-  if (!problem.limits.enforced || margin < LimitOptions().dead_point_margin) return {};
+  LimitOptions& limits = problem.limits;
+  if (!limits.enforced || limits.dead_point_margin < LimitOptions().dead_point_margin) return {};
   if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
-  const double needed = findMargin(solved, record);
-  if (needed <= margin) return {};
-  margin = needed;
+  for (const auto& [linkage, margin] : findMargins(solved, record))
+    if (margin > limits.dead_point_margin) limits.dead_point_margins[linkage] = margin;
+  if (limits.dead_point_margins.empty()) return {};
   RefinedMotion apart{makeMotion(model, *solved.request, problem), {}};
   apart.start = makeStart(record, apart.motion);
   return apart;

@@ -178,6 +178,8 @@ Motion makeMotion(const Model& model, const MotionRequest& request, const Proble
   if (!limits.enforced) motion.options.emplace_back(kNoLimits, true);
   if (limits.dead_point_margin != LimitOptions().dead_point_margin)
     motion.options.emplace_back(kDeadPointMargin, limits.dead_point_margin);
+  for (const auto& [linkage, value] : limits.dead_point_margins)
+    motion.options.emplace_back(kDeadPointMarginOf + linkage, value);
   return motion;
 }
 

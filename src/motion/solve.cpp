@@ -294,8 +294,10 @@ class RequestSolver {
   // Solves a motion in place of one that comes near dead points, and takes it if it converges and its stages are no worse.
   void keepApart(const RefinedMotion& apart, FddpOptions solver, Solution& solution, MotionRecord& record) const {
     constexpr int kMostIterations = 100;  // it begins at a solution
-    tell("linkages come near dead points: solving again with a margin of " +
-         formatNumber(apart.motion.problem_options.limits.dead_point_margin, "%.2g"));
+    std::string margins;
+    for (const auto& [linkage, margin] : apart.motion.problem_options.limits.dead_point_margins)
+      margins += (margins.empty() ? "" : "; ") + linkage + " " + formatNumber(margin, "%.2g");
+    tell("linkages come near dead points: solving again with margins: " + margins);
     solver.max_iterations = std::min(solver.max_iterations, kMostIterations);
     Solution kept = attempt(apart.motion, solver, observer_.motion, apart.start);
     MotionRecord kept_record = makeRecord(kept.motion, kept.trajectory);

@@ -23,6 +23,7 @@ LimitOptions readLimits(const MotionSummary& summary) {
   read(kEffortLimit, limits.efforts);
   read(kVelocityLimit, limits.velocities);
   read(kPowerLimit, limits.powers);
+  read(kDeadPointMarginOf, limits.dead_point_margins);
   for (const auto& [name, value] : summary.options) {
     if (name == kDeadPointMargin) limits.dead_point_margin = getNumber(summary, name, value);
     if (name == kNoLimits) limits.enforced = false;

@@ -52,11 +52,12 @@
 namespace bielle {
 
 struct LimitOptions {
-  bool enforced = true;                      ///< false: all limits, including torque, are ignored
-  std::map<std::string, double> efforts;     ///< by motor, N m or N, replacing the limits of the model
-  std::map<std::string, double> velocities;  ///< by motor, rad/s or m/s, likewise
-  std::map<std::string, double> powers;      ///< by motor, W; driving or braking
-  double dead_point_margin = 0.15;           ///< least share of the transmission at the start, below 1; 0: none
+  bool enforced = true;                              ///< false: all limits, including torque, are ignored
+  std::map<std::string, double> efforts;             ///< by motor, N m or N, replacing the limits of the model
+  std::map<std::string, double> velocities;          ///< by motor, rad/s or m/s, likewise
+  std::map<std::string, double> powers;              ///< by motor, W; driving or braking
+  double dead_point_margin = 0.15;                   ///< least share of the transmission at the start, below 1; 0: none
+  std::map<std::string, double> dead_point_margins;  ///< by Linkage::output, where larger than that
 
   bool areGiven() const { return !(efforts.empty() && velocities.empty() && powers.empty()); }
 };

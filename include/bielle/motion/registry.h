@@ -62,10 +62,11 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions);
 /// The motions of a sequence; none of another request.
 std::vector<SequencePart> listParts(const MotionRequest& request);
 
-/// Prefixes of limits given by motor among the options of a motion, followed by the name of the motor.
+/// Prefixes of limits given by motor or linkage among the options of a motion, followed by its name.
 inline constexpr const char *kEffortLimit = "limit ", *kVelocityLimit = "velocity-limit ",
                             *kPowerLimit = "power-limit ";
-inline constexpr const char *kDeadPointMargin = "dead-point-margin", *kNoLimits = "no-limits";
+inline constexpr const char *kDeadPointMargin = "dead-point-margin", *kNoLimits = "no-limits",
+                            *kDeadPointMarginOf = "dead-point-margin of ";
 
 /// The motion of a request from the robot's standing posture. The limits given by motor are listed with the other options.
 /// \throws InputError as makeMotion() does
