@@ -18,7 +18,7 @@ constexpr double kHalf = 0.5;   // the same by a step of settle()
 // penalty would only shorten the steps.
 constexpr double kNear = 0.03, kNearPenalty = 1e3;  // the latter over the initial penalty, at most
 // Foreseen decrease over the gain of new multipliers at which they are due; and while violations alone are minimized.
-constexpr double kShare = 0.1, kRestorationShare = 1e-6;
+constexpr double kShare = 0.1, kRestorationShare = 1e-8;
 constexpr double kFirst = 2;  // share of a step up to which bounds are met first, over the least one
 // Penalty times squared violations over the cost, while violations alone are minimized.
 constexpr double kRestorationWeight = 1e6;

@@ -1,5 +1,6 @@
 #include "bielle/solve/fddp.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -16,6 +17,7 @@ constexpr int kDampedHoldings = 2;  // the same with a raised regularization
 constexpr double kMuch = 0.1;    // regularization up to which full steps are tried that hold rows, before shorter ones
 constexpr double kBetter = 0.5;  // ratio to which each should reduce the errors of models
 constexpr double kShortest = 0.4;       // alpha of a step in segments after a full one that went too far
+constexpr int kShorter = 5;             // steps tried in segments after a full one
 constexpr int kSettling = 30;           // steps that settle() takes, at most
 constexpr double kSettlingFactor = 10;  // of the regularization, between these steps
 
@@ -154,14 +156,13 @@ FddpSolve::End FddpSolve::updateMultipliers() {
 }
 
 // Leaves the accepted trial in accepted_, or renewed_ set. Where constraints and gaps are small, full steps that violate rows are
-// cheaper by holding these rows or by more regularization than a shorter one in one piece. Where the cost hardly changes either, shorter
-// steps may be taken in segments, since nothing moves far.
+// cheaper by holding these rows or by more regularization than a shorter one.
 FddpSolve::End FddpSolve::searchLine() {
   const int segments = getNumSegments();
   const bool near = line_.violation < kClose && line_.gap <= kClose;
   const bool settles = near && calcForeseen() <= kClose * std::abs(line_.cost);
   renewed_ = false;
-  if (segments > 1 && (last_step_ == 1 || settles) && first_step_ == 1) {
+  if (segments > 1 && first_step_ == 1) {
     if (tryFullStep(segments)) return {};
     if (settles && tryShorterStep(segments)) return {};
     if (near && hasViolatedFreeRows()) {
@@ -169,7 +170,7 @@ FddpSolve::End FddpSolve::searchLine() {
       if (accepted_ || renewed_ || regularization_ < kMuch) return {};
     }
   }
-  searchInOnePiece(startSearch());
+  if (mustClose() || !tryShorterSteps(segments)) searchInOnePiece(startSearch());
   return {};
 }
 
@@ -190,6 +191,16 @@ bool FddpSolve::tryShorterStep(int segments) {
   const double alpha = findMinimum(trial);
   if (alpha < kShortest || alpha >= 1) return false;
   return accept(rollOut(startSearch(), alpha, segments));
+}
+
+// Steps in segments, each half as long as the last one, from the full one on that has been rejected. They are far cheaper than
+// those in one piece, but leave gaps, by which they may be rejected.
+bool FddpSolve::tryShorterSteps(int segments) {
+  const RolloutInput input = startSearch();
+  double alpha = first_step_ < 1 ? first_step_ : 0.5;
+  for (int i = 0; i < kShorter && segments > 1 && !isInterrupted(); ++i, alpha *= 0.5)
+    if (accept(rollOut(input, alpha, segments))) return true;
+  return false;
 }
 
 // Whether the models are wrong about the last trial because of the rows that it violates although they are free in them.

@@ -28,6 +28,7 @@ class FddpSolve : private FddpIterations {
   End searchLine();
   bool tryFullStep(int segments);
   bool tryShorterStep(int segments);
+  bool tryShorterSteps(int segments);
   bool hasViolatedFreeRows();
   End tryHolding(int segments);
   End sweepAgain();

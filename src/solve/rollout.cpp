@@ -11,6 +11,11 @@ namespace bielle {
 
 namespace {
 
+// Coordinates about an iterate may be those of two states, as of a linkage in its two configurations. Where segments join, the
+// state that arrives is made again from its coordinates if it is farther than this from where the next segment starts.
+constexpr double kFar = 0.1;
+constexpr double kSame = 1e-6;  // the most that it may then differ from itself
+
 // Whether part of the gap after a stage is to stay open.
 bool contracts(const RolloutInput& input, const Trial& trial, int stage) {
   return trial.alpha < 1 && input.open[stage];
@@ -49,6 +54,7 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments, int num_t
     group.moved.reserve(size);
   }
   for (VectorXd* x : {&joint_gap_, &joint_slope_, &shift_}) x->setZero(largest);
+  state_.setZero(problem.stateSize());
   control_.setZero(most_controls);
   seconds_ = search_seconds_ = 0;
 }
@@ -286,7 +292,7 @@ void Rollout::updateGaps(const RolloutInput& input, int num_tracks, Trial& trial
       trial.gap_max = std::max(trial.gap_max, rest * gap.lpNorm<Eigen::Infinity>());
     }
   }
-  trial.ok = std::isfinite(trial.merit) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
+  trial.ok &= std::isfinite(trial.merit) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
 }
 
 // The gap between two segments, and its contribution to Eq. (8).
@@ -304,6 +310,20 @@ void Rollout::addJointGap(const RolloutInput& input, double rest, const Track& b
   trial.closing_cost += slope.dot(gap);
   slope.noalias() = value.Vxx * gap;
   trial.closing_cost += 0.5 * slope.dot(gap);
+  if (!hasArrived(input, before, trial)) {
+    trial.ok = false;
+    trial.failed_node = before.end;
+    trial.failure = "a step in segments leads beyond the range of the coordinates about the iterate";
+  }
+}
+
+bool Rollout::hasArrived(const RolloutInput& input, const Track& track, const Trial& trial) {
+  const int k = track.end;
+  const VectorXd& arrived = getEvaluation(input, track, k - 1)->x_next;
+  if ((arrived - trial.nodes.xs[k]).lpNorm<Eigen::Infinity>() <= kFar) return true;
+  IntegrateTask task{k, input.evaluations.getIterate()[k].get(), &track.arrival, &state_};
+  input.problem.integrate(&task, 1, input.evaluations.getScratch(0));
+  return (arrived - state_).lpNorm<Eigen::Infinity>() <= kSame;
 }
 
 }  // namespace bielle

@@ -92,6 +92,8 @@ class Rollout {
   void updateControl(const RolloutInput& input, int k, Trial& trial) const;
   void updateGaps(const RolloutInput& input, int num_tracks, Trial& trial);
   void addJointGap(const RolloutInput& input, double rest, const Track& before, const Track& after, Trial& trial);
+  // Whether the coordinates of what arrives at the end of a segment are those of that state, and of no other one.
+  bool hasArrived(const RolloutInput& input, const Track& track, const Trial& trial);
   NodeEvaluation* getEvaluation(const RolloutInput& input, const Track& track, int node) const;
 
   int N_ = 0;
@@ -100,7 +102,7 @@ class Rollout {
   std::vector<Group> groups_;
   int num_segments_ = 0;  // of the last cut()
   bool rolling_ = false;
-  VectorXd joint_gap_, joint_slope_, shift_, control_;
+  VectorXd joint_gap_, joint_slope_, shift_, control_, state_;
   double seconds_ = 0, search_seconds_ = 0;
 };
 
