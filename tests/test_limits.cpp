@@ -192,21 +192,23 @@ TEST_CASE(
       distance = std::min(distance, linkage.getNearest().distance);
     return distance;
   };
-  const auto getMargin = [](const Solution& solution) {
-    return solution.motion.problem_options.limits.dead_point_margin;
-  };
+  const auto getLimits = [](const Solution& solution) { return solution.motion.problem_options.limits; };
   const Solution apart = solve(makeMotion(model, request));
   REQUIRE(apart.converged());
   CHECK(findNearest(apart) > kNearDeadPoint);
   CHECK(findNearest(apart) < 1.3 * kNearDeadPoint);
-  CHECK(getMargin(apart) > LimitOptions().dead_point_margin);
+  CHECK(getLimits(apart).dead_point_margin == LimitOptions().dead_point_margin);
+  REQUIRE(!getLimits(apart).dead_point_margins.empty());
+  for (const auto& [linkage, margin] : getLimits(apart).dead_point_margins)
+    CHECK(margin > LimitOptions().dead_point_margin);
   // Who asks for less than the default gets it.
   ProblemOptions nearer;
   nearer.limits.dead_point_margin = 0.14;
   const Solution near = solve(makeMotion(model, request, nearer));
   REQUIRE(near.converged());
   CHECK(findNearest(near) < 0.5 * kNearDeadPoint);
-  CHECK(getMargin(near) == 0.14);
+  CHECK(getLimits(near).dead_point_margin == 0.14);
+  CHECK(getLimits(near).dead_point_margins.empty());
   CHECK(apart.summary.iterations > near.summary.iterations);
   CHECK(apart.summary.cost < 1.02 * near.summary.cost);
 }

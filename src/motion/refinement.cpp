@@ -95,7 +95,8 @@ double findMargin(const Linkage& linkage, const Model& model, const MatrixXd& q,
 // By linkage, the margins with which they would keep kNearDeadPoint from the dead points that they come nearer to.
 std::map<std::string, double> findMargins(const Motion& motion, const MotionRecord& record) {
   const Model& model = motion.problem->model();
-  constexpr double kReserve = 1.05, kDigits = 1e3;  // mirror images have the same margin
+  constexpr double kReserve = 1.05;  // other ways to the dead point are shorter
+  constexpr double kGrid = 0.05;     // the same optimum wherever a solve began, the same margin for mirror images
   std::map<std::string, double> margins;
   for (const Linkage& linkage : listLinkages(model, motion.problem->initialState().head(model.nq()))) {
     VectorXd shares(record.q.rows());
@@ -107,8 +108,8 @@ std::map<std::string, double> findMargins(const Motion& motion, const MotionReco
     for (Eigen::Index k = 1; k + 1 < shares.size(); ++k)
       if (shares[k] <= shares[k - 1] && shares[k] < shares[k + 1])
         margin = std::max(margin, findMargin(linkage, model, record.q, shares, k));
-    margin = std::round(kReserve * margin * kDigits) / kDigits;
-    if (margin > 0 && margin < 1) margins[linkage.output] = margin;
+    const double needed = kReserve * margin;
+    if (needed > 0 && needed < 1) margins[linkage.output] = std::min(std::ceil(needed / kGrid) * kGrid, 1 - kGrid);
   }
   return margins;
 }
@@ -162,6 +163,7 @@ std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const Moti
   ProblemOptions problem = solved.problem_options;
   LimitOptions& limits = problem.limits;
   if (!limits.enforced || limits.dead_point_margin < LimitOptions().dead_point_margin) return {};
+  if (!limits.dead_point_margins.empty()) return {};
   if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
   for (const auto& [linkage, margin] : findMargins(solved, record))
     if (margin > limits.dead_point_margin) limits.dead_point_margins[linkage] = margin;

@@ -207,7 +207,7 @@ class RequestSolver {
       }
       solver.acceptable_decrease = again.acceptable_decrease = 0;  // costs of other objectives fall slowly all the way
     }
-    Solution solution = solveAlone(motion_, solver, observer_.motion, std::move(start));
+    Solution solution = solveApart(solver, again, std::move(start));
     MotionRecord record = makeRecord(solution.motion, solution.trajectory);
     if (!solution.converged()) {
       if (solution.summary.termination != FddpTermination::Interrupted)
@@ -218,14 +218,39 @@ class RequestSolver {
     if (refined) improve(refined->motion, refined->start, again, "with stages half as long", solution, record);
     if (const auto apart = avoidDeadPoints(refined ? refined->motion : solution.motion, record))
       improve(*apart, {apart->guess}, from_guess, "with linkages farther from dead points", solution, record);
-    const auto apart = options_.keep_apart ? keepFromDeadPoints(solution.motion, record) : std::nullopt;
-    if (apart) keepApart(*apart, again, solution, record);
+    if (options_.keep_apart && !(apart_ && solution.motion.problem == motion_.problem))
+      if (const auto apart = keepFromDeadPoints(solution.motion, record)) keepApart(*apart, again, solution, record);
     refuseLongStages(record, solution);
     if (!refined && solution.converged()) warnOfMovingSoles(solution, record);
     return solution;
   }
 
  private:
+  // Looks at dead points as soon as the course of the motion is clear: a motion that is solved again needs no end.
+  Solution solveApart(const FddpOptions& solver, const FddpOptions& again, StartingPoint start) {
+    constexpr double kClear = 0.01;  // violation and gaps
+    const auto& callback = observer_.motion.callback;
+    bool looks =
+        options_.keep_apart && !motion_.cycle && motion_.problem_options.objective.objective != Objective::PeakTorque;
+    FddpObserver observer = observer_.motion;
+    observer.callback = [&](const FddpIteration& line, const ShootingTrajectory& nodes) {
+      if (callback && callback(line, nodes) == FddpAction::Stop) return FddpAction::Stop;
+      if (!looks || line.violation > kClear || line.gap > kClear) return FddpAction::Continue;
+      looks = false;
+      apart_ = keepFromDeadPoints(motion_, makeRecord(motion_, nodes));
+      return apart_ ? FddpAction::Stop : FddpAction::Continue;
+    };
+    Solution solution = solveAlone(motion_, solver, observer, std::move(start));
+    if (!apart_) return solution;
+    MotionRecord record = makeRecord(motion_, solution.trajectory);
+    keepApart(*apart_, again, solution, record);
+    if (solution.converged()) return solution;
+    tell("going on without");
+    Solution rest = solveAlone(motion_, again, observer_.motion, {solution.trajectory, solution.multipliers});
+    rest.summary = addUp(solution.summary, std::move(rest.summary));
+    return rest;
+  }
+
   // Of stages that are not halved: those of a given length, of sequences, free durations and the least peak torque.
   void warnOfMovingSoles(const Solution& solution, const MotionRecord& record) const {
     const double moved = observer_.warn && record.has_midpoints ? calcSoleMotion(solution.motion, record) : 0;
@@ -293,7 +318,7 @@ class RequestSolver {
 
   // Solves a motion in place of one that comes near dead points, and takes it if it converges and its stages are no worse.
   void keepApart(const RefinedMotion& apart, FddpOptions solver, Solution& solution, MotionRecord& record) const {
-    constexpr int kMostIterations = 100;  // it begins at a solution
+    constexpr int kMostIterations = 60;  // it begins at a solution
     std::string margins;
     for (const auto& [linkage, margin] : apart.motion.problem_options.limits.dead_point_margins)
       margins += (margins.empty() ? "" : "; ") + linkage + " " + formatNumber(margin, "%.2g");
@@ -354,6 +379,7 @@ class RequestSolver {
   }
 
   Motion motion_;
+  std::optional<RefinedMotion> apart_;  // what solveApart() has tried
   const SolveOptions& options_;
   const SolveObserver& observer_;
 };
