@@ -44,6 +44,7 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments, int num_t
   for (Track& track : tracks_) {
     track.start.setZero(largest);
     track.arrival.setZero(largest);
+    track.arrived.setZero(problem.stateSize());
   }
   groups_.resize((num_tracks + size - 1) / size);
   for (Group& group : groups_) {
@@ -54,7 +55,7 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments, int num_t
     group.moved.reserve(size);
   }
   for (VectorXd* x : {&joint_gap_, &joint_slope_, &shift_}) x->setZero(largest);
-  state_.setZero(problem.stateSize());
+  arrivals_.reserve(num_tracks);
   control_.setZero(most_controls);
   seconds_ = search_seconds_ = 0;
 }
@@ -292,7 +293,8 @@ void Rollout::updateGaps(const RolloutInput& input, int num_tracks, Trial& trial
       trial.gap_max = std::max(trial.gap_max, rest * gap.lpNorm<Eigen::Infinity>());
     }
   }
-  trial.ok &= std::isfinite(trial.merit) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
+  trial.ok = std::isfinite(trial.merit) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
+  if (trial.ok) checkArrivals(input, num_tracks, trial);
 }
 
 // The gap between two segments, and its contribution to Eq. (8).
@@ -310,20 +312,29 @@ void Rollout::addJointGap(const RolloutInput& input, double rest, const Track& b
   trial.closing_cost += slope.dot(gap);
   slope.noalias() = value.Vxx * gap;
   trial.closing_cost += 0.5 * slope.dot(gap);
-  if (!hasArrived(input, before, trial)) {
-    trial.ok = false;
-    trial.failed_node = before.end;
-    trial.failure = "a step in segments leads beyond the range of the coordinates about the iterate";
-  }
 }
 
-bool Rollout::hasArrived(const RolloutInput& input, const Track& track, const Trial& trial) {
-  const int k = track.end;
-  const VectorXd& arrived = getEvaluation(input, track, k - 1)->x_next;
-  if ((arrived - trial.nodes.xs[k]).lpNorm<Eigen::Infinity>() <= kFar) return true;
-  IntegrateTask task{k, input.evaluations.getIterate()[k].get(), &track.arrival, &state_};
-  input.problem.integrate(&task, 1, input.evaluations.getScratch(0));
-  return (arrived - state_).lpNorm<Eigen::Infinity>() <= kSame;
+void Rollout::checkArrivals(const RolloutInput& input, int num_tracks, Trial& trial) {
+  arrivals_.clear();
+  for (int s = 0; s + 1 < num_tracks; ++s) {
+    Track& track = tracks_[s];
+    const VectorXd& arrived = getEvaluation(input, track, track.end - 1)->x_next;
+    if ((arrived - trial.nodes.xs[track.end]).lpNorm<Eigen::Infinity>() <= kFar) continue;
+    arrivals_.push_back({track.end, input.evaluations.getIterate()[track.end].get(), &track.arrival, &track.arrived});
+  }
+  if (arrivals_.empty()) return;
+  input.problem.integrate(arrivals_.data(), static_cast<int>(arrivals_.size()), input.evaluations.getScratch(0));
+  for (int s = 0; s + 1 < num_tracks; ++s) {
+    const Track& track = tracks_[s];
+    const auto is = [&](const IntegrateTask& task) { return task.x_out == &track.arrived; };
+    if (std::none_of(arrivals_.begin(), arrivals_.end(), is)) continue;
+    const auto arrived = getEvaluation(input, track, track.end - 1)->x_next.array(), same = track.arrived.array();
+    // Entries up to their signs: quaternions may have either.
+    if ((arrived - same).abs().min((arrived + same).abs()).maxCoeff() <= kSame) continue;
+    trial.ok = false;
+    trial.failed_node = track.end;
+    trial.failure = "a step in segments leads beyond the range of the coordinates about the iterate";
+  }
 }
 
 }  // namespace bielle

@@ -66,6 +66,7 @@ class Rollout {
     std::string failure;
     VectorXd start;    // deviation at its first node
     VectorXd arrival;  // deviation of f of its last stage, if another segment starts there
+    VectorXd arrived;  // the state of that deviation
     int rolling = -1;  // the first of its two rolling evaluations; -1: it uses those of the trial
     void fail(int node, const std::string& reason) {
       failed_node = node;
@@ -92,8 +93,8 @@ class Rollout {
   void updateControl(const RolloutInput& input, int k, Trial& trial) const;
   void updateGaps(const RolloutInput& input, int num_tracks, Trial& trial);
   void addJointGap(const RolloutInput& input, double rest, const Track& before, const Track& after, Trial& trial);
-  // Whether the coordinates of what arrives at the end of a segment are those of that state, and of no other one.
-  bool hasArrived(const RolloutInput& input, const Track& track, const Trial& trial);
+  // Rejects a trial in which the coordinates of what arrives at the end of a segment are those of another state.
+  void checkArrivals(const RolloutInput& input, int num_tracks, Trial& trial);
   NodeEvaluation* getEvaluation(const RolloutInput& input, const Track& track, int node) const;
 
   int N_ = 0;
@@ -102,7 +103,8 @@ class Rollout {
   std::vector<Group> groups_;
   int num_segments_ = 0;  // of the last cut()
   bool rolling_ = false;
-  VectorXd joint_gap_, joint_slope_, shift_, control_, state_;
+  VectorXd joint_gap_, joint_slope_, shift_, control_;
+  std::vector<IntegrateTask> arrivals_;
   double seconds_ = 0, search_seconds_ = 0;
 };
 
