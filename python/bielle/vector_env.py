@@ -112,8 +112,8 @@ class VectorEnv:
         threads: int = 0,
         engine: str = "bielle",
     ) -> None:
-        if repeat < 1 or not duration > 0:
-            raise ValueError("repeat, duration: expected at least one period, and a positive number of seconds")
+        if repeat < 1 or not (period > 0 and duration > 0):
+            raise ValueError("repeat, period, duration: expected at least one period, and positive numbers of seconds")
         self.worlds = World(model, count=num_envs, ground=ground, time_step=time_step, threads=threads, engine=engine)
         self.model, self.num_envs, self.noise = model, num_envs, noise
         self.period, self.repeat, self.duration = period, repeat, duration
@@ -147,6 +147,13 @@ class VectorEnv:
             self._begin(where)
         return self._observe(), self._state._asdict()
 
+    def _fill(self, name: str, values: npt.ArrayLike) -> Array:
+        """One for each robot; a single one is that of all."""
+        array = np.array(values, dtype=float)
+        if array.shape not in ((), (self.num_envs,)):
+            raise ValueError(f"{name}: expected shape ({self.num_envs},), got {array.shape}")
+        return np.array(np.broadcast_to(array, (self.num_envs,)))
+
     def step(self, actions: npt.ArrayLike) -> Tuple[Array, Array, Mask, Mask, Dict[str, Any]]:
         """Observations, rewards, terminations, truncations, and as infos the arrays of the WorldState."""
         if not self._generators:
@@ -163,8 +170,8 @@ class VectorEnv:
             self._read()
         ended: Mask = self._state.ok == 0
         if self._termination is not None:
-            ended = ended | np.asarray(self._termination(self._state), dtype=bool)
-        rewards = np.array(self._reward(self._state, torques), dtype=float)
+            ended = ended | self._fill("termination", self._termination(self._state)).astype(bool)
+        rewards = self._fill("reward", self._reward(self._state, torques))
         late: Mask = (self._state.time > self.duration - 0.5 * self.period) & ~ended
         begin = self._over
         if begin.any():

@@ -418,3 +418,19 @@ def test_free_motion_in_two_worlds(tmp_path):
     summaries = bielle.simulate("fourbar", tmp_path, world="bielle,simbody", duration=0.2, no_report=True)
     assert [summary["outcome"] for summary in summaries.values()] == ["ended", "ended"]
     assert summaries["bielle"]["largest_gap"] < 1e-12
+
+
+def test_rewards_and_terminations_are_one_for_each_robot():
+    model = bielle.load_robot("fourbar").model
+    start = lambda generator: (model.standing(), np.zeros(model.nv))  # noqa: E731
+    for wrong, name in (({"reward": lambda state, torques: np.zeros(3)}, "reward"),
+                        ({"termination": lambda state: np.zeros(1, dtype=bool)}, "termination")):
+        env = bielle.VectorEnv(model, 2, **{"reward": lambda state, torques: 1.0, "start": start, **wrong})
+        env.reset(seed=1)
+        with pytest.raises(ValueError, match=f"{name}: expected shape \\(2,\\)"):
+            env.step(np.zeros((2, model.nu)))
+    env = bielle.VectorEnv(model, 2, lambda state, torques: 1.0, start=start)
+    env.reset(seed=1)
+    assert (env.step(np.zeros((2, model.nu)))[1] == [1, 1]).all()
+    with pytest.raises(ValueError, match="period"):
+        bielle.VectorEnv(model, 2, lambda state, torques: 1.0, period=-0.01)
