@@ -1,8 +1,8 @@
 """test_place.py BIELLE [rest]: motions do not depend on where on the ground a robot stands, nor on which way it faces: moved
 and turned, it has the same cost, the same torques and the moved trajectory, and is carried out likewise. However its stance is
 given: by the places of its feet, with or without their yaws or the place of its base, by a keyframe of MuJoCo's format, by angles alone, or
-by the origin of a floating joint of a URDF. A walk, and every way to give its stance to a squat; with `rest`, all other motions,
-other places, two levels, toes that are turned out, and terrain."""
+by the origin of a floating joint of a URDF; nor on where the frame of its base is. A walk, and every way to give its stance to a squat; with
+`rest`, all other motions, other places, two levels, toes that are turned out, and terrain."""
 import json
 import math
 import os
@@ -306,6 +306,50 @@ def check_terrain(where):
     assert "'foot_left' starts 0.04 m over the ground" in told and "'foot_right' starts" not in told, told
 
 
+def make_base(directory, rpy, at):
+    """rsu_biped with another base, on which its trunk is fixed."""
+    name = f"{directory}/biped"
+    run("convert", "rsu_biped", "-o", name)
+    with open(f"{name}/biped.urdf") as file:
+        urdf = file.read()
+    joint = (f'<link name="base"/><joint name="base_trunk" type="fixed"><parent link="base"/><child link="trunk"/>'
+             f'<origin xyz="{at[0]} {at[1]} {at[2]}" rpy="{rpy[0]!r} {rpy[1]!r} {rpy[2]!r}"/></joint></robot>')
+    write(f"{name}/biped.urdf", urdf.replace("</robot>", joint))
+    return name
+
+
+def check_bases(where, motion, arguments):
+    """Nothing depends on how the axes of the base are called, and hardly anything on where its frame is."""
+    quarter, results = math.pi / 2, []
+    here, beside, above = (0, 0, 0), (0.3, 0.5, -0.2), (0, 0, 0.575)  # the last one is on the ground
+    for i, (rpy, at) in enumerate([((0, 0, 0), here), ((0, 0, quarter), here), ((quarter, 0, 0), here), ((0, quarter, 0), here),
+                                   ((math.pi, 0, 0), here), ((-quarter, 0, quarter), beside), ((0, 0, 0), above)]):
+        robot = make_base(f"{where}/base-{i}", rpy, at)
+        assert "is assembled with" not in run("info", robot), rpy
+        result = solve(f"{where}/base-{i}", robot, motion, arguments)
+        run("simulate", result, "--duration", 0.8, "--threads", 1, "--no-report", "-o", f"{result}-done", status=(0, 3))
+        results.append((read(result), read(f"{result}-done")))
+        assert all(goal["met"] for goal in results[-1][0][0]["goals"]), results[-1][0][0]["goals"]
+        for (_, at_home), (_, moved) in zip(results[0], results[-1]):
+            joints, torques = np.abs(at_home["q"][:, 7:] - moved["q"][:, 7:]).max(), np.abs(at_home["u"] - moved["u"]).max()
+            print(f"{motion}, base turned by {rpy}, at {at}: joints {joints:.1e}, torques {torques:.1e}")
+            assert joints < (0.01 if any(at) else 1e-6) and torques < (2 if any(at) else 1e-5)
+
+
+def check_without_height(where):
+    """The legs decide how high the base is, by the angles that are given."""
+    robot = make_base(f"{where}/without-height", (0, 0, 0), (0, 0, 0))
+    with open(f"{robot}/biped.yaml") as file:
+        text = file.read()
+    text, count = re.subn(r"    joints:\n(?: {6}.*\n)+    height: .*\n", "    joints: {knee_left: 0.8, knee_right: 0.8}\n", text)
+    assert count == 1, text
+    write(f"{robot}/biped.yaml", text)
+    assert "is assembled with" not in run("info", robot)
+    run("solve", "squat", "--robot", robot, "--max-iterations", 1, "--no-check", "--no-report", "-o", f"{robot}/squat", status=(0, 1))
+    start = dict(zip(read(f"{robot}/squat")[1]["q_names"].tolist(), read(f"{robot}/squat")[1]["q"][0]))
+    assert abs(start["knee_left"] - 0.8) < 0.01 and start["root_joint.z"] > 0.55 and start["root_joint.qw"] > 0.999, start
+
+
 def main():
     known = run("simulate", "squat", "--world", "none", "-o", "none", status=(106, 105, 2))
     worlds = ["bielle"] + (["mujoco"] if "mujoco" in known else [])
@@ -319,12 +363,14 @@ def main():
         for way, make in WAYS.items():
             motion = "walk" if REST else "squat"
             check_motion(where, way, make, motion, MOTIONS[motion], [OTHERS[-1] if REST else PLACE], "--no-check")
+        check_bases(where, *(("turn", REST_OF_MOTIONS["turn"]) if REST else ("squat", MOTIONS["squat"])))
         if REST:
             check_motion(where, "feet", make_feet, "walk", MOTIONS["walk"], OTHERS + [PLACE], "--no-check")
             check_yaws(where)
             check_levels(where, worlds + ["simbody"])
             check_terrain(where)
         else:
+            check_without_height(where)
             check_free(where)
 
 

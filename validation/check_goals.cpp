@@ -83,13 +83,21 @@ class GoalMeter {
     return seconds;
   }
 
-  // From the quaternions of the free-flyer, q = (position, x y z w).
+  // From the quaternions of the free-flyer, q = (position, x y z w): by its axis x, or y where x stands upright at the start of the
+  // record.
   double measureTurn() const {
     require(context_.model().hasFreeFlyer(), "the robot's base does not turn");
+    const auto getAttitude = [this](int k) {
+      const Eigen::Vector4d r = context_.motion.record.q.row(k).segment<4>(3);
+      return Eigen::Quaterniond(r[3], r[0], r[1], r[2]).toRotationMatrix();
+    };
+    const Eigen::Matrix3d start = getAttitude(0);
+    const bool x_is_upright =
+        start(2, 2) <= 0.7 && std::abs(start(2, 0)) >= start.block<1, 2>(2, 1).cwiseAbs().maxCoeff();
     double turned = 0, before = 0;
     for (int k = goal_.first; k <= goal_.last; ++k) {
-      const Eigen::Vector4d r = context_.motion.record.q.row(k).segment<4>(3);
-      const double yaw = std::atan2(2 * (r[3] * r[2] + r[0] * r[1]), 1 - 2 * (r[1] * r[1] + r[2] * r[2]));
+      const Eigen::Vector3d ahead = getAttitude(k).col(x_is_upright ? 1 : 0);
+      const double yaw = std::atan2(ahead.y(), ahead.x());
       if (k > goal_.first) turned += std::remainder(yaw - before, 2 * kPi);
       before = yaw;
     }

@@ -8,6 +8,7 @@
 #include "bielle/motion/footsteps.h"
 #include "bielle/motion/serial_model.h"
 #include "bielle/results/result.h"
+#include "math/upright.h"
 #include "model/number_text.h"
 
 namespace bielle {
@@ -51,12 +52,15 @@ std::vector<GoalOutcome> measureGoals(const Model& model, const std::vector<Goal
   MotionTrack track;
   for (const ContactFrame& contact : model.contacts()) track.contacts.push_back(contact.name);
   Workspace ws(model);
+  SE3 upright;
   double time = 0;
   for (size_t k = 0; k < xs.size() && !goals.empty(); ++k) {
     updatePlacements(model, ws, xs[k].head(model.nq()));
     track.time.push_back(time);
     track.com.push_back(calcCom(model, ws));
-    track.heading.push_back(calcHeading(ws.X_WB[static_cast<size_t>(std::min(1, model.numBodies() - 1))]));
+    const SE3& base = ws.X_WB[static_cast<size_t>(std::min(1, model.numBodies() - 1))];
+    if (k == 0) upright.R = findUprightAxes(base.R.row(2));
+    track.heading.push_back(calcHeading(base * upright));
     track.feet.emplace_back();
     for (const ContactFrame& contact : model.contacts())
       track.feet.back().push_back(getPlacement(ws, contact.body, contact.X_BF));

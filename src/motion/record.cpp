@@ -10,6 +10,7 @@
 #include "dynamics/largest_gaps.h"
 #include "math/largest.h"
 #include "math/so3.h"
+#include "math/upright.h"
 #include "motion/record_tables.h"
 
 namespace bielle {
@@ -139,10 +140,13 @@ MotionTrack makeTrack(const Model& model, const MotionRecord& record) {
   track.time.assign(record.time.begin(), record.time.end());
   track.contacts = record.contact_names;
   Workspace ws(model);
+  SE3 upright;
   for (Eigen::Index k = 0; k < record.time.size(); ++k) {
     updatePlacements(model, ws, record.q.row(k).transpose());
     track.com.push_back(record.com.row(k));
-    track.heading.push_back(calcHeading(ws.X_WB[std::min(1, model.numBodies() - 1)]));
+    const SE3& base = ws.X_WB[std::min(1, model.numBodies() - 1)];
+    if (k == 0) upright.R = findUprightAxes(base.R.row(2));
+    track.heading.push_back(calcHeading(base * upright));
     track.feet.emplace_back();
     for (const ContactFrame& contact : model.contacts())
       track.feet.back().push_back(getPlacement(ws, contact.body, contact.X_BF));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/upright.h"
 #include "motion/motor_scale.h"
 
 namespace bielle {
@@ -14,26 +15,32 @@ bool hasSprings(const Model& model) {
 
 namespace {
 
-RobotSize calcSize(const Model& model, double height) {
-  if (!model.hasFreeFlyer() || hasSprings(model)) return {};
+// \param q  where it stands
+RobotSize calcSize(const Model& model, ConstVectorRef q, double height) {
+  RobotSize size;
+  if (!model.hasFreeFlyer()) return size;
+  const Eigen::Quaterniond base(q[6], q[3], q[4], q[5]);
+  size.upright = findUprightAxes(base.toRotationMatrix().row(2));
+  if (hasSprings(model)) return size;
   const double gravity = model.gravity().norm();
-  if (!(height > 0 && gravity > 0 && model.mass() > 0)) return {};
-  const double length = height / kReferenceHeight;
-  return {length, std::sqrt(length * kReferenceGravity / gravity),
-          model.mass() / kReferenceMass * gravity / kReferenceGravity * length};
+  if (!(height > 0 && gravity > 0 && model.mass() > 0)) return size;
+  size.length = height / kReferenceHeight;
+  size.time = std::sqrt(size.length * kReferenceGravity / gravity);
+  size.torque = model.mass() / kReferenceMass * gravity / kReferenceGravity * size.length;
+  return size;
 }
 
 }  // namespace
 
 RobotSize calcRobotSize(const Model& model, const Stance& stance) {
-  return calcSize(model, stance.com.z() - stance.middle.p.z());
+  return calcSize(model, stance.q, stance.com.z() - stance.middle.p.z());
 }
 
 RobotSize calcRobotSize(const Model& model, const StandingRobot& standing) {
   if (standing.contacts.empty()) return {};
   double sole = 0;
   for (const SE3& contact : standing.contacts) sole += contact.p.z() / static_cast<double>(standing.contacts.size());
-  return calcSize(model, standing.com.z() - sole);
+  return calcSize(model, standing.q, standing.com.z() - sole);
 }
 
 void scaleWeights(const RobotSize& size, MotionOptions& o) {
@@ -59,6 +66,9 @@ VectorXd makeControlWeights(const Model& model, const RobotSize& size) {
 
 void scaleStateWeights(const Model& model, const RobotSize& size, VectorXd& weights) {
   const int nv = model.nv();
+  if (model.hasFreeFlyer())
+    for (int part : {0, 3, nv, nv + 3})
+      weights.segment<3>(part) = Vector3d(size.upright.cwiseAbs() * weights.segment<3>(part));
   for (const Joint& joint : model.joints()) {
     const int linear = joint.kind == JointKind::FreeFlyer   ? 3
                        : joint.kind == JointKind::Planar    ? 2

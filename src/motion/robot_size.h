@@ -13,6 +13,7 @@ namespace bielle {
 /// L, T and M G L relative to the reference robot.
 struct RobotSize {
   double length = 1, time = 1, torque = 1;
+  Matrix3d upright = Matrix3d::Identity();  ///< findUprightAxes() of the base where it stands
 
   double velocity() const { return length / time; }
   double force() const { return torque / length; }
@@ -22,7 +23,7 @@ struct RobotSize {
 inline constexpr double kReferenceHeight = 0.432282447583715, kReferenceMass = 25.6760512, kReferenceGravity = 9.81;
 
 /// From the height of the centre of mass over the contacts, the mass and the gravity. It is that of the reference robot where one of
-/// them is missing, for legs on a rail, whose motors do not carry a whole robot, and for robots with springs.
+/// them is missing, for legs on a rail, whose motors do not carry a whole robot, and for robots with springs; but for `upright`.
 RobotSize calcRobotSize(const Model& model, const StandingRobot& standing);
 RobotSize calcRobotSize(const Model& model, const Stance& stance);
 
@@ -36,7 +37,8 @@ void scaleWeights(const RobotSize& size, LocomotionOptions& options);
 /// Weights of the squares of motor torques, nu; the force of a linear motor counts as its torque about an arm of kScrewArm.
 VectorXd makeControlWeights(const Model& model, const RobotSize& size = {});
 
-/// Scales the weights of a state cost, of the tangents of q and v, 2 nv.
+/// Scales the weights of a state cost, of the tangents of q and v, 2 nv. Those of a free base are given for one that stands with x
+/// ahead and z up, and go to the axes of the robot's that are so, or nearest to it.
 void scaleStateWeights(const Model& model, const RobotSize& size, VectorXd& weights);
 
 }  // namespace bielle

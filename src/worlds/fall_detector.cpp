@@ -49,11 +49,16 @@ std::string FallDetector::find(double time, double plan_time, const VectorXd& q)
   };
   const Vector3d up = getUp(q), planned_up = getUp(q_);
   const double tilt = std::atan2(up.cross(planned_up).norm(), up.dot(planned_up));
-  const double height = (p.z() - ground_.find(p.x(), p.y()).height) /
-                        (planned.z() - planned_ground_.find(planned.x(), planned.y()).height);
+  const double height = calcHeight(q, ground_) / calcHeight(q_, planned_ground_);
   if (!(tilt <= criterion_.tilt)) return "the trunk leans far from its planned attitude at " + formatTime(time);
   if (!(height >= criterion_.height)) return "the trunk is far below its planned height at " + formatTime(time);
   return {};
+}
+
+double FallDetector::calcHeight(const VectorXd& q, const Terrain& ground) const {
+  const Eigen::Quaterniond attitude(q[6], q[3], q[4], q[5]);
+  const Vector3d p = q.head<3>() + attitude * model_.bodies()[1].inertia.com;
+  return p.z() - ground.find(p.x(), p.y()).height;
 }
 
 double FallDetector::calcDeviation(const Joint& joint, const VectorXd& q) const {

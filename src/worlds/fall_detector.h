@@ -11,7 +11,7 @@ namespace bielle::worlds {
 
 /// When a robot counts as fallen: its trunk (the body of the first joint)
 /// - leans by more than `tilt` from its planned attitude, whatever its heading, or
-/// - is less than `height` times as high over the ground as planned at that time,
+/// - has its centre of mass less than `height` times as high over the ground as planned at that time,
 /// or a revolute joint is more than `joint` away from its planned angle: a leg that whirls about carries nothing.
 struct FallCriterion {
   double tilt = 0.8;    ///< rad
@@ -40,6 +40,8 @@ class FallDetector {
   const Joint* findStrayJoint(const VectorXd& q);
   bool followsBack(const VectorXd& q);
   double calcDeviation(const Joint& joint, const VectorXd& q) const;
+  // Of the centre of mass of the trunk over the ground below it: its frame may be anywhere.
+  double calcHeight(const VectorXd& q, const Terrain& ground) const;
 
   Model model_;
   const Policy& plan_;

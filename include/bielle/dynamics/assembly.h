@@ -72,8 +72,8 @@ AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const As
 AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions& options = {});
 
 /// The assembly problem of a reference of the robot's file: preferred joint values, feet flat at their places, height.
-/// A free base that the reference does not give is drawn over the middle of the feet, upright, and faces as they do in the
-/// mean, so that the posture does not depend on where the robot stands. A foot without a yaw is free to turn about the
+/// A free base that is not given is over the middle of the feet, upright (by right angles, as its soles on unbent legs are), and
+/// faces as they do, so that the posture does not depend on where the robot stands. A foot without a yaw is free to turn about the
 /// vertical where an angle but 0 of a joint of its leg about the vertical is given; else it faces as the base does, where
 /// that is given, or else as the robot has to turn for its feet to lie as near as possible to their places (two: across or
 /// along the line between them; more: a fit in the plane, in the least-squares sense; a single foot faces x).
