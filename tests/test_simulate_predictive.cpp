@@ -125,21 +125,23 @@ TEST_CASE("simulate: on leaf springs a robot stands where it is for as long as i
   }
 }
 
-TEST_CASE("simulate: predictive control repeats a cycle, at its speed") {
+TEST_CASE("simulate: a cycle is repeated, at its speed, and stands") {
   const Scratch scratch;
   const std::string plan = (scratch.path / "cycle").string(), output = (scratch.path / "walked").string();
   REQUIRE(runCommand({BIELLE_COMMAND, "solve", "walk", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--speed", "0.4",
                       "--periodic", "-o", plan, "--quiet", "--no-report", "--no-check"})
               .status == 0);
-  const CommandResult result =
-      runCommand({BIELLE_COMMAND, "simulate", plan, "--control", "mpc", "-o", output, "--summary-only"});
-  CAPTURE(result.out, result.err);
-  CHECK(result.status == 0);
-  const nlohmann::json summary = parseSummary(output);
-  const double period = parseSummary(plan)["periodic"]["period_s"];
-  CHECK(summary["duration"].get<double>() == Approx(10 * period).margin(0.002));
-  CHECK(summary["distance"].get<double>() == Approx(10 * 0.4 * period).epsilon(0.02));
-  CHECK(summary["largest_deviation"].get<double>() < 0.02);
+  for (const std::string control : {"mpc", "gains"}) {
+    const CommandResult result =
+        runCommand({BIELLE_COMMAND, "simulate", plan, "--control", control, "-o", output, "--summary-only"});
+    CAPTURE(result.out, result.err);
+    CHECK(result.status == 0);
+    const nlohmann::json summary = parseSummary(output);
+    const double period = parseSummary(plan)["periodic"]["period_s"];
+    CHECK(summary["duration"].get<double>() == Approx(10 * period).margin(0.002));
+    CHECK(summary["distance"].get<double>() == Approx(10 * 0.4 * period).epsilon(0.02));
+    CHECK(summary["largest_deviation"].get<double>() < 0.02);
+  }
 }
 
 TEST_CASE("simulate: predictive control is the default, and gains where it cannot carry a motion out") {

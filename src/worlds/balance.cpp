@@ -13,6 +13,7 @@ namespace {
 constexpr double kTimeConstants = 3;    // for which a robot that stands was at rest or over its support
 constexpr double kCarriedShare = 0.25;  // of the weight, of a sole that carries
 constexpr double kTurnedOver = 0.2;     // of such a sole, rad: what lets go turns by less (describeFeet())
+constexpr double kLate = 0.25;          // of a time constant, by which a foot may land late
 constexpr double kRest = 1e-6;          // kinetic energy of a robot at rest, of m |g| z
 
 }  // namespace
@@ -109,7 +110,8 @@ void Balance::findSupport(double plan_time, const std::vector<PredictedFoothold>
       addSole(contact, *awaited);
     } else if (!foreseen.empty()) {
       for (const PredictedFoothold& other : foreseen) addStepAfter(contact, other);
-    } else if (const ContactTarget* landing = findLanding(contact, plan_time)) {
+    } else if (const ContactTarget* landing =
+                   findLanding(contact, world_.feet()[c].touches ? plan_time : plan_time - kLate * tau_)) {
       addSole(contact, landing->X_WT);
     }
   }
