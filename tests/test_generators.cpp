@@ -282,6 +282,12 @@ TEST_CASE("files that name a generator: parameters by number and choice, a fixed
   CHECK_THAT(geared.warnings[0],
              Catch::Contains("geared.yaml: key 'motors': it replaces that of the robot: left out are") &&
                  Catch::Contains("hipy_left") && !Catch::Contains("hipz_left"));
+  files.write("toes/toes.yaml",
+              "model: ../mine\nreferences:\n  half_sitting: {joints: {hipz_left: 0.3, hipz_right: -0.3}}\n");
+  const LoadedRobot toes = loadRobot(files.path() + "/toes");
+  REQUIRE_FALSE(toes.warnings.empty());
+  CHECK_THAT(toes.warnings[0], Catch::Contains("toes.yaml: reference 'half_sitting': it replaces that of the robot") &&
+                                   Catch::Contains("knee_left") && Catch::Contains("its height, its feet"));
 }
 
 TEST_CASE("writer: robots that were read are written and read again") {

@@ -27,6 +27,24 @@ void warnOfLost(const char* key, const std::vector<Spec>& own, const std::vector
                             listItems(lost));
 }
 
+// A reference replaces that of its name as a whole, though a file may give one angle of it.
+void warnOfLostAngles(const std::vector<Reference>& own, const std::vector<Reference>& former, YamlFile& yaml) {
+  for (const Reference& reference : own)
+    for (const Reference& other : former) {
+      if (other.name != reference.name) continue;
+      std::vector<std::string> lost;
+      for (const auto& [joint, q] : other.joints)
+        if (!reference.joints.count(joint) && std::any_of(q.begin(), q.end(), [](double x) { return x != 0; }))
+          lost.push_back(joint);
+      if (!other.height_frame.empty() && reference.height_frame.empty()) lost.push_back("its height");
+      if (!other.feet.empty() && reference.feet.empty()) lost.push_back("its feet");
+      if (!lost.empty())
+        yaml.warnings.push_back(yaml.path + ": reference '" + reference.name +
+                                "': it replaces that of the robot: left out are " + listItems(lost) +
+                                "; give them as well, or another name");
+    }
+}
+
 // Keys of the file that completes a robot take precedence over what the robot's own files say.
 void complete(const YamlFile& own, YamlFile& yaml) {
   const auto replace = [](const auto& from, auto& to) {
@@ -52,6 +70,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   yaml.joint_forces.insert(yaml.joint_forces.end(), own.joint_forces.begin(), own.joint_forces.end());
   replace(own.point_springs, yaml.point_springs);
   replace(own.contacts, yaml.contacts);
+  warnOfLostAngles(own.references, yaml.references, yaml);
   replace(own.references, yaml.references);
   replace(own.serial_joints, yaml.serial_joints);
   replace(own.importance, yaml.importance);

@@ -195,7 +195,14 @@ void readFrames(const Entry& map, YamlFile& file) {
     const Fields fields = entry.getFields(kFrameKeys);
     FrameSpec frame{name, require(fields, "link", entry).getText(), {}};
     if (const Entry* place = find(fields, "place")) frame.X_LF.p = place->getVector3();
-    if (const Entry* rpy = find(fields, "rpy")) frame.X_LF.R = makeRotation(rpy->getVector3());
+    if (const Entry* rpy = find(fields, "rpy")) {
+      constexpr double kTurn = 6.2832;  // rad
+      const Vector3d angles = rpy->getVector3();
+      frame.X_LF.R = makeRotation(angles);
+      if (angles.cwiseAbs().maxCoeff() > kTurn)
+        file.warnings.push_back(file.path + ": frame '" + name +
+                                "': an angle of its rpy is more than a turn; give radians if degrees were meant");
+    }
     file.frames.push_back(frame);
   }
 }
