@@ -127,7 +127,8 @@ def check_pushes(place):
     assert abs(frames - 1 - 50 * stood["duration_s"]) < 1, frames
     assert os.path.exists(os.path.join(place, "squats", stood["files"]["mcap"]))
     for change, problem in ((("[mjlab, mcap]", "[problem]"), "is no problem"), (("mcap]", "amp]\nisaac_lab: 4"), "no version of Isaac Lab"),
-                            (("hold: 0.1", "live: true"), "cannot be set")):
+                            (("hold: 0.1", "live: true"), "cannot be set"), (("hold: 0.1", "play: foo=1"), "key 'play'"),
+                            (("t=0.2,impulse=2", "t=0.7,impulse=2"), "is over at 0.8 s, but the simulation ends at 0.7 s")):
         refused = run(place, PUSHED.replace(*change), status=2)
         assert problem in refused.stderr, (change, refused.stderr)
 

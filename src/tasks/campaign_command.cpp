@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <optional>
-#include <regex>
 #include <set>
 
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/results/result.h"
 #include "bielle/robots/robot_loader.h"
+#include "model/listing.h"
 #include "model/number_text.h"
 #include "tasks/cells.h"
 #include "tasks/dry_run.h"
@@ -105,34 +105,15 @@ std::vector<std::string> CampaignCommands::make(const CampaignCell& cell, const 
 
 namespace {
 
-// When a motion ends, s, unless it goes on as long as is asked, and the number of its phases.
-struct MotionLength {
-  std::optional<double> end;
-  int phases = 0;
-};
-
-// Of a motion that is not solved yet, from the output of its dry run.
-MotionLength readPlanned(const std::string& log) {
-  std::ifstream file(log);
-  for (std::string line; std::getline(file, line);) {
-    std::smatch found;
-    if (!std::regex_match(line, found,
-                          std::regex("planned: (\\d+) phases, \\d+ stages, (\\S+) s( at most)?(, a cycle)?")))
-      continue;
-    return {found[4].matched ? std::nullopt : parseNumber(found[2].str()), std::stoi(found[1].str())};
-  }
-  return {};
-}
-
-MotionLength readSolved(const std::string& directory) {
+PlannedMotion readSolved(const std::string& directory) {
   const MotionRecord record = readResultRecord(directory);
-  MotionLength length{{}, static_cast<int>(readSummary(directory).phases.size())};
+  PlannedMotion length{{}, static_cast<int>(readSummary(directory).phases.size())};
   if (record.cycle.size() == 0 && record.time.size() > 0) length.end = record.time[record.time.size() - 1];
   return length;
 }
 
 // As calcPhaseTime() will find.
-void checkPushPhases(const CampaignSpec& spec, const std::vector<MotionLength>& lengths) {
+void checkPushPhases(const CampaignSpec& spec, const std::vector<PlannedMotion>& lengths) {
   const CampaignAxis* phases = findAxis(spec, Kind::PushPhase);
   for (size_t m = 0; phases && m < lengths.size(); ++m)
     for (const std::string& value : phases->values)
@@ -141,7 +122,7 @@ void checkPushPhases(const CampaignSpec& spec, const std::vector<MotionLength>& 
 }
 
 // Pushes that are not over when the simulation ends, which `bielle simulate` refuses, before any motion is solved for them.
-void checkPushTimes(const CampaignSpec& spec, const std::vector<MotionLength>& lengths,
+void checkPushTimes(const CampaignSpec& spec, const std::vector<PlannedMotion>& lengths,
                     std::set<std::string>& warnings) {
   constexpr double kHold = 1, kPush = 0.1, kSlack = 1e-6;  // s, unless they are given (worlds/execution.h)
   const CampaignAxis* times = findAxis(spec, Kind::PushTime);
@@ -201,11 +182,27 @@ void checkRobots(const CampaignSpec& spec) {
   }
 }
 
+// By which a dry run knows what options may name; "" of results that do not have it.
+std::string findRobot(const CampaignMotion& motion) {
+  if (!motion.solve.empty()) return motion.robot;
+  const std::string robot = motion.directory + "/mechanism.urdf";
+  return std::filesystem::exists(robot) ? robot : "";
+}
+
+// The part of a push that a complaint is about.
+const CampaignAxis& findPushed(const CampaignSpec& spec, const std::string& complaint, const CampaignAxis& otherwise) {
+  for (const auto& [kind, name] : {std::pair(Kind::PushTime, "time"), std::pair(Kind::PushDirection, "direction"),
+                                   std::pair(Kind::PushDuration, "duration"), std::pair(Kind::PushImpulse, "impulse")})
+    if (complaint.find(": its " + std::string(name)) != std::string::npos)
+      if (const CampaignAxis* axis = findAxis(spec, kind)) return *axis;
+  return otherwise;
+}
+
 }  // namespace
 
 bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const std::string& simulate,
                    const std::string& log, std::set<std::string>& warnings) {
-  std::vector<MotionLength> lengths;
+  std::vector<PlannedMotion> lengths;
   for (const CampaignMotion& motion : spec.motions) {
     if (motion.solve.empty()) {
       lengths.push_back(readSolved(motion.directory));
@@ -218,18 +215,23 @@ bool checkCommands(const CampaignSpec& spec, const std::string& bielle, const st
     const std::optional<std::string> complaint = findComplaint(command, log, told);
     if (!complaint) return false;
     if (!complaint->empty()) refuse("solve " + motion.solve[1], *complaint, motion.options, *motion.entry);
-    lengths.push_back(readPlanned(log));
+    lengths.push_back(readPlannedMotion(log));
   }
   const CampaignCommands commands(spec, {});
   const std::string impulse = spec.search ? formatImpulse(*spec.search, 1) : "";
-  std::set<std::vector<std::string>> tried;  // cells may differ in nothing that options are made of, as in the motion
+  std::set<std::pair<std::string, std::vector<std::string>>>
+      tried;  // cells may differ in nothing else, as in the motion
   const auto check = [&](const CampaignCell& cell, const CampaignAxis& varied) {
     const std::vector<std::string> arguments = commands.make(cell, impulse);
-    if (!tried.insert(arguments).second) return true;
+    if (!tried.emplace(findRobot(spec.motions[cell[0]]), arguments).second) return true;
     std::vector<std::string> command = {simulate, "motion", "-o", "none", "--summary-only"};
     command.insert(command.end(), arguments.begin(), arguments.end());
+    const std::string robot = findRobot(spec.motions[cell[0]]);
+    if (!contains(arguments, std::string("--robot")) && !robot.empty())
+      command.insert(command.end(), {"--robot", robot});
     const std::optional<std::string> complaint = findComplaint(command, log, warnings);
-    if (complaint && !complaint->empty()) refuse("simulate", *complaint, listOptions(spec), varied.entry);
+    if (complaint && !complaint->empty())
+      refuse("simulate", *complaint, listOptions(spec), findPushed(spec, *complaint, varied).entry);
     return complaint.has_value();
   };
   const CampaignCell base(spec.axes.size(), 0);

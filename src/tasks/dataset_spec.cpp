@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <initializer_list>
 #include <map>
+#include <regex>
 #include <set>
 
 #include "bielle/formats/reader.h"
@@ -223,6 +224,36 @@ DatasetSpec readDatasetSpec(const std::string& path) {
   return spec;
 }
 
+namespace {
+
+// As `bielle simulate` does when the motion is solved.
+void requirePushesToEnd(const DatasetTrial& trial, const PlannedMotion& planned) {
+  constexpr double kSlack = 1e-6;  // s
+  double duration = 0, hold = 1;   // s, unless they are given (worlds/execution.h)
+  for (const auto& [name, value] : trial.motion.simulate) {
+    if (name == "duration") duration = parseNumber(value).value_or(0);
+    if (name == "hold") hold = parseNumber(value).value_or(hold);
+  }
+  if (duration == 0 && !planned.end) return;
+  const double end = duration > 0 ? duration : *planned.end + hold;
+  for (const auto& [name, value] : trial.motion.simulate) {
+    std::smatch time, length;
+    if (name != "push" || !std::regex_search(value, time, std::regex("(?:^|,)t=([^,]+)"))) continue;
+    const bool is_given = std::regex_search(value, length, std::regex("(?:^|,)duration=([^,]+)"));
+    const double over =
+        parseNumber(time[1].str()).value_or(0) + (is_given ? parseNumber(length[1].str()).value_or(0) : 0.1);
+    const auto entry = std::find_if(trial.simulate.begin(), trial.simulate.end(),
+                                    [](const auto& option) { return option.first == "push"; });
+    if (over > end + kSlack)
+      (entry == trial.simulate.end() ? trial.varied : entry->second)
+          .fail("'" + value + "' is over at " + formatExact(over) + " s, but the simulation ends at " +
+                    formatExact(end) + " s",
+                "give an earlier time, or a longer `duration` or `hold` beside it");
+  }
+}
+
+}  // namespace
+
 bool checkDataset(const DatasetSpec& spec, const std::string& bielle, const std::string& simulate,
                   const std::string& log) {
   std::set<std::vector<std::string>> tried;
@@ -241,7 +272,10 @@ bool checkDataset(const DatasetSpec& spec, const std::string& bielle, const std:
     const std::vector<std::vector<std::string>> steps = makeDatasetCase(trial.motion, trial.motion.robot).steps;
     if (!check(bielle, steps[0], "solve " + trial.motion.motion, trial.options, trial.varied)) return false;
     if (steps.size() < 2) continue;
-    const std::vector<std::string> arguments(steps[1].begin() + 1, steps[1].end());  // without the command
+    const PlannedMotion planned = readPlannedMotion(log);
+    std::vector<std::string> arguments(steps[1].begin() + 1, steps[1].end());  // without the command
+    arguments.insert(arguments.end(), {"--robot", trial.motion.robot});
+    requirePushesToEnd(trial, planned);
     if (!check(simulate, arguments, "simulate", trial.simulate, trial.varied)) return false;
   }
   return true;

@@ -15,10 +15,17 @@ namespace bielle::tasks {
 std::optional<std::string> findComplaint(std::vector<std::string> command, const std::string& log,
                                          std::set<std::string>& warnings);
 
+/// What the output of a dry run of `bielle solve` tells of its motion.
+struct PlannedMotion {
+  std::optional<double> end;  ///< s, unless it goes on as long as is asked
+  int phases = 0;
+};
+PlannedMotion readPlannedMotion(const std::string& log);
+
 /// Options of a program by their names without dashes, where a file sets them.
 using OptionEntries = std::vector<std::pair<std::string, YamlEntry>>;
 
-/// \throws InputError at the option that a complaint names by its flag, or else at `other`. \param command  e.g. "solve walk"
+/// \throws InputError at the option that a complaint names first by its flag, or by its value, or else at `other`. \param command  e.g. "solve walk"
 [[noreturn]] void refuse(const std::string& command, const std::string& complaint, const OptionEntries& options,
                          const YamlEntry& other);
 

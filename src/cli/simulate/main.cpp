@@ -43,8 +43,16 @@ std::string chooseControl(SimulateArguments& arguments) {
   return "mpc cannot carry out motions solved with --formulation full";
 }
 
-// Options of free motions alone.
+bool isMotion(const std::string& name) {
+  const std::vector<MotionEntry>& motions = getMotions();
+  return std::any_of(motions.begin(), motions.end(), [&](const MotionEntry& motion) { return motion.name == name; });
+}
+
+// Options of free motions, and of motions that are solved first, alone.
 void requirePlan(const SimulateArguments& arguments) {
+  if (arguments.robot.empty() || (arguments.dry_run && !isMotion(arguments.directory)))
+    if (const auto flag = findGiven(arguments, {"speed", "set", "command"}))
+      throw InputError("", *flag, "a solved motion has its own", "give --robot and the name of a motion");
   if (const auto flag = findGiven(arguments, {"posture", "state", "torques", "push_body", "spring"}))
     throw InputError("", *flag, "a motion has its own start and torques", "leave it out, or give a robot alone");
   if (arguments.world.find(',') != std::string::npos)
@@ -60,11 +68,7 @@ void requireSerial(const SimulateArguments& arguments) {
 
 // The motion solved before or, where a robot is given, the motion of that name.
 Plan obtainPlan(const SimulateArguments& arguments) {
-  if (arguments.robot.empty()) {
-    if (const auto flag = findGiven(arguments, {"speed", "set"}))
-      throw InputError("", *flag, "a solved motion has its own", "give --robot and the name of a motion");
-    return readPlan(arguments.directory, arguments.control, arguments.belief);
-  }
+  if (arguments.robot.empty()) return readPlan(arguments.directory, arguments.control, arguments.belief);
   PlanRequest request{arguments.directory,
                       arguments.robot,
                       {},
@@ -130,9 +134,7 @@ int getStatus(Outcome outcome) {
 
 // A robot for a solved motion is that of the world. What is the name of a motion is that motion, whatever lies there.
 void chooseRobot(SimulateArguments& arguments) {
-  const std::vector<MotionEntry>& motions = getMotions();
-  const bool is_motion = std::any_of(motions.begin(), motions.end(),
-                                     [&](const MotionEntry& motion) { return motion.name == arguments.directory; });
+  const bool is_motion = isMotion(arguments.directory);
   const bool is_solved = std::filesystem::exists(std::filesystem::path(arguments.directory) / "summary.json");
   if (arguments.robot.empty() || !is_solved) return;
   if (is_motion) {
@@ -157,6 +159,19 @@ void requireSameParts(const Model& planned, const LoadedRobot& robot) {
   compare("contacts", getNames(planned.contacts()), getNames(robot.model.contacts()));
 }
 
+// What options name, of the robot.
+void requireParts(const SimulateArguments& arguments, const LoadedRobot& robot) {
+  const auto blame = [](const std::string& flag, const auto& make) {
+    try {
+      make();
+    } catch (const InputError& error) {
+      throw InputError("", flag, error.element() + ": " + error.problem(), error.remedy());
+    }
+  };
+  blame("--payload-at " + arguments.payload_at, [&] { addPayload(robot.model, makePayload(arguments)); });
+  blame("--play", [&] { addPlay(robot.model, makePlays(arguments, "")); });
+}
+
 // The robot of the world, which its controller may not know.
 LoadedRobot loadWorldRobot(const Plan& plan, const SimulateArguments& arguments) {
   LoadedRobot robot = plan.robot;
@@ -165,6 +180,7 @@ LoadedRobot loadWorldRobot(const Plan& plan, const SimulateArguments& arguments)
     tell(robot.warnings);
     requireSameParts(plan.robot.model, robot);
   }
+  requireParts(arguments, robot);
   robot.model = addPayload(robot.model, makePayload(arguments));
   return robot;
 }
@@ -207,7 +223,8 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   if (!isFree(arguments) || (arguments.dry_run && !std::filesystem::exists(arguments.directory)))
     requireShortSteps(arguments, "--control-period", arguments.execution.control_period);
   if (arguments.dry_run) {
-    if (!arguments.robot.empty()) loadRobot(arguments.robot);
+    if (!isFree(arguments)) requirePlan(arguments);
+    if (!arguments.robot.empty()) requireParts(arguments, loadRobot(arguments.robot));
     tell(listIdleOptions(arguments));
     return kStood;
   }
@@ -269,8 +286,8 @@ int main(int argc, char** argv) {
   SimulateArguments arguments;
   addOptions(app, arguments);
   app.footer(
-      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or is less than 0.6 times\n"
-      "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. With\n"
+      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or its centre of mass is less\n"
+      "than 0.6 times as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. With\n"
       "--control mpc, a joint driven by a linkage counts only if the linkage has passed a dead point or the joint is "
       "half\n"
       "a turn away. It stands if it has been at rest, or its capture point over its soles, for the last three time\n"
