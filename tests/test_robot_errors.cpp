@@ -83,6 +83,12 @@ TEST_CASE("robot errors: the machine is closed, its motors and its lowest sole w
   }
 }
 
+TEST_CASE("robot errors: joints that no motor determines stay where they are") {
+  const Model model = loadOwn("fivebar_leg").model, machine = makeMachine(model, {0.1, 0, 3});
+  const VectorXd q = makeStandingPosture(model);
+  CHECK((assembleMachine(model, machine, q) - q).norm() < 1e-9);
+}
+
 TEST_CASE("robot errors: impossible ones are refused") {
   const LoadedRobot robot = loadOwn("fivebar");
   CHECK_THROWS_AS(makeMachine(robot.model, {1, 0, 1}), InputError);

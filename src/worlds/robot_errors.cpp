@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
@@ -49,10 +50,15 @@ VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRe
   if (closed.status != NumericalStatus::Ok)
     throw InputError(machine.name(), closed.worst, "its loop cannot be closed: " + closed.message,
                      "allow smaller errors; loops with redundant rows allow no errors");
-  PassiveJoints joints(machine, closed.q);
-  VectorXd motors(machine.nu()), out = q;
+  std::optional<PassiveJoints> joints;
+  try {
+    joints.emplace(machine, closed.q);
+  } catch (const InputError&) {
+    // Motors do not determine all joints, such as rails: the nearest posture then.
+  }
+  VectorXd motors(machine.nu()), out = joints ? VectorXd(q) : closed.q;
   for (int m = 0; m < machine.nu(); ++m) motors[m] = q[machine.joints()[machine.motors()[m].joint].idx_q];
-  if (joints.update(motors, out) != NumericalStatus::Ok)
+  if (joints && joints->update(motors, out) != NumericalStatus::Ok)
     throw InputError(machine.name(), "closures", "they cannot close at the motors' positions", "allow smaller errors");
   if (machine.hasFreeFlyer() && !machine.contacts().empty())
     out[2] += calcLeastHeight(model, q) - calcLeastHeight(machine, out);

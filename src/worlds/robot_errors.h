@@ -17,7 +17,8 @@ struct RobotErrors {
 Model makeMachine(const Model& model, const RobotErrors& errors);
 
 /// Where the machine is when its controller believes that it is at q (nq, closed in the model): the motors of both are at
-/// the same positions, the loops of the machine are closed, the lowest corner of its soles is as high.
+/// the same positions, or near them where they do not determine all joints; the loops of the machine are closed, the lowest corner of
+/// its soles is as high.
 /// \throws InputError when the loops of the machine cannot be closed
 VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRef q);
 
