@@ -383,9 +383,23 @@ TEST_CASE("options that others make useless are told, and what is given twice is
     CHECK_THAT(result.err, Catch::StartsWith("bielle: warning: ") && Catch::Contains(told));
   }
   CHECK(plan({"--dead-point-margin", "0.3"}).err.empty());
+  // By a robot of a generator, which needs another program: once.
+  for (const auto& [options, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"walk", "--serial-armature", "1e-2"}, "--serial-armature has no effect: the model is closed"},
+           {{"walk", "--periodic", "--steps", "4"}, "option 'steps' has no effect: a cycle has two steps"},
+           {{"walk", "--set", "cycles=2"}, "option 'cycles' has no effect: the motion is no cycle"},
+           {{"stairs", "--height", "0.05", "--slope", "0.2"}, "option 'height' has no effect: slope replaces it"}}) {
+    std::vector<std::string> command = {BIELLE_COMMAND, "solve", "--robot", "rsu_biped", "--dry-run"};
+    command.insert(command.begin() + 2, options.begin(), options.end());
+    const CommandResult result = run(command);
+    CHECK(result.status == 0);
+    CHECK(result.err == "bielle: warning: " + told + (told.back() == 'e' ? ", without periodic\n" : "\n"));
+  }
   checkRefused(plan({"--set", "depth=0.9"}), "'depth' is given twice");
   checkRefused(plan({"--set", "com_weight=1e4", "--set", "com_weight=1e5"}), "'com_weight' is given twice");
   checkRefused(plan({"--limit", "motor_knee_left=80", "--limit", "motor_knee_left=90"}), "is given twice");
+  checkRefused(plan({"--free-timings", "all=0.6:1.6", "--free-timings", "all=0.5:2"}), "'all' is given twice");
+  checkRefused(plan({"--set", "cone_margin=1"}), "cone_margin");
 }
 
 TEST_CASE("durations are free within the bounds given, or as planned") {

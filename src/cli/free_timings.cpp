@@ -44,6 +44,7 @@ TimingOptions makeTimings(const TimingArguments& arguments) {
   TimingOptions timings;
   timings.time_weight = arguments.time_weight;
   for (const std::string& phase : arguments.phases) timings.phases.push_back(parseBounds(phase));
+  requireOnce("--free-timings", arguments.phases, "left foot=0.8:1.2");
   if (arguments.given && arguments.phases.empty()) timings.phases.push_back({kAllPhases, {}});
   return timings;
 }

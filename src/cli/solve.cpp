@@ -268,15 +268,38 @@ std::vector<std::string> listIdleOptions(const SolveArguments& arguments) {
   return idle;
 }
 
+// Options of the motion, or of one in a sequence (walk.steps), that others of it make useless.
+std::vector<std::string> listIdleSettings(const SolveArguments& arguments, const OptionSet& options) {
+  std::set<std::string> given = arguments.flags;
+  for (const std::string& setting : arguments.settings)
+    given.insert(splitSetting("--set", setting, "com_weight=1e5").first);
+  std::vector<std::string> idle;
+  for (const std::string& name : given) {
+    const std::string part = name.substr(0, name.rfind('.') + 1), last = name.substr(part.size());
+    const Option *periodic = options.find(part + "periodic"), *slope = options.find(part + "slope");
+    const bool is_cycle = periodic && periodic->value == OptionValue(true);
+    const auto check = [&](bool is_idle, std::initializer_list<const char*> names, const std::string& reason) {
+      if (is_idle && std::find(names.begin(), names.end(), last) != names.end())
+        idle.push_back("option '" + name + "' has no effect: " + reason);
+    };
+    check(is_cycle && !options.find(part + "angle"), {"steps"}, "a cycle has two steps");
+    check(is_cycle, {"start_support", "start_pressure", "end_support"}, "a cycle neither starts nor ends");
+    check(!is_cycle, {"cycles"}, "the motion is no cycle, without periodic");
+    check(slope && slope->value != OptionValue(0.0), {"height"}, "slope replaces it");
+  }
+  return idle;
+}
+
 int solve(const SolveArguments& arguments, MotionRequest request) {
   requireOnce("--set", arguments.settings, "com_weight=1e5", arguments.flags);
-  printWarnings(listIdleOptions(arguments));
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] = splitSetting("--set", setting, "com_weight=1e5");
     request.options.set(name, parseOption(value));
   }
   requireApart(arguments.directory, {arguments.warm_start});
   const LoadedRobot robot = arguments.robot.load();
+  printWarnings(listIdleOptions(arguments));  // not before: where the robot needs another program, that one tells
+  printWarnings(listIdleSettings(arguments, request.options));
   std::optional<SerialModel> serial;
   if (arguments.serial) {
     serial =

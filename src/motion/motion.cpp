@@ -186,7 +186,7 @@ void describe(OptionFields& f, MotionOptions& o) {
   f.number("pressure_weight", o.pressure_weight, "1", kNotNegative,
            "keep the centre of pressure in the middle of the sole");
   f.number("friction", o.friction, "1", kPositive, "friction coefficient");
-  f.number("cone_margin", o.cone_margin, "1", kNotNegative, "share of friction and soles that wrenches leave unused");
+  f.number("cone_margin", o.cone_margin, "1", {0, 0.99}, "share of friction and soles that wrenches leave unused");
   f.number("contact_kp", o.contact_kp, "1/s^2", kNotNegative,
            "position gain of the stabilisation of contacts, in jumps also of closures (at most 1/(3 h^2) with the time "
            "step h; Euler: 1/(2 h^2))");

@@ -13,7 +13,7 @@ namespace bielle {
 void describe(OptionFields& f, LocomotionOptions& o) {
   f.number("start_support", o.timing.start, "s", kNotNegative,
            "least duration of double support before the first step");
-  f.number("start_pressure", o.start_pressure, "1", kNotNegative,
+  f.number("start_pressure", o.start_pressure, "1", {0, 1},
            "start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never");
   f.number("single_support", o.timing.single, "s", kNotNegative, "duration with one foot on the ground");
   f.number("double_support", o.timing.both, "s", kNotNegative,
