@@ -1,5 +1,6 @@
 // Four-bars by their closed form, against differences and the mechanism itself; the search, and what the command writes.
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
@@ -213,4 +214,18 @@ TEST_CASE("four-bars: Bipetto's knee is found again by its ratios, and the biped
   CHECK(refused.status == 1);
   CHECK_THAT(refused.err, Contains("lower --margin"));
   CHECK(runCommand({BIELLE_COMMAND, "synthesize", "-o", out}).status == 2);
+  for (const auto& [options, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--range", "0:90"}, "give radians"},
+           {{"--range", "0:1", "--crank", "0:0.1"}, "--crank: a length is not positive"},
+           {{"--range", "0:1", "--arm", "0.1:0.02"}, "--arm: its bounds are in the wrong order"},
+           {{"leg_biped", "--range", "0:1", "--joint", "knee_left", "--parameter", "knee_crank", "--margin", "0.2"},
+            "--margin excludes --parameter"}}) {
+    const std::string nothing = out + "/nothing";
+    std::vector<std::string> command = {BIELLE_COMMAND, "synthesize", "-o", nothing};
+    command.insert(command.end(), options.begin(), options.end());
+    const CommandResult wrong = runCommand(command);
+    CHECK(wrong.status == 2);
+    CHECK_THAT(wrong.err, Contains(told));
+    CHECK_FALSE(std::filesystem::exists(nothing));
+  }
 }

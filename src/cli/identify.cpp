@@ -75,6 +75,9 @@ MotionLog thin(MotionLog log, int every) {
   if (every == 1) return log;
   MotionLog out{log.path, {}, log.names, {}, {}};
   const auto count = static_cast<Eigen::Index>((log.rows.size() - 1) / static_cast<size_t>(every) + 1);
+  if (count < 2)
+    throw InputError(log.path, "--every " + std::to_string(every),
+                     "it leaves one row of " + std::to_string(log.rows.size()), "give a smaller number");
   out.time.resize(count), out.values.resize(count, log.values.cols());
   for (Eigen::Index k = 0; k < count; ++k) {
     out.time[k] = log.time[k * every];
@@ -322,7 +325,8 @@ void addIdentify(CLI::App& command, Action& action) {
       .add_option("--window", arguments->torques.window,
                   "of the polynomials that smooth positions for --dynamics, their degree being 4 [s]")
       ->capture_default_str()
-      ->check(CLI::Range(1e-4, 10.0));
+      ->check(CLI::Range(1e-4, 10.0))
+      ->needs("--dynamics");
   command
       .add_option(
           "--motion", arguments->motion,

@@ -1,10 +1,12 @@
 // bielle synthesize: linkages for a joint, from what is requested of it.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <optional>
 #include <thread>
+#include <tuple>
 
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
@@ -56,7 +58,7 @@ void describe(OptionFields& f, SynthesizeArguments& a) {
            "least way from the range to a dead point, of linkages by --parameter");
   f.number("margin", a.margin, "1", {0, 1},
            "least sine of the angles between rod, crank and arm of four-bars; 0 at dead points");
-  f.number("clearance", a.clearance, "m", {}, "least distance of the rod of four-bars from the joint's axis");
+  f.number("clearance", a.clearance, "m", {0, 10}, "least distance of the rod of four-bars from the joint's axis");
   f.integer("count", a.count, {1, kMostKept}, "linkages kept");
   f.integer("seed", a.seed, "of the random numbers");
   f.integer("threads", a.threads, {0, kMostThreads}, "threads; 0: one per core");
@@ -102,6 +104,8 @@ JointDemand makeDemand(const SynthesizeArguments& arguments, const std::optional
       throw InputError("", "option --range", "it is missing", "give it, or --motion with --joint");
     if (!(arguments.range[0] < arguments.range[1]))
       throw InputError("", "option --range", "it is empty", "give the smaller angle first");
+    if (std::max(-arguments.range[0], arguments.range[1]) > 2 * M_PI)
+      throw InputError("", "option --range", "it is beyond a turn", "give radians");
     demand.angles = VectorXd::LinSpaced(kAngles, arguments.range[0], arguments.range[1]);
     if (arguments.ratio) demand.ratios = VectorXd::Constant(kAngles, *arguments.ratio);
     if (!arguments.like.empty())
@@ -117,9 +121,14 @@ FourBarSpace makeSpace(const SynthesizeArguments& a) {
   space.lower.resize(FourBarDrawing::kCount), space.upper.resize(FourBarDrawing::kCount);
   space.lower << a.motor_x[0], a.motor_z[0], a.crank[0], -M_PI, a.arm[0], -M_PI;
   space.upper << a.motor_x[1], a.motor_z[1], a.crank[1], M_PI, a.arm[1], M_PI;
-  for (Eigen::Index i = 0; i < space.lower.size(); ++i)
-    if (!(space.lower[i] <= space.upper[i]))
-      throw InputError("", "bounds of the drawing", "a pair is in the wrong order", "give the smaller number first");
+  for (const auto& [flag, pair, is_length] :
+       {std::tuple("--motor-x", a.motor_x, false), std::tuple("--motor-z", a.motor_z, false),
+        std::tuple("--crank", a.crank, true), std::tuple("--arm", a.arm, true)}) {
+    if (!(pair[0] <= pair[1]))
+      throw InputError("", flag, "its bounds are in the wrong order", "give the smaller number first");
+    if (is_length && !(pair[0] > 0))
+      throw InputError("", flag, "a length is not positive", "give metres, e.g. 0.02:0.1");
+  }
   space.margin = a.margin, space.clearance = a.clearance;
   return space;
 }
@@ -195,7 +204,7 @@ int synthesize(const SynthesizeArguments& arguments) {
   const std::vector<FoundLinkage> found = searchLinkages(sought.family, demand, options);
   if (found.empty()) {
     std::cerr << "bielle: none of " << options.samples << " linkages closes over the whole range with this "
-              << (is_drawn ? "margin; widen the bounds, or lower --margin\n"
+              << (is_drawn ? "margin and clearance; widen the bounds, or lower --margin or --clearance\n"
                            : "distance; widen the ranges, or lower --distance\n");
     return kFailed;
   }
@@ -250,6 +259,9 @@ void addSynthesize(CLI::App& command, Action& action) {
   add_pair("--motor-z", a->motor_z, "four-bars: place of the motor above the joint [m]")->capture_default_str();
   add_pair("--crank", a->crank, "four-bars: length of the crank [m]")->capture_default_str();
   add_pair("--arm", a->arm, "four-bars: length of the joint's arm [m]")->capture_default_str();
+  for (const char* flag : {"--motor-x", "--motor-z", "--crank", "--arm", "--margin", "--clearance"})
+    command.get_option(flag)->excludes("--parameter");
+  command.get_option("--distance")->needs("--parameter");
   command
       .add_option("--samples", a->samples,
                   "linkages at random; default: 1000000 by their drawing, 10000 by --parameter")

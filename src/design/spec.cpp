@@ -142,8 +142,9 @@ DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const En
   const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.parameter.empty() +
                     (ratio != nullptr) + (motor != nullptr);
   if (kinds != 1)
-    entry.fail("variable '" + variable.name + "' is not a length, a shift, a parameter, a ratio or a motor",
-               "give `length`, `shift`, `parameter`, `ratio` or `motor`");
+    entry.fail(
+        "variable '" + variable.name + "' is not exactly one of a length, a shift, a parameter, a ratio and a motor",
+        "give one of `length`, `shift`, `parameter`, `ratio` and `motor`");
   if (const Entry* unit = find(fields, "unit")) variable.unit = unit->getText();
   const Entry* start = find(fields, "start");
   if (start && !choices && !ratio)

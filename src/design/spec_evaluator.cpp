@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/registry.h"
 #include "design/motor_change.h"
@@ -20,9 +21,7 @@ DesignMotion makeRequestedMotion(const std::string& file, const MotionSpec& moti
           motion.weight, motion.payload, usual};
 }
 
-}  // namespace
-
-DesignEvaluator makeEvaluator(const DesignSpec& spec) {
+DesignEvaluator makeEvaluatorOf(const DesignSpec& spec) {
   std::vector<DesignMotion> motions;
   for (const MotionSpec& motion : spec.motions) motions.push_back(makeRequestedMotion(spec.path, motion));
   EvaluationOptions options;
@@ -37,6 +36,18 @@ DesignEvaluator makeEvaluator(const DesignSpec& spec) {
       if (findMotors(start, {name}).empty()) entry.failUnknown("motor", name, getNames(start.motors()));
   }
   return DesignEvaluator(robot, motions, spec.objective, options);
+}
+
+}  // namespace
+
+DesignEvaluator makeEvaluator(const DesignSpec& spec) {
+  try {
+    return makeEvaluatorOf(spec);
+  } catch (const InputError& error) {  // of a robot, where the file that names it is wrong
+    if (error.source() == spec.path) throw;
+    throw InputError(spec.path, (error.source().empty() ? "" : error.source() + ": ") + error.element(),
+                     error.problem(), error.remedy());
+  }
 }
 
 std::vector<std::string> listShortMotions(const DesignSpec& spec, const std::vector<DesignGoal>& goals) {

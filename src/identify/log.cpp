@@ -47,9 +47,13 @@ class LogTable {
 
   MotionLog finish() const {
     const auto time = std::find(names_.begin(), names_.end(), kTime);
-    if (time == names_.end())
-      throw InputError(path_, "column 'time'", "it is missing; there are: " + listItems(listFirst()),
-                       "add the time of each row, s");
+    if (time == names_.end()) {
+      const std::vector<std::string> there = listFirst();
+      const bool is_split = there.size() != 1 || there[0].find_first_of("; \t") == std::string::npos;
+      throw InputError(
+          path_, "column 'time'", "it is missing; there are: " + listItems(there),
+          is_split ? "add the time of each row, s" : "separate columns by commas, with decimal points in numbers");
+    }
     MotionLog log;
     log.path = path_;
     log.rows = rows_;
