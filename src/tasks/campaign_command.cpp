@@ -151,11 +151,11 @@ void checkPushTimes(const CampaignSpec& spec, const std::vector<PlannedMotion>& 
       longest = std::max(longest, end);
       if (over > end + kSlack)
         warnings.insert("warning: motion " + spec.motions[m].name + ": a push at " + value + " s is over at " +
-                        formatExact(over) + " s, but its simulation ends at " + formatExact(end) +
+                        formatNumber(over) + " s, but its simulation ends at " + formatExact(end) +
                         " s; these runs are refused");
     }
     if (over > longest + kSlack)
-      times->entry.fail("a push at " + value + " s is over at " + formatExact(over) +
+      times->entry.fail("a push at " + value + " s is over at " + formatNumber(over) +
                             " s, but the simulations end at " + formatExact(longest) + " s",
                         "give an earlier time, or `options: {" +
                             (duration ? "duration: " + formatExact(std::ceil(over + kHold))

@@ -246,8 +246,8 @@ void requirePushesToEnd(const DatasetTrial& trial, const PlannedMotion& planned)
                                     [](const auto& option) { return option.first == "push"; });
     if (over > end + kSlack)
       (entry == trial.simulate.end() ? trial.varied : entry->second)
-          .fail("'" + value + "' is over at " + formatExact(over) + " s, but the simulation ends at " +
-                    formatExact(end) + " s",
+          .fail("'" + value + "' is over at " + formatNumber(over) + " s, but the simulation ends at " +
+                    formatNumber(end) + " s",
                 "give an earlier time, or a longer `duration` or `hold` beside it");
   }
 }
