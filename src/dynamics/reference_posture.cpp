@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bielle/dynamics/assembly.h"
@@ -52,7 +53,7 @@ class ReferenceFeet {
     unbent_ = model.makeNeutral();
     if (model.hasFreeFlyer() && is_placed_) unbent_.head<7>() = q_ref.head<7>();
     if (!is_placed_) {
-      upright_ = findUpright();
+      upright_ = findUpright(q_ref);
       q_ref.segment<4>(3) = unbent_.segment<4>(3) = Eigen::Quaterniond(upright_).coeffs();
     }
     if (reference.feet.empty()) return;
@@ -79,22 +80,22 @@ class ReferenceFeet {
     return yaw == reference_.yaws.end() ? heading_ : yaw->second;
   }
 
-  // Over the middle of the feet, and facing as they do in the mean. Where the base is far beside them on unbent legs, it is so here;
-  // unless a height is given, also as high.
-  SE3 findBase() {
+  // Over the middle of the feet, and facing as they do in the mean. Where the base is far beside them, on unbent legs and by the given
+  // angles, it is so here; unless a height is given, as high as on unbent legs.
+  SE3 findBase(const VectorXd& q_ref) {
     constexpr double kBeside = 0.1;  // of the way to the feet
+    const auto isBeside = [](const Vector3d& way) { return way.head<2>().norm() > kBeside * way.norm(); };
     double sine = 0, cosine = 0;
-    Vector3d way = Vector3d::Zero();
-    updatePositions(model_, ws_, unbent_);
     for (const auto& [name, place] : reference_.feet) {
       sine += std::sin(getYaw(name));
       cosine += std::cos(getYaw(name));
-      const ContactFrame& contact = getFoot(model_, reference_, name);
-      way += getPlacement(ws_, contact.body, contact.X_BF).p / static_cast<double>(reference_.feet.size());
     }
     const Matrix3d turn = makeAxisRotation(Vector3d::UnitZ(), reference_.feet.empty() ? 0 : std::atan2(sine, cosine));
     SE3 base{turn * upright_, {middle_.x(), middle_.y(), lowest_}};
-    if (way.head<2>().norm() > kBeside * way.norm()) base.p.head<2>() -= (turn * way).head<2>();
+    VectorXd given = q_ref;
+    given.head<7>() = unbent_.head<7>();
+    const Vector3d way = calcWay(unbent_);
+    if (isBeside(way) && isBeside(calcWay(given))) base.p.head<2>() -= (turn * way).head<2>();
     if (reference_.height_frame.empty()) base.p.z() -= way.z();
     return base;
   }
@@ -115,10 +116,20 @@ class ReferenceFeet {
   }
 
  private:
-  // Attitude of a base that need not have z up and x ahead, nearest to that in which its soles on unbent legs have so: by right angles.
-  Matrix3d findUpright() {
-    constexpr double kQuarter = 1.57079632679489662;  // turn
-    updatePositions(model_, ws_, unbent_);
+  // From the base to the middle of the feet, m (world).
+  Vector3d calcWay(const VectorXd& q) {
+    Vector3d way = Vector3d::Zero();
+    updatePositions(model_, ws_, q);
+    for (const auto& [name, place] : reference_.feet) {
+      const ContactFrame& contact = getFoot(model_, reference_, name);
+      way += getPlacement(ws_, contact.body, contact.X_BF).p / static_cast<double>(reference_.feet.size());
+    }
+    return way;
+  }
+
+  // Axes z and x of the soles, in the mean.
+  std::pair<Vector3d, Vector3d> findSoles(const VectorXd& q) {
+    updatePositions(model_, ws_, q);
     Vector3d up = Vector3d::Zero(), ahead = Vector3d::Zero();
     for (const ContactFrame& contact : model_.contacts()) {
       if (contact.kind == ContactKind::Point3D) continue;
@@ -126,11 +137,26 @@ class ReferenceFeet {
       up += R.col(2);
       ahead += R.col(0);
     }
-    if (up.isZero(0)) return Matrix3d::Identity();
-    const Matrix3d upright = findUprightAxes(up).transpose();
-    ahead = upright * ahead;
-    const double quarters = std::round(std::atan2(ahead.y(), ahead.x()) / kQuarter);
-    return quarters == 0 ? upright : makeAxisRotation(Vector3d::UnitZ(), -quarters * kQuarter) * upright;
+    return {up, ahead};
+  }
+
+  // Attitude of a base that need not have z up and x ahead, nearest to that in which its soles on unbent legs have so: by right angles,
+  // and not where those by the given angles tell otherwise, as of feet that hang down from unbent legs.
+  Matrix3d findUpright(const VectorXd& q_ref) {
+    constexpr double kQuarter = 1.57079632679489662;  // turn
+    const auto unbent = findSoles(unbent_), given = findSoles(q_ref);
+    if (unbent.first.isZero(0)) return Matrix3d::Identity();
+    Matrix3d upright = findUprightAxes(unbent.first).transpose();
+    if (!((upright * given.first).z() > given.first.z())) upright.setIdentity();
+    const auto countQuarters = [&](const Vector3d& axis) {
+      const Vector3d ahead = upright * axis;
+      if (!(ahead.head<2>().norm() > 0.5 * ahead.norm())) return 0.0;
+      const double quarters = std::round(std::atan2(ahead.y(), ahead.x()) / kQuarter);
+      return quarters == -2 ? 2 : quarters;
+    };
+    const double quarters = countQuarters(unbent.second);
+    if (quarters == 0 || quarters != countQuarters(given.second)) return upright;
+    return makeAxisRotation(Vector3d::UnitZ(), -quarters * kQuarter) * upright;
   }
 
   // That of soles on unbent legs: their axes across stay level as legs bend.
@@ -218,7 +244,7 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
   if (model.hasFreeFlyer()) problem.weights.head<6>().setOnes();
   ReferenceFeet feet(model, reference, problem.q_ref);
   if (!feet.is_placed()) {
-    const SE3 base = feet.findBase();
+    const SE3 base = feet.findBase(problem.q_ref);
     problem.q_ref.head<7>() << base.p, Eigen::Quaterniond(base.R).coeffs();
     // Without a height, the legs decide, from unbent ones.
     if (!reference.feet.empty() && reference.height_frame.empty()) problem.weights[feet.findVertical()] = kTie;
