@@ -274,6 +274,8 @@ TEST_CASE("free motion: what does not fit is refused, with the remedy") {
   refuse(kFreeFivebar, {"--torques", scratch.write("a.yaml", "torques: [{time: 0, elbow: 1}]")},
          "the robot has no such motor");
   refuse(kFreeFivebar, {"--torques", scratch.write("b.yaml", "torques: [{shoulder_left: 1}]")}, "it has no time");
+  refuse(kFreeFivebar, {"--torques", scratch.write("c.yaml", "torques: [{time: -1, shoulder_left: 1}]")},
+         "its time is negative");
   refuse(kFreeFourbar, {"--state", scratch.write("c.json", R"({"joints": {"crank": {"q": 1}}})")},
          "the robot has no such joint");
 }

@@ -1,4 +1,5 @@
 // bielle campaign: motions carried out again and again, under many conditions.
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 
@@ -41,7 +42,12 @@ int run(const CampaignArguments& arguments) {
   std::vector<std::string> notes;
   printPaths(writeCampaign(arguments.directory, results, notes), notes);
   if (!results.complete) std::cerr << "bielle: error: some runs failed; run the same command again to retry them\n";
-  return results.complete ? kOk : kFailed;
+  const auto isRefused = [](const CampaignRun& run) { return run.result.at("outcome") == kRefused; };
+  const bool is_refused = !results.runs.empty() && std::all_of(results.runs.begin(), results.runs.end(), isRefused);
+  if (is_refused)
+    std::cerr << "bielle: error: all runs were refused, the first one: "
+              << results.runs.front().result.at("outcome_message").get<std::string>() << "\n";
+  return results.complete && !is_refused ? kOk : kFailed;
 }
 
 }  // namespace

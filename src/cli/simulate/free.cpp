@@ -60,6 +60,7 @@ std::vector<TimedTorques> readTorques(const Model& model, const std::string& pat
       if (!has_time)
         entry.fail("it has no time", "e.g. {time: 0.5, " + (model.nu() > 0 ? model.motors()[0].name : "MOTOR") +
                                          ": 3}, in s and N m or N");
+      if (next.time < 0) entry.fail("its time is negative", "give seconds from the start");
       if (next.time < torques.back().time || (torques.size() > 1 && next.time == torques.back().time))
         entry.fail("its time is not later than that of the previous entry", "list torques in order of time");
       torques.push_back(next);
@@ -109,6 +110,9 @@ void addSprings(const Model& model, const std::string& text, const VectorXd& q, 
     spring.rest = std::isnan(angle) ? q[model.joints()[model.motors()[m].joint].idx_q] : angle;
     springs.push_back(spring);
   }
+  constexpr double kTurn = 6.2832;  // rad
+  if (std::abs(angle) > kTurn)
+    tell({"--spring '" + text + "': its angle is more than a turn; give radians if degrees were meant"});
   if (!is_found)
     throw InputError("", "--spring '" + text + "'",
                      name.empty() ? "the robot has no motors" : "the robot has no motor '" + name + "'",
