@@ -69,7 +69,39 @@ def use_all(place):
         yield arguments, run(*arguments, where=place)
 
 
+def keep_play():
+    """A result keeps what its robot has in worlds alone."""
+    with tempfile.TemporaryDirectory() as place:
+        robot = shutil.copytree(ROBOT, os.path.join(place, "robot"))
+        file = os.path.join(robot, "bipetto.yaml")
+        plain = read(file)
+        write(plain + '\nplay: {"closure_ankle*": 0.0003, closure_ankle2_left: 0.001, "*ankle1_right": 0}\n', file)
+        plays = [("closure_ankle2_right", 0.0003), ("closure_ankle1_left", 0.0003), ("closure_ankle2_left", 0.001)]
+        info = json.loads(run("info", "robot", "--json", where=place).stdout)
+        assert [(play["name"], play["size"]) for play in info["play"]] == plays, info["play"]
+        shown = run("info", "robot", where=place).stdout
+        assert "play in worlds" in shown and "closure_ankle2_left   0.001" in shown, shown
+        run("convert", "robot", "--to", "bielle", "-o", "again", where=place)
+        assert json.loads(run("info", "again", "--json", where=place).stdout)["play"] == info["play"]
+        told = run("convert", "robot", "--to", "mjcf", "-o", "robot.xml", where=place).stderr
+        assert told.count("is left out: add --play") == len(plays), told
+        run("solve", *SQUAT, "--robot", "robot", "--quiet", "--no-report", "-o", "squat", where=place)
+        simulate(place, "before")
+        write(plain, file)
+        assert TOLD in run("check", "squat", where=place).stderr.splitlines()[0]
+        shutil.rmtree(robot)
+        simulate(place, "after")
+        for name in ("before", "after"):
+            summary = json.loads(read(place, name, "summary.json"))
+            assert summary["play"] == dict(plays) and summary["books"]["stop_loss_J"] > 1e-6, summary["books"]
+        assert calc_distance(place, "before", "after") < 1e-6  # rounding, which stops amplify; play moves joints by 1e-3
+        run("simulate", "squat", "-o", "none", "--control", "gains", "--duration", "0.3", "--play", "*=0,hipx_left=0.002",
+            where=place)
+        assert json.loads(read(place, "none", "summary.json"))["play"] == {**dict(plays), "*": 0, "hipx_left": 0.002}
+
+
 def main():
+    keep_play()
     with tempfile.TemporaryDirectory() as place:
         shutil.copytree(ROBOT, os.path.join(place, "robot"))
         solve = ["solve", *SQUAT, "--robot", "robot", "--quiet", "--no-report", "-o"]

@@ -7,9 +7,10 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/builder.h"
+#include "bielle/model/wear.h"
 #include "bielle/motion/motion.h"
+#include "bielle/worlds/sensors.h"
 #include "get_error.h"
-#include "model/play.h"
 #include "model/stiction.h"
 #include "own_robots.h"
 #include "worlds/make_world.h"
@@ -35,6 +36,12 @@ Model makePendulum(double armature, double gravity = kGravity) {
   builder.addLink("bob", "world", joint, {kMass, {0, 0, -kLength}, Matrix3d::Zero()});
   builder.addMotor("hinge", armature);
   return builder.build();
+}
+
+WorldOptions withPlay(const Play& play) {
+  WorldOptions options;
+  options.wear.plays = {play};
+  return options;
 }
 
 constexpr double kInertia = kMass * kLength * kLength;
@@ -69,7 +76,7 @@ TEST_CASE("play: a rotor crosses its play, and takes the link along as after a p
                lost = 0.5 * kRotor * kInertia / (kRotor + kInertia) * hit * hit;
   for (const std::string& name : listWorlds()) {
     CAPTURE(name);
-    const auto world = makeWorld(name, makePendulum(kRotor, 0), {}, {{"hinge", kPlay}});
+    const auto world = makeWorld(name, makePendulum(kRotor, 0), withPlay({"hinge", kPlay}));
     world->reset(VectorXd::Zero(1), VectorXd::Zero(1));
     world->setTorques(VectorXd::Constant(1, kTorque));
     const bool crosses = world->advance(0.95 * kRotor * hit / kTorque);
@@ -90,10 +97,10 @@ TEST_CASE("play: a pendulum swings freely in a dead band, and its ends take what
   constexpr double kBand = 0.048, kHeavy = 1e5;
   for (const std::string& name : listWorlds()) {
     CAPTURE(name);
-    WorldOptions options;
+    WorldOptions options = withPlay({"hinge", kBand});
     options.time_step = name == "bielle" ? 5e-5 : name == "mujoco" ? 1e-5 : 0;
     if (name == "simbody") options.tolerance = 1e-6;
-    const auto world = makeWorld(name, makePendulum(kHeavy), options, {{"hinge", kBand}});
+    const auto world = makeWorld(name, makePendulum(kHeavy), options);
     const auto swing = [&](double speed, double& largest) {
       world->reset(VectorXd::Zero(1), VectorXd::Constant(1, 0));
       world->setPush({speed * kMass * kLength / 1e-4, 0, 0});
@@ -129,7 +136,7 @@ TEST_CASE("play: a loaded rod is as long as at the end of its play") {
   const Closure& weld = model.closures()[0];
   const Vector3d along = (weld.X_B1 * weld.X_B2.inverse()).p.normalized();
   for (const std::string& name : listWorlds()) {
-    const auto world = makeWorld(name, model, {}, {{weld.name, kPlay}});
+    const auto world = makeWorld(name, model, withPlay({weld.name, kPlay}));
     world->reset(q, VectorXd::Zero(model.nv()));
     REQUIRE(world->advance(1));
     double nearest = 1, farther = 0;
@@ -191,6 +198,23 @@ TEST_CASE("play: at its middle the robot is the one without, coordinate by coord
         CHECK(with.lowerLimits()[dof] == -play.size / 2);
         CHECK(with.armature()[dof] == 0);
       }
+  }
+}
+
+TEST_CASE("play: encoders read the motor, which goes ahead of its link") {
+  constexpr double kPlay = 0.02;
+  for (const std::string& name : listWorlds()) {
+    CAPTURE(name);
+    const Model model = makePendulum(0.2, 0);
+    const auto world = makeWorld(name, model, withPlay({"hinge", kPlay}));
+    Sensors sensors(model, {{}, 0, 1, {}});
+    world->reset(VectorXd::Zero(1), VectorXd::Zero(1));
+    sensors.reset(*world, 0);
+    CHECK(sensors.read(*world).motor_positions[0] == 0);
+    world->setTorques(VectorXd::Constant(1, 2));
+    REQUIRE(world->advance(0.3));
+    CHECK(sensors.read(*world).motor_positions[0] - world->configuration()[0] == Approx(kPlay / 2).epsilon(0.1));
+    CHECK(world->motorConfiguration()[0] == sensors.read(*world).motor_positions[0]);
   }
 }
 

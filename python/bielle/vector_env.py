@@ -1,6 +1,6 @@
 """Many robots for learning, by the conventions of Gymnasium's VectorEnv, without Gymnasium."""
 
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 import numpy.typing as npt
@@ -82,7 +82,7 @@ class VectorEnv:
     `termination(state)` are functions of arrays: the WorldState and torques (num_envs, nu).
     `start(generator)` gives their first states, by default those of StartStates, and `push(state)` the forces on their trunks
     (num_envs, 3), N, during the period to come. Episodes are truncated after a duration, s, and terminated also where physics break
-    off. `worlds` are theirs, of the `engine` (World, World.set()).
+    off. `worlds` are theirs, of the `engine` and with the `play` of World (World, World.set()).
 
     Autoreset "NextStep": the step after the last one of an episode starts the next one, whatever the action, with reward 0.
     Each robot has random numbers of its own: its episodes are the same, bit by bit, for any number of robots and of threads.
@@ -111,10 +111,13 @@ class VectorEnv:
         time_step: float = 0.0,
         threads: int = 0,
         engine: str = "bielle",
+        play: Mapping[str, float] = {},
     ) -> None:
         if repeat < 1 or not (period > 0 and duration > 0):
             raise ValueError("repeat, period, duration: expected at least one period, and positive numbers of seconds")
-        self.worlds = World(model, count=num_envs, ground=ground, time_step=time_step, threads=threads, engine=engine)
+        self.worlds = World(
+            model, count=num_envs, ground=ground, time_step=time_step, threads=threads, engine=engine, play=play
+        )
         self.model, self.num_envs, self.noise = model, num_envs, noise
         self.period, self.repeat, self.duration = period, repeat, duration
         self._reward, self._termination, self._torques, self._push = reward, termination, torques, push

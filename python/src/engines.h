@@ -7,11 +7,11 @@
 
 namespace bielle::python {
 
-/// As worlds::makeWorld, without play.
+/// As worlds::makeWorld.
 using MakeWorld = std::unique_ptr<worlds::World> (*)(const std::string& name, const Model& model,
                                                      const worlds::WorldOptions& options);
 
 /// The name of the capsule, which changes when its type does.
-inline constexpr char kEnginesCapsule[] = "bielle.make_world.2";
+inline constexpr char kEnginesCapsule[] = "bielle.make_world.3";
 
 }  // namespace bielle::python

@@ -7,12 +7,15 @@
 
 namespace bielle::python {
 
+using NamedSizes = std::vector<std::pair<std::string, double>>;
+
 struct Robot {
   std::string name;              // as requested
   std::shared_ptr<Model> model;  // shared with all that is made of it
   std::string file, directory;   // empty: not from files
   std::vector<std::string> warnings;
   std::vector<LockedLoops> locked = {};
+  NamedSizes play = {};  // by what has it, rad or m
 
   /// \throws ValueError when it was made without one
   const Model& get() const {
@@ -21,8 +24,14 @@ struct Robot {
   }
 };
 
+inline Wear makeWear(const NamedSizes& play) {
+  Wear wear;
+  for (const auto& [name, size] : play) wear.plays.push_back({name, size});
+  return wear;
+}
+
 inline LoadedRobot toLoaded(const Robot& robot) {
-  return {robot.get(), robot.warnings, robot.directory, robot.file, robot.locked};
+  return {robot.get(), robot.warnings, robot.directory, robot.file, robot.locked, makeWear(robot.play)};
 }
 
 }  // namespace bielle::python

@@ -19,9 +19,14 @@ Robot load(const std::string& name, const std::optional<std::string>& base) {
   LoadedRobot loaded = loadRobot(name, options);
   const std::vector<std::string> moved = checkReferences(loaded);
   loaded.warnings.insert(loaded.warnings.end(), moved.begin(), moved.end());
-  return {
-      name,         std::make_shared<Model>(std::move(loaded.model)), loaded.file, loaded.directory, loaded.warnings,
-      loaded.locked};
+  Robot robot{name};
+  for (const Play& play : loaded.wear.plays) robot.play.emplace_back(play.name, play.size);
+  robot.model = std::make_shared<Model>(std::move(loaded.model));
+  robot.file = loaded.file;
+  robot.directory = loaded.directory;
+  robot.warnings = loaded.warnings;
+  robot.locked = loaded.locked;
+  return robot;
 }
 
 Robot generate(const std::string& name, const std::string& directory,
@@ -66,9 +71,13 @@ void bindRobots(py::module_& module) {
       .field("file", &Robot::file, "absolute path of the .urdf, or of the .yaml without a URDF beside it; or empty")
       .field("directory", &Robot::directory, "where the files are; or empty")
       .field("warnings", &Robot::warnings, "valid but suspicious: \"file: element: problem\"")
+      .field("play", &Robot::play, "of joints and rods in a World, by their names: from stop to stop, rad or m")
       .type()
       .def(
-          "write", [](const Robot& robot, const std::string& directory) { writeRobot(robot.get(), directory); },
+          "write",
+          [](const Robot& robot, const std::string& directory) {
+            writeRobot(robot.get(), directory, "", makeWear(robot.play));
+          },
           py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
           "Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.")
       .def("info", &describe,

@@ -12,7 +12,7 @@
 #include "bind.h"
 #include "busy.h"
 #include "engines.h"
-#include "model_access.h"
+#include "robot.h"
 
 namespace bielle::python {
 namespace {
@@ -41,7 +41,7 @@ MakeWorld findEngine(const std::string& engine) {
 class HeldWorlds {
  public:
   HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step,
-             double tolerance, const std::string& engine, int threads)
+             double tolerance, const std::string& engine, int threads, const NamedSizes& play)
       : model_(std::move(model)), many_(count), engine_(engine), time_step_(time_step) {
     if (count && *count < 1) throw py::value_error("count: at least one world");
     for (const auto& [name, value] : {std::pair{"time_step", time_step}, std::pair{"tolerance", tolerance}})
@@ -51,8 +51,9 @@ class HeldWorlds {
     const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngine(engine);
     worlds::WorldOptions options{ground, time_step};
     options.tolerance = tolerance;
+    options.wear = makeWear(play);
     const py::gil_scoped_release release;
-    if (count && engine == "bielle" && tolerance == 0) {
+    if (count && engine == "bielle" && tolerance == 0 && play.empty()) {
       const worlds::WorldBatchOptions all{{options, {}}, threads_};
       batch_ = std::make_unique<worlds::WorldBatch>(*model_, *count, all);
       return;
@@ -85,7 +86,7 @@ class HeldWorlds {
            const py::object& friction, const py::object& delays) {
     if (!batch_)
       throw py::value_error(
-          "set: expected worlds of Bielle's own engine at fixed steps, made with `count` (1 for one)");
+          "set: expected worlds of Bielle's own engine at fixed steps, made with `count` (1 for one) and without play");
     const BusyGuard guard(is_busy_, "world");
     worlds::WorldParameters parameters;
     const auto read = [this](const py::object& given, Eigen::Index size, const char* name, MatrixXd& out) {
@@ -104,7 +105,8 @@ class HeldWorlds {
   }
   py::object parameters() {
     if (!batch_)
-      throw py::value_error("parameters: expected worlds of Bielle's own engine at fixed steps, made with `count`");
+      throw py::value_error(
+          "parameters: expected worlds of Bielle's own engine at fixed steps, made with `count` and without play");
     const BusyGuard guard(is_busy_, "world");
     const worlds::WorldParameters& now = batch_->parameters();
     return makeNamed("WorldParameters",
@@ -191,7 +193,7 @@ class HeldWorlds {
                                   batch_->torques().col(i)});
     for (size_t i = 0; i < worlds_.size(); ++i) {
       const World& world = *worlds_[i];
-      task(i, worlds::SensedState{world.time(), world.configuration(), world.velocity(), world.torques()});
+      task(i, worlds::SensedState{world.time(), world.motorConfiguration(), world.velocity(), world.torques()});
     }
   }
 
@@ -380,15 +382,18 @@ void bindWorlds(py::module_& module) {
       "warns.\n"
       "tolerance: error per step of 'bielle' and 'simbody', rad, m and relative in velocities; with it, 'bielle' takes "
       "steps of high order and controlled error, for mechanisms in motion; 0: fixed steps, the fastest on feet.\n"
+      "play: of joints and of the rods that closures tie, {name: from stop to stop, rad or m}, as a Robot has it; * "
+      "stands for any text. States are those of the robot without it: a joint is where its link is.\n"
       "With `count`, that many worlds are stepped together on all cores, or on `threads`: arguments and results have a "
       "leading axis of worlds.")
       .def(py::init([](std::shared_ptr<Model> model, const py::object& count, const Ground& ground, double time_step,
-                       double tolerance, const std::string& engine, int threads) {
+                       double tolerance, const std::string& engine, int threads, const py::object& play) {
              return std::make_shared<HeldWorlds>(std::move(model), read<std::optional<int>>(count, "count"), ground,
-                                                 time_step, tolerance, engine, threads);
+                                                 time_step, tolerance, engine, threads, read<NamedSizes>(play, "play"));
            }),
            py::arg("model"), py::arg("count") = py::none(), py::arg("ground") = Ground(), py::arg("time_step") = 0.0,
-           py::arg("tolerance") = 0.0, py::arg("engine") = "bielle", py::arg("threads") = 0)
+           py::arg("tolerance") = 0.0, py::arg("engine") = "bielle", py::arg("threads") = 0,
+           py::arg("play") = py::dict())
       .def_property_readonly("model", &HeldWorlds::model, "Model")
       .def_property_readonly(
           "count", [](const HeldWorlds& self) { return show(self.count(), {}); }, "number of worlds, or None")
@@ -405,7 +410,7 @@ void bindWorlds(py::module_& module) {
       .def("set", &HeldWorlds::set, py::arg("mass_factors") = py::none(), py::arg("armatures") = py::none(),
            py::arg("effort_limits") = py::none(), py::arg("friction") = py::none(), py::arg("delays") = py::none(),
            "Sets parameters by which worlds differ from the model, from now on and over reset(), of worlds made with "
-           "`count`; each for all alike, or with a leading axis of worlds.\n\n"
+           "`count` and without play; each for all alike, or with a leading axis of worlds.\n\n"
            "mass_factors: (bodies,), mass and inertia over those of the model, the world first; armatures: (nu,), of "
            "the motors, kg m^2 or kg; effort_limits: (nu,), N m or N; friction: of the ground; delays: from step() "
            "until "

@@ -434,3 +434,25 @@ def test_rewards_and_terminations_are_one_for_each_robot():
     assert (env.step(np.zeros((2, model.nu)))[1] == [1, 1]).all()
     with pytest.raises(ValueError, match="period"):
         bielle.VectorEnv(model, 2, lambda state, torques: 1.0, period=-0.01)
+
+
+def test_worlds_have_play(model):
+    q, v = model.standing(), np.zeros(model.nv)
+    joint = model.joints[model.motors[0].joint]
+    for world in (bielle.World(model, play={joint.name: 0.02}), bielle.World(model, count=2, play={joint.name: 0.02})):
+        sensors = bielle.Sensors(world, noise=0)
+        world.reset(q, v)
+        sensors.reset(0.0)
+        torques = np.zeros((model.nu,) if world.count is None else (world.count, model.nu))
+        torques[..., 0] = 5
+        for _ in range(10):
+            state = world.step(torques, 1e-3)
+        ahead = np.ravel(sensors.read().motor_positions)[0] - np.ravel(state.q)[joint.idx_q]
+        assert ahead == pytest.approx(0.01, rel=0.2)
+    with pytest.raises(ValueError, match="without play"):
+        world.set(friction=0.5)
+    for wrong in ({"nowhere": 1e-3}, {joint.name: -1}):
+        with pytest.raises(ValueError, match="play of"):
+            bielle.World(model, play=wrong)
+    with pytest.raises(TypeError):
+        bielle.World(model, play=3)

@@ -23,7 +23,6 @@
 #include "formats/usd.h"
 #include "model/number_text.h"
 #include "model/payload.h"
-#include "model/play.h"
 #include "results/option_flags.h"
 #include "results/output_place.h"
 #include "results/setting.h"
@@ -52,7 +51,7 @@ void describe(OptionFields& f, ConvertArguments& a) {
   f.number("payload", a.payload, "kg", {0, 1e6}, "mass fixed to the trunk");
   f.texts("play", a.plays,
           "NAME=SIZE, e.g. closure_ankle*=0.0003: play of a joint or of the rod that a closure ties, a free coordinate "
-          "between two stops [rad, m]; * stands for any text; may be repeated");
+          "between two stops [rad, m]; * stands for any text; may be repeated, or several with commas");
   f.flag("serial", a.is_serial,
          "with --to mjcf or urdf: the chain of the serial joints, with motors on them, for trainers; beside it, in "
          "NAME.linkages.json, inertia, limits and friction of its linkages over their postures");
@@ -106,6 +105,19 @@ void writeFirmware(const LoadedRobot& robot, const ConvertArguments& arguments) 
   writeTextDirectory(arguments.output, text.files);
 }
 
+// With --play, all play becomes coordinates. What is left in wear, files of Bielle alone keep.
+std::vector<Play> takePlays(const ConvertArguments& arguments, Wear& wear) {
+  std::vector<Play> plays = parsePlays(arguments.plays);
+  if (!plays.empty()) {
+    plays.insert(plays.begin(), wear.plays.begin(), wear.plays.end());
+    wear.plays.clear();
+  }
+  if (arguments.format == "bielle") return plays;
+  for (const Play& play : wear.plays)
+    warn({"its play of '" + play.name + "' is left out: add --play " + play.name + "=" + formatNumber(play.size)});
+  return plays;
+}
+
 int convert(const ConvertArguments& arguments) {
   const ConvertArguments usual;
   const bool has_postures = arguments.postures != usual.postures;
@@ -124,14 +136,7 @@ int convert(const ConvertArguments& arguments) {
                      "add --to mjcf or --to urdf, or leave it out");
   LoadedRobot robot = arguments.robot.load();
   requireApart(arguments.output, listFiles(robot));
-  std::vector<Play> plays;
-  for (const std::string& text : arguments.plays) {
-    const auto [name, size] = parseSetting("--play", text, "closure_ankle*=0.0003");
-    plays.push_back({name, size});
-  }
-  for (const Play& play : listPlays(robot.file))
-    if (plays.empty())
-      warn({"its play of '" + play.name + "' is left out: add --play " + play.name + "=" + formatNumber(play.size)});
+  const std::vector<Play> plays = takePlays(arguments, robot.wear);
   Payload payload;
   payload.mass = arguments.payload;
   if (!arguments.payload_at.empty()) payload.at = Eigen::Map<const Vector3d>(arguments.payload_at.data());
@@ -146,7 +151,8 @@ int convert(const ConvertArguments& arguments) {
   }
   if (arguments.format == "bielle") {
     writeRobot(robot.model, arguments.output,
-               "Written by `bielle convert` from " + std::filesystem::path(robot.file).filename().string() + ".");
+               "Written by `bielle convert` from " + std::filesystem::path(robot.file).filename().string() + ".",
+               robot.wear);
   } else if (isFirmware(arguments.format)) {
     writeFirmware(robot, arguments);
   } else if (arguments.format == "urdf") {

@@ -41,8 +41,9 @@ std::map<std::string, std::string> makeRobots(const DatasetSpec& spec, const std
     if (!is_new || !(motion.payload > 0)) continue;
     it->second = (fs::path(directory) / "robots" / motion.body).string();
     makeOutputDirectory(it->second);
-    writeRobot(addPayload(loadRobot(motion.robot).model, {motion.payload, {}, {}}), it->second,
-               "Written by `bielle dataset`.");
+    const LoadedRobot robot = loadRobot(motion.robot);
+    writeRobot(addPayload(robot.model, {motion.payload, {}, {}}), it->second, "Written by `bielle dataset`.",
+               robot.wear);
   }
   return robots;
 }

@@ -269,7 +269,7 @@ int run(const IdentifyArguments& arguments) {
     return kFailed;
   }
   makeOutputDirectory(arguments.directory);
-  writeRobot(model, arguments.directory, "with what `bielle identify` found");
+  writeRobot(model, arguments.directory, "with what `bielle identify` found", robot.wear);
   Json summary = {{"robot", arguments.robot.name},
                   {"log", arguments.log},
                   {"interrupted", static_cast<bool>(isInterrupted())},

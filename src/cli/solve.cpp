@@ -217,9 +217,9 @@ SolveObserver makeObserver(const SolveArguments& arguments) {
 }
 
 // Errors of the recorded motion name the directory of the result. \param robot  the closed one
-StartingPoint readStart(const std::string& directory, const Model& robot, const Motion& motion) {
+StartingPoint readStart(const std::string& directory, const LoadedRobot& robot, const Motion& motion) {
   if (const std::string other = describeOtherRobot(directory, robot); !other.empty())
-    printWarnings({directory + ": the motion to start from was solved for another robot than '" + robot.name() +
+    printWarnings({directory + ": the motion to start from was solved for another robot than '" + robot.model.name() +
                    "' is now" + other + "; it is no more than a guess"});
   const MotionRecord record = readResultRecord(directory);
   try {
@@ -314,7 +314,7 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   const Motion motion = makeMotion(model, request, problem);
   SolveOptions options;
   options.solver = arguments.solver;
-  if (!arguments.warm_start.empty()) options.start = readStart(arguments.warm_start, robot.model, motion);
+  if (!arguments.warm_start.empty()) options.start = readStart(arguments.warm_start, robot, motion);
   if (arguments.dry_run) {
     checkFeasibility(motion, options.start ? &*options.start : nullptr, makeObserver(arguments).warn);
     printPlan(motion);

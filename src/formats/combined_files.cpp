@@ -319,10 +319,11 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, LoadedR
       if (linkage.written >= 0) told->locked.push_back({linkage.closures, linkage.written});
   }
   try {
-    addPlay(linkages.model, yaml.plays);  // only to check them: worlds have play, the model does not
-  } catch (const InputError& error) {     // which knows no file
+    addPlay(linkages.model, yaml.wear.plays);  // only to check them: worlds have play, the model does not
+  } catch (const InputError& error) {          // which knows no file
     throw InputError(settings, error.element(), error.problem(), error.remedy());
   }
+  if (told) told->wear.plays = listPlays(linkages.model, yaml.wear.plays);
   return std::move(linkages.model);
 }
 }  // namespace bielle

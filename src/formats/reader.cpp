@@ -79,7 +79,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   if (own.rounding) yaml.rounding = own.rounding;
   if (own.motor_armature) yaml.motor_armature = own.motor_armature;
   if (own.gravity) yaml.gravity = own.gravity;
-  yaml.plays.insert(yaml.plays.end(), own.plays.begin(), own.plays.end());
+  yaml.wear.plays.insert(yaml.wear.plays.end(), own.wear.plays.begin(), own.wear.plays.end());
   yaml.names.insert(yaml.names.end(), own.names.begin(), own.names.end());
   yaml.warnings.insert(yaml.warnings.end(), own.warnings.begin(), own.warnings.end());
 }
@@ -162,8 +162,6 @@ RobotSources& getRobotSources() {
 std::string LoadedRobot::path() const {
   return (std::filesystem::path(directory) / std::filesystem::path(file).filename()).lexically_normal().string();
 }
-
-std::vector<Play> listPlays(const std::string& file) { return readRobotFiles(file).yaml.plays; }
 
 std::vector<std::string> listHarmless(const std::string& file) { return readRobotFiles(file).urdf.harmless; }
 

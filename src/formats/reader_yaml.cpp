@@ -209,8 +209,8 @@ void readFrames(const Entry& map, YamlFile& file) {
 
 void readPlays(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
-    file.plays.push_back({name, entry.getNumber()});
-    if (!(file.plays.back().size >= 0)) entry.fail("it is negative", "give the way from stop to stop, rad or m");
+    file.wear.plays.push_back({name, entry.getNumber()});
+    if (!(file.wear.plays.back().size >= 0)) entry.fail("it is negative", "give the way from stop to stop, rad or m");
   }
 }
 

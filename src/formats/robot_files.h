@@ -9,9 +9,9 @@
 #include "bielle/formats/reader.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/model.h"
+#include "bielle/model/wear.h"
 #include "formats/decimals.h"
 #include "formats/yaml_entry.h"
-#include "model/play.h"
 
 namespace bielle {
 
@@ -129,7 +129,7 @@ struct YamlFile {
   std::vector<std::string> serial_joints;
   std::vector<std::pair<std::string, std::array<double, 2>>> importance;  ///< joint -> of its position, of its velocity
   std::optional<Vector3d> gravity;
-  std::vector<Play> plays;                ///< of the robot in worlds; later ones take precedence
+  Wear wear;                              ///< of the robot in worlds
   std::vector<RobotName> names;           ///< all that this file uses, to be found in the robot
   Decimals axes{Decimals::Kind::Angles};  ///< of closures
   std::optional<double> rounding;         ///< instead of that of the numbers, rad and m
@@ -188,11 +188,9 @@ std::vector<std::string> listHarmless(const std::string& file);
 /// UrdfJoint::effort of the joints of the file of a robot that have one, by name, whether a motor drives them or not.
 /// \throws InputError as loadRobot() does
 std::map<std::string, double> listEfforts(const std::string& file);
-/// Its play in worlds: the key `play` of its YAML files, for addPlay(). \throws InputError as loadRobot() does
-std::vector<Play> listPlays(const std::string& file);
 
 /// The model of both files. Of what is harmless, the warnings give the number.
-/// \param base  overrides the file's key   \param told  receives warnings and locked loops; null for none
+/// \param base  overrides the file's key   \param told  receives warnings, locked loops and wear; null for none
 Model combineFiles(RobotFiles files, std::optional<BaseKind> base, LoadedRobot* told);
 
 /// What other libraries add to loadRobot() when a program that links them starts (model/missing_part.h).

@@ -28,7 +28,7 @@ char getAxisLetter(const Vector3d& axis) {
 
 class YamlWriter {
  public:
-  explicit YamlWriter(const Model& model) : model_(model) {}
+  YamlWriter(const Model& model, const Wear& wear) : model_(model), wear_(wear) {}
 
   std::string format(const std::string& remark) {
     if (!remark.empty()) out_ << YAML::Comment(remark);
@@ -48,6 +48,7 @@ class YamlWriter {
       out_ << EndSeq;
     }
     writeImportance();
+    writeMap("play", "rad, m", wear_.plays, [this](const Play& play) { add(play.name, play.size); });
     out_ << EndMap;
     return out_.size() ? out_.c_str() + std::string("\n") : "";
   }
@@ -229,13 +230,14 @@ class YamlWriter {
   }
 
   const Model& model_;
+  const Wear& wear_;
   Emitter out_;
 };
 
 }  // namespace
 
-RobotText formatRobot(const Model& model, const std::string& remark) {
-  return {formatUrdfBesideYaml(model, remark), YamlWriter(model).format(remark)};
+RobotText formatRobot(const Model& model, const std::string& remark, const Wear& wear) {
+  return {formatUrdfBesideYaml(model, remark), YamlWriter(model, wear).format(remark)};
 }
 
 std::vector<std::pair<const char*, std::string>> getMotorData(const Motor& motor) {
@@ -260,11 +262,11 @@ std::vector<std::pair<const char*, std::string>> getMotorData(const Motor& motor
   return data;
 }
 
-void writeRobot(const Model& model, const std::string& directory, const std::string& remark) {
+void writeRobot(const Model& model, const std::string& directory, const std::string& remark, const Wear& wear) {
   namespace fs = std::filesystem;
   const fs::path path = fs::absolute(directory).lexically_normal();
   const std::string name = (path.has_filename() ? path : path.parent_path()).filename().string();
-  const RobotText text = formatRobot(model, remark);
+  const RobotText text = formatRobot(model, remark, wear);
   std::error_code error;
   fs::create_directories(path, error);
   if (error)

@@ -1,5 +1,3 @@
-#include "model/play.h"
-
 #include <fnmatch.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <map>
 
 #include "bielle/model/builder.h"
+#include "bielle/model/wear.h"
 
 namespace bielle {
 namespace {
@@ -200,6 +199,14 @@ class PlayBuilder {
 }  // namespace
 
 std::string getPlayName(const std::string& name) { return name + ".play"; }
+
+std::vector<Play> listPlays(const Model& model, const std::vector<Play>& plays) {
+  const Places places = findPlaces(model, plays);
+  std::vector<Play> out;
+  for (const auto& [i, size] : places.joints) out.push_back({model.joints()[static_cast<size_t>(i)].name, size});
+  for (const auto& [c, size] : places.closures) out.push_back({model.closures()[static_cast<size_t>(c)].name, size});
+  return out;
+}
 
 Model addPlay(const Model& model, const std::vector<Play>& plays) {
   const Places places = findPlaces(model, plays);

@@ -301,6 +301,12 @@ bool isTurnedFar(const Joint& joint, const VectorXd& given) {
   return (joint.kind == JointKind::Revolute || joint.kind == JointKind::Continuous) && std::abs(given[0]) > 2 * kPi;
 }
 
+Json describePlay(const LoadedRobot& robot) {
+  Json plays = Json::array();
+  for (const Play& play : robot.wear.plays) plays.push_back({{"name", play.name}, {"size", play.size}});
+  return plays;
+}
+
 }  // namespace
 
 std::vector<std::string> checkReferences(const LoadedRobot& robot) {
@@ -362,6 +368,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"drives", Json::array()},
                {"joint_forces", describeJointForces(model)},
                {"point_springs", describePointSprings(model, postures)},
+               {"play", describePlay(robot)},
                {"shapes", {{"given", given}, {"fitted", model.shapes().size() - given}}},
                {"distances", describeDistances(model, chooseStanding(postures))},
                {"contacts", Json::array()},

@@ -52,17 +52,24 @@ bool isFile(const std::string& path) {
 }
 
 // The text of a robot; empty if files cannot express it.
-RobotText formatIfPossible(const Model& model) {
+RobotText formatIfPossible(const LoadedRobot& robot) {
   try {
-    return formatRobot(model);
+    return formatRobot(robot.model, "", robot.wear);
   } catch (const InputError&) {
     return {};
   }
 }
 
+LoadedRobot readText(const RobotText& text, const std::string& path) {
+  LoadedRobot robot;
+  robot.model = combineFiles(parseRobotText(text, path), {}, &robot);
+  robot.warnings.clear();  // were told when it was written
+  return robot;
+}
+
 // As written and read again, which may round: in the same way for two texts of one robot, whatever version wrote them.
 RobotText readAndFormat(const RobotText& text, const std::string& path) {
-  return text.urdf.empty() ? text : formatIfPossible(combineFiles(parseRobotText(text, path), {}, nullptr));
+  return text.urdf.empty() ? text : formatIfPossible(readText(text, path));
 }
 
 // Whether two lines are the same but for the rounding of their numbers. Linkages that were mended (rounded_linkages.h) differ by
@@ -110,10 +117,10 @@ std::string describeCommand(const std::vector<std::string>& command) {
 
 // The robot in a result, with the pictures of its file, if that is still there.
 LoadedRobot loadOwn(const std::string& mechanism, const RobotText& text, const std::string& path) {
-  LoadedRobot robot;
-  robot.file = isFile(path) ? path : fs::absolute(mechanism).lexically_normal().string();
-  robot.directory = fs::path(robot.file).parent_path().string();
-  robot.model = combineFiles(parseRobotText(text, robot.file), {}, nullptr);
+  const std::string file = isFile(path) ? path : fs::absolute(mechanism).lexically_normal().string();
+  LoadedRobot robot = readText(text, file);
+  robot.file = file;
+  robot.directory = fs::path(file).parent_path().string();
   return robot;
 }
 
@@ -165,22 +172,22 @@ std::string calcFingerprint(const RobotText& text) {
 
 RunInfo makeRunInfo(const std::string& name, const LoadedRobot& robot, const std::vector<std::string>& command,
                     Belief model, const std::string& serial_armature) {
-  return {name, robot.file, command, model, serial_armature, formatIfPossible(robot.model)};
+  return {name, robot.file, command, model, serial_armature, formatIfPossible(robot)};
 }
 
 LoadedRobot loadRobotOf(const std::string& directory) {
   const RobotEntry entry = readEntry(directory);
   if (entry.fingerprint.empty()) return loadByName(entry);
   const std::optional<LoadedRobot> current = loadCurrent(entry.path);
-  const RobotText now = current ? formatIfPossible(current->model) : RobotText();
+  const RobotText now = current ? formatIfPossible(*current) : RobotText();
   if (calcFingerprint(now) == entry.fingerprint) return *current;
   for (const BaseKind base : {BaseKind::Free, BaseKind::Fixed})  // it may have been loaded with another one
     if (const auto based = loadCurrent(entry.path, base))
-      if (calcFingerprint(formatIfPossible(based->model)) == entry.fingerprint) return *based;
+      if (calcFingerprint(formatIfPossible(*based)) == entry.fingerprint) return *based;
   const std::string mechanism = (fs::path(directory) / kMechanismUrdf).string();
   LoadedRobot robot = loadOwn(mechanism, readOwn(directory, entry), entry.path);
   if (!isFile(entry.path)) return robot;
-  const RobotText then = formatIfPossible(robot.model), read = readAndFormat(now, robot.file);
+  const RobotText then = formatIfPossible(robot), read = readAndFormat(now, robot.file);
   const std::string difference = !current ? ", and cannot be read" : describeChange(read, then);
   if (difference.empty()) return *current;
   const std::string again = entry.command.empty() ? "" : ": `" + describeCommand(entry.command) + "`";
@@ -190,12 +197,12 @@ LoadedRobot loadRobotOf(const std::string& directory) {
   return robot;
 }
 
-std::string describeOtherRobot(const std::string& directory, const Model& now) {
+std::string describeOtherRobot(const std::string& directory, const LoadedRobot& now) {
   const RobotEntry entry = readEntry(directory);
   const RobotText text = formatIfPossible(now);
   if (entry.fingerprint.empty() || calcFingerprint(text) == entry.fingerprint) return "";
   const LoadedRobot robot = loadOwn((fs::path(directory) / kMechanismUrdf).string(), readOwn(directory, entry), "");
-  return describeChange(readAndFormat(text, robot.file), formatIfPossible(robot.model));
+  return describeChange(readAndFormat(text, robot.file), formatIfPossible(robot));
 }
 
 }  // namespace bielle

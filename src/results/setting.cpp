@@ -1,6 +1,7 @@
 #include "results/setting.h"
 
 #include <charconv>
+#include <sstream>
 
 #include "bielle/model/error.h"
 
@@ -26,6 +27,18 @@ std::pair<std::string, double> parseSetting(const std::string& flag, const std::
     throw InputError("", flag + " '" + setting + "'", "it is not of the form name=number",
                      "e.g. " + flag + " " + example);
   return {setting.substr(0, equals), value};
+}
+
+std::vector<Play> parsePlays(const std::vector<std::string>& settings) {
+  std::vector<Play> plays;
+  for (const std::string& setting : settings) {
+    std::istringstream parts(setting);
+    for (std::string part; std::getline(parts, part, ',');) {
+      const auto [name, size] = parseSetting("--play", part, "closure_ankle*=0.0003");
+      plays.push_back({name, size});
+    }
+  }
+  return plays;
 }
 
 void requireOnce(const std::string& flag, const std::vector<std::string>& settings, const std::string& example,

@@ -53,12 +53,11 @@ std::vector<std::string> listWorlds() {
 
 bool controlsError(const std::string& name) { return getEntry(name).controls_error; }
 
-std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options,
-                                 const std::vector<Play>& plays) {
+std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options) {
   const Entry& entry = getEntry(name);
   if (options.tolerance > 0 && !entry.controls_error)
     throw InputError("", "tolerance of world '" + name + "'", "its steps are of a fixed length", "give a time step");
-  return makePlayWorld(model, plays, options, entry.make);
+  return makePlayWorld(model, options, entry.make);
 }
 
 }  // namespace bielle::worlds

@@ -3,7 +3,6 @@
 #include <memory>
 
 #include "bielle/worlds/world.h"
-#include "model/play.h"
 
 namespace bielle::worlds {
 
@@ -13,9 +12,8 @@ std::vector<std::string> listWorlds();
 /// Whether the steps of a world follow from WorldOptions::tolerance, if that is given.
 bool controlsError(const std::string& name);
 
-/// "bielle": makeOwnWorld(). \param plays  play_world.h
+/// "bielle": makeOwnWorld().
 /// \throws InputError when there is no world of this name, it cannot carry the robot, or has no use for a tolerance
-std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options = {},
-                                 const std::vector<Play>& plays = {});
+std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options = {});
 
 }  // namespace bielle::worlds

@@ -14,6 +14,7 @@
 #include "model/number_text.h"
 #include "worlds/contact_law.h"
 #include "worlds/left_out.h"
+#include "worlds/play_world.h"
 
 namespace bielle::worlds {
 namespace {
@@ -306,8 +307,9 @@ std::unique_ptr<World> makeManifoldWorld(const Model& model, const ManifoldWorld
 }
 
 std::unique_ptr<World> makeOwnWorld(const Model& model, const WorldOptions& options) {
-  if (options.tolerance > 0) return makeManifoldWorld(model, {options, {}, options.tolerance});
-  return makeBielleWorld(model, {options, {}});
+  return makePlayWorld(model, options, [](const Model& robot, const WorldOptions& o) {
+    return o.tolerance > 0 ? makeManifoldWorld(robot, {o, {}, o.tolerance}) : makeBielleWorld(robot, {o, {}});
+  });
 }
 
 }  // namespace bielle::worlds

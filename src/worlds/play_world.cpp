@@ -11,9 +11,9 @@ class PlayWorld : public World {
  public:
   using Make = std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>;
 
-  PlayWorld(const Model& model, const std::vector<Play>& plays, const WorldOptions& options, const Make& make)
+  // \param options  without play
+  PlayWorld(const Model& model, const Model& robot, const WorldOptions& options, const Make& make)
       : World(model, options) {
-    const Model robot = addPlay(model, plays);
     WorldOptions inside = options;
     inside.pushed_body = findBody(robot, model.bodies()[options.pushed_body].name);
     world_ = make(robot, inside);
@@ -25,10 +25,12 @@ class PlayWorld : public World {
     integration_ = world_->integration();
     q_inside_ = robot.makeNeutral();
     v_inside_.setZero(robot.nv());
+    q_motors_ = q_;
   }
 
   Books books() const override { return world_->books(); }
   double gap() const override { return world_->gap(); }
+  const VectorXd& motorConfiguration() const override { return q_motors_; }
 
  private:
   struct Place {
@@ -50,6 +52,7 @@ class PlayWorld : public World {
       q_inside_.segment(inside.idx_q, inside.nq) = q_.segment(joint.idx_q, joint.nq);
       v_inside_.segment(inside.idx_v, inside.nv) = v_.segment(joint.idx_v, joint.nv);
     });
+    q_motors_ = q_;
     world_->reset(q_inside_, v_inside_);
     message_ = world_->message();
   }
@@ -68,6 +71,7 @@ class PlayWorld : public World {
     visitJoints([this](const Joint& joint, const Joint& inside, const Joint* play) {
       q_.segment(joint.idx_q, joint.nq) = world_->configuration().segment(inside.idx_q, inside.nq);
       v_.segment(joint.idx_v, joint.nv) = world_->velocity().segment(inside.idx_v, inside.nv);
+      q_motors_.segment(joint.idx_q, joint.nq) = q_.segment(joint.idx_q, joint.nq);
       if (!play) return;
       q_[joint.idx_q] += world_->configuration()[play->idx_q];
       v_[joint.idx_v] += world_->velocity()[play->idx_v];
@@ -86,14 +90,18 @@ class PlayWorld : public World {
   std::unique_ptr<World> world_;
   std::vector<Place> places_;
   VectorXd q_inside_, v_inside_;  // of the robot with play
+  VectorXd q_motors_;
 };
 
 }  // namespace
 
 std::unique_ptr<World> makePlayWorld(
-    const Model& model, const std::vector<Play>& plays, const WorldOptions& options,
+    const Model& model, const WorldOptions& options,
     const std::function<std::unique_ptr<World>(const Model& model, const WorldOptions& options)>& make) {
-  return plays.empty() ? make(model, options) : std::make_unique<PlayWorld>(model, plays, options, make);
+  if (options.wear.plays.empty()) return make(model, options);
+  WorldOptions others = options;
+  others.wear.plays.clear();
+  return std::make_unique<PlayWorld>(model, addPlay(model, options.wear.plays), others, make);
 }
 
 }  // namespace bielle::worlds

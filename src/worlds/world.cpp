@@ -20,7 +20,9 @@ World::World(const Model& model, const WorldOptions& options)
       interrupt_(options.interrupt),
       feet_(model.contacts().size()),
       wrenches_(feet_.size(), Vector6d::Zero()),
-      touchdowns_(feet_.size(), Vector3d::Zero()) {}
+      touchdowns_(feet_.size(), Vector3d::Zero()) {
+  if (!options.wear.plays.empty()) throw std::logic_error("a world of a robot with play is made by makePlayWorld()");
+}
 
 void World::reset(ConstVectorRef q, ConstVectorRef v) {
   if (!q.allFinite() || !v.allFinite())

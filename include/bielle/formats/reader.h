@@ -108,6 +108,7 @@
 #include <vector>
 
 #include "bielle/model/model.h"
+#include "bielle/model/wear.h"
 
 namespace bielle {
 
@@ -129,6 +130,7 @@ struct LoadedRobot {
   std::string directory;              ///< where the files were found
   std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml without a URDF beside it
   std::vector<LockedLoops> locked;
+  Wear wear;                 ///< the key `play`, by the names of what has it, in the order of the model
   std::string path() const;  ///< of the same file in `directory`, as messages name it
 };
 

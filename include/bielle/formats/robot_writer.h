@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bielle/model/model.h"
+#include "bielle/model/wear.h"
 
 namespace bielle {
 
@@ -19,7 +20,7 @@ struct RobotText {
 /// \param remark  comment at the head of both files
 /// \throws InputError naming anything that the files cannot express: a universal joint whose axes are not axes of its
 ///   frame, limits of joints with several coordinates
-RobotText formatRobot(const Model& model, const std::string& remark = "");
+RobotText formatRobot(const Model& model, const std::string& remark = "", const Wear& wear = {});
 
 struct UrdfText {
   std::string urdf;
@@ -33,7 +34,8 @@ UrdfText formatUrdf(const Model& model);
 
 /// Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.
 /// \throws InputError as above, or when they cannot be written
-void writeRobot(const Model& model, const std::string& directory, const std::string& remark = "");
+void writeRobot(const Model& model, const std::string& directory, const std::string& remark = "",
+                const Wear& wear = {});
 
 /// The entry of a motor in a YAML file besides its armature and limits: its loss, drive and continuous effort, as keys and values.
 std::vector<std::pair<const char*, std::string>> getMotorData(const Motor& motor);

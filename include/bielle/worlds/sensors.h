@@ -29,7 +29,7 @@ struct SensorOptions {
 /// What sensors feel: a state of a robot, and the torques of its motors.
 struct SensedState {
   double time;             ///< s
-  ConstVectorRef q, v;     ///< nq, nv
+  ConstVectorRef q, v;     ///< nq, of the motors (World::motorConfiguration()); nv
   ConstVectorRef torques;  ///< nu, N m or N
 };
 
@@ -51,7 +51,7 @@ class Sensors {
 
  private:
   static SensedState sense(const World& world) {
-    return {world.time(), world.configuration(), world.velocity(), world.torques()};
+    return {world.time(), world.motorConfiguration(), world.velocity(), world.torques()};
   }
   Vector3d drawNoise(const Vector3d& deviations);
   void readEncoders(const SensedState& state);

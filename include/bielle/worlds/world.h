@@ -10,6 +10,7 @@
 
 #include "bielle/dynamics/ground.h"
 #include "bielle/dynamics/workspace.h"
+#include "bielle/model/wear.h"
 
 namespace bielle::worlds {
 
@@ -21,6 +22,7 @@ struct WorldOptions {
   /// Error allowed per step of worlds that control it (makeManifoldWorld(), Simbody's); 0: the world's own.
   double tolerance = 0;
   int pushed_body = 1;  ///< at whose centre of mass World::setPush() acts; 1: the trunk, the body of the first joint
+  Wear wear = {};       ///< play in makeOwnWorld() and makeWorld() alone; others throw std::logic_error
 };
 
 /// Energies at present and work since reset(), J. With E = kinetic + potential + elastic,
@@ -76,11 +78,13 @@ class World {
   bool advance(double duration);
   const std::string& message() const { return message_; }  ///< empty unless the integration broke off
 
-  const Model& model() const { return model_; }                  ///< of the robot
-  const Ground& ground() const { return ground_; }               ///< with its coefficient of friction
-  double time() const { return time_; }                          ///< since reset(), s
-  const VectorXd& configuration() const { return q_; }           ///< nq, coordinates of the model
-  const VectorXd& velocity() const { return v_; }                ///< nv
+  const Model& model() const { return model_; }         ///< of the robot
+  const Ground& ground() const { return ground_; }      ///< with its coefficient of friction
+  double time() const { return time_; }                 ///< since reset(), s
+  const VectorXd& configuration() const { return q_; }  ///< nq, coordinates of the model
+  const VectorXd& velocity() const { return v_; }       ///< nv
+  /// nq: the configuration as encoders of motors read it, with joints that have play where their motors are.
+  virtual const VectorXd& motorConfiguration() const { return q_; }
   const VectorXd& torques() const { return u_; }                 ///< nu, as they were cut
   const std::vector<FootReport>& feet() const { return feet_; }  ///< per contact of the model
   /// What the world leaves out of the model or takes otherwise, a sentence each, with its size; empty: nothing.

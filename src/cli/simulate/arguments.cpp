@@ -156,7 +156,7 @@ void describeWorld(OptionFields& fields, SimulateArguments& a) {
   fields.texts(
       "play", a.plays,
       "NAME=SIZE, e.g. closure_ankle*=0.0003: play of a joint or of the rod that a closure ties, the way from stop to "
-      "stop [rad, m]; * stands for any text. Of the simulated robot alone; may be repeated");
+      "stop [rad, m]; * stands for any text. Of the simulated robot alone; may be repeated, or several with commas");
   fields.number("mass_error", a.errors.mass, "1", {0, 0.99},
                 "largest relative error of masses: the simulated robot's masses and inertias are the "
                 "controller's, times a random factor within 1 plus or minus this");
@@ -255,18 +255,10 @@ Payload makePayload(const SimulateArguments& arguments) {
   return payload;
 }
 
-std::vector<Play> makePlays(const SimulateArguments& arguments, const std::string& file) {
-  std::vector<Play> plays;
-  try {
-    if (!file.empty()) plays = listPlays(file);
-  } catch (const InputError&) {
-    // Results keep their robot, which serves where its file can no longer be read, as its warning says; but not the file's play.
-  }
-  for (const std::string& text : arguments.plays) {
-    const auto [name, size] = parseSetting("--play", text, "closure_ankle*=0.0003");
-    plays.push_back({name, size});
-  }
-  return plays;
+Wear makeWear(const SimulateArguments& arguments, const LoadedRobot& robot) {
+  Wear wear = robot.wear;
+  for (const Play& play : parsePlays(arguments.plays)) wear.plays.push_back(play);
+  return wear;
 }
 
 std::string getName(PlanControl control) { return kControls[static_cast<size_t>(control)]; }
@@ -380,7 +372,7 @@ void parseOptions(SimulateArguments& arguments) {
   if (is_real) arguments.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
   makeGround(arguments, {});
   makePayload(arguments);
-  makePlays(arguments, "");
+  parsePlays(arguments.plays);
   const std::vector<std::string> worlds = splitWorlds(arguments.world);
   if (std::set<std::string>(worlds.begin(), worlds.end()).size() < worlds.size())
     throw InputError("", "--world " + arguments.world, "a world is given twice", "give it once");

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "bielle/model/options.h"
+#include "bielle/model/wear.h"
 #include "model/payload.h"
-#include "model/play.h"
 #include "worlds/execution.h"
 #include "worlds/robot_errors.h"
 #include "worlds/standing_place.h"
@@ -83,8 +83,8 @@ void parseOptions(SimulateArguments& arguments);
 
 /// What the robot of the world carries, and a plan does not know. \throws InputError
 Payload makePayload(const SimulateArguments& arguments);
-/// Those of the robot's file, and of the options, which take precedence.
-std::vector<Play> makePlays(const SimulateArguments& arguments, const std::string& file);
+/// That of the robot of the world, and of the options, which take precedence. \throws InputError
+Wear makeWear(const SimulateArguments& arguments, const LoadedRobot& robot);
 
 /// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01".
 struct WorldGround {

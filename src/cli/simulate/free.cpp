@@ -189,7 +189,7 @@ std::vector<std::string> writeRun(const SimulateArguments& arguments, const Load
   summary["integration"] = listIntegration(e.integration);
   summary["warnings"] = run.warnings;
   summary["pushes"] = listPushes(arguments.execution.pushes);
-  for (const Play& play : makePlays(arguments, robot.file)) summary["play"][play.name] = play.size;
+  for (const Play& play : makeWear(arguments, robot).plays) summary["play"][play.name] = play.size;
   const int pushed = findPushedBody(model, arguments.push_body);
   const Vector3d& com = model.bodies()[pushed].inertia.com;
   summary["pushed_body"] = {{"index", pushed}, {"com", std::vector<double>(com.data(), com.data() + 3)}};
@@ -321,7 +321,8 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
                                 : name == "simbody"    ? kSimbodyTolerance
                                                        : kOwnTolerance;
     world_options.pushed_body = pushed_body;
-    const std::unique_ptr<World> world = makeWorld(name, model, world_options, makePlays(arguments, robot.file));
+    world_options.wear = makeWear(arguments, robot);
+    const std::unique_ptr<World> world = makeWorld(name, model, world_options);
     FreeRun run{name, names.size() > 1 ? (fs::path(arguments.output) / name).string() : arguments.output, idle, {}};
     for (const std::string& warning : world->warnings()) {
       run.warnings.push_back("world " + name + ": " + warning);

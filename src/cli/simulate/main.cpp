@@ -247,9 +247,9 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   for (const std::string& each : listOddGround(plan, ground, place, start)) warnings.push_back(each);
   const LoadedRobot robot = loadWorldRobot(plan, arguments);
   const double tolerance = controlsError(arguments.world) ? arguments.accuracy : 0;
-  const auto world =
-      makeWorld(arguments.world, addErrors(plan, robot.model, arguments.errors),
-                {ground, arguments.time_step, &isInterrupted(), tolerance}, makePlays(arguments, robot.file));
+  WorldOptions world_options{ground, arguments.time_step, &isInterrupted(), tolerance};
+  world_options.wear = makeWear(arguments, robot);
+  const auto world = makeWorld(arguments.world, addErrors(plan, robot.model, arguments.errors), world_options);
   for (const std::string& each : listIdleInPlan(arguments, plan, *world)) warnings.push_back(each);
   for (const std::string& each : world->warnings()) warnings.push_back("world " + arguments.world + ": " + each);
   tell(warnings);

@@ -217,7 +217,7 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
     summary["payload"] = {{"mass_kg", payload.mass}, {"link", payload.link}};
     if (payload.at) summary["payload"]["at_m"] = {payload.at->x(), payload.at->y(), payload.at->z()};
   }
-  for (const Play& play : makePlays(arguments, carried.robot.file)) summary["play"][play.name] = play.size;
+  for (const Play& play : makeWear(arguments, carried.robot).plays) summary["play"][play.name] = play.size;
   summary["robot_errors"] = {{"mass", arguments.errors.mass}, {"rod_m", arguments.errors.rod}};
   summary["delay"] = {{"mean_ms", arguments.delay}, {"jitter_ms", arguments.jitter}};
   summary["seed"] = arguments.seed;
