@@ -75,17 +75,21 @@ def keep_play():
         robot = shutil.copytree(ROBOT, os.path.join(place, "robot"))
         file = os.path.join(robot, "bipetto.yaml")
         plain = read(file)
-        write(plain + '\nplay: {"closure_ankle*": 0.0003, closure_ankle2_left: 0.001, "*ankle1_right": 0}\n', file)
+        write(plain + '\nplay: {"closure_ankle*": 0.0003, closure_ankle2_left: 0.001, "*ankle1_right": 0}\n'
+              "rod_friction: {closure_knee_left: {coefficient: 0.1, radius: 0.01, joints: [free_knee_left]}}\n", file)
         plays = [("closure_ankle2_right", 0.0003), ("closure_ankle1_left", 0.0003), ("closure_ankle2_left", 0.001)]
         info = json.loads(run("info", "robot", "--json", where=place).stdout)
         assert [(play["name"], play["size"]) for play in info["play"]] == plays, info["play"]
         shown = run("info", "robot", where=place).stdout
         assert "play in worlds" in shown and "closure_ankle2_left   0.001" in shown, shown
         run("convert", "robot", "--to", "bielle", "-o", "again", where=place)
-        assert json.loads(run("info", "again", "--json", where=place).stdout)["play"] == info["play"]
+        again = json.loads(run("info", "again", "--json", where=place).stdout)
+        assert [again[key] for key in ("play", "rod_friction")] == [info[key] for key in ("play", "rod_friction")], again
+        assert info["rod_friction"][0]["joints"] == ["free_knee_left"], info["rod_friction"]
         told = run("convert", "robot", "--to", "mjcf", "-o", "robot.xml", where=place).stderr
         assert told.count("is left out: add --play") == len(plays), told
-        run("solve", *SQUAT, "--robot", "robot", "--quiet", "--no-report", "-o", "squat", where=place)
+        told = run("solve", *SQUAT, "--robot", "robot", "--quiet", "--no-report", "-o", "squat", where=place).stderr
+        assert "friction of rod ends is left out of the plan (closure_knee_left)" in told, told
         simulate(place, "before")
         write(plain, file)
         assert TOLD in run("check", "squat", where=place).stderr.splitlines()[0]
@@ -94,6 +98,7 @@ def keep_play():
         for name in ("before", "after"):
             summary = json.loads(read(place, name, "summary.json"))
             assert summary["play"] == dict(plays) and summary["books"]["stop_loss_J"] > 1e-6, summary["books"]
+            assert summary["books"]["other_loss_J"] > 1e-4, summary["books"]
         assert calc_distance(place, "before", "after") < 1e-6  # rounding, which stops amplify; play moves joints by 1e-3
         run("simulate", "squat", "-o", "none", "--control", "gains", "--duration", "0.3", "--play", "*=0,hipx_left=0.002",
             where=place)

@@ -1,11 +1,11 @@
 """Many robots for learning, by the conventions of Gymnasium's VectorEnv, without Gymnasium."""
 
-from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ._bielle import Ground, LoopCloser, Model, NumericalStatus, Sensors, World
+from ._bielle import Ground, LoopCloser, Model, NumericalStatus, RodFriction, Sensors, World
 from .named import Readings, WorldState
 
 Array = npt.NDArray[np.float64]
@@ -82,7 +82,7 @@ class VectorEnv:
     `termination(state)` are functions of arrays: the WorldState and torques (num_envs, nu).
     `start(generator)` gives their first states, by default those of StartStates, and `push(state)` the forces on their trunks
     (num_envs, 3), N, during the period to come. Episodes are truncated after a duration, s, and terminated also where physics break
-    off. `worlds` are theirs, of the `engine` and with the `play` of World (World, World.set()).
+    off. `worlds` are theirs, of the `engine` and with the `play` and `rod_frictions` of World (World, World.set()).
 
     Autoreset "NextStep": the step after the last one of an episode starts the next one, whatever the action, with reward 0.
     Each robot has random numbers of its own: its episodes are the same, bit by bit, for any number of robots and of threads.
@@ -112,11 +112,19 @@ class VectorEnv:
         threads: int = 0,
         engine: str = "bielle",
         play: Mapping[str, float] = {},
+        rod_frictions: Sequence[RodFriction] = (),
     ) -> None:
         if repeat < 1 or not (period > 0 and duration > 0):
             raise ValueError("repeat, period, duration: expected at least one period, and positive numbers of seconds")
         self.worlds = World(
-            model, count=num_envs, ground=ground, time_step=time_step, threads=threads, engine=engine, play=play
+            model,
+            count=num_envs,
+            ground=ground,
+            time_step=time_step,
+            threads=threads,
+            engine=engine,
+            play=play,
+            rod_frictions=rod_frictions,
         )
         self.model, self.num_envs, self.noise = model, num_envs, noise
         self.period, self.repeat, self.duration = period, repeat, duration

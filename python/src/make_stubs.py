@@ -14,7 +14,7 @@ from bielle import _bielle
 # Arguments and results that are any object to C++, by name; "" is the result.
 ARGUMENTS = {
     "contacts": "Contacts", "callback": "Optional[Callable[[Iteration], Optional[bool]]]", "gravity": "ArrayLike",
-    "torque_loss": "Optional[float]", "count": "Optional[int]", "play": "Mapping[str, float]", "other": "object", "warm_start": "Union[None, Trajectory, Solution, Record]",
+    "torque_loss": "Optional[float]", "count": "Optional[int]", "play": "Mapping[str, float]", "rod_frictions": "Sequence[RodFriction]", "other": "object", "warm_start": "Union[None, Trajectory, Solution, Record]",
     "objective": "Callable[[Array], Union[float, Tuple[float, ArrayLike]]]",
 }  # fmt: skip
 RESULTS = {

@@ -15,6 +15,7 @@ struct Robot {
   std::string file, directory;   // empty: not from files
   std::vector<std::string> warnings;
   std::vector<LockedLoops> locked = {};
+  std::vector<RodFriction> rod_frictions = {};
   NamedSizes play = {};  // by what has it, rad or m
 
   /// \throws ValueError when it was made without one
@@ -24,14 +25,15 @@ struct Robot {
   }
 };
 
-inline Wear makeWear(const NamedSizes& play) {
-  Wear wear;
+inline Wear makeWear(const NamedSizes& play, const std::vector<RodFriction>& frictions) {
+  Wear wear{{}, frictions};
   for (const auto& [name, size] : play) wear.plays.push_back({name, size});
   return wear;
 }
 
 inline LoadedRobot toLoaded(const Robot& robot) {
-  return {robot.get(), robot.warnings, robot.directory, robot.file, robot.locked, makeWear(robot.play)};
+  return {robot.get(), robot.warnings, robot.directory,
+          robot.file,  robot.locked,   makeWear(robot.play, robot.rod_frictions)};
 }
 
 }  // namespace bielle::python

@@ -21,6 +21,7 @@ Robot load(const std::string& name, const std::optional<std::string>& base) {
   loaded.warnings.insert(loaded.warnings.end(), moved.begin(), moved.end());
   Robot robot{name};
   for (const Play& play : loaded.wear.plays) robot.play.emplace_back(play.name, play.size);
+  robot.rod_frictions = loaded.wear.frictions;
   robot.model = std::make_shared<Model>(std::move(loaded.model));
   robot.file = loaded.file;
   robot.directory = loaded.directory;
@@ -64,6 +65,14 @@ std::string makeViewPage(const Robot& robot) {
 }  // namespace
 
 void bindRobots(py::module_& module) {
+  Value<RodFriction>(module, "RodFriction", "Friction of the pivots at the ends of a rod, which grows with its force.")
+      .field("closure", &RodFriction::closure, "name of a ball or a hinge, which is a pivot itself, or of a weld")
+      .field("coefficient", &RodFriction::coefficient, "of friction, over the force of the closure")
+      .field("radius", &RodFriction::radius, "of the ball or pin, m")
+      .field("friction_speed", &RodFriction::friction_speed, "below which it acts like a damper, rad/s")
+      .field("stiction", &RodFriction::stiction, "coefficient at rest; that of sliding where there is no more")
+      .field("stribeck_speed", &RodFriction::stribeck_speed, "at which it has fallen to that of sliding, rad/s")
+      .field("joints", &RodFriction::joints, "names of further pivots that bear the same force");
   Value<Robot>(module, "Robot",
                "A robot: its model, and where it came from. `load_robot` and `generate_robot` make them.")
       .field("name", &Robot::name, "as requested")
@@ -71,12 +80,13 @@ void bindRobots(py::module_& module) {
       .field("file", &Robot::file, "absolute path of the .urdf, or of the .yaml without a URDF beside it; or empty")
       .field("directory", &Robot::directory, "where the files are; or empty")
       .field("warnings", &Robot::warnings, "valid but suspicious: \"file: element: problem\"")
+      .field("rod_frictions", &Robot::rod_frictions, "RodFrictions in a World")
       .field("play", &Robot::play, "of joints and rods in a World, by their names: from stop to stop, rad or m")
       .type()
       .def(
           "write",
           [](const Robot& robot, const std::string& directory) {
-            writeRobot(robot.get(), directory, "", makeWear(robot.play));
+            writeRobot(robot.get(), directory, "", makeWear(robot.play, robot.rod_frictions));
           },
           py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
           "Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.")

@@ -41,7 +41,8 @@ MakeWorld findEngine(const std::string& engine) {
 class HeldWorlds {
  public:
   HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step,
-             double tolerance, const std::string& engine, int threads, const NamedSizes& play)
+             double tolerance, const std::string& engine, int threads, const NamedSizes& play,
+             const std::vector<RodFriction>& rod_frictions)
       : model_(std::move(model)), many_(count), engine_(engine), time_step_(time_step) {
     if (count && *count < 1) throw py::value_error("count: at least one world");
     for (const auto& [name, value] : {std::pair{"time_step", time_step}, std::pair{"tolerance", tolerance}})
@@ -51,7 +52,7 @@ class HeldWorlds {
     const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngine(engine);
     worlds::WorldOptions options{ground, time_step};
     options.tolerance = tolerance;
-    options.wear = makeWear(play);
+    options.wear = makeWear(play, rod_frictions);
     const py::gil_scoped_release release;
     if (count && engine == "bielle" && tolerance == 0 && play.empty()) {
       const worlds::WorldBatchOptions all{{options, {}}, threads_};
@@ -384,16 +385,19 @@ void bindWorlds(py::module_& module) {
       "steps of high order and controlled error, for mechanisms in motion; 0: fixed steps, the fastest on feet.\n"
       "play: of joints and of the rods that closures tie, {name: from stop to stop, rad or m}, as a Robot has it; * "
       "stands for any text. States are those of the robot without it: a joint is where its link is.\n"
+      "rod_frictions: RodFrictions, as a Robot has them; in 'bielle', others warn.\n"
       "With `count`, that many worlds are stepped together on all cores, or on `threads`: arguments and results have a "
       "leading axis of worlds.")
       .def(py::init([](std::shared_ptr<Model> model, const py::object& count, const Ground& ground, double time_step,
-                       double tolerance, const std::string& engine, int threads, const py::object& play) {
+                       double tolerance, const std::string& engine, int threads, const py::object& play,
+                       const py::object& rod_frictions) {
              return std::make_shared<HeldWorlds>(std::move(model), read<std::optional<int>>(count, "count"), ground,
-                                                 time_step, tolerance, engine, threads, read<NamedSizes>(play, "play"));
+                                                 time_step, tolerance, engine, threads, read<NamedSizes>(play, "play"),
+                                                 read<std::vector<RodFriction>>(rod_frictions, "rod_frictions"));
            }),
            py::arg("model"), py::arg("count") = py::none(), py::arg("ground") = Ground(), py::arg("time_step") = 0.0,
            py::arg("tolerance") = 0.0, py::arg("engine") = "bielle", py::arg("threads") = 0,
-           py::arg("play") = py::dict())
+           py::arg("play") = py::dict(), py::arg("rod_frictions") = py::tuple())
       .def_property_readonly("model", &HeldWorlds::model, "Model")
       .def_property_readonly(
           "count", [](const HeldWorlds& self) { return show(self.count(), {}); }, "number of worlds, or None")

@@ -456,3 +456,22 @@ def test_worlds_have_play(model):
             bielle.World(model, play=wrong)
     with pytest.raises(TypeError):
         bielle.World(model, play=3)
+
+
+def test_worlds_have_friction_of_rods(model):
+    closure = model.closures[0]
+    rods = [bielle.RodFriction(closure=closure.name, coefficient=0.2, radius=0.01, joints=[model.joints[closure.body1].name])]
+    robot = bielle.Robot(name="rubbing", model=model, rod_frictions=rods)
+    assert robot.rod_frictions[0] == rods[0]
+    q, v = model.standing(), np.zeros(model.nv)
+    free, one, many = bielle.World(model), bielle.World(model, rod_frictions=rods), bielle.World(model, count=2, rod_frictions=rods)
+    for world in (free, one, many):
+        world.reset(q, v)
+    for _ in range(20):
+        smooth, rubbed, both = (w.step(np.zeros(model.nu), 1e-3) for w in (free, one, many))
+    assert one.books.other_loss > 0
+    assert free.books.other_loss == pytest.approx(0, abs=1e-12)
+    assert np.abs(rubbed.v - smooth.v).max() > 1e-4
+    assert np.abs(both.v - rubbed.v).max() < 1e-6
+    with pytest.raises(ValueError, match="there is no such closure"):
+        bielle.World(model, rod_frictions=[rods[0].replace(closure="nowhere")])

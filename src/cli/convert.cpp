@@ -115,6 +115,8 @@ std::vector<Play> takePlays(const ConvertArguments& arguments, Wear& wear) {
   if (arguments.format == "bielle") return plays;
   for (const Play& play : wear.plays)
     warn({"its play of '" + play.name + "' is left out: add --play " + play.name + "=" + formatNumber(play.size)});
+  for (const RodFriction& friction : wear.frictions)
+    warn({"friction of closure '" + friction.closure + "' is left out: it depends on the closure's force"});
   return plays;
 }
 

@@ -55,6 +55,8 @@ void printInfo(const Json& robot) {
   printSection(robot, "point_springs", "springs and dampers between points (N/m, m, N, N s/m)",
                {"name", "body1", "body2", "stiffness", "rest", "preload", "damping"});
   printSection(robot, "play", "play in worlds, from stop to stop (rad, m)", {"name", "size"});
+  printSection(robot, "rod_friction", "friction of rod ends in worlds (over the force of the closure; m, rad/s)",
+               {"name", "coefficient", "radius", "friction_speed", "stiction", "stribeck_speed", "joints"});
   printSection(robot, "contacts", "contacts (length and width in m)", {"name", "kind", "body", "sole"});
   const Json& shapes = robot["shapes"];
   const std::string title = "least distances between shapes (m), " + shapes["given"].dump() + " from the files, " +

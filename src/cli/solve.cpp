@@ -300,6 +300,9 @@ int solve(const SolveArguments& arguments, MotionRequest request) {
   const LoadedRobot robot = arguments.robot.load();
   printWarnings(listIdleOptions(arguments));  // not before: where the robot needs another program, that one tells
   printWarnings(listIdleSettings(arguments, request.options));
+  if (!robot.wear.frictions.empty())
+    printWarnings({"friction of rod ends is left out of the plan (" + robot.wear.frictions.front().closure +
+                   (robot.wear.frictions.size() > 1 ? ", .." : "") + "): it depends on the closure's force"});
   std::optional<SerialModel> serial;
   if (arguments.serial) {
     serial =

@@ -4,6 +4,7 @@
 
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
+#include "dynamics/rod_friction.h"
 #include "formats/reader_dialects.h"
 #include "formats/reader_loops.h"
 #include "formats/robot_files.h"
@@ -319,11 +320,13 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, LoadedR
       if (linkage.written >= 0) told->locked.push_back({linkage.closures, linkage.written});
   }
   try {
-    addPlay(linkages.model, yaml.wear.plays);  // only to check them: worlds have play, the model does not
+    // Only to check them: worlds have play and friction of rods, the model does not.
+    addPlay(linkages.model, yaml.wear.plays);
+    makeRodBearings(linkages.model, yaml.wear.frictions);
   } catch (const InputError& error) {          // which knows no file
     throw InputError(settings, error.element(), error.problem(), error.remedy());
   }
-  if (told) told->wear.plays = listPlays(linkages.model, yaml.wear.plays);
+  if (told) told->wear = {listPlays(linkages.model, yaml.wear.plays), yaml.wear.frictions};
   return std::move(linkages.model);
 }
 }  // namespace bielle

@@ -80,6 +80,12 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   if (own.motor_armature) yaml.motor_armature = own.motor_armature;
   if (own.gravity) yaml.gravity = own.gravity;
   yaml.wear.plays.insert(yaml.wear.plays.end(), own.wear.plays.begin(), own.wear.plays.end());
+  for (const RodFriction& friction : own.wear.frictions) {  // by closure
+    std::vector<RodFriction>& frictions = yaml.wear.frictions;
+    const auto is_same = [&friction](const RodFriction& other) { return other.closure == friction.closure; };
+    frictions.erase(std::remove_if(frictions.begin(), frictions.end(), is_same), frictions.end());
+    frictions.push_back(friction);
+  }
   yaml.names.insert(yaml.names.end(), own.names.begin(), own.names.end());
   yaml.warnings.insert(yaml.warnings.end(), own.warnings.begin(), own.warnings.end());
 }

@@ -32,6 +32,8 @@ const char* const kRobotOrPart = "robot, part";
 const YamlKeys kRobotKeys("robot", "", listRobotKeys());
 const YamlKeys kClosureKeys(kRobotOrPart, "closures[]",
                             {"name", "frames", "type", "axis", "length", "joints", "offset", "kp", "kd"});
+const YamlKeys kRodFrictionKeys(kRobotOrPart, "rod_friction.CLOSURE",
+                                {"coefficient", "radius", "friction_speed", "stiction", "stribeck_speed", "joints"});
 const YamlKeys kJointForceKeys(kRobotOrPart, "joint_forces.JOINT",
                                {"stiffness", "rest", "preload", "damping", "friction", "friction_speed", "stiction",
                                 "stribeck_speed"});
@@ -145,6 +147,24 @@ void readTiedFrames(const Fields& fields, const Entry& entry, ClosureSpec& closu
   closure.name = name ? name->getText() : makeClosureName(frames[0], frames[1]);
   closure.frame1 = frames[0];
   closure.frame2 = frames[1];
+}
+
+void readRodFrictions(const Entry& map, YamlFile& file) {
+  for (const auto& [closure, entry] : map.getMap()) {
+    const Fields fields = entry.getFields(kRodFrictionKeys);
+    RodFriction friction;
+    friction.closure = closure;
+    friction.coefficient = require(fields, "coefficient", entry).getNumber();
+    friction.radius = require(fields, "radius", entry).getNumber();
+    if (const Entry* speed = find(fields, "friction_speed")) friction.friction_speed = speed->getNumber();
+    if (const Entry* stiction = find(fields, "stiction")) friction.stiction = stiction->getNumber();
+    if (const Entry* speed = find(fields, "stribeck_speed")) friction.stribeck_speed = speed->getNumber();
+    if (const Entry* joints = find(fields, "joints")) {
+      friction.joints = joints->getTexts();
+      addNames(RobotName::Kind::Joint, *joints, file);
+    }
+    file.wear.frictions.push_back(std::move(friction));
+  }
 }
 
 void readClosures(const Entry& list, YamlFile& file) {
@@ -420,9 +440,9 @@ void readRoot(const Entry& root, YamlFile& file) {
 const YamlKeys kFrameKeys(kRobotOrPart, "frames.NAME", {"link", "place", "rpy"});
 
 const std::vector<std::string>& listSharedKeys() {
-  static const std::vector<std::string> keys = {"motors",        "motor_catalogue", "armature",      "closures",
-                                                "joint_forces",  "contacts",        "point_springs", "references",
-                                                "serial_joints", "gravity",         "importance",    "base"};
+  static const std::vector<std::string> keys = {
+      "motors",     "motor_catalogue", "armature", "closures",   "joint_forces", "contacts",    "point_springs",
+      "references", "serial_joints",   "gravity",  "importance", "base",         "rod_friction"};
   return keys;
 }
 
@@ -430,6 +450,7 @@ void readSharedKeys(const YamlFields& fields, YamlFile& file) {
   readMotors(fields, file);
   if (const Entry* entry = find(fields, "closures")) readClosures(*entry, file);
   if (const Entry* entry = find(fields, "joint_forces")) readJointForces(*entry, file);
+  if (const Entry* entry = find(fields, "rod_friction")) readRodFrictions(*entry, file);
   if (const Entry* entry = find(fields, "point_springs")) readPointSprings(*entry, file);
   if (const Entry* entry = find(fields, "contacts")) readContacts(*entry, file);
   if (const Entry* entry = find(fields, "references")) readReferences(*entry, file);

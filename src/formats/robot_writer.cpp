@@ -48,6 +48,7 @@ class YamlWriter {
       out_ << EndSeq;
     }
     writeImportance();
+    writeRodFrictions();
     writeMap("play", "rad, m", wear_.plays, [this](const Play& play) { add(play.name, play.size); });
     out_ << EndMap;
     return out_.size() ? out_.c_str() + std::string("\n") : "";
@@ -158,6 +159,21 @@ class YamlWriter {
                for (const auto& [key, value] : getJointForceData(whole)) add(key, value);
                out_ << EndMap;
              });
+  }
+
+  void writeRodFrictions() {
+    writeMap("rod_friction", "m, rad/s", wear_.frictions, [this](const RodFriction& friction) {
+      out_ << Key << friction.closure << Value << Flow << BeginMap;
+      add("coefficient", friction.coefficient);
+      add("radius", friction.radius);
+      add("friction_speed", friction.friction_speed);
+      if (friction.stiction > friction.coefficient) {
+        add("stiction", friction.stiction);
+        add("stribeck_speed", friction.stribeck_speed);
+      }
+      if (!friction.joints.empty()) out_ << Key << "joints" << Value << Flow << friction.joints;
+      out_ << EndMap;
+    });
   }
 
   void writePointSprings() {

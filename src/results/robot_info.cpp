@@ -307,6 +307,19 @@ Json describePlay(const LoadedRobot& robot) {
   return plays;
 }
 
+Json describeRodFriction(const LoadedRobot& robot) {
+  Json frictions = Json::array();
+  for (const RodFriction& friction : robot.wear.frictions)
+    frictions.push_back({{"name", friction.closure},
+                         {"coefficient", friction.coefficient},
+                         {"radius", friction.radius},
+                         {"friction_speed", friction.friction_speed},
+                         {"stiction", std::max(friction.coefficient, friction.stiction)},
+                         {"stribeck_speed", friction.stribeck_speed},
+                         {"joints", friction.joints}});
+  return frictions;
+}
+
 }  // namespace
 
 std::vector<std::string> checkReferences(const LoadedRobot& robot) {
@@ -369,6 +382,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"joint_forces", describeJointForces(model)},
                {"point_springs", describePointSprings(model, postures)},
                {"play", describePlay(robot)},
+               {"rod_friction", describeRodFriction(robot)},
                {"shapes", {{"given", given}, {"fitted", model.shapes().size() - given}}},
                {"distances", describeDistances(model, chooseStanding(postures))},
                {"contacts", Json::array()},

@@ -75,7 +75,7 @@ class Pipe {
 // Of a thread: allocated once, since worlds step in loops.
 struct Worker {
   Worker(const Model& model, const BielleWorldOptions& options)
-      : steps(model, options.world.ground, options.contact, options.world.pushed_body),
+      : steps(model, options.world, options.contact),
         motors(model.motors()),
         q(model.nq()),
         v(model.nv()),

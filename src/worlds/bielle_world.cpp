@@ -12,7 +12,7 @@ class BielleWorld : public World {
       : World(model, options.world),
         time_step_(options.world.time_step > 0 ? options.world.time_step : kBielleTimeStep),
         interrupt_(options.world.interrupt),
-        steps_(model, ground_, options.contact, pushed_body_) {
+        steps_(model, options.world, options.contact) {
     integration_.integrator = "leapfrog";
     warnings_ = listMissingStops(model);
   }

@@ -1,5 +1,7 @@
 #include "worlds/closed_tree.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "bielle/dynamics/kinematics.h"
@@ -52,6 +54,12 @@ ClosedTreeOf<T>::Cluster::Cluster(const ReducedCluster& l) : cluster(l), scratch
   for (Vector* x : {&d, &a_d}) x->setZero(l.model.nv());
   for (Vector* x : {&drift, &zeta}) x->setZero(l.rank);
   rows.setZero(l.closures.rows);
+  JW.setZero(l.rank, l.model.nv());
+  B.setZero(l.rank, l.closures.rows);
+  BB.setZero(l.rank, l.rank);
+  y.setZero(l.rank);
+  lambda.setZero(l.closures.rows);
+  pivots.resize(l.rank);
 }
 
 template <typename T>
@@ -78,7 +86,8 @@ ClosedTreeOf<T>::ClosedTreeOf(const Model& model, ConstVectorRef q, const std::v
   M_.setZero(size(), size());
   for (Vector* x : {&state_.q, &q_next_, &q_kept_}) *x = model.makeNeutral().cast<T>();
   state_.turns.setZero(model.nq());
-  for (Vector* x : {&state_.v, &v_next_, &v_foreseen_, &a_d_}) x->setZero(model.nv());
+  for (Vector* x : {&state_.v, &v_next_, &v_foreseen_, &a_d_, &forces_, &rates_}) x->setZero(model.nv());
+  changes_.assign(model.numBodies(), Vector6<T>::Zero());
   state_.armature = ws_.armature;
   for (Vector* x : {&state_.w, &w_next_, &loads_, &w_kept_}) x->setZero(size());
 }
@@ -305,17 +314,61 @@ void ClosedTreeOf<T>::updateLoads(const Vector& tau, const Vector& dw, const Mas
     for (size_t k = 0; k < c.cluster.dofs.size(); ++k) a_d_[c.cluster.dofs[k]] = c.a_d[k];
   }
   updateInverseDynamics<T>(model_, ws_, a_d_);
-  v_foreseen_ = tau - ws_.b;
+  forces_ = tau - ws_.b;
   for (const JointForce& force : model_.jointForces())
-    v_foreseen_[force.dof] -= calcDissipativeForce<T>(force, ws_.v[force.dof]);
+    forces_[force.dof] -= calcDissipativeForce<T>(force, ws_.v[force.dof]);
   for (size_t i = 0; i < clusters_.size(); ++i) {
     Cluster& c = clusters_[i];
-    gather(c.cluster.dofs, v_foreseen_, c.d);
+    gather(c.cluster.dofs, forces_, c.d);
     multiplyTransposed<T>(state_.clusters[i].basis.N, c.d, loads_.segment(c.cluster.offset, c.cluster.size));
   }
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    loads_.segment(reduction_.free_offsets[i], joint.nv) = v_foreseen_.segment(joint.idx_v, joint.nv);
+    loads_.segment(reduction_.free_offsets[i], joint.nv) = forces_.segment(joint.idx_v, joint.nv);
+  }
+}
+
+// J_all^T lambda = r = M w' - what else acts. With J_all x in place of lambda, x = W^{-1} J^T y, this is B B^T y = J
+// W^{-1} r.
+template <typename T>
+void ClosedTreeOf<T>::updateClosureForces(const T& h, const Vector& dw, const std::vector<Vector6<T>>& on_bodies,
+                                          const Vector& on_dofs, const std::vector<int>& closures, Vector& sizes) {
+  using std::sqrt;
+  rates_.setZero();
+  addReduced(dw, rates_);
+  rates_ /= h;
+  for (int i = 1; i < model_.numBodies(); ++i) {
+    const Joint& joint = model_.joints()[i];
+    changes_[i] = changes_[joint.parent];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) changes_[i] += ws_.J.col(k) * rates_[k];
+    ws_.F[i] = ws_.Y[i] * changes_[i] - on_bodies[i];
+  }
+  for (int i = model_.numBodies() - 1; i > 0; --i) {
+    const Joint& joint = model_.joints()[i];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
+      rates_[k] = ws_.J.col(k).dot(ws_.F[i]) + ws_.armature[k] * rates_[k] - forces_[k] - on_dofs[k];
+    if (joint.parent > 0) ws_.F[joint.parent] += ws_.F[i];
+  }
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    Cluster& c = clusters_[i];
+    const std::vector<int>& own = c.cluster.closure_indices;
+    const auto holds = [&](int closure) { return std::find(own.begin(), own.end(), closure) != own.end(); };
+    if (std::none_of(closures.begin(), closures.end(), holds)) continue;
+    const ClusterBasisOf<T>& basis = state_.clusters[i].basis;
+    gather(c.cluster.dofs, rates_, c.d);
+    for (Eigen::Index k = 0; k < c.JW.cols(); ++k) c.JW.col(k) = basis.J.col(k) * T(c.cluster.inverse_metric[k]);
+    for (Vector* x : {&c.y, &c.lambda}) x->setZero();
+    for (MatrixX<T>* x : {&c.B, &c.BB}) x->setZero();
+    addSmallProduct(c.JW, c.scratch.J_all.transpose(), c.B);
+    addSmallProduct(c.B, c.B.transpose(), c.BB);
+    addSmallProduct(c.JW, c.d, c.y);
+    factorizeSmall(c.BB, c.pivots);
+    solveFactorized(c.BB, c.pivots, c.y);
+    addSmallProductTransposed(c.B, c.y, c.lambda);
+    for (size_t k = 0; k < closures.size(); ++k)
+      for (size_t o = 0; o < own.size(); ++o)
+        if (own[o] == closures[k])
+          sizes[k] = sqrt(c.lambda.template segment<3>(c.cluster.closures.offsets[o]).squaredNorm());
   }
 }
 

@@ -62,6 +62,12 @@ class ClosedTreeOf {
   /// The part N^T (tau - b - M a_d) of Eq. (1) at the velocity w + dw (size), less dampers and friction of joints, and the
   /// drift for the next drift() of those of the mask.
   void updateLoads(const Vector& tau, const Vector& dw, const Mask& which);
+  /// Sizes of the forces of closures, without their moments, N, in a step of length h that changes w by dw. Where rows
+  /// are redundant they are those of least norm. Needs updateLoads().
+  /// \param on_bodies  numBodies, wrenches (world)   \param on_dofs  nv, what else acts there beside tau and springs
+  /// \param closures  of the model, those of interest   \param sizes  one each
+  void updateClosureForces(const T& h, const Vector& dw, const std::vector<Vector6<T>>& on_bodies,
+                           const Vector& on_dofs, const std::vector<int>& closures, Vector& sizes);
   /// w <- w + dw
   void kick(const Vector& dw, const Mask& which);
   /// Exchanges the robots for others. Placements and all that is updated are those of the former until the next drift().
@@ -82,6 +88,7 @@ class ClosedTreeOf {
   const Vector& configuration() const { return state_.q; }    ///< nq, without turns()
   const Vector& turns() const { return state_.turns; }        ///< nq, whole turns of hinges that nothing counts, rad
   const Vector& velocity() const { return state_.v; }         ///< nv
+  const Matrix6X<T>& columns() const { return ws_.J; }        ///< 6 x nv, twists per unit of each velocity (world)
   const SE3Of<T>& getPlacement(int body) const { return ws_.X_WB[body]; }
   /// Columns J_b N of a tip, about the origin of the world; `outer` are their indices into w.
   const typename ReducedTreeOf<T>::Columns& getTip(int index) const { return tree_.getTip(index); }
@@ -108,6 +115,9 @@ class ClosedTreeOf {
     ClusterStateOf<T> next;
     ClusterMotionOf<T> motion;
     Vector d, a_d, rows, drift, zeta;  // n; n; m; rank; rank
+    MatrixX<T> JW, B, BB;              // rank x n, J W^{-1}; rank x m, J W^{-1} J_all^T; B B^T
+    Vector y, lambda;                  // rank; m
+    std::vector<typename LogicOf<T>::Index> pivots;
   };
   struct DofPlace {
     int cluster = -1, index = 0;  // row of N of the cluster; without one, index into w
@@ -132,6 +142,8 @@ class ClosedTreeOf {
   const std::vector<int> free_turns_;
   Vector q_next_, v_next_, w_next_;  // nq, nv, size
   Vector v_foreseen_, a_d_, loads_;  // nv, nv, size
+  Vector forces_, rates_;            // nv: tau - b - M a_d with springs alone; w'
+  std::vector<Vector6<T>> changes_;  // numBodies, of their twists
   Vector q_kept_, w_kept_;           // nq, size
   std::array<std::string, kLanesOf<T>> failures_;
 };

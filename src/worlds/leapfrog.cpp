@@ -62,6 +62,7 @@ void assignMoment(const MaskOf<T>& mask, const typename LeapfrogOf<T>::Moment& f
   for (auto part : {&WorksOf<T>::motor, &WorksOf<T>::push, &WorksOf<T>::contact, &WorksOf<T>::stop, &WorksOf<T>::joint})
     assignLanes(mask, from.works.*part, to.works.*part);
   for (size_t c = 0; c < to.wrenches.size(); ++c) assignLanes(mask, from.wrenches[c], to.wrenches[c]);
+  assignLanes(mask, from.rod_forces, to.rod_forces);
 }
 
 template <typename T>
@@ -77,17 +78,19 @@ void assignPoints(const MaskOf<T>& mask, const std::vector<ContactPointOf<T>>& f
 }  // namespace
 
 template <typename T>
-LeapfrogOf<T>::LeapfrogOf(const Model& model, const Ground& ground, const ContactOptions& contact, int pushed_body)
+LeapfrogOf<T>::LeapfrogOf(const Model& model, const WorldOptions& options, const ContactOptions& contact)
     : model_(model),
-      pushed_body_(pushed_body),
-      friction_(ground.friction),
-      tree_(model, findPosture(model), listTips(model, pushed_body)),
-      contacts_(model, ground, contact),
+      pushed_body_(options.pushed_body),
+      friction_(options.ground.friction),
+      tree_(model, findPosture(model), listTips(model, pushed_body_)),
+      contacts_(model, options.ground, contact),
       forces_(contacts_.points.size()),
       steps_(contacts_.points.size()),
       touches_(contacts_.points.size()),
       places_(contacts_.points.size(), Vector3<T>::Zero()),
       stop_forces_(contacts_.stops.size(), T(0)),
+      rods_(model, tree_, options.wear.frictions),
+      on_bodies_(model.numBodies(), Vector6<T>::Zero()),
       factors_(tree_.size()),
       pivots_(tree_.size()) {
   u_.setZero(model.nu());
@@ -96,6 +99,8 @@ LeapfrogOf<T>::LeapfrogOf(const Model& model, const Ground& ground, const Contac
     x->setZero(tree_.size());
   for (MatrixX<T>* x : {&damping_, &system_}) x->setZero(tree_.size(), tree_.size());
   moment_.wrenches.assign(model.contacts().size(), Vector6<T>::Zero());
+  moment_.rod_forces.setZero(static_cast<Eigen::Index>(rods_.closures().size()));
+  on_dofs_.setZero(model.nv());
   moment_kept_ = moment_before_ = moment_;
   points_kept_ = points_before_ = contacts_.points;
 }
@@ -113,6 +118,7 @@ MaskOf<T> LeapfrogOf<T>::start(const Vector& q, const Vector& v, const Mask& whi
   moment_.owed = moment_.length = 0;
   moment_.works = {};
   for (Vector6<T>& wrench : moment_.wrenches) wrench.setZero();
+  moment_.rod_forces.setZero();
   if (any(done)) {
     moment_.energy = tree_.calcEnergy();
     contacts_.reset([this](int body) { return tree_.getPlacement(body); });
@@ -303,6 +309,7 @@ MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
       steps_[i] = {h, linear(twist) + angular(twist).cross(places_[i])};
   }
   com_ = getPlace(pushed_body_, model_.bodies()[pushed_body_].inertia.com.cast<T>());
+  rods_.update(tree_);
   const Mask solved = solve(h, which);
   if (!any(solved)) return solved;
   w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
@@ -322,6 +329,7 @@ MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
   if (!any(done)) return done;
   for (size_t i = 0; i < points.size(); ++i) updateAnchor<T>(contacts_.terrain, places_[i], forces_[i], points[i]);
   contacts_.settle([this](int body) { return tree_.getPlacement(body); });
+  if (!rods_.empty()) updateRodForces(h);
   tree_.kick(dw_, done);
   moment_.half_last = 0.5 * dw_;
   return done;
@@ -426,6 +434,8 @@ void LeapfrogOf<T>::addForces(const Vector& w, Vector& loads, MatrixX<T>* dampin
   addContacts(w, loads, damping);
   addStops(w, loads, damping);
   addJoints(w, loads, damping);
+  const bool is_indefinite = rods_.add(moment_.rod_forces, w, loads, damping);
+  slides_ = slides_ || (damping && is_indefinite);
 }
 
 // Of a coordinate.
@@ -454,6 +464,23 @@ void LeapfrogOf<T>::addJoints(const Vector& w, Vector& loads, MatrixX<T>* dampin
     const T v = calcRate(force.dof, w);
     addRow(force.dof, calcDissipativeForce<T>(force, v), damping ? calcResistance<T>(force, v) : T(0), loads, damping);
   }
+}
+
+// After book(), whose wrenches of the ground they are balanced with.
+template <typename T>
+void LeapfrogOf<T>::updateRodForces(const T& h) {
+  for (Vector6<T>& wrench : on_bodies_) wrench.setZero();
+  on_dofs_.setZero();
+  for (size_t c = 0; c < model_.contacts().size(); ++c) on_bodies_[model_.contacts()[c].body] += moment_.wrenches[c];
+  if (is_pushed_) {
+    linear(on_bodies_[pushed_body_]) += push_;
+    angular(on_bodies_[pushed_body_]) += com_.cross(push_);
+  }
+  for (size_t i = 0; i < stop_forces_.size(); ++i) on_dofs_[contacts_.stops[i].dof] += stop_forces_[i];
+  for (const JointForce& force : model_.jointForces())
+    on_dofs_[force.dof] += calcDissipativeForce<T>(force, calcRate(force.dof, w_mean_));
+  rods_.addToDofs(tree_, on_dofs_);
+  tree_.updateClosureForces(h, dw_, on_bodies_, on_dofs_, rods_.closures(), moment_.rod_forces);
 }
 
 template <typename T>
@@ -531,6 +558,7 @@ void LeapfrogOf<T>::book(const T& h) {
     const T rate = calcRate(force.dof, w_mean_);
     works.joint += h * calcDissipativeForce<T>(force, rate) * rate;
   }
+  works.joint += h * rods_.power();
   int tip = static_cast<int>(model_.contacts().size()) + 1;
   for (const PointSpring& spring : model_.pointSprings()) {
     const Vector3<T> p1 = getPlace(spring.body1, spring.point1.cast<T>()),

@@ -12,6 +12,7 @@
 #include "math/decompositions.h"
 #include "worlds/closed_tree.h"
 #include "worlds/contact_law.h"
+#include "worlds/rod_pivots.h"
 
 namespace bielle::worlds {
 
@@ -39,7 +40,7 @@ class LeapfrogOf {
   using Courses = std::array<Course, kLanesOf<T>>;
 
   /// \throws InputError when the robot has no closed standing posture
-  LeapfrogOf(const Model& model, const Ground& ground, const ContactOptions& contact, int pushed_body);
+  LeapfrogOf(const Model& model, const WorldOptions& options, const ContactOptions& contact);
 
   /// What a step changes beside the tree.
   struct Moment {
@@ -49,6 +50,7 @@ class LeapfrogOf {
     Vector half_last;                  ///< size, half of its dw
     WorksOf<T> works;                  ///< since start()
     std::vector<Vector6<T>> wrenches;  ///< of the ground in the last step, per contact of the model (world)
+    Vector rod_forces;                 ///< likewise, of the closures whose rods have friction, N
   };
   using Points = std::vector<ContactPointOf<T>>;
   struct State {
@@ -88,6 +90,7 @@ class LeapfrogOf {
   void addContacts(const Vector& w, Vector& loads, MatrixX<T>* damping);
   void addStops(const Vector& w, Vector& loads, MatrixX<T>* damping);
   void addJoints(const Vector& w, Vector& loads, MatrixX<T>* damping);
+  void updateRodForces(const T& h);
   T calcRate(int dof, const Vector& w) const;
   void addRow(int dof, const T& force, const T& resistance, Vector& loads, MatrixX<T>* damping);
   Vector6<T> calcTwist(int tip, const Vector& w) const;
@@ -116,6 +119,9 @@ class LeapfrogOf {
   std::vector<TouchOf<T>> touches_;        // at places_
   std::vector<Vector3<T>> places_;         // where they acted, m (world)
   std::vector<T> stop_forces_;
+  RodPivotsOf<T> rods_;
+  std::vector<Vector6<T>> on_bodies_;
+  Vector on_dofs_;                                                   // nv
   Vector u_, tau_;                                                   // nu, nv
   Vector3<T> push_ = Vector3<T>::Zero(), com_ = Vector3<T>::Zero();  // N; of the pushed body, m
   bool is_pushed_ = false;

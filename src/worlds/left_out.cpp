@@ -37,4 +37,13 @@ std::vector<std::string> listTurnedArmatures(const Model& model) {
   return warnings;
 }
 
+std::vector<std::string> listRodFrictions(const Wear& wear) {
+  std::vector<std::string> warnings;
+  for (const RodFriction& friction : wear.frictions)
+    warnings.push_back("closure '" + friction.closure +
+                       "': the friction of its rod's ends is left out: a coefficient of " +
+                       formatNumber(friction.coefficient) + " at a radius of " + formatNumber(friction.radius) + " m");
+  return warnings;
+}
+
 }  // namespace bielle::worlds

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bielle/model/model.h"
+#include "bielle/model/wear.h"
 
 namespace bielle::worlds {
 
@@ -14,5 +15,8 @@ std::vector<std::string> listMissingStops(const Model& model, const std::functio
 std::vector<std::string> listMissingStops(const Model& model);
 /// Armatures of planar and free joints, in worlds whose velocities of these lie along the axes of the parent.
 std::vector<std::string> listTurnedArmatures(const Model& model);
+
+/// Friction of rod ends.
+std::vector<std::string> listRodFrictions(const Wear& wear);
 
 }  // namespace bielle::worlds

@@ -15,6 +15,7 @@
 #include "worlds/contact_law.h"
 #include "worlds/left_out.h"
 #include "worlds/play_world.h"
+#include "worlds/rod_forces.h"
 
 namespace bielle::worlds {
 namespace {
@@ -29,6 +30,9 @@ constexpr double kNearest = 1e-9;   // share of it below which rows are not chos
 constexpr double kMostLoose = 1e4;  // error of a step that is taken there, over the tolerance
 constexpr double kOpen = 1e-8;      // of dependent rows, m or rad: the rank has changed
 constexpr double kLessIndependent = 1e-2;  // share of it below which rows are chosen anew
+
+constexpr double kSettled = 1e-12;  // of forces of rods with friction, relative to 1 N and the largest
+constexpr int kMostRounds = 30;     // for them to settle
 
 enum Work { kMotors, kPush, kContacts, kStops, kJoints, kWorks };
 
@@ -64,9 +68,10 @@ class ManifoldWorld : public World {
   RungeKutta method_;
   RungeKutta::Derivative derivative_;
   ContactSet contacts_;
+  RodForces rods_;
   const std::vector<int> free_turns_;
   VectorXd near_, turns_;  // nq: the configuration without and its whole turns
-  VectorXd tau_motors_, tau_, x_, rate_, scale_;
+  VectorXd tau_motors_, tau_, tau_all_, x_, rate_, scale_;
   double next_step_ = 0, usual_step_ = 0, gap_ = 0, best_independence_ = 1, least_independence_ = 1;
 };
 
@@ -78,6 +83,7 @@ ManifoldWorld::ManifoldWorld(const Model& model, const ManifoldWorldOptions& opt
       method_(2 * model.nv() + kWorks),
       derivative_([this](const VectorXd& x, VectorXd& rate) { return evaluate(x, rate); }),
       contacts_(model, ground_, options.contact),
+      rods_(model, options.world.wear.frictions),
       free_turns_(listFreeTurns(model)) {
   integration_.integrator = "Runge-Kutta of order 8";
   integration_.tolerance = tolerance_;
@@ -222,7 +228,17 @@ bool ManifoldWorld::evaluate(const VectorXd& x, VectorXd& rate) {
   least_independence_ = std::min(least_independence_, field_.independence());
   std::array<double, kWorks> power{};
   calcForces(tau_, power);
-  field_.accelerate(tau_, rate.head(nv), rate.segment(nv, nv));
+  for (int round = 0;; ++round) {
+    tau_all_ = tau_;
+    const double rubbed = rods_.empty() ? 0 : rods_.add(field_.workspace(), tau_all_);
+    field_.accelerate(tau_all_, rate.head(nv), rate.segment(nv, nv));
+    if (rods_.empty() ||
+        rods_.update(field_.workspace(), rate.segment(nv, nv), tau_all_) <= kSettled * (1 + rods_.largest())) {
+      power[kJoints] += rubbed;
+      break;
+    }
+    if (round == kMostRounds) return false;
+  }
   for (int w = 0; w < kWorks; ++w) rate[2 * nv + w] = power[w];
   return rate.allFinite();
 }

@@ -51,6 +51,7 @@ class MujocoWorld : public World {
       return hasStops(joint.kind) || joint.kind == JointKind::Planar || (has_axes && k < 3);
     });
     for (const std::string& warning : listTurnedArmatures(model)) warnings_.push_back(warning);
+    for (const std::string& warning : listRodFrictions(options.world.wear)) warnings_.push_back(warning);
     for (size_t c = 0; c < model.contacts().size(); ++c)
       contact_of_geom_[mj_name2id(&mj, mjOBJ_GEOM, (model.contacts()[c].name + ".1").c_str())] = static_cast<int>(c);
     for (VectorXd* x : {&v_before_, &v_mean_, &push_force_}) x->setZero(model.nv());

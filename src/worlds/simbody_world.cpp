@@ -204,6 +204,7 @@ SimbodyWorld::SimbodyWorld(const Model& model, const SimbodyWorldOptions& option
   integration_.closure_tolerance = options.gap;
   warnings_ = listMissingStops(model);
   for (const std::string& warning : listTurnedArmatures(model)) warnings_.push_back(warning);
+  for (const std::string& warning : listRodFrictions(options.world.wear)) warnings_.push_back(warning);
 }
 
 void SimbodyWorld::addRotors() {

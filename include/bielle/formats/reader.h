@@ -45,6 +45,8 @@
 ///   `effort` and `velocity` at the shaft of its gear
 /// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
 /// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed, stiction, stribeck_speed}, ...}`; `{}`: none
+/// - `rod_friction: {closure: {coefficient, radius, friction_speed, stiction, stribeck_speed, joints}, ...}` of a ball, hinge or weld,
+///   in worlds (RodFriction, docs/execution.md); `stiction` is a coefficient, too
 /// - `point_springs: {name: {frames: [A, B], points: [[x, y, z], [x, y, z]], stiffness, rest, preload, damping}, ...}`
 ///   between a point of A and one of B (m, default their origins), links or joints as in `closed_loop`; PointSpring in
 ///   model.h
