@@ -444,8 +444,8 @@ def test_worlds_have_play(model):
         world.reset(q, v)
         sensors.reset(0.0)
         torques = np.zeros((model.nu,) if world.count is None else (world.count, model.nu))
-        torques[..., 0] = 5
-        for _ in range(10):
+        torques[..., 0] = 10
+        for _ in range(20):
             state = world.step(torques, 1e-3)
         ahead = np.ravel(sensors.read().motor_positions)[0] - np.ravel(state.q)[joint.idx_q]
         assert ahead == pytest.approx(0.01, rel=0.2)

@@ -328,8 +328,8 @@ void ClosedTreeOf<T>::updateLoads(const Vector& tau, const Vector& dw, const Mas
   }
 }
 
-// J_all^T lambda = r = M w' - what else acts. With J_all x in place of lambda, x = W^{-1} J^T y, this is B B^T y = J
-// W^{-1} r.
+// J_all^T lambda = r = M w' - what else acts. With lambda = J_all x, x = W^{-1} J^T y, this is B B^T y = J W^{-1} r;
+// where no row is redundant, lambda = (J W^{-1} J^T)^{-1} J W^{-1} r.
 template <typename T>
 void ClosedTreeOf<T>::updateClosureForces(const T& h, const Vector& dw, const std::vector<Vector6<T>>& on_bodies,
                                           const Vector& on_dofs, const std::vector<int>& closures, Vector& sizes) {
@@ -356,15 +356,22 @@ void ClosedTreeOf<T>::updateClosureForces(const T& h, const Vector& dw, const st
     if (std::none_of(closures.begin(), closures.end(), holds)) continue;
     const ClusterBasisOf<T>& basis = state_.clusters[i].basis;
     gather(c.cluster.dofs, rates_, c.d);
-    for (Eigen::Index k = 0; k < c.JW.cols(); ++k) c.JW.col(k) = basis.J.col(k) * T(c.cluster.inverse_metric[k]);
-    for (Vector* x : {&c.y, &c.lambda}) x->setZero();
-    for (MatrixX<T>* x : {&c.B, &c.BB}) x->setZero();
-    addSmallProduct(c.JW, c.scratch.J_all.transpose(), c.B);
-    addSmallProduct(c.B, c.B.transpose(), c.BB);
-    addSmallProduct(c.JW, c.d, c.y);
-    factorizeSmall(c.BB, c.pivots);
-    solveFactorized(c.BB, c.pivots, c.y);
-    addSmallProductTransposed(c.B, c.y, c.lambda);
+    for (Eigen::Index k = 0; k < c.d.size(); ++k) c.d[k] *= c.cluster.inverse_metric[k];
+    c.y.setZero();
+    addSmallProduct(basis.J, c.d, c.y);
+    if (c.cluster.rank == c.cluster.closures.rows) {
+      solveGram(basis, c.y);
+      expandIndependent<T>(basis, c.y, c.lambda);
+    } else {
+      for (Eigen::Index k = 0; k < c.JW.cols(); ++k) c.JW.col(k) = basis.J.col(k) * T(c.cluster.inverse_metric[k]);
+      for (MatrixX<T>* x : {&c.B, &c.BB}) x->setZero();
+      addSmallProduct(c.JW, c.scratch.J_all.transpose(), c.B);
+      addSmallProduct(c.B, c.B.transpose(), c.BB);
+      factorizeSmall(c.BB, c.pivots);
+      solveFactorized(c.BB, c.pivots, c.y);
+      c.lambda.setZero();
+      addSmallProductTransposed(c.B, c.y, c.lambda);
+    }
     for (size_t k = 0; k < closures.size(); ++k)
       for (size_t o = 0; o < own.size(); ++o)
         if (own[o] == closures[k])
