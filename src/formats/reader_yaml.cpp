@@ -23,8 +23,8 @@ constexpr double kMostYaw = 3.1416;  // rad, half a turn of four decimals
 std::vector<std::string> listRobotKeys() {
   std::vector<std::string> keys = {"closed_loop", "type", "closure_name", "name_mot"};
   keys.insert(keys.end(), listSharedKeys().begin(), listSharedKeys().end());
-  keys.insert(keys.end(),
-              {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set", "rounding", "play"});
+  keys.insert(keys.end(), {"joint_name", "joint_type", "cross_inertia", "frames", "model", "generator", "set",
+                           "rounding", "play", "rod_friction"});
   return keys;
 }
 
@@ -32,7 +32,7 @@ const char* const kRobotOrPart = "robot, part";
 const YamlKeys kRobotKeys("robot", "", listRobotKeys());
 const YamlKeys kClosureKeys(kRobotOrPart, "closures[]",
                             {"name", "frames", "type", "axis", "length", "joints", "offset", "kp", "kd"});
-const YamlKeys kRodFrictionKeys(kRobotOrPart, "rod_friction.CLOSURE",
+const YamlKeys kRodFrictionKeys("robot", "rod_friction.CLOSURE",
                                 {"coefficient", "radius", "friction_speed", "stiction", "stribeck_speed", "joints"});
 const YamlKeys kJointForceKeys(kRobotOrPart, "joint_forces.JOINT",
                                {"stiffness", "rest", "preload", "damping", "friction", "friction_speed", "stiction",
@@ -430,6 +430,7 @@ void readRoot(const Entry& root, YamlFile& file) {
   }
   if (const Entry* entry = find(fields, "frames")) readFrames(*entry, file);
   if (const Entry* entry = find(fields, "play")) readPlays(*entry, file);
+  if (const Entry* entry = find(fields, "rod_friction")) readRodFrictions(*entry, file);
   if (const Entry* entry = find(fields, "model"))
     file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};
   readGenerator(fields, file);
@@ -440,9 +441,9 @@ void readRoot(const Entry& root, YamlFile& file) {
 const YamlKeys kFrameKeys(kRobotOrPart, "frames.NAME", {"link", "place", "rpy"});
 
 const std::vector<std::string>& listSharedKeys() {
-  static const std::vector<std::string> keys = {
-      "motors",     "motor_catalogue", "armature", "closures",   "joint_forces", "contacts",    "point_springs",
-      "references", "serial_joints",   "gravity",  "importance", "base",         "rod_friction"};
+  static const std::vector<std::string> keys = {"motors",        "motor_catalogue", "armature",      "closures",
+                                                "joint_forces",  "contacts",        "point_springs", "references",
+                                                "serial_joints", "gravity",         "importance",    "base"};
   return keys;
 }
 
@@ -450,7 +451,6 @@ void readSharedKeys(const YamlFields& fields, YamlFile& file) {
   readMotors(fields, file);
   if (const Entry* entry = find(fields, "closures")) readClosures(*entry, file);
   if (const Entry* entry = find(fields, "joint_forces")) readJointForces(*entry, file);
-  if (const Entry* entry = find(fields, "rod_friction")) readRodFrictions(*entry, file);
   if (const Entry* entry = find(fields, "point_springs")) readPointSprings(*entry, file);
   if (const Entry* entry = find(fields, "contacts")) readContacts(*entry, file);
   if (const Entry* entry = find(fields, "references")) readReferences(*entry, file);

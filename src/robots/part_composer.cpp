@@ -211,11 +211,6 @@ class PartComposer {
       c.higher = std::move(higher);
     }
     append(own.closures, yaml.closures);
-    for (RodFriction& friction : own.wear.frictions) {
-      make(friction.closure);
-      for (std::string& joint : friction.joints) use(joint);
-    }
-    append(own.wear.frictions, yaml.wear.frictions);
     for (MotorSpec& motor : own.motors) use(motor.joint), motor.role = part_.role;
     append(own.motors, yaml.motors);
     for (const auto& [joint, value] : own.armature) yaml.armature[resolve(joint, any)] = value;
