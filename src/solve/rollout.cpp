@@ -328,7 +328,8 @@ void Rollout::checkArrivals(const RolloutInput& input, int num_tracks, Trial& tr
     const Track& track = tracks_[s];
     const auto is = [&](const IntegrateTask& task) { return task.x_out == &track.arrived; };
     if (std::none_of(arrivals_.begin(), arrivals_.end(), is)) continue;
-    const auto arrived = getEvaluation(input, track, track.end - 1)->x_next.array(), same = track.arrived.array();
+    const auto arrived = getEvaluation(input, track, track.end - 1)->x_next.array();
+    const auto same = track.arrived.array();
     // Entries up to their signs: quaternions may have either.
     if ((arrived - same).abs().min((arrived + same).abs()).maxCoeff() <= kSame) continue;
     trial.ok = false;
