@@ -309,16 +309,6 @@ void printEstimation(const EstimationErrors& s) {
 
 }  // namespace
 
-Json makeHappenedSummary(const MotionResult& result) {
-  Json summary = bielle::makeSummary(result);
-  for (const char* of_solving :
-       {"formulation", "step", "converged", "interrupted", "termination", "message", "acceptable", "cost", "iterations",
-        "seconds", "solver_gap", "constraints", "free_timings", "log_columns", "log"})
-    summary.erase(of_solving);
-  if (result.goals.empty()) summary.erase("goals");
-  return summary;
-}
-
 Json listBooks(const Execution& e) {
   return {{"energy_start_J", e.start.energy()},   {"energy_end_J", e.end.energy()},
           {"motor_work_J", e.end.motor_work},     {"push_work_J", e.end.push_work},

@@ -1,12 +1,11 @@
 #pragma once
 // What bielle-simulate prints and writes.
 #include "cli/simulate/arguments.h"
+#include "results/happened_summary.h"
 #include "results/result_files.h"
 
 namespace bielle::worlds {
 
-/// The summary of a result of what happened, without what tells how it was solved.
-Json makeHappenedSummary(const MotionResult& result);
 Json listBooks(const Execution& execution);
 Json listPushes(const std::vector<Push>& pushes);
 /// Integrator, steps [s] and tolerances of a world.
