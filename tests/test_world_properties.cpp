@@ -208,7 +208,7 @@ std::vector<Property> listMotors() {
   add("voltage of a motor", weak, fed, 6);
   out.push_back(makeOfArm("torque", [&](ModelBuilder& b) { b.addMotor(makeMotor(0)); }));
   out.back().torque = 3;
-  for (const JointKind kind : testing::kJointKinds) {
+  for (const JointKind kind : bielle::testing::kJointKinds) {
     out.push_back(makeOfArm(
         std::string("armature of a ") + getName(kind) + " joint without a motor",
         [](ModelBuilder& b) {
@@ -289,9 +289,9 @@ std::vector<Property> listLoops() {
     if (closure == ClosureKind::Slider) property.refuses = "mujoco";
     out.push_back(property);
   };
-  testing::Selection selection;
-  for (const JointKind joint : testing::kJointKinds)
-    for (const ClosureKind closure : testing::kClosureKinds)
+  bielle::testing::Selection selection;
+  for (const JointKind joint : bielle::testing::kJointKinds)
+    for (const ClosureKind closure : bielle::testing::kClosureKinds)
       if (!(joint == JointKind::Prismatic && closure == ClosureKind::Weld6D) && !selection.isLeftOut())
         add(joint, closure);  // the one left out cannot move
   // A coupler of three joints.
@@ -380,7 +380,7 @@ TEST_CASE("world properties: what limits only plans moves no world") {
 
 TEST_CASE("world properties: limits are stops, with gravity or without, or told") {
   for (const double gravity : {0.0, -9.81})
-    for (const JointKind kind : testing::kJointKinds) {
+    for (const JointKind kind : bielle::testing::kJointKinds) {
       const int nv = getNv(kind);
       JointLimits limits;
       limits.upper = VectorXd::Constant(nv, 0.1), limits.lower = VectorXd::Constant(nv, -0.1);

@@ -10,6 +10,7 @@ if(BIELLE_BUILD_SIMULATION)
   bielle_test(generated_maps SOURCES test_generated_maps.cpp LIBS bielle_simulation)
   bielle_test(bielle_world SOURCES test_bielle_world.cpp world_trials.cpp LIBS bielle_simulation)
   bielle_test(batch SOURCES test_batch.cpp world_trials.cpp LIBS bielle_simulation)
+  bielle_test(lane_worlds SOURCES test_lane_worlds.cpp LIBS bielle_simulation)
   bielle_test(manifold_world SOURCES test_manifold_world.cpp world_trials.cpp LIBS bielle_simulation)
   bielle_test(dead_point_stop SOURCES test_dead_point_stop.cpp LIBS bielle_simulation)
   bielle_test(predictive_controller SOURCES test_predictive_controller.cpp test_predictive_timing.cpp predictive_trials.cpp

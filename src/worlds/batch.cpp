@@ -4,9 +4,11 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
 #include "solve/team.h"
 #include "worlds/leapfrog.h"
@@ -130,6 +132,8 @@ struct WorldBatch::Data {
   void vary(Worker& worker, size_t group, const WorldParameters& before);
   void command(Worker& worker, int lane, int world, ConstVectorRef u);
   void takeSteps(Worker& worker, size_t group, const MatrixView& u, const MatrixView& push, double duration);
+  void mark(const std::vector<char>& where);
+  void setGrounds(const std::vector<std::shared_ptr<const Ground>>& grounds);
 
   Model model;
   BielleWorldOptions options;
@@ -139,10 +143,12 @@ struct WorldBatch::Data {
   Team team;
   std::vector<Steps::State> groups;  // of kLane worlds
   WorldParameters parameters;
-  std::vector<Pipe> pipes;  // empty where no torques are delayed
+  std::vector<std::shared_ptr<const Terrain>> terrains;  // of parameters.grounds
+  std::vector<Pipe> pipes;                               // empty where no torques are delayed
   MatrixXd q, v, torques, wrenches;
-  VectorXd times;
-  std::vector<char> is_ok, marks;  // marks: of those that are reset
+  Workspace ws;  // of springs()
+  VectorXd times, shortest_steps, longest_steps;
+  std::vector<char> is_ok, marks;  // marks: of those that are reset, or step
   std::vector<std::string> messages, warnings;
 };
 
@@ -151,6 +157,7 @@ WorldBatch::Data::Data(const Model& model, int count, const WorldBatchOptions& a
       options(all.world),
       count(count),
       time_step(options.world.time_step > 0 ? options.world.time_step : kBielleTimeStep),
+      ws(model),
       warnings(listMissingStops(model)) {
   if (count < 1) throw std::invalid_argument("worlds: the count is " + std::to_string(count) + "; give at least one");
   const size_t size = (static_cast<size_t>(count) + kLane - 1) / kLane;
@@ -171,7 +178,7 @@ WorldBatch::Data::Data(const Model& model, int count, const WorldBatchOptions& a
   v.setZero(model.nv(), count);
   torques.setZero(model.nu(), count);
   wrenches.setZero(6 * static_cast<Eigen::Index>(model.contacts().size()), count);
-  times.setZero(count);
+  for (VectorXd* x : {&times, &shortest_steps, &longest_steps}) x->setZero(count);
   is_ok.assign(static_cast<size_t>(count), false);
   marks = is_ok;
   messages.assign(static_cast<size_t>(count), "it has not been reset");
@@ -204,7 +211,7 @@ void WorldBatch::Data::takeSteps(Worker& worker, size_t group, const MatrixView&
                                  double duration) {
   Steps::Courses& courses = worker.courses;
   Vector3<Lanes> force = Vector3<Lanes>::Zero();
-  LaneMask which = choose(group, is_ok);
+  LaneMask which = choose(group, is_ok) && choose(group, marks);
   std::array<double, kLane> start{}, taken{};
   for (int l = 0; l < kLane; ++l) {
     if (!which[l]) continue;
@@ -243,12 +250,24 @@ void WorldBatch::Data::takeSteps(Worker& worker, size_t group, const MatrixView&
       if (!which[l]) continue;
       const int world = getFirst(group) + l;
       taken[l] += courses[l].taken;
+      if (courses[l].longest_step > 0) {
+        longest_steps[world] = std::max(longest_steps[world], courses[l].longest_step);
+        double& shortest = shortest_steps[world];
+        shortest = shortest > 0 ? std::min(shortest, courses[l].shortest_step) : courses[l].shortest_step;
+      }
       times[world] = start[l] + (taken[l] == count ? duration : taken[l] * h);
       is_ok[world] = courses[l].message.empty();
       messages[world] = courses[l].message;
       which.set(l, is_ok[world] && courses[l].taken == courses[l].steps && taken[l] < count);
     }
   }
+}
+
+void WorldBatch::Data::mark(const std::vector<char>& where) {
+  if (!where.empty() && where.size() != static_cast<size_t>(count))
+    throw std::invalid_argument("worlds: where has " + std::to_string(where.size()) + " entries; give " +
+                                std::to_string(count));
+  for (int i = 0; i < count; ++i) marks[i] = where.empty() || where[i];
 }
 
 WorldBatch::WorldBatch(const Model& model, int count, const WorldBatchOptions& options)
@@ -261,15 +280,11 @@ void WorldBatch::reset(const MatrixView& q, const MatrixView& v, const std::vect
   Data& d = *data_;
   requireShape(q, d.model.nq(), d.count, "q");
   requireShape(v, d.model.nv(), d.count, "v");
-  if (!where.empty() && where.size() != static_cast<size_t>(d.count))
-    throw std::invalid_argument("worlds: where has " + std::to_string(where.size()) + " entries; give " +
-                                std::to_string(d.count));
-  const auto isMarked = [&](int i) { return where.empty() || where[i]; };
+  d.mark(where);
   for (int i = 0; i < d.count; ++i)
-    if (isMarked(i) && !(q.col(i).allFinite() && v.col(i).allFinite()))
+    if (d.marks[i] && !(q.col(i).allFinite() && v.col(i).allFinite()))
       throw std::invalid_argument("worlds: the state of world " + std::to_string(i) +
                                   " has a number that is not finite; give a closed configuration and a velocity");
-  for (int i = 0; i < d.count; ++i) d.marks[i] = isMarked(i);
   d.visit([&](Worker& worker, size_t group) {
     const LaneMask which = d.choose(group, d.marks);
     if (!any(which)) return;
@@ -279,7 +294,7 @@ void WorldBatch::reset(const MatrixView& q, const MatrixView& v, const std::vect
     for (int l = 0; l < kLane; ++l) {
       if (!which[l]) continue;
       const int world = d.getFirst(group) + l;
-      d.times[world] = 0;
+      d.times[world] = d.shortest_steps[world] = d.longest_steps[world] = 0;
       d.torques.col(world).setZero();
       if (!d.pipes.empty()) d.pipes[world].clear();
       d.is_ok[world] = done[l];
@@ -308,6 +323,27 @@ void WorldBatch::Data::vary(Worker& worker, size_t group, const WorldParameters&
   worker.steps.vary(factors, armature, friction[0], which);
 }
 
+void WorldBatch::Data::setGrounds(const std::vector<std::shared_ptr<const Ground>>& grounds) {
+  if (grounds.empty()) return;
+  if (grounds.size() != static_cast<size_t>(count))
+    throw std::invalid_argument("worlds: there are " + std::to_string(grounds.size()) + " grounds; give " +
+                                std::to_string(count));
+  const bool has_steps = !options.world.ground.steps.empty();
+  std::map<const Ground*, std::shared_ptr<const Terrain>> known;
+  for (size_t i = 0; i < terrains.size(); ++i) known[parameters.grounds[i].get()] = terrains[i];
+  for (const auto& ground : grounds) {
+    if (!ground || ground->steps.empty() == has_steps)
+      throw std::invalid_argument(std::string("worlds: a ground has ") + (has_steps ? "no " : "") +
+                                  "steps, other than that of all; give grounds with steps, or none");
+    if (!known.count(ground.get())) known[ground.get()] = std::make_shared<const Terrain>(*ground);
+  }
+  terrains.resize(grounds.size());
+  for (int i = 0; i < count; ++i) {
+    terrains[i] = known.at(grounds[i].get());
+    groups[i / kLane].grounds.set(static_cast<int>(i % kLane), *terrains[i]);
+  }
+}
+
 void WorldBatch::set(const WorldParameters& parameters) {
   Data& d = *data_;
   WorldParameters all = d.parameters;
@@ -327,20 +363,55 @@ void WorldBatch::set(const WorldParameters& parameters) {
       parameters.effort_limits, "effort_limits", "positive", [](double x) { return x > 0; }, all.effort_limits);
   takeParameters(parameters.friction, "friction", "not negative", isNotNegative, all.friction);
   takeParameters(parameters.delays, "delays", "not negative", isNotNegative, all.delays);
+  d.setGrounds(parameters.grounds);
+  if (!parameters.grounds.empty()) all.grounds = parameters.grounds;
   std::swap(d.parameters, all);
   if (d.pipes.empty() && !d.parameters.delays.isZero(0)) d.pipes.resize(static_cast<size_t>(d.count));
   d.visit([&](Worker& worker, size_t group) { d.vary(worker, group, all); });
 }
 
-bool WorldBatch::step(const MatrixView& u, const MatrixView& push, double duration) {
+bool WorldBatch::step(const MatrixView& u, const MatrixView& push, double duration, const std::vector<char>& where) {
   Data& d = *data_;
   requireShape(u, d.model.nu(), d.count, "u");
   requireShape(push, 3, d.count, "push");
   if (!(duration > 0 && std::isfinite(duration)))
     throw std::invalid_argument("worlds: the duration is " + std::to_string(duration) +
                                 " s; give a positive number of seconds");
+  d.mark(where);
   d.visit([&](Worker& worker, size_t group) { d.takeSteps(worker, group, u, push, duration); });
   return std::all_of(d.is_ok.begin(), d.is_ok.end(), [](char ok) { return ok != 0; });
+}
+
+Works WorldBatch::works(int world) const {
+  const WorksOf<Lanes>& works = data_->groups[world / kLane].moment.works;
+  const auto lane = world % kLane;
+  return {works.motor[lane], works.push[lane], works.contact[lane], works.stop[lane], works.joint[lane]};
+}
+
+SpringEnergies WorldBatch::springs(int world) const {
+  Data& d = *data_;
+  const Steps::State& state = d.groups[world / kLane];
+  const auto lane = static_cast<int>(world % kLane);
+  updatePlacements(d.model, d.ws, d.q.col(world));
+  SpringEnergies out;
+  for (const ContactPointOf<Lanes>& each : state.points) {
+    const ContactPoint point = takeLane(each, lane);
+    const Vector3d x = d.ws.X_WB[point.body].act(point.p);
+    const TouchOf<double> touch = findTouch<double>(*state.grounds.terrains[lane], x, point.from);
+    const double mu = state.friction[lane];
+    out.contacts += calcContactForce<double>(touch, mu, point, x, Vector3d::Zero(), false, {}).elastic;
+  }
+  for (const JointStop& stop : d.workers.front()->steps.contacts().stops)
+    out.stops += state.mass_ratio[lane] * calcStopForce(stop, d.q(stop.coordinate, world), 0).elastic;
+  return out;
+}
+
+Integration WorldBatch::integration(int world) const {
+  Integration out;
+  out.integrator = "leapfrog";
+  out.shortest_step = data_->shortest_steps[world];
+  out.longest_step = data_->longest_steps[world];
+  return out;
 }
 
 const WorldParameters& WorldBatch::parameters() const { return data_->parameters; }

@@ -103,16 +103,16 @@ std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& gr
 }
 
 template <typename T>
-TouchOf<T> findTouch(const Terrain& terrain, const Vector3<T>& x, const Vector3<T>& from) {
+TouchOf<T> findTouch(const GroundsOf<T>& grounds, const Vector3<T>& x, const Vector3<T>& from) {
   if constexpr (std::is_same_v<T, double>) {
-    const Terrain::Touch touch = terrain.touch(x, from);
+    const Terrain::Touch touch = grounds.terrains[0]->touch(x, from);
     return {touch.depth, touch.normal};
   } else {
-    if (terrain.ground().steps.empty()) return {terrain.ground().height - x.z(), Vector3<T>::UnitZ()};
+    if (!grounds.hasSteps()) return {grounds.height - x.z(), Vector3<T>::UnitZ()};
     TouchOf<T> out;
     for (Eigen::Index l = 0; l < kLane; ++l) {
       const auto getLane = [l](const Vector3<T>& v) { return Vector3d(v[0][l], v[1][l], v[2][l]); };
-      const Terrain::Touch touch = terrain.touch(getLane(x), getLane(from));
+      const Terrain::Touch touch = grounds.terrains[l]->touch(getLane(x), getLane(from));
       out.depth.set(l, touch.depth);
       for (int i = 0; i < 3; ++i) out.normal[i].set(l, touch.normal[i]);
     }
@@ -187,15 +187,33 @@ ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, const T& mu, const C
 }
 
 template <typename T>
-void updateAnchor(const Terrain& terrain, const Vector3<T>& x, const ContactForceOf<T>& force,
+void updateAnchor(const GroundsOf<T>& grounds, const Vector3<T>& x, const ContactForceOf<T>& force,
                   ContactPointOf<T>& point) {
   const Vector3<T> at = x + force.shift;
-  const TouchOf<T> touch = findTouch<T>(terrain, at, point.from);
+  const TouchOf<T> touch = findTouch<T>(grounds, at, point.from);
   point.touches = touch.depth > T(0);
   point.anchor = point.from = at;
   if (!any(point.touches)) return;
   point.anchor = select(point.touches, Vector3<T>(at + force.spring / point.shear_stiffness), at);
   point.from = select(point.touches, Vector3<T>(at + touch.depth * touch.normal), at);
+}
+
+ContactPoint takeLane(const ContactPointOf<Lanes>& point, int lane) {
+  ContactPoint out;
+  out.contact = point.contact;
+  out.body = point.body;
+  out.is_corner = point.is_corner;
+  out.damping = point.damping;
+  out.stiffness = point.stiffness[lane];
+  out.shear_stiffness = point.shear_stiffness[lane];
+  out.shear_damping = point.shear_damping[lane];
+  out.touches = point.touches[lane];
+  for (int i = 0; i < 3; ++i) {
+    out.p[i] = point.p[i][lane];
+    out.anchor[i] = point.anchor[i][lane];
+    out.from[i] = point.from[i][lane];
+  }
+  return out;
 }
 
 std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<ContactPoint>& points) {
@@ -214,7 +232,8 @@ std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<
 }
 
 template <>
-void settle<double>(const Terrain& terrain, const SE3& X_WF, ContactArea& area, std::vector<ContactPoint>& points) {
+void settle<double>(const GroundsOf<double>& grounds, const SE3& X_WF, ContactArea& area,
+                    std::vector<ContactPoint>& points) {
   const Matrix3d& R = X_WF.R;
   const Eigen::Matrix2d along = R.topLeftCorner<2, 2>(), back = along.inverse();
   const Eigen::Vector2d slope = -R.col(2).head<2>() / R(2, 2), centre = X_WF.p.head<2>();
@@ -224,7 +243,7 @@ void settle<double>(const Terrain& terrain, const SE3& X_WF, ContactArea& area, 
                                     centre + along * Eigen::Vector2d(-x, -y), centre + along * Eigen::Vector2d(x, -y)};
   for (size_t i = 0; i < area.homes.size(); ++i)
     area.places[i].home = area.places[i].support = centre + along * area.homes[i].head<2>();
-  if (R(2, 2) > kSteep) terrain.findSupports(corners, plane, kOver, kUnder, area.places);
+  if (R(2, 2) > kSteep) grounds.terrains[0]->findSupports(corners, plane, kOver, kUnder, area.places);
   for (size_t i = 0; i < area.homes.size(); ++i) {
     const Eigen::Vector2d& support = area.places[i].support;
     const bool is_home = support == area.places[i].home;
@@ -244,7 +263,7 @@ void settle<double>(const Terrain& terrain, const SE3& X_WF, ContactArea& area, 
 
 // One robot after the other: only where the ground has steps.
 template <>
-void settle<Lanes>(const Terrain& terrain, const SE3Of<Lanes>& X_WF, ContactArea& area,
+void settle<Lanes>(const GroundsOf<Lanes>& grounds, const SE3Of<Lanes>& X_WF, ContactArea& area,
                    std::vector<ContactPointOf<Lanes>>& points) {
   constexpr Vector3<Lanes> ContactPointOf<Lanes>::*kParts[] = {
       &ContactPointOf<Lanes>::p, &ContactPointOf<Lanes>::anchor, &ContactPointOf<Lanes>::from};
@@ -257,7 +276,7 @@ void settle<Lanes>(const Terrain& terrain, const SE3Of<Lanes>& X_WF, ContactArea
     for (size_t k = area.first; k < area.first + area.homes.size(); ++k)
       for (int part = 0; part < 3; ++part)
         for (int i = 0; i < 3; ++i) (one[k].*kOwn[part])[i] = (points[k].*kParts[part])[i][l];
-    settle<double>(terrain, X, area, one);
+    settle<double>(*grounds.terrains[l], X, area, one);
     for (size_t k = area.first; k < area.first + area.homes.size(); ++k)
       for (int part = 0; part < 3; ++part)
         for (int i = 0; i < 3; ++i) (points[k].*kParts[part])[i].set(l, (one[k].*kOwn[part])[i]);
@@ -302,15 +321,16 @@ StopForceOf<T> calcStopForce(const JointStop& stop, const T& q, const T& v, cons
           select(touches, T(normal.rate + normal.force / mean.depth * mean.rate * step.h), T(0))};
 }
 
-template TouchOf<double> findTouch(const Terrain&, const Vector3d&, const Vector3d&);
-template TouchOf<Lanes> findTouch(const Terrain&, const Vector3<Lanes>&, const Vector3<Lanes>&);
+template TouchOf<double> findTouch(const GroundsOf<double>&, const Vector3d&, const Vector3d&);
+template TouchOf<Lanes> findTouch(const GroundsOf<Lanes>&, const Vector3<Lanes>&, const Vector3<Lanes>&);
 template ContactForce calcContactForce(const TouchOf<double>&, const double&, const ContactPoint&, const Vector3d&,
                                        const Vector3d&, bool, const ContactStep&);
 template ContactForceOf<Lanes> calcContactForce(const TouchOf<Lanes>&, const Lanes&, const ContactPointOf<Lanes>&,
                                                 const Vector3<Lanes>&, const Vector3<Lanes>&, bool,
                                                 const ContactStepOf<Lanes>&);
-template void updateAnchor(const Terrain&, const Vector3d&, const ContactForce&, ContactPoint&);
-template void updateAnchor(const Terrain&, const Vector3<Lanes>&, const ContactForceOf<Lanes>&, ContactPointOf<Lanes>&);
+template void updateAnchor(const GroundsOf<double>&, const Vector3d&, const ContactForce&, ContactPoint&);
+template void updateAnchor(const GroundsOf<Lanes>&, const Vector3<Lanes>&, const ContactForceOf<Lanes>&,
+                           ContactPointOf<Lanes>&);
 template StopForce calcStopForce(const JointStop&, const double&, const double&, const StopStep&);
 template StopForceOf<Lanes> calcStopForce(const JointStop&, const Lanes&, const Lanes&, const StopStepOf<Lanes>&);
 

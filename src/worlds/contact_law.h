@@ -39,6 +39,7 @@
 /// wherever in the step the point touches down (Gonzalez, "Time integration and discrete Hamiltonian systems", 1996).
 ///
 /// T is double, or Lanes for the same point of as many robots.
+#include <array>
 #include <vector>
 
 #include "bielle/worlds/bielle_world.h"
@@ -102,6 +103,19 @@ struct ContactStepOf {
   Vector3<T> before = Vector3<T>::Zero();  ///< m/s (world)
 };
 using ContactStep = ContactStepOf<double>;
+/// What is under each robot: a ground for all, or one of its own. Either all have steps, or none.
+template <typename T>
+struct GroundsOf {
+  GroundsOf(const Terrain& terrain) : height(terrain.ground().height) { terrains.fill(&terrain); }
+  void set(int lane, const Terrain& terrain) {
+    terrains[lane] = &terrain;
+    setLaneOf(height, lane, terrain.ground().height);
+  }
+  bool hasSteps() const { return !terrains[0]->ground().steps.empty(); }
+
+  std::array<const Terrain*, kLanesOf<T>> terrains;  ///< which outlive this
+  T height;                                          ///< of the planes, m
+};
 /// Terrain::Touch.
 template <typename T>
 struct TouchOf {
@@ -110,24 +124,30 @@ struct TouchOf {
 };
 /// Terrain::touch(x, from)
 template <typename T>
-TouchOf<T> findTouch(const Terrain& terrain, const Vector3<T>& x, const Vector3<T>& from);
+TouchOf<T> findTouch(const GroundsOf<T>& grounds, const Vector3<T>& x, const Vector3<T>& from);
 /// Eqs. (1), (2) and (4) at a position and a velocity (world).
 /// \param with_damping  whether to fill the derivative
 ContactForce calcContactForce(const Terrain& terrain, const ContactPoint& point, const Vector3d& x,
                               const Vector3d& velocity, bool with_damping = false, const ContactStep& step = {});
-/// \param touch     findTouch(terrain, x, point.from), which does not depend on the velocity   \param mu  friction of the ground
+/// \param touch     findTouch(grounds, x, point.from), which does not depend on the velocity   \param mu  friction of the ground
 template <typename T>
 ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, const T& mu, const ContactPointOf<T>& point,
                                    const Vector3<T>& x, const Vector3<T>& velocity, bool with_damping,
                                    const ContactStepOf<T>& step);
 /// Eq. (3), for the force at x, and where the point came from.
 template <typename T>
-void updateAnchor(const Terrain& terrain, const Vector3<T>& x, const ContactForceOf<T>& force,
+void updateAnchor(const GroundsOf<T>& grounds, const Vector3<T>& x, const ContactForceOf<T>& force,
                   ContactPointOf<T>& point);
+inline void updateAnchor(const Terrain& terrain, const Vector3d& x, const ContactForce& force, ContactPoint& point) {
+  updateAnchor<double>(terrain, x, force, point);
+}
+/// The point of one of several robots.
+ContactPoint takeLane(const ContactPointOf<Lanes>& point, int lane);
 
 /// Moves points of an area that overhang a step onto its edge, where they are nearest, and back. Their bristles stay as they are bent.
 template <typename T>
-void settle(const Terrain& terrain, const SE3Of<T>& X_WF, ContactArea& area, std::vector<ContactPointOf<T>>& points);
+void settle(const GroundsOf<T>& grounds, const SE3Of<T>& X_WF, ContactArea& area,
+            std::vector<ContactPointOf<T>>& points);
 
 /// A stop of a joint: (1) in one coordinate.
 struct JointStop {
@@ -166,8 +186,13 @@ inline StopForce calcStopForce(const JointStop& stop, double q, double v, const 
 template <typename T>
 class ContactSetOf {
  public:
+  ContactSetOf(const ContactSetOf&) = delete;
+  ContactSetOf& operator=(const ContactSetOf&) = delete;
   ContactSetOf(const Model& model, const Ground& ground, const ContactOptions& options)
-      : terrain(ground), stops(makeJointStops(model)), made_(makeContactPoints(model, ground, options)) {
+      : terrain(ground),
+        grounds(terrain),
+        stops(makeJointStops(model)),
+        made_(makeContactPoints(model, ground, options)) {
     for (const ContactPoint& point : made_) {
       points.emplace_back();
       points.back().contact = point.contact;
@@ -188,6 +213,7 @@ class ContactSetOf {
   }
 
   const Terrain terrain;
+  GroundsOf<T> grounds;  ///< the terrain, unless robots have others
   std::vector<ContactPointOf<T>> points;
   const std::vector<JointStop> stops;
 
@@ -200,12 +226,12 @@ class ContactSetOf {
     }
     settle(getPlacement);
     for (ContactPointOf<T>& point : points)
-      updateAnchor<T>(terrain, getPlacement(point.body).act(point.p), ContactForceOf<T>(), point);
+      updateAnchor<T>(grounds, getPlacement(point.body).act(point.p), ContactForceOf<T>(), point);
   }
   /// Of all soles and edges; once per step, after the anchors.
   template <typename GetPlacement>
   void settle(const GetPlacement& getPlacement) {
-    for (ContactArea& area : areas_) worlds::settle<T>(terrain, getPlacement(area.body) * area.X_BF, area, points);
+    for (ContactArea& area : areas_) worlds::settle<T>(grounds, getPlacement(area.body) * area.X_BF, area, points);
   }
   template <typename GetPlace, typename GetCoordinate>
   void setStart(const GetPlace& getPlace, const GetCoordinate& getCoordinate) {

@@ -1,39 +1,16 @@
-#include "worlds/execution.h"
-
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <thread>
 
 #include "bielle/dynamics/assembly.h"
 #include "control/clock.h"
 #include "math/constants.h"
 #include "model/number_text.h"
 #include "motion/motor_scale.h"
-#include "worlds/balance.h"
-#include "worlds/motion_recorder.h"
+#include "worlds/carrying.h"
 #include "worlds/robot_errors.h"
 
 namespace bielle::worlds {
 namespace {
-
-// The clock beside a world.
-class Pace {
- public:
-  // s since the start
-  double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-  // Keeps the world from running ahead. \returns how far it is behind, s
-  double await(double time) const {
-    const Clock::time_point due =
-        start_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(time));
-    std::this_thread::sleep_until(due);
-    return std::chrono::duration<double>(Clock::now() - due).count();
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point start_ = Clock::now();
-};
 
 // Advances by a control period, through all changes of the torques that fall into it.
 bool advance(World& world, TorqueDelay& delay, double time, double period) {
@@ -118,100 +95,128 @@ double getEnd(const Plan& plan, const ExecutionOptions& o) {
   return o.duration > 0 ? o.duration : plan.end.value_or(plan.reference().duration() + o.hold);
 }
 
-Execution carryOut(const Plan& plan, Controller& controller, World& world, const PerceptionOptions& sensors,
-                   const ExecutionOptions& o, const ExecutionObserver& observer) {
+Carrying::Carrying(const Plan& plan, Controller& controller, World& world, const PerceptionOptions& sensors,
+                   const ExecutionOptions& o)
+    : options_(o),
+      duration_(getEnd(plan, o)),
+      controller_(controller),
+      world_(world),
+      ticks_(countPeriods(duration_, o.control_period)),
+      most_ticks_(ticks_ + countPeriods(kMostExtension, o.control_period)),
+      ticks_per_row_(countPeriods(o.record_period, o.control_period)),
+      recorder_(world, (most_ticks_ + ticks_per_row_ - 1) / ticks_per_row_),
+      perception_(plan.reference().model(), plan.schedule, sensors),
+      delay_(world.model().nu(), o.control_period, o.delay),
+      u_(VectorXd::Zero(world.model().nu())) {
   const Policy& reference = plan.reference();
   const Model& model = world.model();
-  const double duration = getEnd(plan, o);
-  const int ticks = countPeriods(duration, o.control_period);
-  const int most_ticks = ticks + countPeriods(kMostExtension, o.control_period);
-  const int ticks_per_row = countPeriods(o.record_period, o.control_period);
-  const int ticks_per_look = countPeriods(kBalancePeriod, o.control_period);
-  MotionRecorder recorder(world, (most_ticks + ticks_per_row - 1) / ticks_per_row);
-  Execution& happened = recorder.happened;
-
-  Perception perception(reference.model(), plan.schedule, sensors);
-  TorqueDelay delay(model.nu(), o.control_period, o.delay);
-  VectorXd u = VectorXd::Zero(model.nu());
-  Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
-  reference.getReference(0, measurement.q, measurement.v);
+  VectorXd q = model.makeNeutral(), v = VectorXd::Zero(model.nv());
+  reference.getReference(0, q, v);
   if (model.isCopyOf(reference.model())) {
-    world.reset(measurement.q, measurement.v);
+    world.reset(q, v);
   } else {
-    const VectorXd q = assembleMachine(reference.model(), model, measurement.q);
+    const VectorXd closed = assembleMachine(reference.model(), model, q);
     Workspace ws(model);
-    world.reset(q, projectVelocity(model, ws, makeConstraintSet(model), q, measurement.v));
+    world.reset(closed, projectVelocity(model, ws, makeConstraintSet(model), closed, v));
   }
-  FallDetector detector(model, reference, world.configuration(), o.fall, world.ground(), plan.ground);
-  Balance balance(world, plan.schedule);
-  perception.reset(world, measurement.q, measurement.v);
-  happened.update_seconds.reserve(static_cast<size_t>(most_ticks));
-  recorder.addNode(controller.footholds());
-  int cut = 0, tick = 0;
-  bool advances = true, is_stopped = false, stands = false;
-  std::string fall;
-  const Pace pace;
-  const auto describe = [&](double since) {
-    Execution so_far = recorder.describe(since);
-    so_far.distance = recorder.way().head<2>().norm();
-    so_far.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
-    so_far.whole_seconds = pace.elapsed();
-    so_far.estimation = perception.errors();
-    return so_far;
-  };
-  for (; tick < most_ticks && !stands && !is_stopped && fall.empty(); ++tick) {
-    if (o.real_time) happened.largest_lag = std::max(happened.largest_lag, pace.await(world.time()));
-    const double start = pace.elapsed();
-    measurement = perception.update(world, controller.getPlanTime(world.time()));
-    measurement.delay = o.delay.delay;
-    const double perceived = pace.elapsed();
-    controller.update(measurement, u);
-    happened.update_seconds.push_back(pace.elapsed() - perceived);
-    delay.send(measurement.time, u);
-    world.setPush(calcPush(o.pushes, measurement.time));
-    const double controlled = pace.elapsed();
-    advances = advance(world, delay, measurement.time, o.control_period);
-    happened.control_seconds += controlled - start;
-    recorder.noteAdvance(pace.elapsed() - controlled);
-    is_stopped = o.interrupt && *o.interrupt;
-    for (int m = 0; m < model.nu(); ++m) cut += delay.acting()[m] != world.torques()[m];
-    if (!world.message().empty()) break;
-    if (tick % ticks_per_row == 0) recorder.addStage();
-    fall = detector.find(world.time(), controller.getPlanTime(world.time()), world.configuration());
-    happened.largest_deviation = std::max(happened.largest_deviation, detector.deviation());
-    happened.largest_joint_deviation = std::max(happened.largest_joint_deviation, detector.jointDeviation());
-    const bool is_pushed = !calcPush(o.pushes, measurement.time).isZero(0);
-    if (is_pushed || tick % ticks_per_look == 0 || tick + 1 >= ticks)
-      balance.update(controller.getPlanTime(world.time()), controller.footholds(), is_pushed);
-    stands = tick + 1 >= ticks && balance.stands();
-    const bool ends = stands || tick + 1 == most_ticks || is_stopped || !fall.empty();
-    if ((tick + 1) % ticks_per_row != 0 && !ends) continue;
-    recorder.addNode(controller.footholds());
-    if (observer && !ends) observer(world.time(), std::max(duration, world.time()), describe);
+  detector_.emplace(model, reference, world.configuration(), o.fall, world.ground(), plan.ground);
+  balance_.emplace(world, plan.schedule);
+  perception_.reset(world, q, v);
+  recorder_.happened.update_seconds.reserve(static_cast<size_t>(most_ticks_));
+  recorder_.addNode(controller.footholds());
+}
+
+bool Carrying::isOver() const { return has_broken_ || ends_ || tick_ >= most_ticks_; }
+
+void Carrying::command() {
+  Execution& happened = recorder_.happened;
+  if (options_.real_time) happened.largest_lag = std::max(happened.largest_lag, pace_.await(world_.time()));
+  const double start = pace_.elapsed();
+  measurement_ = perception_.update(world_, controller_.getPlanTime(world_.time()));
+  measurement_.delay = options_.delay.delay;
+  const double perceived = pace_.elapsed();
+  controller_.update(measurement_, u_);
+  happened.update_seconds.push_back(pace_.elapsed() - perceived);
+  delay_.send(measurement_.time, u_);
+  world_.setPush(calcPush(options_.pushes, measurement_.time));
+  controlled_ = pace_.elapsed();
+  happened.control_seconds += controlled_ - start;
+}
+
+bool Carrying::advance() { return worlds::advance(world_, delay_, measurement_.time, options_.control_period); }
+
+void Carrying::holdTorques() { world_.setTorques(delay_.getTorques(measurement_.time)); }
+
+void Carrying::note(bool advances, const ExecutionObserver& observer) {
+  Execution& happened = recorder_.happened;
+  recorder_.noteAdvance(pace_.elapsed() - controlled_);
+  advances_ = advances;
+  is_stopped_ = options_.interrupt && *options_.interrupt;
+  for (int m = 0; m < world_.model().nu(); ++m) cut_ += delay_.acting()[m] != world_.torques()[m];
+  has_broken_ = !world_.message().empty();
+  if (has_broken_) return;
+  if (tick_ % ticks_per_row_ == 0) recorder_.addStage();
+  const double plan_time = controller_.getPlanTime(world_.time());
+  fall_ = detector_->find(world_.time(), plan_time, world_.configuration());
+  happened.largest_deviation = std::max(happened.largest_deviation, detector_->deviation());
+  happened.largest_joint_deviation = std::max(happened.largest_joint_deviation, detector_->jointDeviation());
+  const bool is_pushed = !calcPush(options_.pushes, measurement_.time).isZero(0);
+  const int ticks_per_look = countPeriods(kBalancePeriod, options_.control_period);
+  if (is_pushed || tick_ % ticks_per_look == 0 || tick_ + 1 >= ticks_)
+    balance_->update(plan_time, controller_.footholds(), is_pushed);
+  stands_ = tick_ + 1 >= ticks_ && balance_->stands();
+  ends_ = stands_ || tick_ + 1 == most_ticks_ || is_stopped_ || !fall_.empty();
+  if ((tick_ + 1) % ticks_per_row_ == 0 || ends_) {
+    recorder_.addNode(controller_.footholds());
+    if (observer && !ends_)
+      observer(world_.time(), std::max(duration_, world_.time()), [this](double since) { return describe(since); });
   }
+  ++tick_;
+}
+
+Execution Carrying::describe(double since) const {
+  Execution so_far = recorder_.describe(since);
+  so_far.distance = recorder_.way().head<2>().norm();
+  so_far.saturated_share = static_cast<double>(cut_) / (std::max(1, tick_) * std::max(1, static_cast<int>(u_.size())));
+  so_far.whole_seconds = pace_.elapsed();
+  so_far.estimation = perception_.errors();
+  return so_far;
+}
+
+Execution Carrying::finish() {
   Execution out = describe(0);
-  out.extension = std::max(0, tick - ticks) * o.control_period;
-  if (!world.message().empty()) {
-    balance.update(controller.getPlanTime(world.time()), controller.footholds(), false);
-    const bool falls = world.time() > 0 && balance.falls();  // before the first step no ground has borne a sole
+  out.extension = std::max(0, tick_ - ticks_) * options_.control_period;
+  if (!world_.message().empty()) {
+    balance_->update(controller_.getPlanTime(world_.time()), controller_.footholds(), false);
+    const bool falls = world_.time() > 0 && balance_->falls();  // before the first step no ground has borne a sole
     out.outcome = falls ? Outcome::Fell : Outcome::BrokeOff;
-    out.message = describeBreak(world);
+    out.message = describeBreak(world_);
     if (falls)
-      out.message = balance.describe() + " at " + formatNumber(out.duration, "%.3f s") +
+      out.message = balance_->describe() + " at " + formatNumber(out.duration, "%.3f s") +
                     ", where the world broke off: " + out.message;
-  } else if (!fall.empty()) {
+  } else if (!fall_.empty()) {
     out.outcome = Outcome::Fell;
-    out.message = fall;
-  } else if (!advances || is_stopped) {
+    out.message = fall_;
+  } else if (!advances_ || is_stopped_) {
     out.outcome = Outcome::Stopped;
-  } else if (!stands) {
+  } else if (!stands_) {
     out.outcome = Outcome::Undecided;
-    out.message = balance.describe();
+    out.message = balance_->describe();
   } else {
     out.outcome = Outcome::Stood;
-    out.message = describeFeet(model, out);
+    out.message = describeFeet(world_.model(), out);
   }
   return out;
+}
+
+Execution carryOut(const Plan& plan, Controller& controller, World& world, const PerceptionOptions& sensors,
+                   const ExecutionOptions& options, const ExecutionObserver& observer) {
+  Carrying carrying(plan, controller, world, sensors, options);
+  while (!carrying.isOver()) {
+    carrying.command();
+    carrying.note(carrying.advance(), observer);
+  }
+  return carrying.finish();
 }
 
 }  // namespace bielle::worlds

@@ -156,6 +156,7 @@ void LeapfrogOf<T>::swap(State& state) {
   contacts_.points.swap(state.points);
   std::swap(friction_, state.friction);
   std::swap(mass_ratio_, state.mass_ratio);
+  std::swap(contacts_.grounds, state.grounds);
 }
 
 // How one robot goes along. Where a step cannot be taken, all that led there, since the cause is often a kick some steps before, are
@@ -300,7 +301,7 @@ MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
   std::vector<ContactPointOf<T>>& points = contacts_.points;
   for (size_t i = 0; i < points.size(); ++i) {
     places_[i] = getPlace(points[i].body, points[i].p);
-    touches_[i] = findTouch<T>(contacts_.terrain, places_[i], points[i].from);
+    touches_[i] = findTouch<T>(contacts_.grounds, places_[i], points[i].from);
   }
   for (size_t c = 0, i = 0; c < model_.contacts().size(); ++c) {
     const int tip = static_cast<int>(c);
@@ -327,7 +328,7 @@ MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
   const Mask done =
       balance(kinetic + abs(added), kinetic + tree_.calcPotential() - 0.5 * (before + moment_.works.sum()), solved);
   if (!any(done)) return done;
-  for (size_t i = 0; i < points.size(); ++i) updateAnchor<T>(contacts_.terrain, places_[i], forces_[i], points[i]);
+  for (size_t i = 0; i < points.size(); ++i) updateAnchor<T>(contacts_.grounds, places_[i], forces_[i], points[i]);
   contacts_.settle([this](int body) { return tree_.getPlacement(body); });
   if (!rods_.empty()) updateRodForces(h);
   tree_.kick(dw_, done);

@@ -58,6 +58,7 @@ class LeapfrogOf {
     Moment moment;
     Points points;
     T friction, mass_ratio;  ///< of the ground; of the robot's mass to that of the model
+    GroundsOf<T> grounds;
   };
 
   /// Closed configurations of the robots of the mask, velocities that keep them closed, no torques and no push.
@@ -72,7 +73,9 @@ class LeapfrogOf {
   void advance(double h, const Mask& which, const std::atomic<bool>* interrupt, Courses& courses);
   /// Exchanges the robots for others.
   void swap(State& state);
-  State copyState() const { return {tree_.state(), moment_, contacts_.points, friction_, mass_ratio_}; }
+  State copyState() const {
+    return {tree_.state(), moment_, contacts_.points, friction_, mass_ratio_, contacts_.grounds};
+  }
 
   const ClosedTreeOf<T>& tree() const { return tree_; }
   ContactSetOf<T>& contacts() { return contacts_; }

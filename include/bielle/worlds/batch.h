@@ -20,6 +20,14 @@ struct WorldParameters {
   MatrixXd effort_limits;  ///< nu x count, Motor::effort_limit, N m or N; positive, maybe infinite
   VectorXd friction;       ///< count, Ground::friction; not negative
   VectorXd delays;  ///< count, from step() until its torques act, to the nearest whole time step, s; not negative
+  /// count, on which they stand, maybe the same one for several; either all have steps or none, as WorldOptions::ground. Worlds
+  /// whose ground changes are to be reset. Their friction is not read.
+  std::vector<std::shared_ptr<const Ground>> grounds{};
+};
+
+/// What springs hold, J.
+struct SpringEnergies {
+  double contacts = 0, stops = 0;
 };
 
 struct WorldBatchOptions {
@@ -42,9 +50,11 @@ class WorldBatch {
   void reset(const Eigen::Ref<const MatrixXd>& q, const Eigen::Ref<const MatrixXd>& v,
              const std::vector<char>& where = {});
   /// Advances by a duration, s, under torques of the motors u (nu x count, N m or N), cut at their limits, and a force at the centre of
-  /// mass of the pushed body (3 x count), N (world). Worlds that are not ok() stay as they are.
+  /// mass of the pushed body (3 x count), N (world). Worlds that are not ok(), or that `where` (count)
+  /// does not mark, stay as they are.
   /// \returns whether all are ok() \throws std::invalid_argument for a wrong shape, or a duration that is not positive
-  bool step(const Eigen::Ref<const MatrixXd>& u, const Eigen::Ref<const MatrixXd>& push, double duration);
+  bool step(const Eigen::Ref<const MatrixXd>& u, const Eigen::Ref<const MatrixXd>& push, double duration,
+            const std::vector<char>& where = {});
 
   /// Changes those parameters that are not empty, of all worlds, from now on: at once, and over reset(). Soles sink, and stops give
   /// way, as deep under another weight as under that of the model (ContactOptions). Torques that are under way still act when they
@@ -65,6 +75,9 @@ class WorldBatch {
   /// that is closed and balances, and message() says why it is not ok.
   bool ok(int world) const;
   const std::string& message(int world) const;
+  Works works(int world) const;              ///< since reset()
+  SpringEnergies springs(int world) const;   ///< of contacts and stops, now
+  Integration integration(int world) const;  ///< as World::integration()
   /// What the worlds leave out of the model (World::warnings()).
   const std::vector<std::string>& warnings() const;
   /// Rounds of Newton's method so far, of whole registers.
