@@ -26,6 +26,7 @@ namespace {
 
 constexpr size_t kMostCells = 1'000'000;
 constexpr const char* kMotion = "motion";
+constexpr size_t kMostTogether = 64;  // runs in a task
 std::string join(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
@@ -111,19 +112,18 @@ class CampaignRunner {
       out.interrupted = i % 1000 == 0 && tasks::SignalWatch::isEndAsked();
     }
     if (out.interrupted) return out;
+    std::stable_sort(waiting.begin(), waiting.end(),
+                     [this](size_t a, size_t b) { return findGroup(a) < findGroup(b); });
     while (true) {
-      while (!waiting.empty() && options_.engine->hasRoom()) {
-        const size_t cell = waiting.front();
-        waiting.pop_front();
-        begin(cell);
-      }
+      while (!waiting.empty() && options_.engine->hasRoom()) begin(waiting);
       if (running_.empty()) break;
       const std::optional<tasks::TaskEnd> end = options_.engine->wait();
       if (!end) {
+        keepFinished();
         out.interrupted = true;
         return out;
       }
-      if (const auto cell = finish(*end)) waiting.push_front(*cell);
+      for (const size_t cell : finish(*end)) waiting.push_front(cell);
     }
     out.complete = complete_;
     collect(out);
@@ -146,11 +146,16 @@ class CampaignRunner {
     }
   }
 
-  struct Running {
+  struct Run {
     size_t cell = 0;
+    std::string key;
+    std::vector<std::string> own;  // SplitCommand
+  };
+  struct Running {
+    std::vector<Run> runs;  // one, or those of a file
+    bool together = false;
     int slot = 0;  // of its directory
     int attempt = 1;
-    std::string key;
     tasks::Task task;
   };
 
@@ -187,60 +192,118 @@ class CampaignRunner {
   }
   std::string getPlace(int slot) const { return directory_ + "/running/" + std::to_string(slot); }
 
-  void begin(size_t cell) {
-    const int multiple = follow(cell).next;
-    if (multiple == 0) return;
+  // Runs that may share a task have the same number.
+  size_t findGroup(size_t cell) {
+    const std::string shared = join(splitCommand(commands_.make(cells_[cell], makeImpulse(1))).shared);
+    return groups_.emplace(std::pair{cells_[cell][0], shared}, groups_.size()).first->second;
+  }
+
+  // Takes the first, and others that go with it. How many there are in a task changes nothing but the time.
+  void begin(std::deque<size_t>& waiting) {
+    const size_t cell = waiting.front(), group = findGroup(cell);
+    const std::vector<std::string> shared = splitCommand(commands_.make(cells_[cell], makeImpulse(1))).shared;
     Running entry;
-    entry.cell = cell;
-    entry.key = makeKey(cell, multiple);
+    entry.together = goesTogether(shared);
+    const size_t width = static_cast<size_t>(options_.engine->width());
+    const size_t most = entry.together ? std::clamp<size_t>((waiting.size() + width - 1) / width, 1, kMostTogether) : 1;
+    for (; !waiting.empty() && entry.runs.size() < most && findGroup(waiting.front()) == group; waiting.pop_front()) {
+      const int multiple = follow(waiting.front()).next;
+      if (multiple > 0)
+        entry.runs.push_back({waiting.front(), makeKey(waiting.front(), multiple),
+                              splitCommand(commands_.make(cells_[waiting.front()], makeImpulse(multiple))).own});
+    }
+    if (entry.runs.empty()) return;
     if (free_slots_.empty()) free_slots_.push_back(static_cast<int>(running_.size()));
     entry.slot = free_slots_.back();
     free_slots_.pop_back();
     entry.task = shipped_[cells_[cell][0]];
     entry.task.programs = {options_.simulate};
     entry.task.arguments = {"@motion", "-o", "@out", "--summary-only"};
-    const std::vector<std::string> arguments = commands_.make(cells_[cell], makeImpulse(multiple));
-    entry.task.arguments.insert(entry.task.arguments.end(), arguments.begin(), arguments.end());
+    entry.task.arguments.insert(entry.task.arguments.end(), shared.begin(), shared.end());
+    if (!entry.together)
+      entry.task.arguments.insert(entry.task.arguments.end(), entry.runs[0].own.begin(), entry.runs[0].own.end());
     entry.task.outputs = {"out"};
     entry.task.directory = getPlace(entry.slot);
     if (options_.engine->isRemote()) shipFiles(entry.task);
+    if (entry.together) {
+      entry.task.inputs.push_back({"runs", entry.task.directory + "/runs"});
+      entry.task.arguments.insert(entry.task.arguments.end(), {"--runs", "@runs"});
+    }
     submit(std::move(entry));
   }
 
   void submit(Running entry) {
     clearFiles(entry.task.directory);
     makeOutputDirectory(entry.task.directory);
+    if (entry.together) {
+      std::string lines;
+      for (const Run& run : entry.runs) lines += Json(run.own).dump() + "\n";
+      writeTextFile(entry.task.directory + "/runs", lines);
+    }
     const int id = options_.engine->submit(entry.task);
     running_.emplace(id, std::move(entry));
   }
 
-  // The cell of a task that has ended, if more may have to be done for it.
-  std::optional<size_t> finish(const tasks::TaskEnd& end) {
+  // Null, or a text that says why, where there is none.
+  static std::vector<Json> readResults(const Running& entry, int status) {
+    if (entry.together) return readCampaignResults(entry.task, static_cast<int>(entry.runs.size()));
+    try {
+      return {readCampaignResult(entry.task, status)};
+    } catch (const std::exception& error) {
+      return {error.what()};
+    }
+  }
+
+  // The cells of a task that has ended for which more may have to be done.
+  std::vector<size_t> finish(const tasks::TaskEnd& end) {
     const auto found = running_.find(end.id);
-    if (found == running_.end()) return std::nullopt;
+    if (found == running_.end()) return {};
     Running entry = std::move(found->second);
     running_.erase(found);
-    Json result;
-    try {
-      result = readCampaignResult(entry.task, end.status);
-    } catch (const std::exception& error) {
-      const bool again = entry.attempt < options_.engine->attempts();
-      report(entry.key + ": " + error.what() + (again ? "; retrying" : ""), again);
-      if (again) {
-        ++entry.attempt;
-        submit(std::move(entry));
-      } else {
-        free_slots_.push_back(entry.slot);
-        complete_ = false;
+    const std::vector<Json> results = readResults(entry, end.status);
+    std::vector<size_t> cells;
+    std::vector<Run> failed;
+    const bool again = entry.attempt < options_.engine->attempts();
+    for (size_t i = 0; i < results.size(); ++i) {
+      if (results[i].is_object()) {
+        keep(entry.runs[i], results[i]);
+        cells.push_back(entry.runs[i].cell);
+        continue;
       }
-      return std::nullopt;
+      failed.push_back(entry.runs[i]);
+      const std::string why =
+          results[i].is_string() ? results[i].get<std::string>() : describeEnd(entry.task, end.status);
+      report(entry.runs[i].key + ": " + why + (again ? "; retrying" : ""), again);
     }
-    free_slots_.push_back(entry.slot);
+    if (again && !failed.empty()) {
+      ++entry.attempt;
+      entry.runs = failed;
+      submit(std::move(entry));
+    } else {
+      free_slots_.push_back(entry.slot);
+      complete_ = complete_ && failed.empty();
+    }
+    std::reverse(cells.begin(), cells.end());
+    return cells;
+  }
+
+  void keep(const Run& run, const Json& result) {
     if (result.at("outcome") != kRefused)
-      log_.append(Json{{"motion", getIdentity(entry.cell)}, {"run", entry.key}, {"result", result}}.dump());
-    results_[{getIdentity(entry.cell), entry.key}] = result;
-    report(entry.key + ": " + result.at("outcome").get<std::string>());
-    return entry.cell;
+      log_.append(Json{{"motion", getIdentity(run.cell)}, {"run", run.key}, {"result", result}}.dump());
+    results_[{getIdentity(run.cell), run.key}] = result;
+    report(run.key + ": " + result.at("outcome").get<std::string>());
+  }
+
+  // What tasks of several runs have done before they are ended.
+  void keepFinished() {
+    options_.engine->stop();
+    for (const auto& [id, entry] : running_) {
+      if (!entry.together) continue;
+      const std::vector<Json> results = readResults(entry, 0);
+      for (size_t i = 0; i < results.size(); ++i)
+        if (results[i].is_object()) keep(entry.runs[i], results[i]);
+    }
+    running_.clear();
   }
 
   void report(const std::string& text, bool again = false) {
@@ -276,6 +339,7 @@ class CampaignRunner {
   std::map<std::pair<std::string, std::string>, Json> results_;  // by identity of the motion, and key
   std::vector<tasks::Task> shipped_;                             // the part of a task that depends on the motion alone
   std::map<int, Running> running_;                               // by the number of the task
+  std::map<std::pair<size_t, std::string>, size_t> groups_;      // by motion and shared arguments
   std::vector<int> free_slots_;
   size_t done_ = 0;
   bool complete_ = true;

@@ -56,6 +56,28 @@ std::string formatImpulse(const ImpulseSearch& search, int multiple) {
   return formatExact(std::round(1e9 * multiple * search.step) / 1e9);
 }
 
+SplitCommand splitCommand(const std::vector<std::string>& arguments) {
+  static const std::set<std::string> kOwn = {"--push",  "--seed",  "--friction", "--mass-error",
+                                             "--delay", "--noise", "--terrain"};
+  SplitCommand out;
+  bool is_own = false;
+  for (const std::string& word : arguments) {
+    if (word.rfind("--", 0) == 0) is_own = kOwn.count(word) > 0;
+    (is_own ? out.own : out.shared).push_back(word);
+  }
+  return out;
+}
+
+bool goesTogether(const std::vector<std::string>& shared) {
+  std::string control, world = "bielle";
+  for (size_t i = 0; i < shared.size(); ++i) {
+    if (shared[i] == "--real-time" || shared[i] == "--live") return false;
+    if (i + 1 < shared.size() && shared[i] == "--control") control = shared[i + 1];
+    if (i + 1 < shared.size() && shared[i] == "--world") world = shared[i + 1];
+  }
+  return (control == "gains" || control == "open") && world == "bielle";
+}
+
 CampaignCommands::CampaignCommands(const CampaignSpec& spec, const std::vector<std::string>& directories)
     : spec_(spec) {
   const CampaignAxis* phases = findAxis(spec, Kind::PushPhase);

@@ -13,6 +13,14 @@ using CampaignCell = std::vector<size_t>;
 
 std::string formatImpulse(const ImpulseSearch& search, int multiple);
 
+// What runs that one task does (`bielle simulate --runs`) share of their commands, and what is a run's own.
+struct SplitCommand {
+  std::vector<std::string> shared, own;
+};
+SplitCommand splitCommand(const std::vector<std::string>& arguments);
+// Whether a task does several: those that Bielle's own world steps many at once. \param shared  of them
+bool goesTogether(const std::vector<std::string>& shared);
+
 class CampaignCommands {
  public:
   // \param directories  of the motions; empty: phases count as time 0

@@ -1,6 +1,7 @@
 #include "tasks/campaign_result.h"
 
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 
 #include "formats/process.h"
@@ -54,18 +55,52 @@ Json pickCampaignResult(const Json& summary) {
 }
 
 Json readCampaignResult(const tasks::Task& task, int status) {
-  const std::string log = tasks::getOutput(task, task.log), error = findError(log);
+  const std::string error = findError(tasks::getOutput(task, task.log));
   if (status == 2 && !error.empty()) return {{"outcome", kRefused}, {"outcome_message", error}};
-  if (status == kNotStarted) throw std::runtime_error("it could not be started" + describeLog(log));
-  if (status >= 128)
-    throw std::runtime_error("terminated by signal " + std::to_string(status - 128) + describeLog(log));
-  if (status == 2 || status > kNotDecided || status < 0)
-    throw std::runtime_error("exit status " + std::to_string(status) + describeLog(log));
+  if (status == 2 || status > kNotDecided || status < 0) throw std::runtime_error(describeEnd(task, status));
   try {
     return readRunSummary(tasks::readOutput(tasks::getOutput(task, "out/summary.json"), kLongestSummary), status);
   } catch (const std::exception& problem) {
     throw std::runtime_error("it returned an invalid result: " + describeJsonError(problem));
   }
+}
+
+std::vector<Json> readCampaignResults(const tasks::Task& task, int count) {
+  std::vector<Json> results(static_cast<size_t>(count));
+  std::string log;
+  try {
+    log = tasks::readOutput(tasks::getOutput(task, "out/runs.jsonl"), kLongestSummary);
+  } catch (const std::exception&) {
+    return results;  // it was ended before
+  }
+  std::istringstream lines(log);
+  for (std::string line; std::getline(lines, line);) {
+    int run = 0;
+    try {
+      const Json told = parseJson(line);
+      run = told.at("run");
+      if (run < 1 || run > count) continue;
+      Json& result = results[static_cast<size_t>(run - 1)];
+      const int status = told.at("status");
+      if (status == 2)
+        result = {{"outcome", kRefused}, {"outcome_message", told.at("error")}};
+      else
+        result = readRunSummary(
+            tasks::readOutput(tasks::getOutput(task, "out/" + std::to_string(run) + "/summary.json"), kLongestSummary),
+            status);
+    } catch (const std::exception& problem) {
+      if (run > 0)
+        results[static_cast<size_t>(run - 1)] = "it returned an invalid result: " + describeJsonError(problem);
+    }
+  }
+  return results;
+}
+
+std::string describeEnd(const tasks::Task& task, int status) {
+  const std::string log = describeLog(tasks::getOutput(task, task.log));
+  if (status == kNotStarted) return "it could not be started" + log;
+  if (status >= 128) return "terminated by signal " + std::to_string(status - 128) + log;
+  return "exit status " + std::to_string(status) + log;
 }
 
 }  // namespace bielle::tasks

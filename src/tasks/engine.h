@@ -38,6 +38,8 @@ struct TaskEnd {
 class TaskEngine {
  public:
   virtual ~TaskEngine() = default;
+  /// How many tasks are done at a time, as far as is known.
+  virtual int width() const = 0;
   /// Whether another task would be done soon. An engine with room for nothing but what it does takes more, too.
   virtual bool hasRoom() const = 0;
   /// Returns the number by which its end will be known. \throws InputError when nothing can be started

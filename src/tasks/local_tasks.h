@@ -15,6 +15,7 @@ class LocalTasks : public TaskEngine {
   LocalTasks(const LocalTasks&) = delete;
   LocalTasks& operator=(const LocalTasks&) = delete;
 
+  int width() const override { return jobs_; }
   bool hasRoom() const override { return static_cast<int>(running_.size()) < jobs_; }
   int submit(const Task& task) override;
   std::optional<TaskEnd> wait() override;

@@ -35,6 +35,7 @@ class WorkerTasks : public TaskEngine {
   WorkerTasks& operator=(const WorkerTasks&) = delete;
 
   int port() const { return port_; }
+  int width() const override { return cores_; }
   bool hasRoom() const override;
   int submit(const Task& task) override;
   std::optional<TaskEnd> wait() override;

@@ -391,11 +391,23 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
                  "directory for trajectory.csv, trajectory.npz and summary.json of the executed motion, plan.npz (the "
                  "plan at the same times) and report.html")
       ->required();
+  app.add_option("--runs", a.runs,
+                 "many runs of this motion: a file with a line per run, a JSON list of its further options. Their "
+                 "results go to directories 1, 2, .. in the output, what became of each to runs.jsonl there. With "
+                 "gains or open control in world bielle, those that differ in push, seed, friction, mass_error, delay, "
+                 "noise or terrain alone are stepped many at once")
+      ->check(CLI::ExistingFile);
   addFlags(a, app);
   app.add_option("--at", a.payload_at, "short for --payload-at")->excludes(app.get_option("--payload-at"));
   app.get_option("--world")->check(isListOfWorlds());
+  for (const char* name : {"--live", "--dry-run", "--real-time"})
+    app.get_option("--runs")->excludes(app.get_option(name));
   for (const char* name : {"--no-report", "--summary-only"}) app.get_option(name)->excludes(app.get_option("--live"));
   requireFiniteNumbers(app);
+}
+
+void noteGiven(const CLI::App& app, SimulateArguments& arguments) {
+  arguments.has_record_period = app.count("--record-period") > 0;
 }
 
 }  // namespace bielle::worlds

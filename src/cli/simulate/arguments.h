@@ -55,6 +55,7 @@ struct SimulateArguments {
   std::vector<std::string> springs;
 
   ExecutionOptions execution;
+  std::string runs;  // file; empty: one run
   bool has_record_period = false;
   bool live = false, no_report = false, summary_only = false, dry_run = false;
 };
@@ -62,6 +63,8 @@ struct SimulateArguments {
 void describe(OptionFields& fields, SimulateArguments& arguments);
 
 void addOptions(CLI::App& app, SimulateArguments& arguments);
+/// What `app` has parsed, to which addOptions() was applied, says beside the options.
+void noteGiven(const CLI::App& app, SimulateArguments& arguments);
 
 /// The flag of the first of these options that is not as usual.
 std::optional<std::string> findGiven(const SimulateArguments& arguments, const std::vector<std::string>& names);

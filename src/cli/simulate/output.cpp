@@ -231,7 +231,7 @@ Json makeSummary(const MotionResult& result, const CarriedOut& carried, const Ex
   summary["extension"] = e.extension;
   summary["distance"] = e.distance;
   summary["mean_speed"] = e.meanSpeed();
-  if (!plan.goals.empty()) summary["plan"] = {{"goals", listGoals(measurePlannedGoals(plan))}};
+  if (!plan.goals.empty()) summary["plan"] = {{"goals", listGoals(carried.planned)}};
   const std::optional<double> steady = findSteadySpeed(result.goals);
   summary["steady_speed"] = steady ? Json(*steady) : Json();
   summary["largest_deviation"] = e.largest_deviation;
@@ -398,7 +398,7 @@ void print(const CarriedOut& carried, const std::string& reason, const Execution
   }
   if (arguments.sensors == Sensing::Real) printEstimation(e.estimation);
   std::cout.flush();
-  tell(listDifferences(measurePlannedGoals(plan), goals));
+  tell(listDifferences(carried.planned, goals));
 }
 
 std::vector<std::string> write(const CarriedOut& carried, const Execution& execution) {

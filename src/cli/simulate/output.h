@@ -17,7 +17,8 @@ void tell(const std::vector<std::string>& warnings);
 struct CarriedOut {
   const SimulateArguments& arguments;
   const Plan& plan;
-  const LoadedRobot& robot;  // of the world, without random errors
+  const LoadedRobot& robot;                 // of the world, without random errors
+  const std::vector<GoalOutcome>& planned;  // goals, measured on the plan
   const PlanController& controller;
   const Ground& ground;  // of the world
   const std::vector<std::string>& command;
