@@ -79,11 +79,14 @@ class Walks:
         height = self.plan.q[self.plan.instant(state.time), 2]
         return (lean > np.sin(0.6)) | (state.q[:, 2] < 0.75 * height) | (np.abs(state.v).max(axis=1) > 40)
 
-    def run(self, control, seed, watch=None):
+    def run(self, control, seed, watch=None, begin=None):
         """One walk of each. control(k, observations, state) gives torques (N, nu) at the instants k (N,).
 
-        Returns (mean rewards (N,), zero after a fall; whether it stood in the end (N,)). watch(k, alive, state) looks on."""
+        Returns (mean rewards (N,), zero after a fall; whether it stood in the end (N,)). watch(k, alive, state) looks on, after
+        begin(state)."""
         observations, infos = self.env.reset(seed=seed)
+        if begin is not None:
+            begin(infos)
         alive, total = np.ones(self.count, dtype=bool), np.zeros(self.count)
         for _ in range(self.plan.num_instants - 1):
             k = self.plan.instant(infos["time"])

@@ -32,6 +32,8 @@ def make_parser():
     parser.add_argument("--speed", type=float, default=0.4, help="of the walk, m/s; %(default)g")
     parser.add_argument("--steps", type=int, default=8, help="%(default)d")
     parser.add_argument("--serial", action="store_true", help="learn on the robot's Approximate Serial model")
+    parser.add_argument("--armature", default="", help="of the motors that it has at joints, kg m^2, or reflected: the "
+                        "rotors as they appear there; default: 0.001, as in the paper")  # fmt: skip
     parser.add_argument("--impulse", type=float, default=4, help="of the hardest pushes, N s; %(default)g")
     parser.add_argument("--imitated", type=int, default=48, help="walks of a round of imitation; %(default)d")
     parser.add_argument("--pairs", type=int, default=24, help="directions tried forth and back; %(default)d")
@@ -63,8 +65,9 @@ def read_arguments(arguments=None):
     if path.exists():
         before = json.loads(path.read_text())
         for name in settings:
-            if before.get(name) != settings[name]:
-                parser.error(f"--{name}: {given.directory} was begun with {before.get(name)}; go on with that, or elsewhere")
+            was = before.get(name, parser.get_default(name))
+            if was != settings[name]:
+                parser.error(f"--{name}: {given.directory} was begun with {was}; go on with that, or elsewhere")
     else:
         given.directory.mkdir(parents=True, exist_ok=True)
         save(path, lambda file: file.write(json.dumps(settings, indent=1).encode()))
@@ -81,7 +84,7 @@ def load_policy(given, plan, tell=print):
         return Policy(plan, file["gains"], file["observer"])
 
 
-def walk(walks, policy, thetas, mean, deviation, seed, watch=None):
+def walk(walks, policy, thetas, mean, deviation, seed, watch=None, begin=None):
     """Walks of robots with a theta each (N, ..): mean rewards, whether they stood; number, sum and sum of squares of z."""
     policy.begin(walks.count)
     moments, fallen = np.zeros(1 + 2 * len(mean)), np.zeros(walks.count, dtype=bool)
@@ -98,14 +101,14 @@ def walk(walks, policy, thetas, mean, deviation, seed, watch=None):
         if watch is not None:
             watch(k, alive, state)
 
-    returns, stood = walks.run(control, seed, look)
+    returns, stood = walks.run(control, seed, look, begin)
     return returns, stood, moments
 
 
 def main(arguments=None):
     given = read_arguments(arguments)
     tell = lambda line: print(line, flush=True)
-    plan = load_plan(given.directory, given.robot, given.speed, given.steps, given.serial)
+    plan = load_plan(given.directory, given.robot, given.speed, given.steps, given.serial, given.armature)
     policy = load_policy(given, plan, tell)
     walks = Walks(plan, 2 * given.pairs, given.threads)
     exam = walks.draw(np.random.default_rng(given.seed + 1), given.impulse)

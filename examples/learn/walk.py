@@ -39,11 +39,11 @@ SHAPE = (BASES, 2, 3, 5)  # of Theta
 LIMIT = 3.0  # of actions, in their units
 
 
-def solve_walk(robot, speed, steps, serial=False):
-    """The Solution of a walk of the robot, or of its Approximate Serial model."""
+def solve_walk(robot, speed, steps, serial=False, armature=""):
+    """The Solution of a walk of the robot, or of its Approximate Serial model with an armature of make_serial_model()."""
     model = bielle.load_robot(robot).model
     if serial:
-        model = bielle.make_serial_model(model, model.standing()).model
+        model = bielle.make_serial_model(model, model.standing(), armature).model
     request = bielle.Request(motion="walk", options={"speed": speed, "steps": steps})
     solution = bielle.Motion.make(model, request).solve()
     if not solution.converged:
@@ -161,11 +161,11 @@ def save(path, write):
     part.replace(path)
 
 
-def load_plan(directory, robot, speed, steps, serial):
+def load_plan(directory, robot, speed, steps, serial, armature=""):
     """Solves the walk, or takes it from a directory where this was done: LAPACK's last bits depend on where arrays lie."""
     path = Path(directory) / "walk.pickle"
     if not path.exists():
-        plan = make_plan(solve_walk(robot, speed, steps, serial))
+        plan = make_plan(solve_walk(robot, speed, steps, serial, armature))
         save(path, lambda file: pickle.dump(plan, file))
     return pickle.loads(path.read_bytes())
 
