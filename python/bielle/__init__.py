@@ -22,5 +22,6 @@ from .named import (
     WorldParameters as WorldParameters,
     WorldState as WorldState,
 )
+from .recorder import Recorder as Recorder
 from .residuals import Residual as Residual
 from .vector_env import StartStates as StartStates, VectorEnv as VectorEnv

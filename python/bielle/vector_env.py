@@ -41,6 +41,9 @@ class StartStates:
     def __init__(
         self, model: Model, q: Optional[npt.ArrayLike] = None, spread: float = 0.1, speed: float = 0.1, height: float = 0.0
     ) -> None:
+        for name, value in (("spread", spread), ("speed", speed), ("height", height)):
+            if not np.isfinite(value) or (value < 0 and name != "height"):
+                raise ValueError(f"{name}: expected a finite number" + ", not negative" * (name != "height"))
         self.model, self.spread, self.speed, self.height = model, spread, speed, height
         self.q = model.standing() if q is None else np.asarray(q, dtype=float)
         self._motors = [list(model.q_names).index(name) for name in model.u_names]
@@ -82,7 +85,8 @@ class VectorEnv:
     `termination(state)` are functions of arrays: the WorldState and torques (num_envs, nu).
     `start(generator)` gives their first states, by default those of StartStates, and `push(state)` the forces on their trunks
     (num_envs, 3), N, during the period to come. Episodes are truncated after a duration, s, and terminated also where physics break
-    off. `worlds` are theirs, of the `engine` and with the `play` and `rod_frictions` of World (World, World.set()).
+    off, or an action is not finite (worlds.message tells). `worlds` are theirs, of the `engine` and with the `play` and
+    `rod_frictions` of World (World, World.set()).
 
     Autoreset "NextStep": the step after the last one of an episode starts the next one, whatever the action, with reward 0.
     Each robot has random numbers of its own: its episodes are the same, bit by bit, for any number of robots and of threads.
@@ -114,8 +118,13 @@ class VectorEnv:
         play: Mapping[str, float] = {},
         rod_frictions: Sequence[RodFriction] = (),
     ) -> None:
-        if repeat < 1 or not (period > 0 and duration > 0):
-            raise ValueError("repeat, period, duration: expected at least one period, and positive numbers of seconds")
+        if repeat < 1 or int(repeat) != repeat:
+            raise ValueError("repeat: expected a number of periods, 1 at least")
+        for name, value in (("period", period), ("duration", duration)):
+            if not 0 < value < np.inf:
+                raise ValueError(f"{name}: expected a positive number of seconds")
+        if not 0 <= noise < np.inf:
+            raise ValueError("noise: expected 0 or a positive number")
         self.worlds = World(
             model,
             count=num_envs,
@@ -158,20 +167,13 @@ class VectorEnv:
             self._begin(where)
         return self._observe(), self._state._asdict()
 
-    def _fill(self, name: str, values: npt.ArrayLike) -> Array:
-        """One for each robot; a single one is that of all."""
-        array = np.array(values, dtype=float)
-        if array.shape not in ((), (self.num_envs,)):
-            raise ValueError(f"{name}: expected shape ({self.num_envs},), got {array.shape}")
-        return np.array(np.broadcast_to(array, (self.num_envs,)))
-
     def step(self, actions: npt.ArrayLike) -> Tuple[Array, Array, Mask, Mask, Dict[str, Any]]:
         """Observations, rewards, terminations, truncations, and as infos the arrays of the WorldState."""
         if not self._generators:
             raise RuntimeError("step: reset() first")
         actions = np.asarray(actions, dtype=float)
-        if actions.shape != self.action_space.shape or not np.isfinite(actions).all():
-            raise ValueError(f"actions: expected finite numbers of shape {self.action_space.shape}, got {actions.shape}")
+        if actions.shape != self.action_space.shape:
+            raise ValueError(f"actions: expected shape {self.action_space.shape}, got {actions.shape}")
         torques = actions
         for _ in range(self.repeat):
             if self._torques is not None:
@@ -181,8 +183,9 @@ class VectorEnv:
             self._read()
         ended: Mask = self._state.ok == 0
         if self._termination is not None:
-            ended = ended | self._fill("termination", self._termination(self._state)).astype(bool)
-        rewards = self._fill("reward", self._reward(self._state, torques))
+            ended = ended | self._spread(self._termination(self._state), "termination").astype(bool)
+        rewards: Array = self._spread(self._reward(self._state, torques), "reward").astype(float)
+        rewards[(self._state.ok == 0) & ~np.isfinite(rewards)] = 0  # of torques that are not finite
         late: Mask = (self._state.time > self.duration - 0.5 * self.period) & ~ended
         begin = self._over
         if begin.any():
@@ -191,8 +194,20 @@ class VectorEnv:
         self._over = ended | late
         return self._observe(), rewards, ended, late, self._state._asdict()
 
+    @property
+    def readings(self) -> Readings:
+        """What the sensors read last."""
+        return self._readings
+
     def close(self) -> None:
         """Nothing is left open."""
+
+    def _spread(self, value: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
+        """(num_envs,), of one for each or one for all."""
+        array = np.asarray(value)
+        if array.shape not in ((), (self.num_envs,)):
+            raise ValueError(f"{name}: expected shape ({self.num_envs},), got {array.shape}")
+        return np.broadcast_to(array, (self.num_envs,))
 
     def _begin(self, where: Mask) -> None:
         for i in np.flatnonzero(where):

@@ -3,6 +3,7 @@
 #include <pybind11/stl.h>
 
 #include "bielle/report/report.h"
+#include "bielle/results/happened.h"
 #include "bind.h"
 #include "motion.h"
 
@@ -127,6 +128,30 @@ void bindResults(py::module_& module) {
              py::arg("callback") = py::none(),
              "Solves a Request as `bielle solve` does. Returns a Result.\n\n"
              "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve.");
+  module.def(
+      "write_happened",
+      [](const std::string& directory, const Robot& robot, const py::object& time, const py::object& q,
+         const py::object& v, const py::object& u, const py::object& contact_wrenches, const std::string& motion,
+         const Ground& ground, const std::string& facts) {
+        for (const py::object& table : {time, q, v, u})
+          if (table.is_none()) throw py::type_error("time, q, v, u: expected arrays, got None");
+        HappenedMotion happened{motion, ground, read<VectorXd>(time, "time"), {}, {}, {}, {}, facts};
+        happened.q = read<RowMatrixXd>(q, "q");
+        happened.v = read<RowMatrixXd>(v, "v");
+        happened.u = read<RowMatrixXd>(u, "u");
+        if (!contact_wrenches.is_none())
+          happened.contact_wrenches = read<RowMatrixXd>(contact_wrenches, "contact_wrenches");
+        const py::gil_scoped_release release;
+        return writeHappened(directory, robot.name, toLoaded(robot), happened);
+      },
+      py::arg("directory"), py::arg("robot"), py::arg("time"), py::arg("q"), py::arg("v"), py::arg("u"),
+      py::arg("contact_wrenches") = py::none(), py::arg("motion") = "recorded motion", py::arg("ground") = Ground(),
+      py::arg("facts") = "{}",
+      "Writes what happened to a robot as a result that `bielle report` and `bielle export` read, whatever moved it; "
+      "Recorder collects it.\n\n"
+      "time: (N + 1,), s; q: (N + 1, nq); v: (N + 1, nv); u: (N, nu), torques from each node to the next; "
+      "contact_wrenches: (N, 6 per contact), of the ground on the feet, in their frames; facts: what its summary tells "
+      "beside, a JSON object. Returns the paths. Raises ValueError for a wrong shape.");
   module.def(
       "make_result",
       [](const HeldSolution& held, const Robot& robot) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <map>
 #include <optional>
 
 #include "bielle/model/error.h"
@@ -37,6 +38,8 @@ MakeWorld findEngine(const std::string& engine) {
   }
 }
 
+enum class Numbers { Finite, NotNan, Any };
+
 // One world, or many that are stepped together on all cores: those of Bielle's own engine at fixed steps in a WorldBatch.
 class HeldWorlds {
  public:
@@ -69,8 +72,7 @@ class HeldWorlds {
     const MatrixXd q0 = readRows(q, model_->nq(), "q", true), v0 = readRows(v, model_->nv(), "v", true);
     const VectorXd chosen = readMask(where);
     if (batch_) {
-      std::vector<char> marks;
-      for (const double mark : chosen) marks.push_back(mark != 0);
+      const std::vector<char> marks = makeMarks(chosen);
       const py::gil_scoped_release release;
       batch_->reset(q0, v0, marks);
     }
@@ -84,14 +86,14 @@ class HeldWorlds {
 
   // Of all worlds (fields without an axis of them) or of each.
   void set(const py::object& mass_factors, const py::object& armatures, const py::object& effort_limits,
-           const py::object& friction, const py::object& delays) {
+           const py::object& friction, const py::object& delays, const py::object& grounds) {
     if (!batch_)
       throw py::value_error(
           "set: expected worlds of Bielle's own engine at fixed steps, made with `count` (1 for one) and without play");
     const BusyGuard guard(is_busy_, "world");
     worlds::WorldParameters parameters;
     const auto read = [this](const py::object& given, Eigen::Index size, const char* name, MatrixXd& out) {
-      if (!given.is_none()) out = readRows(given, size, name, true, true);
+      if (!given.is_none()) out = readRows(given, size, name, true, Numbers::NotNan);
     };
     const auto readEach = [this](const py::object& given, const char* name, VectorXd& out) {
       if (!given.is_none()) out = readNumbers(given, name);
@@ -101,6 +103,7 @@ class HeldWorlds {
     read(effort_limits, model_->nu(), "effort_limits", parameters.effort_limits);
     readEach(friction, "friction", parameters.friction);
     readEach(delays, "delays", parameters.delays);
+    if (!grounds.is_none()) parameters.grounds = readGrounds(grounds);
     const py::gil_scoped_release release;
     batch_->set(parameters);
   }
@@ -132,17 +135,23 @@ class HeldWorlds {
     return many_ ? py::object(messages) : py::object(messages[0]);
   }
 
-  py::object step(const py::object& u, double duration, const py::object& push) {
+  py::object step(const py::object& u, double duration, const py::object& push, const py::object& where) {
     if (!(duration > 0 && std::isfinite(duration)))
       throw py::value_error("duration: expected a positive number of seconds");
     const BusyGuard guard(is_busy_, "world");
     warnOfStep(duration);
-    const MatrixXd torques = readRows(u, model_->nu(), "u", true), force = readRows(push, 3, "push", true);
+    // Of a batch, worlds whose torques are not finite break off.
+    const auto finite = batch_ ? Numbers::Any : Numbers::Finite;
+    const MatrixXd torques = readRows(u, model_->nu(), "u", true, finite),
+                   force = readRows(push, 3, "push", true, finite);
+    const VectorXd chosen = readMask(where);
     if (batch_) {
+      const std::vector<char> marks = makeMarks(chosen);
       const py::gil_scoped_release release;
-      batch_->step(torques, force, duration);
+      batch_->step(torques, force, duration, marks);
     }
     run([&](World& world, Eigen::Index i) {
+      if (chosen[i] == 0) return;
       world.setTorques(torques.col(i));
       world.setPush(force.col(i));
       ok_[i] = world.advance(duration);
@@ -223,6 +232,25 @@ class HeldWorlds {
   }
 
  private:
+  static std::vector<char> makeMarks(const VectorXd& chosen) {
+    std::vector<char> marks;
+    for (const double mark : chosen) marks.push_back(mark != 0);
+    return marks;
+  }
+  // One for all, or a sequence of one per world. The same object is one ground.
+  std::vector<std::shared_ptr<const Ground>> readGrounds(const py::object& given) const {
+    const auto copy = [](py::handle one) { return std::make_shared<const Ground>(read<Ground>(one, "grounds")); };
+    if (!py::isinstance<py::sequence>(given)) return {numWorlds(), copy(given)};
+    std::map<PyObject*, std::shared_ptr<const Ground>> known;
+    std::vector<std::shared_ptr<const Ground>> out;
+    for (const py::handle one : py::sequence(given)) {
+      auto& ground = known[one.ptr()];
+      if (!ground) ground = copy(one);
+      out.push_back(ground);
+    }
+    return out;
+  }
+
   // Once: the end of a step() ends a step of the world.
   void warnOfStep(double duration) {
     if (has_warned_ || time_step_ <= duration * (1 + 1e-9)) return;
@@ -237,10 +265,11 @@ class HeldWorlds {
 
   // One column per world.
   MatrixXd readRows(py::handle value, Eigen::Index size, const std::string& what, bool shared,
-                    bool may_be_infinite = false) const {
+                    Numbers numbers = Numbers::Finite) const {
     const Array array = readArray(value, what);
-    if (!std::all_of(array.data(), array.data() + array.size(),
-                     [&](double x) { return std::isfinite(x) || (may_be_infinite && std::isinf(x)); }))
+    if (!std::all_of(array.data(), array.data() + array.size(), [&](double x) {
+          return std::isfinite(x) || numbers == Numbers::Any || (numbers == Numbers::NotNan && !std::isnan(x));
+        }))
       throw py::value_error(what + ": expected finite numbers");
     const auto count = static_cast<Eigen::Index>(numWorlds());
     if (many_ && !(shared && array.ndim() == 1)) {
@@ -408,17 +437,25 @@ void bindWorlds(py::module_& module) {
            "where: (count,), True for the worlds that are reset while the others stay unchanged; None: all. Returns "
            "the WorldState.")
       .def("step", &HeldWorlds::step, py::arg("u"), py::arg("duration"), py::arg("push") = py::make_tuple(0, 0, 0),
+           py::arg("where") = py::none(),
            "Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), "
            "N.\n\n"
-           "Returns the WorldState; its `ok` is False where the integration failed.")
-      .def("set", &HeldWorlds::set, py::arg("mass_factors") = py::none(), py::arg("armatures") = py::none(),
-           py::arg("effort_limits") = py::none(), py::arg("friction") = py::none(), py::arg("delays") = py::none(),
-           "Sets parameters by which worlds differ from the model, from now on and over reset(), of worlds made with "
-           "`count` and without play; each for all alike, or with a leading axis of worlds.\n\n"
-           "mass_factors: (bodies,), mass and inertia over those of the model, the world first; armatures: (nu,), of "
-           "the motors, kg m^2 or kg; effort_limits: (nu,), N m or N; friction: of the ground; delays: from step() "
-           "until "
-           "its torques act, to the nearest whole time step, s. Raises ValueError, and nothing changes.")
+           "where: as in reset(); the other worlds stay as they are. With `count`, a world whose torques or push are "
+           "not "
+           "finite breaks off. Returns the WorldState; its `ok` is False where "
+           "the integration failed.")
+      .def(
+          "set", &HeldWorlds::set, py::arg("mass_factors") = py::none(), py::arg("armatures") = py::none(),
+          py::arg("effort_limits") = py::none(), py::arg("friction") = py::none(), py::arg("delays") = py::none(),
+          py::arg("grounds") = py::none(),
+          "Sets parameters by which worlds differ from the model, from now on and over reset(), of worlds made with "
+          "`count` and without play; each for all alike, or with a leading axis of worlds.\n\n"
+          "mass_factors: (bodies,), mass and inertia over those of the model, the world first; armatures: (nu,), of "
+          "the motors, kg m^2 or kg; effort_limits: (nu,), N m or N; friction: of the ground; delays: from step() "
+          "until "
+          "its torques act, to the nearest whole time step, s; grounds: a Ground for all or a list of them, either all "
+          "with steps or none, as the world was made; reset worlds whose ground changes. Raises ValueError, and "
+          "nothing changes.")
       .def_property_readonly("parameters", &HeldWorlds::parameters, "WorldParameters, of worlds made with `count`")
       .def_property_readonly("books", &HeldWorlds::books,
                              "energies now, and work and losses since reset, of a single world (Books), J")

@@ -16,6 +16,7 @@ LEARN = Path(__file__).resolve().parents[2] / "examples" / "learn"
 sys.path.insert(0, str(LEARN))
 
 import ars  # noqa: E402
+import replay  # noqa: E402
 import train  # noqa: E402
 import walk  # noqa: E402
 from episodes import Walks  # noqa: E402
@@ -215,6 +216,24 @@ def test_linkages_carry_a_slow_crouch(robots):
             state = world.step(linkages.torques((torques + 150 * (q[at] - joints) - 3 * speeds)[None]), period)
         off.append(np.abs(state.q[0, seen] - q[at]).max())
     assert off[0] < 3e-3 and off[1] > 5 * off[0]
+
+
+def test_a_replay_is_a_result_that_is_read(begun, given, plan, tmp_path, capsys):
+    """The walk that the page shows is that of the same policy, to the last bit."""
+    replay.main([str(begun), "-o", str(tmp_path / "replay"), "--world", "bielle", "--impulse", "0"])
+    told = capsys.readouterr().out
+    record = bielle.read_result_record(str(tmp_path / "replay"))
+    summary = json.loads((tmp_path / "replay" / "summary.json").read_text())
+    assert summary["outcome"] in told and (tmp_path / "replay" / "report.html").stat().st_size > 1e5
+    walks = Walks(plan, 1)
+    conditions = walks.draw(np.random.default_rng(1), 0.0)
+    walks.set(type(conditions)(np.ones_like(conditions.masses), np.ones(1), np.zeros(1), conditions.times, conditions.impulses))
+    with np.load(begun / "policy.npz") as file:
+        learned, last = dict(file), []
+    policy = walk.Policy(plan, learned["gains"], learned["observer"])
+    train.walk(walks, policy, learned["theta"][None], learned["mean"], learned["deviation"], 1, lambda k, alive, s: last.append(s["q"][0]))
+    assert len(record.u) == len(last) and np.array_equal(record.q[-1], last[-1])
+    assert np.abs(record.q[0] - plan.q[0]).max() < 1e-9
 
 
 def test_mirrored_steps_share_what_is_learned(plan, given):

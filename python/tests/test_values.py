@@ -25,7 +25,7 @@ VALUES = {
 
 # They hold what goes on.
 NOT_VALUES = {"ModelBuilder", "Node", "Controller", "Estimator", "World", "Sensors", "LoopCloser", "LinkageMap", "StartStates",
-              "VectorEnv"}
+              "VectorEnv", "Recorder"}
 
 
 def make_plan():
