@@ -60,8 +60,11 @@ void addCampaign(CLI::App& command, Action& action) {
           "-o,--output", arguments->directory,
           "directory for runs.csv, campaign.md, summary.json, map.svg and the log runs.jsonl; created if necessary")
       ->required();
-  addTaskOptions(command, "runs at a time, each in its own process; except in real time, results do not depend on it",
-                 arguments->tasks);
+  addTaskOptions(
+      command,
+      "processes at a time, each with a run or with several that are stepped together; except in real time, results "
+      "do not depend on it",
+      arguments->tasks);
   command.footer(
       "SPEC: every combination of the values is one run of `bielle simulate`.\n"
       "  motions:\n"
