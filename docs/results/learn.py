@@ -26,6 +26,7 @@ DATA = common.HERE / "data/learn.json"
 IMAGE = common.SOURCE / "docs/images/learn.svg"
 LEARN = common.SOURCE / "examples/learn"
 MASSES = (0.9, 1.0, 1.1)
+WALKS = {"own": 48, "rotors": 24}
 PUSHES = [(1.5, angle) for angle in (0, 90, 180, 270)]  # s, degrees
 IMPULSE = 2.5  # N s
 HARDEST = (0, 2, 4)  # N s, of imitated walks
@@ -242,7 +243,7 @@ def main():
         measured = {}
         if arguments.measure:
             runs = [Learned(directory) for directory in arguments.directories]
-            measured = {"run": now, **measure(arguments.measure, runner, runs, PUSHES, MASSES, 48)}
+            measured = {"run": now, **measure(arguments.measure, runner, runs, PUSHES, MASSES, WALKS.get(arguments.measure))}
         data = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {}
         if measured:
             data[arguments.measure] = measured
@@ -286,11 +287,12 @@ by the ratios of its loops, or by constant ones.""")
     rotors = data["rotors"]
     page.add(f"""Ratios of the present posture are what the loops do: torques of motors that they give for weights in random
 postures agree with differences of the potential energy along the motors (virtual work) within 1e-6 N m, and a slow crouch
-ends within 2 mrad, with constant ratios within 21 (`python/tests/test_learn.py`). That they stand less often in the table
+ends within 2 mrad, with constant ratios 54 off (`python/tests/test_learn.py`). That they stand less often in the table
 above has another reason. The serial model has rotors of 0.001 kg m² at knees and ankles, as in the paper, where those
-behind the loops appear as 0.0018 to 0.0042 kg m²: swinging feet lag behind, and land turned. Constant ratios read these
-angles wrongly by up to 0.03 rad, which happens to correct that. On a serial model with rotors as they appear where the robot
-stands, imitation learns to swing heavier feet, and then both ways carry it over alike. Of {rotors['count']} walks of imitated
+behind the loops appear as 0.0018 to 0.0042 kg m²: ankles of swinging legs lag by 0.15 rad, and feet land turned, after a
+second without any push. With constant ratios, which read these angles wrongly by up to 0.03 rad, ankles lag as
+much about one axis, half as much about the other, and the same walk bears it. On a serial model with rotors as they appear where the robot stands, imitation learns to
+swing them, and both ways carry it over alike. Of {rotors['count']} walks of imitated
 gains each, under pushes of up to 0, 2 and 4 N s (*{rotors['run']}*), stood""")
     page.table(["rotors of the serial model", "carried out by", *(f"{impulse} N s" for impulse in HARDEST)], rotors["rows"])
     page.heading("Carried out in MuJoCo's world")
