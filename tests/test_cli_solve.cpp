@@ -389,8 +389,8 @@ TEST_CASE("options that others make useless are told, and what is given twice is
            {{"walk", "--periodic", "--steps", "4"}, "option 'steps' has no effect: a cycle has two steps"},
            {{"walk", "--set", "cycles=2"}, "option 'cycles' has no effect: the motion is no cycle"},
            {{"stairs", "--height", "0.05", "--slope", "0.2"}, "option 'height' has no effect: slope replaces it"}}) {
-    std::vector<std::string> command = {BIELLE_COMMAND, "solve", "--robot", "rsu_biped", "--dry-run"};
-    command.insert(command.begin() + 2, options.begin(), options.end());
+    std::vector<std::string> command = {"solve", "--robot", "rsu_biped", "--dry-run"};
+    command.insert(command.begin() + 1, options.begin(), options.end());
     const CommandResult result = run(command);
     CHECK(result.status == 0);
     CHECK(result.err == "bielle: warning: " + told + (told.back() == 'e' ? ", without periodic\n" : "\n"));
