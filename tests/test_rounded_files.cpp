@@ -12,6 +12,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "formats/decimals.h"
 #include "get_error.h"
+#include "math/constants.h"
 #include "model/number_text.h"
 #include "robot_directory.h"
 #include "rounded_families.h"
@@ -141,6 +142,15 @@ TEST_CASE("how far numbers may be off, from how they are written") {
   for (const char* other : {"1.5707963267948966", "0.70710678118654757", "0.5", "1.57", "1.5709", "0.0001"})
     CHECK(calcHalfUnit(other + std::string(" 3.141592653589793"), Decimals::Kind::Angles) < 1e-14);
   CHECK(calcHalfUnit("1.5708 3.141592653589793") < 1e-14);
+  // In degrees beside directions; but few digits are those of exact numbers.
+  for (const auto& [degrees, half] :
+       {std::pair("30.12 -45", 0.005 * kDegree), {"30.125 90", 0.0005 * kDegree}, {"30 90", 0.0}}) {
+    Decimals decimals(Decimals::Kind::Angles);
+    decimals.add(degrees, kDegree);
+    decimals.add("0.267261241912424 0.963624111659432");
+    CHECK(decimals.calcHalfUnit() == Approx(half).margin(1e-14));
+    CHECK(decimals.most_digits() == 15);
+  }
   CHECK(calcHalfUnit("1.57079637050628662 0.100000001490116119 0.5") == Approx(1.57 * std::pow(2, -24)).epsilon(0.01));
 }
 
@@ -227,20 +237,29 @@ TEST_CASE("axes that are farther from parallel than rounding are told, with what
   CHECK(countWarnings(robot, "mobility would be 1") == 1);
 }
 
-TEST_CASE("MuJoCo's quaternions of six decimals, and its sites beside the plane") {
-  const auto load = [](const std::string& turn, const std::string& place) {
+TEST_CASE(
+    "MuJoCo's quaternions of six decimals, its sites beside the plane, and degrees beside directions with all digits") {
+  const auto load = [](const std::string& turn, const std::string& place, const std::string& more = "") {
     const RobotDirectory directory;
-    return loadRobot(directory.write("fourbar.xml", R"(<mujoco><compiler angle="radian"/>
+    return loadRobot(directory.write("fourbar.xml", R"(<mujoco>
 <default><geom type="capsule" size="0.012" density="900"/><joint axis="0 1 0"/></default>
 <worldbody>
 <body name="crank" pos="0 0 0.5"><joint name="crank"/><geom fromto="0 0 0 0.1 0 0.1"/>
 <body name="rod" pos="0.1 0 0.1"><joint name="rod"/><geom fromto="0 0 0 0.35 0 0.1"/><site name="a" pos=")" +
-                                                        place + R"("/></body></body>
+                                                        place + "\"/>" + more + R"(</body></body>
 <body name="rocker" pos="0.5 0 0.5" )" + turn + R"(><geom fromto="0 0 0 -0.05 0.2 0"/>
 <joint name="rocker" axis="0 0 1"/><site name="b" pos="-0.05 0.2 0"/></body>
 </worldbody>
 <equality><connect site1="a" site2="b"/></equality><actuator><motor joint="crank"/></actuator></mujoco>)"));
   };
+  const std::string turned_site = "<site quat=\"0.923879532511287 0 0.38268343236509 0\"/>";
+  for (const std::string& turn : {R"(euler="89.9999 0 0")", R"(axisangle="1 0 0 89.9999")"}) {
+    const LoadedRobot robot = load(turn, "0.35 0 0.1", turned_site);
+    CHECK(countWarnings(robot, "as a plane linkage: axes of crank, rod, rocker made parallel") == 1);
+    checkTurns(robot.model);
+  }
+  CHECK(countWarnings(load(R"(euler="89.99990000000000 0 0")", "0.35 0 0.1"), "more than its numbers are rounded") ==
+        1);
   for (const auto& [turn, place] : {std::pair("quat=\"0.707107 0.707105 0 0\"", "0.35 0 0.1"),
                                     {"quat=\"0.707107 0.707107 0 0\"", "0.35 0.000001 0.1"}}) {
     const LoadedRobot robot = load(turn, place);

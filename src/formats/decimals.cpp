@@ -61,32 +61,48 @@ void Decimals::add(const std::string& text, double unit, bool are_floats) {
       decimals += is_behind;
     }
     if (i < word.size() && (word[i] == 'e' || word[i] == 'E')) exponent = std::atoi(word.c_str() + i + 1);
-    const double last = unit * std::pow(10, exponent - decimals);
+    const double last = std::pow(10, exponent - decimals);
+    Group& group = groups_[unit];
     if (kind_ == Kind::Angles && unit == 1 && digits >= kFewestDigits && isRoundedConstant(*value, last / 2))
-      constant_ = std::max(constant_, last / 2);
-    finest_ = unit_ == 0 ? last : std::min(finest_, last);
-    unit_ = unit;
-    if (static_cast<int>(largest_.size()) <= digits) largest_.resize(digits + 1, 0);
-    largest_[digits] = std::max(largest_[digits], std::abs(*value) * unit);
-    most_digits_ = std::max(most_digits_, digits);
+      group.constant = std::max(group.constant, last / 2);
+    group.finest = std::min(group.finest, last);
+    if (static_cast<int>(group.largest.size()) <= digits) group.largest.resize(digits + 1, 0);
+    group.largest[digits] = std::max(group.largest[digits], std::abs(*value));
+    group.most_digits = std::max(group.most_digits, digits);
     if (are_floats || digits >= kDigitsOfFloat) {
-      const double off = std::abs(*value - static_cast<double>(static_cast<float>(*value))) * unit;
-      all_floats_ = all_floats_ && off <= 0.51 * last;
-      float_ = std::max(float_, std::abs(*value) * unit * std::pow(2, -24));
+      const double off = std::abs(*value - static_cast<double>(static_cast<float>(*value)));
+      group.all_floats = group.all_floats && off <= 0.51 * last;
+      group.largest_float = std::max(group.largest_float, std::abs(*value));
     }
   }
 }
 
-double Decimals::calcHalfUnit() const {
-  if (most_digits_ == 0) return 0;
-  double half = std::max(0.5 * finest_, constant_);
-  if (most_digits_ >= kFewestDigits) {
+int Decimals::most_digits() const {
+  int most = 0;
+  for (const auto& [unit, group] : groups_) most = std::max(most, group.most_digits);
+  return most;
+}
+
+double Decimals::Group::calcHalfUnit() const {
+  double half = std::max(0.5 * finest, constant);
+  if (most_digits >= kFewestDigits) {
     // The largest of those that have nearly all of the digits; zeros at the end are left out by many.
-    double largest = 0;
-    for (int n = std::max(1, most_digits_ - 2); n <= most_digits_; ++n) largest = std::max(largest, largest_[n]);
-    half = std::max(half, 0.5 * std::pow(10, std::floor(std::log10(largest / unit_)) + 1 - most_digits_) * unit_);
+    double most = 0;
+    for (int n = std::max(1, most_digits - 2); n <= most_digits; ++n) most = std::max(most, largest[n]);
+    half = std::max(half, 0.5 * std::pow(10, std::floor(std::log10(most)) + 1 - most_digits));
   }
-  return all_floats_ ? std::max(half, float_) : half;
+  return all_floats ? std::max(half, largest_float * std::pow(2, -24)) : half;
+}
+
+// Numbers of few digits, such as right angles in degrees, are hardly rounded where others have more.
+double Decimals::calcHalfUnit() const {
+  double coarsest = 0, finest = HUGE_VAL;
+  for (const auto& [unit, group] : groups_) {
+    const double half = unit * group.calcHalfUnit();
+    finest = std::min(finest, half);
+    if (group.most_digits >= kFewestDigits) coarsest = std::max(coarsest, half);
+  }
+  return coarsest > 0 ? coarsest : groups_.empty() ? 0 : finest;
 }
 
 void GeometryDecimals::add(const tinyxml2::XMLElement& element, bool degrees) {

@@ -1,5 +1,7 @@
 #pragma once
 /// \file By how much the numbers of a file may be rounded, from how they are written.
+#include <cmath>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -15,7 +17,7 @@ namespace bielle {
 /// last of the most decimals, or of the most significant digits (of four or more), whichever is larger. Numbers that are those of
 /// float, printed with more digits than it has, are off by half of its last bit. Angles and directions that are rounded from multiples
 /// of 15 degrees, their sines or cosines are off by half a unit of their own last digits, whatever the others have (1.5708 beside
-/// 3.141592653589793).
+/// 3.141592653589793). Numbers in different units are written differently: of degrees and directions, what is coarser counts.
 class Decimals {
  public:
   enum class Kind { Angles, Lengths };
@@ -23,18 +25,22 @@ class Decimals {
   /// \param text  anything; what is no number is passed over   \param unit  of these numbers
   /// \param are_floats  whether they are floats by the format, however few digits they need
   void add(const std::string& text, double unit = 1, bool are_floats = false);
-  int most_digits() const { return most_digits_; }
+  int most_digits() const;
   /// 0 without numbers.
   double calcHalfUnit() const;
 
  private:
-  int most_digits_ = 0;
-  bool all_floats_ = true;
-  double finest_ = 1;            // unit of the last decimal
-  std::vector<double> largest_;  // number by its significant digits, in their unit of measure
-  double float_ = 0, unit_ = 0;
+  struct Group {
+    int most_digits = 0;
+    bool all_floats = true;
+    double finest = HUGE_VAL;     // unit of the last decimal
+    std::vector<double> largest;  // number by its significant digits
+    double largest_float = 0;
+    double constant = 0;  // the most that a rounded constant may be off
+    double calcHalfUnit() const;
+  };
   Kind kind_;
-  double constant_ = 0;  // the most that a rounded constant may be off
+  std::map<double, Group> groups_;  // by the unit of their numbers, and in it
 };
 
 /// Of the placements and axes of joints, of bodies, sites and frames and of the loops in a document: in URDF, MJCF or SDF.
