@@ -85,6 +85,29 @@ HingeNet makeBennettNet(std::mt19937& rng) {
   return {4, {hinge(0, 1, X1), hinge(1, 2, X2), hinge(2, 3, X3), hinge(3, 0, X4)}};
 }
 
+// Bricard's of threefold symmetry: six links of one length, twisted by a right angle one way and the other, without offsets, and
+// cos(t1) cos(t2) + cos(t1) + cos(t2) = 0 of its angles by turns.
+HingeNet makeBricardNet(std::mt19937& rng) {
+  const double length = draw(rng, 0.1, 0.4), t1 = draw(rng, 1.6, 2.05), c = std::cos(t1);
+  const double t2 = std::acos(-c / (1 + c)), right = std::acos(0.0);
+  const auto link = [&](double turn, double twist) {
+    return SE3(exp3(Vector3d(0, 0, turn)), Vector3d::Zero()) * SE3(exp3(Vector3d(twist, 0, 0)), Vector3d(length, 0, 0));
+  };
+  const auto close = [&](double sign) {
+    SE3 X;
+    for (int i = 0; i < 3; ++i) X = X * link(t1, right) * link(sign * t2, -right);
+    return X;
+  };
+  const double sign = close(1).p.norm() < 1e-9 * length ? 1 : -1;
+  SE3 X(drawRotation(rng), Vector3d(draw(rng, -0.3, 0.3), draw(rng, -0.3, 0.3), draw(rng, -0.3, 0.3)));
+  HingeNet net{6, {}};
+  for (int i = 0; i < 6; ++i) {
+    net.hinges.push_back({i, (i + 1) % 6, X});
+    X = X * (i % 2 == 0 ? link(t1, right) : link(sign * t2, -right));
+  }
+  return net;
+}
+
 double roundTo(double value, std::optional<int> decimals) {
   const double unit = decimals ? std::pow(10, -*decimals) : 0;
   return decimals ? std::round(value / unit) * unit : value;
@@ -102,14 +125,15 @@ SE3 roundPlacement(const SE3& X, std::optional<int> decimals) {
 }  // namespace
 
 const char* getName(Family family) {
-  constexpr const char* kNames[] = {"plane four-bar", "six-bar",       "spherical",
-                                    "Bennett",        "parallelogram", "plane in space"};
+  constexpr const char* kNames[] = {"plane four-bar", "six-bar",        "spherical", "Bennett",
+                                    "parallelogram",  "plane in space", "Bricard"};
   return kNames[static_cast<int>(family)];
 }
 
 HingeNet makeHingeNet(Family family, std::mt19937& rng) {
   if (family == Family::Spherical) return makeSphericalNet(rng);
   if (family == Family::Bennett) return makeBennettNet(rng);
+  if (family == Family::Bricard) return makeBricardNet(rng);
   HingeNet net = makePlaneNet(rng, family == Family::Parallelogram, family == Family::SixBar);
   // In the plane x-z, or in any plane.
   const SE3 X = family == Family::PlaneInSpace

@@ -6,7 +6,7 @@
 
 namespace bielle::testing {
 
-enum class Family { PlaneFourBar, SixBar, Spherical, Bennett, Parallelogram, PlaneInSpace };
+enum class Family { PlaneFourBar, SixBar, Spherical, Bennett, Parallelogram, PlaneInSpace, Bricard };
 inline constexpr Family kFamilies[] = {Family::PlaneFourBar, Family::SixBar,        Family::Spherical,
                                        Family::Bennett,      Family::Parallelogram, Family::PlaneInSpace};
 const char* getName(Family family);

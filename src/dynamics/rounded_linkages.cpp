@@ -18,7 +18,7 @@
 namespace bielle {
 namespace {
 
-constexpr double kExact = 1e-13;   // what moves so needs no change, rad or L
+constexpr double kExact = 1e-13;   // what moves so needs no change, rad or L, of one loop; of many it adds up
 constexpr double kCloses = 1e-12;  // as in assembly, rad or m
 constexpr double kAdds = 20;       // rounded numbers along a loop: residuals and singular values, of the tolerance
 constexpr double kFrameParts = 4;  // numbers that place a frame and may each be off: those of a quaternion
@@ -66,22 +66,42 @@ bool mend(FollowedLinkage& linkage, std::vector<VectorXd>& postures, int m,
   return false;
 }
 
-// Places that a linkage can be followed from, the likelier ones first. Only values of the cluster's dofs matter.
-std::vector<VectorXd> makeStarts(const Model& model) {
-  constexpr int kRandom = 20;
-  constexpr double kSpread = 0.1;  // rad or m per start
-  std::vector<VectorXd> starts;
-  for (const Reference& reference : model.references()) starts.push_back(makeReferenceProblem(model, reference).q_ref);
-  const VectorXd neutral = model.makeNeutral();
-  starts.push_back(neutral);
-  std::mt19937 rng(1);
-  for (int i = 1; i <= kRandom; ++i) {
-    std::uniform_real_distribution<double> uniform(-kSpread * i, kSpread * i);
-    starts.push_back(
-        model.integrate(neutral, VectorXd::NullaryExpr(model.nv(), [&](Eigen::Index) { return uniform(rng); })));
+// Places that a linkage can be followed from, the likelier ones first: references, the neutral configuration and what it closes to,
+// which takes longest and is looked for only where these do not serve, and others beside it. Only values of the cluster's
+// dofs matter.
+class Starts {
+ public:
+  explicit Starts(const Model& model) : model_(model) {
+    for (const Reference& reference : model.references()) q_.push_back(makeReferenceProblem(model, reference).q_ref);
+    q_.push_back(model.makeNeutral());
+    given_ = q_.size();
   }
-  return starts;
-}
+  size_t size() const { return given_ + 1 + kRandom; }
+  const VectorXd& get(size_t i) {
+    if (i == given_ && q_.size() == given_) addOthers();
+    return q_[i];
+  }
+
+ private:
+  static constexpr size_t kRandom = 20;
+
+  void addOthers() {
+    constexpr double kSpread = 0.1;  // rad or m per start
+    const VectorXd neutral = q_.back();
+    q_.push_back(closeConfiguration(model_, neutral).q);
+    std::mt19937 rng(1);
+    for (size_t i = 1; i <= kRandom; ++i) {
+      const double spread = kSpread * static_cast<double>(i);
+      std::uniform_real_distribution<double> uniform(-spread, spread);
+      q_.push_back(
+          model_.integrate(neutral, VectorXd::NullaryExpr(model_.nv(), [&](Eigen::Index) { return uniform(rng); })));
+    }
+  }
+
+  const Model& model_;
+  std::vector<VectorXd> q_;
+  size_t given_ = 0;
+};
 
 // An axis of a linkage in the world.
 struct Line {
@@ -146,13 +166,22 @@ bool isWithin(const FollowedLinkage& linkage, const std::vector<RoundingToleranc
   return true;
 }
 
-// The rows close over fifty other postures, and no placement has changed too much.
-bool isIdeal(FollowedLinkage& linkage, const Finding& found, const std::vector<RoundingTolerance>& tolerances) {
-  if (!isWithin(linkage, tolerances)) return false;
-  const std::optional<LinkageFit> start = fitLinkage(linkage, found.q, found.rank);
-  if (!start) return false;
-  const LinkageWay others = followLinkage(linkage, *start, found.rank, kOthers, 2, kCloses);
-  return others.gap <= kCloses && others.moved >= kMoves;
+// Whether it can be changed so that postures of its way close, and fifty others, too, and no placement changes too much. Others that
+// are far from those that were made to close may be open by more than these: then they are made to close as well.
+bool makeIdeal(FollowedLinkage& linkage, std::vector<VectorXd> postures, const Finding& found,
+               const std::vector<RoundingTolerance>& tolerances) {
+  constexpr unsigned kRounds = 3;
+  constexpr double kNearlyCloses = 1e-9;
+  constexpr size_t kEach = 4;  // of the others is made to close
+  for (unsigned round = 0; round < kRounds; ++round) {
+    if (!mend(linkage, postures, found.rank, tolerances) || !isWithin(linkage, tolerances)) return false;
+    const std::optional<LinkageFit> start = fitLinkage(linkage, found.q, found.rank);
+    if (!start) return false;
+    const LinkageWay others = followLinkage(linkage, *start, found.rank, kOthers, 2 + round, kNearlyCloses);
+    if (others.gap <= kCloses) return others.moved >= kMoves;
+    for (size_t i = 0; i < others.postures.size(); i += kEach) postures.push_back(others.postures[i]);
+  }
+  return false;
 }
 
 // Of the places of a linkage. Frames of hinges whose axis runs through two points turn as far as these may be off.
@@ -174,16 +203,16 @@ std::vector<RoundingTolerance> makeTolerances(const FollowedLinkage& linkage, co
 }
 
 // Supposes ranks from the least upwards.
-Finding examine(FollowedLinkage& linkage, const std::vector<VectorXd>& starts,
-                const std::vector<RoundingTolerance>& tolerances) {
+Finding examine(FollowedLinkage& linkage, Starts& starts, const std::vector<RoundingTolerance>& tolerances) {
   double size = 0;
   for (const RoundingTolerance& tolerance : tolerances)
     size = std::max({size, tolerance.angle, tolerance.length / linkage.length()});
   const double opening = std::max(kAdds * size, 10 * kCloses);
+  const double exact = kExact * std::sqrt(static_cast<double>(linkage.model().closures().size()));
   Finding found;
   std::optional<LinkageFit> start;
   for (size_t i = 0; i < starts.size() && !start; ++i) {
-    start = fitLinkage(linkage, starts[i], -1, std::max(opening, 1e-9));
+    start = fitLinkage(linkage, starts.get(i), -1, std::max(opening, 1e-9));
     if (start && start->gap > opening) start.reset();
   }
   found.rank = found.written = -1;
@@ -200,16 +229,16 @@ Finding examine(FollowedLinkage& linkage, const std::vector<VectorXd>& starts,
     const std::optional<LinkageFit> here = fitLinkage(linkage, start->q, m);
     if (!here) continue;
     const LinkageWay some = followLinkage(linkage, *here, m, kFirst, 1, opening);
-    if (some.gap <= kExact) {
+    if (some.gap <= exact) {
       found.exact = true;
       return found;
     }
     if (m == linkage.numDofs() || some.gap > opening) continue;
-    LinkageWay way = followLinkage(linkage, *here, m, kPostures, 1, opening);
+    const LinkageWay way = followLinkage(linkage, *here, m, kPostures, 1, opening);
     if (way.moved < kMoves || way.gap > opening || way.postures.empty()) continue;
     const FollowedLinkage written = linkage;
     linkage.findPlaneLoops(start->q, opening);
-    if (mend(linkage, way.postures, m, tolerances) && isIdeal(linkage, found, tolerances)) {
+    if (makeIdeal(linkage, way.postures, found, tolerances)) {
       found.mended = true;
       return found;
     }
@@ -269,7 +298,7 @@ RoundedLinkages findRoundedLinkages(const Model& model, const RoundingTolerance&
   RoundedLinkages out;
   out.model = model;
   if (model.clusters().empty()) return out;
-  const std::vector<VectorXd> starts = makeStarts(model);
+  Starts starts(model);
   ModelParts parts = takeParts(model);
   for (const LoopCluster& cluster : model.clusters()) {
     FollowedLinkage linkage(model, cluster);
