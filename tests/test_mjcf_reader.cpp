@@ -341,6 +341,23 @@ TEST_CASE("two points of the same two bodies make a hinge, whatever their names,
             .kind == ClosureKind::Hinge5D);
 }
 
+TEST_CASE("a weld without torque is a ball, as in MuJoCo, at its anchor") {
+  const auto read = [](const std::string& scale) {
+    const RobotDirectory directory;
+    return loadRobot(directory.write("arm.xml",
+                                     "<mujoco><worldbody><body name=\"a\" pos=\"0 0 1\"><joint axis=\"0 1 0\"/>"
+                                     "<geom size=\"0.1\"/></body></worldbody><equality><weld body1=\"world\" "
+                                     "body2=\"a\" anchor=\"0.1 0 0.2\"" +
+                                         scale + "/></equality></mujoco>"));
+  };
+  CHECK(read("").model.closures()[0].kind == ClosureKind::Weld6D);
+  CHECK(read(" torquescale=\"0.5\"").model.closures()[0].kind == ClosureKind::Weld6D);
+  const LoadedRobot ball = read(" torquescale=\"0\"");
+  CHECK(ball.model.closures()[0].kind == ClosureKind::Ball3D);
+  CHECK((ball.model.closures()[0].X_B2.p - Vector3d(0.1, 0, 0.2)).norm() < 1e-15);
+  CHECK((ball.model.closures()[0].X_B1.p - Vector3d(0.1, 0, 1.2)).norm() < 1e-15);
+}
+
 TEST_CASE("a robot of MuJoCo becomes one of ours and stays the same") {
   const RobotDirectory directory;
   for (const char* name : {"bipetto", "cleobot", "belt_biped", "spring_leg", "delta"}) {

@@ -88,21 +88,21 @@ void MjcfReader::readTie(MjcfElement& e, const std::string& name) {
   Tie tie;
   tie.name = name;
   tie.line = e.line();
-  tie.kind = e.tag() == "weld" ? ClosureKind::Weld6D : ClosureKind::Ball3D;
+  // A weld without torque, too, is a ball.
+  const bool is_weld = e.tag() == "weld" && e.getNumber("torquescale", 1) != 0;
+  tie.kind = is_weld ? ClosureKind::Weld6D : ClosureKind::Ball3D;
   if (e.find("site1") || e.find("site2")) {
     // Two sites are brought together, wherever the bodies stand.
     const BodyPlace &one = findSite(e, "site1"), &two = findSite(e, "site2");
     tie.body1 = one.link, tie.body2 = two.link;
     tie.X_L1 = one.X_LB, tie.X_L2 = two.X_LB;
-    if (tie.kind == ClosureKind::Weld6D) e.find("torquescale");
   } else {
     if (!e.find("body1")) e.fail("it has no body1", "name the first body");
     const BodyPlace &one = findBody(e, "body1"), &two = findBody(e, "body2");
     const SE3 X_12 = one.X_WB.inverse() * two.X_WB;
     const Vector3d anchor = e.getVector("anchor", Vector3d::Zero());
     tie.body1 = one.link, tie.body2 = two.link;
-    if (tie.kind == ClosureKind::Weld6D) {
-      e.find("torquescale");
+    if (e.tag() == "weld") {
       tie.X_L1 = one.X_LB * X_12 * translate(anchor);
       tie.X_L2 = two.X_LB * translate(anchor);
       const std::vector<double> relative = e.getNumbers("relpose", 7, 7);
