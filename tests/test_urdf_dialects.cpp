@@ -126,6 +126,17 @@ TEST_CASE("URDF dialects: a joint of Gazebo closes a loop where the links stand"
       halves +
       close("revolute", "<pose>-0.1 0 0 0 0 1.57</pose><axis><xyz expressed_in=\"__model__\">0 1 0</xyz></axis>"));
   checkMobility(model_axis.model, 2);
+  // In the words of SDF up to 1.6, and with a pose in another link.
+  const LoadedRobot old_axis = loadUrdf(
+      halves +
+      close("revolute",
+            "<pose relative_to=\"coupler\">-0.1 0 0.1 0 0 1.57</pose><axis><xyz>0 1 0</xyz>"
+            "<use_parent_model_frame>1</use_parent_model_frame></axis><screw_thread_pitch>1</screw_thread_pitch>"));
+  checkMobility(old_axis.model, 2);
+  const Closure& old_weld = old_axis.model.closures()[0];
+  CHECK((old_weld.X_B1.p - Vector3d(-0.1, 0, 0.1)).norm() < 1e-12);
+  CHECK((old_weld.X_B1.R * old_weld.axis - Vector3d::UnitY()).norm() < 1e-12);
+  CHECK(says(old_axis, "<screw_thread_pitch> (line 11): it is left out"));
   CHECK(loadUrdf(halves + close("ball")).model.closures()[0].kind == ClosureKind::Ball3D);
   CHECK_THAT(getLoadError(halves + close("screw")), Catch::Contains("its type 'screw' cannot close a loop"));
   CHECK_THAT(getLoadError(halves + close("revolute")), Catch::Contains("it has no <axis>; give one"));
@@ -260,6 +271,41 @@ TEST_CASE("URDF dialects: transmissions are motors whose torques do the same wor
       says(loadUrdf(arm + transmit("HarmonicTransmission")), "<transmission> (line 7): it is left out: transmissions"));
   CHECK_THAT(getLoadError(arm + "<transmission><type>SimpleTransmission</type><joint name=\"knee\"/></transmission>"),
              Catch::Contains("there is no joint 'knee'"));
+}
+
+TEST_CASE("URDF dialects: joints of ros2_control with commands have motors, and those that mimic are coupled") {
+  const std::string pair = "<link name=\"world\"/>\n" + writeLink("left") + writeLink("right") +
+                           writeJoint("l", "world", "left", "0 0.1 0") + writeJoint("r", "world", "right", "0 -0.1 0");
+  const auto control = [&](const std::string& more, const std::string& left = "") {
+    return pair + "<ros2_control name=\"s\" type=\"system\"><joint name=\"l\">" + left +
+           "<command_interface name=\"position\"/></joint><joint name=\"r\">" + more +
+           "</joint><joint name=\"of_another_file\"><command_interface name=\"effort\"/></joint></ros2_control>";
+  };
+  const LoadedRobot robot =
+      loadUrdf(control("<param name=\"mimic\">l</param><param name=\"multiplier\">-2</param>"
+                       "<command_interface name=\"position\"/>"));
+  CHECK(robot.warnings.empty());
+  REQUIRE(robot.model.nu() == 1);
+  CHECK(robot.model.motors()[0].name == "l");
+  REQUIRE(robot.model.closures().size() == 1);
+  VectorXd q = robot.model.makeNeutral();
+  q[robot.model.joints()[robot.model.findJoint("l")].idx_q] = 0.2;
+  q[robot.model.joints()[robot.model.findJoint("r")].idx_q] = -0.4;
+  Workspace ws(robot.model);
+  updatePositions(robot.model, ws, q);
+  CHECK(calcClosureResidual(ws, robot.model.closures()[0]).norm() < 1e-15);
+  CHECK(loadUrdf(control("<state_interface name=\"position\"/>")).model.nu() == 1);
+  CHECK(loadUrdf(control("<command_interface name=\"effort\"/>")).model.nu() == 2);
+  CHECK_THAT(getLoadError(control("<param name=\"mimic\">none</param>")),
+             Catch::Contains("<param> (line") && Catch::Contains("'none' is no joint with one coordinate; name one"));
+  // A transmission has the gear.
+  const std::string geared =
+      "<transmission><type>SimpleTransmission</type><joint name=\"l\"/><actuator name=\"a\">"
+      "<mechanicalReduction>30</mechanicalReduction></actuator></transmission>";
+  const LoadedRobot driven = loadUrdf(control("") + geared);
+  CHECK(driven.warnings.empty());
+  REQUIRE(driven.model.nu() == 1);
+  CHECK(driven.model.motors()[0].drive.ratio == 30);
 }
 
 TEST_CASE("URDF dialects: balls, a world of another name, ends of loops, and elements that nobody knows") {

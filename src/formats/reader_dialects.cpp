@@ -17,8 +17,8 @@ const std::map<std::string, ClosureKind> kClosureKinds = {
     {"prismatic", ClosureKind::Slider}};
 
 // Of elements that change no mechanism. What is in neither list is told.
-const std::set<std::string> kHarmless = {"link",   "joint",        "material", "mujoco",
-                                         "sensor", "ros2_control", "version",  "drake:joint"},
+const std::set<std::string> kHarmless = {"link",         "joint",   "material",    "mujoco",      "sensor",
+                                         "ros2_control", "version", "drake:joint", "transmission"},
                             kHarmlessOfJoint = {"parent", "child",       "origin",
                                                 "axis",   "limit",       "dynamics",
                                                 "mimic",  "calibration", "safety_controller",
@@ -26,13 +26,9 @@ const std::set<std::string> kHarmless = {"link",   "joint",        "material", "
                             kHarmlessOfLink = {"inertial", "visual", "collision",
                                                "contact",  "sensor", "self_collision_checking",
                                                "material"},
+                            kHarmlessOfSdfJoint = {"parent", "child", "pose", "axis", "physics", "sensor"},
                             kChangingOfGazebo = {"link",    "model",          "springStiffness", "springReference",
                                                  "gravity", "turnGravityOff", "static"};
-
-std::string getText(const XMLElement& e) {
-  const char* text = e.GetText();
-  return text ? text : "";
-}
 
 // Such as <joint_properties friction="0.0"/> of onshape-to-robot.
 bool isZero(const XMLElement& e) {
@@ -59,14 +55,10 @@ class DialectReader {
         readLoop(*e);
       else if (tag == "coupling")
         readCoupling(*e);
-      else if (tag == "transmission")
-        readTransmission(*e);
       else if (tag == "gazebo")
         readGazebo(*e);
-      else if (!kHarmless.count(tag) && tag.rfind("drake:", 0) != 0)
+      else if (!kHarmless.count(tag) && tag.rfind("drake:", 0) != 0 && !(for_drake_ && tag == "frame"))
         leaveOut(*e);
-      if (tag == "ros2_control")
-        for (const XMLElement* inner : getChildren(*e, "transmission")) readTransmission(*inner);
       if (tag == "joint" && getAttribute(e, "independent") == "false")
         tree_.dependent.push_back(getAttribute(e, "name"));
       if (tag == "joint" || tag == "link")
@@ -188,11 +180,16 @@ class DialectReader {
     const std::string parent = getLink(getChild(e, "parent", "name the link"), nullptr),
                       child = getLink(getChild(e, "child", "name the link"), nullptr);
     SE3 X_CJ;
+    for (const XMLElement* inner : getChildren(e))
+      if (!kHarmlessOfSdfJoint.count(getTag(*inner))) leaveOut(*inner);
     if (const XMLElement* pose = e.FirstChildElement("pose")) {
-      if (!getAttribute(pose, "relative_to").empty())
-        fail(*pose, "its attribute 'relative_to' is not read here", "give the pose in the child link");
       const std::vector<double> v = parse(*pose, getText(*pose), 6, "it");
       X_CJ = {makeRotation({v[3], v[4], v[5]}), {v[0], v[1], v[2]}};
+      const std::string frame = getAttribute(pose, "relative_to");
+      if (frame == "__model__")
+        X_CJ = X_WL_.at(child).inverse() * X_CJ;
+      else if (!frame.empty())
+        X_CJ = X_WL_.at(child).inverse() * X_WL_.at(getLink(*pose, "relative_to")) * X_CJ;
     }
     const SE3 X_WJ = X_WL_.at(child) * X_CJ;
     if (hasAxis(closure.kind)) {
@@ -202,8 +199,9 @@ class DialectReader {
       closure.axis = {v[0], v[1], v[2]};
       if (!(closure.axis.norm() > 1e-12)) fail(xyz, "it is not a direction", "give a non-zero vector");
       closure.axis.normalize();
+      const XMLElement* in_model = axis.FirstChildElement("use_parent_model_frame");  // of SDF up to 1.6
       const std::string frame = getAttribute(&xyz, "expressed_in");
-      if (frame == "__model__")
+      if (frame == "__model__" || (in_model && (getText(*in_model) == "1" || getText(*in_model) == "true")))
         closure.axis = X_WJ.R.transpose() * closure.axis;
       else if (!frame.empty())
         fail(xyz, "its attribute 'expressed_in' is not read here", "give the axis in the frame of the joint");
@@ -251,117 +249,6 @@ class DialectReader {
     settings_.closures.push_back(closure);
   }
 
-  // One end of a transmission.
-  struct Port {
-    const XMLElement* element = nullptr;
-    std::string name, role;
-    double reduction = 1, offset = 0;
-  };
-  double getNumber(const XMLElement& e, const char* tag, const char* tag2, double otherwise) const {
-    const XMLElement* child = e.FirstChildElement(tag);
-    if (!child && tag2) child = e.FirstChildElement(tag2);
-    return child ? parse(*child, getText(*child), 1, "it")[0] : otherwise;
-  }
-  double getReduction(const XMLElement& e) const {
-    const double reduction = getNumber(e, "mechanicalReduction", "mechanical_reduction", 1);
-    if (reduction == 0) fail(e, "its mechanical reduction is 0", "give turns of the rotor per turn of the joint");
-    return reduction;
-  }
-  std::vector<Port> listPorts(const XMLElement& e, const char* tag) const {
-    std::vector<Port> out;
-    for (const XMLElement* child : getChildren(e, tag)) {
-      Port port{child, getAttribute(child, "name"), getAttribute(child, "role"), getReduction(*child),
-                getNumber(*child, "offset", nullptr, 0)};
-      if (const XMLElement* role = child->FirstChildElement("role")) port.role = getText(*role);
-      out.push_back(port);
-    }
-    // In the order of the file unless their roles say otherwise.
-    if (out.size() == 2 && out[0].role == std::string(tag) + "2" && out[1].role == std::string(tag) + "1")
-      std::swap(out[0], out[1]);
-    return out;
-  }
-  const UrdfJoint& getDriven(const Port& port) const {
-    const auto it = std::find_if(tree_.joints.begin(), tree_.joints.end(),
-                                 [&](const UrdfJoint& joint) { return joint.joint.name == port.name; });
-    if (it == tree_.joints.end()) fail(*port.element, "there is no joint '" + port.name + "'", "correct the name");
-    return *it;
-  }
-
-  void readTransmission(const XMLElement& e) {
-    if (for_drake_) return;
-    std::string type = getAttribute(&e, "type");
-    for (const char* tag : {"type", "plugin"})
-      if (const XMLElement* child = e.FirstChildElement(tag)) type = getText(*child);
-    const std::string kind =
-        type.substr(type.find_last_of("/:") == std::string::npos ? 0 : type.find_last_of("/:") + 1);
-    const std::vector<Port> joints = listPorts(e, "joint"), actuators = listPorts(e, "actuator");
-    const bool is_simple = kind == "SimpleTransmission", is_differential = kind == "DifferentialTransmission";
-    if (!is_simple && !is_differential && kind != "FourBarLinkageTransmission")
-      return warn(e, "it is left out: transmissions '" + type +
-                         "' are not known here; give `motors`, and couplers under "
-                         "`closures`, in the robot's YAML file");
-    const size_t count = is_simple ? 1 : 2;
-    if (joints.size() != count || actuators.size() > count || actuators.size() + is_simple < count)
-      fail(e, "it does not have " + std::to_string(count) + " <joint> and " + std::to_string(count) + " <actuator>",
-           "correct it");
-    for (const Port& port : joints)
-      if (getNv(getDriven(port).joint.kind) != 1)
-        return warn(e, "it is left out: joint '" + port.name + "' does not have exactly one coordinate");
-    if (is_simple)
-      addMotor(e, joints[0].name,
-               getReduction(e) * joints[0].reduction * (actuators.empty() ? 1 : actuators[0].reduction));
-    else
-      addRotors(e, joints, actuators, is_differential);
-  }
-
-  void addMotor(const XMLElement& e, const std::string& joint, double ratio) {
-    for (const MotorSpec& other : settings_.motors)
-      if (other.joint == joint) return warn(e, "it is left out: joint '" + joint + "' already has a motor");
-    MotorSpec motor;
-    motor.joint = joint;
-    motor.drive.ratio = std::abs(ratio);
-    settings_.motors.push_back(motor);
-  }
-
-  void addRotors(const XMLElement& e, const std::vector<Port>& joints, const std::vector<Port>& actuators,
-                 bool is_differential) {
-    const UrdfJoint first = getDriven(joints[0]);
-    const Port &j1 = joints[0], &j2 = joints[1];
-    for (int i = 0; i < 2; ++i) {
-      const Port& actuator = actuators[i];
-      if (actuator.name.empty()) fail(*actuator.element, "it has no name", "give it one");
-      UrdfJoint rotor;
-      rotor.parent = first.parent;
-      rotor.child = rotor.joint.name = actuator.name;
-      rotor.joint.kind = JointKind::Continuous;
-      rotor.joint.X_PJ = first.joint.X_PJ;
-      rotor.joint.axis = first.joint.axis;
-      const auto is_taken = [&](const UrdfJoint& joint) { return joint.joint.name == actuator.name; };
-      if (std::any_of(tree_.joints.begin(), tree_.joints.end(), is_taken) ||
-          !tree_.links.emplace(actuator.name, makeRotor(actuator.name)).second)
-        fail(*actuator.element, "there is a link or joint of this name already", "rename it");
-      tree_.joints.push_back(rotor);
-      ClosureSpec coupler;
-      coupler.kind = ClosureKind::Coupler;
-      coupler.name = actuator.name + "_transmission";
-      const double n = actuator.reduction;
-      double c1 = n * j1.reduction, c2 = 0;
-      if (is_differential)
-        c2 = (i == 0 ? 1 : -1) * n * j2.reduction;
-      else if (i == 1)
-        c1 = n, c2 = n * j2.reduction;
-      coupler.coefficients = {{actuator.name, 1}, {j1.name, -c1}};
-      if (c2 != 0) coupler.coefficients[j2.name] = -c2;
-      coupler.offset = 0.0 - c1 * j1.offset - c2 * j2.offset;
-      settings_.closures.push_back(coupler);
-      addMotor(e, actuator.name, 1);
-    }
-    warn(e, "its actuators '" + actuators[0].name + "' and '" + actuators[1].name +
-                "' are rotors without inertia and without limits, since limits of the file are those of joints; "
-                "`motors` in the "
-                "robot's YAML file gives effort, velocity and armature");
-  }
-
   const bool for_drake_;
   UrdfFile& tree_;
   YamlFile& settings_;
@@ -372,13 +259,9 @@ class DialectReader {
 
 }  // namespace
 
-UrdfLink makeRotor(const std::string& name) {
-  constexpr double kMass = 1e-9, kInertia = 1e-9;  // kg, kg m^2
-  return {name, {kMass, Vector3d::Zero(), kInertia * Matrix3d::Identity()}, {}, {}};
-}
-
 void readDialects(const XMLElement& robot, bool for_drake, UrdfFile& tree, YamlFile& settings) {
   DialectReader(for_drake, tree, settings).read(robot);
+  if (!for_drake) readTransmissions(robot, tree, settings);
 }
 
 bool readMimicPlugin(const XMLElement& plugin, UrdfFile& tree) {

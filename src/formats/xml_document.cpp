@@ -68,6 +68,8 @@ std::string getAttribute(const XMLElement* element, const char* attribute) {
   return text ? text : "";
 }
 
+std::string getText(const XMLElement& element) { return element.GetText() ? element.GetText() : ""; }
+
 std::string describe(const XMLElement& element) {
   return "<" + getTag(element) + "> (line " + std::to_string(element.GetLineNum()) + ")";
 }

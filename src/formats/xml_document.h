@@ -22,6 +22,8 @@ const XMLElement& parseXml(const std::string& xml, const std::string& path, cons
 std::string getTag(const XMLElement& element);
 /// Empty without the attribute or without the element.
 std::string getAttribute(const XMLElement* element, const char* attribute);
+/// Empty without any.
+std::string getText(const XMLElement& element);
 /// "<joint> (line 3)"
 std::string describe(const XMLElement& element);
 /// " (line 3)", or " (lines 3, 5 and 7 more)"
