@@ -1,4 +1,5 @@
 // Drake's URDF as its users write it: what is read, completed and reported, whatever becomes of the file.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -116,6 +117,58 @@ TEST_CASE("files of Drake's users are read, completed by a YAML file, and their 
              "<drake:linear_spring_damper_stiffness> (line 15): its attribute");
   checkError(change("ball_constraint_body_B name=\"tip\"", "ball_constraint_body_B name=\"world\""),
              "closure 'ball_9'");
+}
+
+TEST_CASE("Drake's bushings are the joints that they stand for, and its tendons with little play are couplers") {
+  const auto load = [](const std::string& elements) {
+    const RobotDirectory directory;
+    std::string urdf = R"(<robot name="arms" xmlns:drake="http://drake.mit.edu"><link name="world"/>)";
+    for (const std::string name : {"a", "b"})
+      urdf += "<link name=\"" + name +
+              "\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/>"
+              "</inertial></link><joint name=\"j" +
+              name + "\" type=\"revolute\"><parent link=\"world\"/><child link=\"" + name +
+              "\"/><axis xyz=\"0 1 0\"/></joint>";
+    return loadRobot(directory.writeRobot(urdf + "\n" + elements + "</robot>", "base: fixed\n"));
+  };
+  const auto bushing = [](const std::string& torque) {
+    return R"(<frame name="f" link="b" xyz="0.1 0 0.2" rpy="1.5707963267948966 0 0"/><drake:linear_bushing_rpy>
+<drake:bushing_frameA name="a"/><drake:bushing_frameC name="f"/><drake:bushing_torque_stiffness value=")" +
+           torque + R"("/><drake:bushing_force_stiffness value="1e4 1e4 1e4"/></drake:linear_bushing_rpy>)";
+  };
+  const auto says = [](const LoadedRobot& robot, const std::string& text) {
+    return std::any_of(robot.warnings.begin(), robot.warnings.end(),
+                       [&](const std::string& warning) { return warning.find(text) != std::string::npos; });
+  };
+  const LoadedRobot hinge = load(bushing("3000 3000 0"));
+  REQUIRE(hinge.model.closures().size() == 1);
+  const Closure& closure = hinge.model.closures()[0];
+  CHECK(closure.kind == ClosureKind::Hinge5D);
+  CHECK((closure.X_B2.p - Vector3d(0.1, 0, 0.2)).norm() < 1e-15);
+  CHECK((closure.X_B2.R * closure.axis + Vector3d::UnitY()).norm() < 1e-12);
+  CHECK(says(hinge, "its springs become a hinge that does not give"));
+  CHECK_FALSE(says(hinge, "<frame>"));
+  CHECK(load(bushing("0 0 0")).model.closures()[0].kind == ClosureKind::Ball3D);
+  CHECK_THAT(getError([&] { load(bushing("1 0 0")); }), Catch::Contains("it is not as stiff as a ball, a hinge"));
+
+  const auto tendon = [](const std::string& joint, const std::string& upper) {
+    return R"(<drake:tendon_constraint><drake:tendon_constraint_joint name="ja" a="2"/><drake:tendon_constraint_joint name=")" +
+           joint + R"(" a="-1"/><drake:tendon_constraint_offset value="0.3"/>
+<drake:tendon_constraint_lower_limit value="-0.02"/><drake:tendon_constraint_upper_limit value=")" +
+           upper + R"("/></drake:tendon_constraint>)";
+  };
+  const LoadedRobot coupled = load(tendon("jb", "0.06"));
+  REQUIRE(coupled.model.closures().size() == 1);
+  CHECK(says(coupled, "it is read as a coupler; its play of 0.04 to either side is left out"));
+  // 2 qa - qb + 0.3 = 0.02, the middle.
+  Workspace ws(coupled.model);
+  updatePositions(coupled.model, ws, Eigen::Vector2d(0.1, 2 * 0.1 + 0.28));
+  CHECK(calcClosureResidual(ws, coupled.model.closures()[0]).norm() < 1e-15);
+  const LoadedRobot wide = load(tendon("jb", "inf"));
+  CHECK(wide.model.closures().empty());
+  CHECK(says(wide, "<drake:tendon_constraint> (line 2): it is left out"));
+  CHECK_THAT(getError([&] { load(tendon("none", "0")); }), Catch::Contains("'none' is no joint with one coordinate"));
+  CHECK_THAT(getError([&] { load(tendon("ja", "0")); }), Catch::Contains("joint 'ja' is listed twice"));
 }
 
 TEST_CASE("whatever becomes of a file of Drake, it is a robot or one clear error") {

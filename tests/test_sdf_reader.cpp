@@ -309,6 +309,22 @@ TEST_CASE("<mimic> of SDF 1.11 is a coupler, though libsdformat leaves it out; a
   REQUIRE(plugged.model.closures().size() == 1);
   CHECK(plugged.model.closures()[0].kind == ClosureKind::Coupler);
   CHECK_FALSE(warnsOf(plugged, "plugin"));
+  // As by Drake, whose tendons may be couplers, too.
+  const LoadedRobot of_drake = loadSdf(replaceOnce(makeFourBar("", ""), "<child>c</child>",
+                                                   "<child>c</child><drake:mimic joint=\"ja\" multiplier=\"-2\" "
+                                                   "offset=\"0.5\"/>"));
+  REQUIRE(of_drake.model.closures().size() == 1);
+  CHECK(closeConfiguration(of_drake.model, closed.q).q.isApprox(closed.q, 1e-9));
+  CHECK_FALSE(warnsOf(of_drake, "drake:mimic"));
+  const LoadedRobot tendon = loadSdf(replaceOnce(
+      makeFourBar("", ""), "</model>",
+      "<drake:tendon_constraint><drake:tendon_constraint_joint name=\"ja\" a=\"2\"/><drake:tendon_constraint_joint "
+      "name=\"jc\" a=\"1\"/><drake:tendon_constraint_lower_limit>0.4</drake:tendon_constraint_lower_limit>"
+      "<drake:tendon_constraint_upper_limit>0.6</drake:tendon_constraint_upper_limit></drake:tendon_constraint></"
+      "model>"));
+  REQUIRE(tendon.model.closures().size() == 1);
+  CHECK(closeConfiguration(tendon.model, closed.q).q.isApprox(closed.q, 1e-9));
+  CHECK(warnsOf(tendon, "its play of 0.1 to either side is left out"));
   const auto getSdfError = [&](const std::string& mimic) { return getError([&] { loadSdf(swing(mimic)); }); };
   CHECK_THAT(getSdfError("<mimic joint=\"none\"/>"),
              Catch::Contains("joint 'jc': <mimic> (line") && Catch::Contains("'none' is no joint with one coordinate"));

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <locale>
+#include <map>
 #include <set>
 #include <sstream>
 
 #include "bielle/model/error.h"
 #include "formats/reader_loops.h"
+#include "math/direction.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -30,12 +33,17 @@ class DrakeReader {
   void read() {
     for (const XMLElement* e : getChildren(robot_))
       if (isJoint(*e)) readJoint(*e);
+    for (const XMLElement* e : getChildren(robot_, "frame")) frames_[getAttribute(e, "name")] = e;
     for (const XMLElement* e : getChildren(robot_)) {
       const std::string& tag = getTag(*e);
       if (tag == "transmission")
         readTransmission(*e);
       else if (tag == "drake:ball_constraint")
         readBallConstraint(*e);
+      else if (tag == "drake:linear_bushing_rpy")
+        readBushing(*e);
+      else if (tag == "drake:tendon_constraint")
+        readDrakeTendon(*e, file_, settings_);
       else if (tag == "drake:linear_spring_damper")
         readSpringDamper(*e);
       // What may collide is of no meaning here.
@@ -52,8 +60,6 @@ class DrakeReader {
   void warn(const XMLElement& e, const std::string& problem) {
     file_.warnings.push_back(file_.path + ": " + describe(e) + ": " + problem);
   }
-
-  static std::string getText(const XMLElement& e) { return e.GetText() ? e.GetText() : ""; }
 
   const XMLElement& getChild(const XMLElement& e, const std::string& tag) const {
     const XMLElement* child = e.FirstChildElement(tag.c_str());
@@ -167,6 +173,35 @@ class DrakeReader {
     settings_.closures.push_back(closure);
   }
 
+  // A link, or a <frame name link xyz rpy> on one.
+  std::pair<std::string, SE3> findFrame(const XMLElement& e, const std::string& tag) const {
+    const XMLElement& entry = getChild(e, tag);
+    const auto frame = frames_.find(getAttribute(&entry, "name"));
+    if (frame == frames_.end()) return {getLink(e, tag), {}};
+    const XMLElement& f = *frame->second;
+    const auto get = [&](const char* attribute) {
+      const std::vector<double> v =
+          f.Attribute(attribute) ? getNumbers(f, attribute, 3) : std::vector<double>{0.0, 0.0, 0.0};
+      return Vector3d(v[0], v[1], v[2]);
+    };
+    const std::string link = getAttribute(&f, "link");
+    if (!file_.links.count(link)) fail(f, "there is no link '" + link + "'", "declare the link or correct the name");
+    return {link, {makeRotation(get("rpy")), get("xyz")}};
+  }
+
+  void readBushing(const XMLElement& e) {
+    std::optional<ClosureSpec> closure = makeBushing(getChildVector(e, "drake:bushing_torque_stiffness"),
+                                                     getChildVector(e, "drake:bushing_force_stiffness"));
+    if (!closure) fail(e, "it is not as stiff as a ball, a hinge or a weld", kBushingRemedy);
+    warn(e, describeBushing(*closure));
+    closure->name = nameClosure("bushing_" + std::to_string(e.GetLineNum()), settings_);
+    const auto [a, X_A] = findFrame(e, "drake:bushing_frameA");
+    const auto [c, X_C] = findFrame(e, "drake:bushing_frameC");
+    closure->frame1 = addUrdfFrame(file_, closure->name + "_frame1", a, X_A);
+    closure->frame2 = addUrdfFrame(file_, closure->name + "_frame2", c, X_C);
+    settings_.closures.push_back(*closure);
+  }
+
   void readSpringDamper(const XMLElement& e) {
     const std::string tag = getTag(e);
     PointSpringSpec spec{getLink(e, tag + "_body_A"), getLink(e, tag + "_body_B"), {}};
@@ -186,10 +221,72 @@ class DrakeReader {
   const XMLElement& robot_;
   UrdfFile& file_;
   YamlFile& settings_;
+  std::map<std::string, const XMLElement*> frames_;
   std::set<std::string> effortless_;  // joints with a limit of effort of zero, which Drake does not drive
 };
 
 }  // namespace
+
+std::optional<ClosureSpec> makeBushing(const Vector3d& torque, const Vector3d& force) {
+  const auto free = (torque.array() == 0).count();
+  if (!(force.array() > 0).all() || (torque.array() < 0).any() || free == 2) return {};
+  ClosureSpec closure;
+  closure.kind = free == 3 ? ClosureKind::Ball3D : free == 1 ? ClosureKind::Hinge5D : ClosureKind::Weld6D;
+  if (free == 1) closure.axis = (torque.array() == 0).cast<double>();
+  return closure;
+}
+
+std::string describeBushing(const ClosureSpec& bushing) {
+  return std::string("its springs become a ") +
+         (bushing.kind == ClosureKind::Ball3D    ? "ball"
+          : bushing.kind == ClosureKind::Hinge5D ? "hinge"
+                                                 : "weld") +
+         " that does not give";
+}
+
+// The length a_1 q_1 + a_2 q_2 + .. + offset stays between limits. In SDF values are text.
+void readDrakeTendon(const XMLElement& e, UrdfFile& file, YamlFile& settings) {
+  const std::string tag = getTag(e);
+  const auto fail = [&](const XMLElement& element, const std::string& problem) {
+    throw InputError(file.path, describe(element), problem, "correct it");
+  };
+  const auto parse = [&](const XMLElement& element, const std::string& text) {
+    std::vector<double> v;
+    if (!parseNumbers(text, v) || v.size() != 1) fail(element, "its value is not a finite number");
+    return v[0];
+  };
+  const auto isInfinite = [](const std::string& text) { return text.find("inf") != std::string::npos; };
+  const auto get = [&](const char* what, double usual) {
+    const XMLElement* child = e.FirstChildElement((tag + what).c_str());
+    const std::string text = child && child->GetText() ? getText(*child) : getAttribute(child, "value");
+    return !child || isInfinite(text) ? usual : parse(*child, text);  // by default, limits are infinite
+  };
+  ClosureSpec coupler;
+  coupler.kind = ClosureKind::Coupler;
+  coupler.name = nameClosure("tendon_" + std::to_string(e.GetLineNum()), settings);
+  double most = kMostPlay;
+  for (const XMLElement* term : getChildren(e, (tag + "_joint").c_str())) {
+    const std::string name = getAttribute(term, "name");
+    const auto joint = std::find_if(file.joints.begin(), file.joints.end(), [&](const UrdfJoint& candidate) {
+      return candidate.joint.name == name && getNv(candidate.joint.kind) == 1;
+    });
+    if (joint == file.joints.end()) fail(*term, "'" + name + "' is no joint with one coordinate");
+    if (joint->joint.kind == JointKind::Prismatic) most = kMostSlidePlay;
+    if (!coupler.coefficients.emplace(name, parse(*term, getAttribute(term, "a"))).second)
+      fail(*term, "joint '" + name + "' is listed twice");
+  }
+  const double lower = get("_lower_limit", -kInfinity), upper = get("_upper_limit", kInfinity),
+               play = (upper - lower) / 2;
+  const std::string about = file.path + ": " + describe(e) + ": ";
+  if (!(play >= 0 && play <= most) || coupler.coefficients.size() < 2) {
+    file.warnings.push_back(about + "it is left out: its limits are too wide for a coupler with play");
+    return;
+  }
+  coupler.offset = (lower + upper) / 2 - get("_offset", 0);
+  settings.closures.push_back(coupler);
+  file.warnings.push_back(about + "it is read as a coupler; its play of " + formatNumber(play) +
+                          " to either side is left out");
+}
 
 bool isForDrake(const XMLElement& robot) { return robot.Attribute("xmlns:drake") || hasDrakeElement(robot); }
 

@@ -1,5 +1,7 @@
 #pragma once
-/// \file Drake's own elements of a URDF: loops, springs between points, rotors and gears of motors, ball and universal joints.
+/// \file Drake's own elements of a URDF: loops, couplers, springs between points, rotors and gears of motors, ball and universal joints.
+#include <optional>
+
 #include "formats/robot_files.h"
 #include "formats/xml_document.h"
 
@@ -19,5 +21,16 @@ void removeDrake(XMLElement& robot);
 /// \param file  the tree, to which limits on one side and frames are added
 /// \throws InputError naming the line for what lacks an entry, is no number, or names what does not exist
 void readDrakeElements(const XMLElement& robot, UrdfFile& file, YamlFile& settings);
+
+/// What <drake:linear_bushing_rpy> stands for: a hinge, ball or weld, by where it has no stiffness; empty if it is none of them.
+/// \param torque, force  its stiffness in N m and N/m
+std::optional<ClosureSpec> makeBushing(const Vector3d& torque, const Vector3d& force);
+/// "its springs become a hinge that does not give"
+std::string describeBushing(const ClosureSpec& bushing);
+inline constexpr char kBushingRemedy[] =
+    "make its stiffness positive, but for the torques about one axis or about all three";
+
+/// <drake:tendon_constraint> of a URDF or an SDF file: a coupler, if its limits leave little play; else it is left out, with a warning.
+void readDrakeTendon(const XMLElement& e, UrdfFile& file, YamlFile& settings);
 
 }  // namespace bielle

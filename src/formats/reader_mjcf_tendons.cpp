@@ -7,11 +7,6 @@
 #include "model/number_text.h"
 
 namespace bielle {
-namespace {
-
-constexpr double kMostPlay = 0.1, kMostSlidePlay = 0.01;  // half the range of a coupler with play, rad and m
-
-}  // namespace
 
 // Adds the length of a tendon, less that of the file as it stands, to what a coupler keeps.
 void MjcfReader::addTendonLength(FixedTendon& tendon, double factor, ClosureSpec& coupler, const MjcfElement& e) {

@@ -1,5 +1,6 @@
 // Drake's own elements of SDF files that tie links together.
 #include "bielle/model/error.h"
+#include "formats/reader_drake.h"
 #include "formats/reader_sdf.h"
 #include "model/number_text.h"
 
@@ -13,6 +14,8 @@ void SdfReader::readDrake(const XMLElement& model) {
       readBushing(*e);
     } else if (tag == "drake:ball_constraint") {
       readBall(*e);
+    } else if (tag == "drake:tendon_constraint") {
+      readDrakeTendon(*e, tree_, yaml_);
     } else if (tag == "drake:joint") {
       fail(describe(*e), "joints of Drake's own are not supported", "replace it by a joint of SDF");
     } else if (tag == "drake:collision_filter_group") {
@@ -89,24 +92,10 @@ void SdfReader::readBushing(const XMLElement& e) {
   const auto [link2, X_W2] = findDrakeFrame(e, "drake:bushing_frameC");
   const Vector3d torque = getVector(e, "drake:bushing_torque_stiffness"),
                  force = getVector(e, "drake:bushing_force_stiffness");
-  const auto free = (torque.array() == 0).count();
-  if (!(force.array() > 0).all() || (torque.array() < 0).any() || free == 2)
-    fail(describe(e), "it is not as stiff as a ball, a hinge or a weld",
-         "make its stiffness positive, but for the torques about one axis or about all three");
-  Vector3d axis = Vector3d::UnitZ();
-  ClosureKind kind = ClosureKind::Weld6D;
-  if (free == 3) kind = ClosureKind::Ball3D;
-  if (free == 1) {
-    kind = ClosureKind::Hinge5D;
-    axis = (torque.array() == 0).cast<double>();
-  }
-  notes_.add(path_, "<" + getTag(e) + ">", e.GetLineNum(),
-             std::string("its springs become a ") +
-                 (free == 3   ? "ball"
-                  : free == 1 ? "hinge"
-                              : "weld") +
-                 " that does not give");
-  addClosure("bushing_" + std::to_string(e.GetLineNum()), kind, axis, link1, X_W1, link2, X_W2);
+  const std::optional<ClosureSpec> closure = makeBushing(torque, force);
+  if (!closure) fail(describe(e), "it is not as stiff as a ball, a hinge or a weld", kBushingRemedy);
+  notes_.add(path_, "<" + getTag(e) + ">", e.GetLineNum(), describeBushing(*closure));
+  addClosure("bushing_" + std::to_string(e.GetLineNum()), closure->kind, closure->axis, link1, X_W1, link2, X_W2);
 }
 
 void SdfReader::readBall(const XMLElement& e) {

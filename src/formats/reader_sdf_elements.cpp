@@ -14,7 +14,7 @@ void SdfReader::noteElements(const XMLElement& element) {
       {"model", {"link", "joint", "frame", "pose", "static", "include"}},
       {"link", {"pose", "inertial", "visual", "collision"}},
       {"inertial", {"pose", "mass", "inertia"}},
-      {"joint", {"parent", "child", "pose", "axis", "axis2", "drake:parent_frame", "drake:child_frame"}},
+      {"joint", {"parent", "child", "pose", "axis", "axis2", "drake:parent_frame", "drake:child_frame", "drake:mimic"}},
       {"axis", {"xyz", "limit", "dynamics", "mimic", "use_parent_model_frame"}},
       {"axis2", {"xyz", "limit", "dynamics", "use_parent_model_frame"}},
       {"limit", {"lower", "upper", "effort", "velocity"}},
@@ -78,10 +78,11 @@ void SdfReader::checkInertia(const XMLElement& link) {
                              ", by the specification of SDF");
 }
 
-// q = multiplier (q of the other joint - reference) + offset, of SDF 1.11.
+// q = multiplier (q of the other joint - reference) + offset, of SDF 1.11; of Drake, with attributes.
 void SdfReader::readMimic(const XMLElement& joint) {
   const XMLElement* axis = joint.FirstChildElement("axis");
   const XMLElement* mimic = axis ? axis->FirstChildElement("mimic") : nullptr;
+  if (!mimic) mimic = joint.FirstChildElement("drake:mimic");
   if (!mimic) return;
   const std::string name = getAttribute(&joint, "name"), other = getAttribute(mimic, "joint");
   const std::string element = "joint '" + name + "': <mimic> (line " + std::to_string(mimic->GetLineNum()) + ")";
@@ -95,9 +96,10 @@ void SdfReader::readMimic(const XMLElement& joint) {
   if (!is_single(follower)) fail(element, "this joint closes a loop or has not one coordinate", "remove it");
   const auto get = [&](const char* tag, double usual) {
     const XMLElement* e = mimic->FirstChildElement(tag);
-    if (!e) return usual;
+    const char* text = e ? e->GetText() : mimic->Attribute(tag);
+    if (!e && !text) return usual;
     std::vector<double> numbers;
-    if (!parseNumbers(e->GetText() ? e->GetText() : "", numbers) || numbers.size() != 1)
+    if (!parseNumbers(text ? text : "", numbers) || numbers.size() != 1)
       fail(element, std::string("<") + tag + "> is not a finite number", "correct it");
     return numbers[0];
   };

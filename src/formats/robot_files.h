@@ -67,6 +67,9 @@ struct ClosureSpec {
   double kp = 0, kd = 0;
 };
 
+/// Half the range within which a sum of coordinates is kept by a coupler, and its play told: rad, and m if one of them slides.
+inline constexpr double kMostPlay = 0.1, kMostSlidePlay = 0.01;
+
 /// A link that only turns with a motor, next to massless: nothing without mass has inertia.
 UrdfLink makeRotor(const std::string& name);
 
