@@ -461,6 +461,46 @@ TEST_CASE("a robot of more than two legs is adopted with a point for each foot, 
   }
 }
 
+TEST_CASE("feet whose frames face backward get frames that face forward, so that they can stand") {
+  // Four legs without shapes whose thighs are turned by half a turn.
+  const auto link = [](const std::string& name, double mass) {
+    return "<link name=\"" + name + "\"><inertial><mass value=\"" + std::to_string(mass) +
+           "\"/><inertia ixx=\"0.02\" ixy=\"0\" ixz=\"0\" iyy=\"0.02\" iyz=\"0\" izz=\"0.02\"/></inertial></link>";
+  };
+  const auto joint = [](const std::string& parent, const std::string& child, const std::string& place,
+                        const std::string& axis) {
+    return "<joint name=\"to_" + child + "\" type=\"revolute\"><parent link=\"" + parent + "\"/><child link=\"" +
+           child + "\"/><origin " + place + "/><axis xyz=\"" + axis +
+           "\"/><limit lower=\"-10\" upper=\"10\" effort=\"9\" " + "velocity=\"9\"/></joint>";
+  };
+  std::string urdf = "<robot name=\"cat\">" + link("trunk", 5);
+  for (const auto& [leg, hip] :
+       {std::pair("fl", "0.2 0.1 0"), {"fr", "0.2 -0.1 0"}, {"bl", "-0.2 0.1 0"}, {"br", "-0.2 -0.1 0"}}) {
+    const std::string name = leg;
+    urdf += link(name + "_hip", 0.5) + link(name + "_thigh", 0.5) + link(name + "_shank", 0.1) +
+            link(name + "_toes", 0.1) + joint("trunk", name + "_hip", "xyz=\"" + std::string(hip) + "\"", "1 0 0") +
+            joint(name + "_hip", name + "_thigh", "rpy=\"0 0 3.141592653589793\"", "0 1 0") +
+            joint(name + "_thigh", name + "_shank", "xyz=\"0 0 -0.2\"", "0 1 0") +
+            joint(name + "_shank", name + "_toes", "xyz=\"0 0 -0.2\"", "0 1 0");
+  }
+  const RobotDirectory directory;
+  const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(urdf + "</robot>", "")), "../robot.urdf");
+  CAPTURE(adoption.yaml);
+  const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+  const AssemblyResult posture = assembleReference(model, "half_sitting");
+  REQUIRE(posture.status == NumericalStatus::Ok);
+  Workspace ws(model);
+  updatePositions(model, ws, posture.q);
+  REQUIRE(model.contacts().size() == 4);
+  for (const ContactFrame& contact : model.contacts()) {
+    const SE3 X = getPlacement(ws, contact.body, contact.X_BF);
+    CHECK((X.R - Matrix3d::Identity()).norm() < 1e-9);
+    CHECK(std::abs(X.p.z()) < 1e-9);
+    CHECK(model.bodies()[static_cast<size_t>(contact.body)].name.find("_toes") != std::string::npos);
+  }
+  CHECK(std::abs(calcCom(model, ws).x()) < 0.01);
+}
+
 TEST_CASE(
     "motors that are guessed move a robot as its mobility is, in loops by their cranks, with the efforts of the file") {
   // A biped without its motors: joints of knees that four-bars drive, and free ones.

@@ -95,6 +95,7 @@ class Adopter {
     if (feet_.empty())
       fail("no frame on a leg has its z axis up in the closed neutral configuration, and no body has a shape",
            "add a link without mass under each foot, z up and x forward");
+    are_turned_ = turnForward(feet_);
     has_made_frames_ = feet_[0].frame.empty();
     for (size_t i = 0; i < feet_.size() && has_made_frames_; ++i) {
       feet_[i].frame = "sole" + getContactName(i).substr(4);
@@ -201,10 +202,12 @@ class Adopter {
       is_flat &= contact->kind == ContactKind::Surface6D;
       parts.contacts.push_back(*contact);
     }
-    guess(std::string(has_made_frames_ ? "Feet: new frames on the lowest points of shapes in the posture below"
-                                       : "Feet: the lowest frames with z up" +
-                                             std::string(feet_[0].is_named ? " that are named like feet"
-                                                                           : ", although not named like feet")) +
+    guess(std::string(are_turned_
+                          ? "Feet: new frames where the lowest ones with z up are, since some of these face backward"
+                      : has_made_frames_ ? "Feet: new frames on the lowest points of shapes in the posture below"
+                                         : "Feet: the lowest frames with z up" +
+                                               std::string(feet_[0].is_named ? " that are named like feet"
+                                                                             : ", although not named like feet")) +
           describeFeet());
     guesses_.push_back(is_held       ? "Soles: points (3d), since the legs cannot turn their feet about them."
                        : is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
@@ -306,15 +309,19 @@ class Adopter {
     return false;
   }
 
+  enum class Bend { None, IntoRanges, Knees };
+
   void writePosture() {
     if (!model_.references().empty() && writeGivenPosture(model_.references().front())) return;
     const bool may_be_nearer = feet_.size() == 2 && with_feet_->contacts()[0].half_width > 0;
     for (const double least : {1.0, 0.5})  // legs without a roll of the ankle stand where they are alone, to all digits
-      for (const bool within_ranges : {false, true})
+      for (const Bend bend : {Bend::None, Bend::IntoRanges, Bend::Knees})
         for (double share = kHighest; share > kLowest && work_ < kMostWork && (least == 1 || may_be_nearer);
              share -= kStep) {
           Reference r = makePosture(ws_, share, least);
-          if (within_ranges) preferRanges(r);
+          if (bend == Bend::IntoRanges) preferRanges(r);
+          if (bend == Bend::Knees)
+            for (const auto& [joint, angle] : bendKnees(model_, ws_, feet_)) r.joints[joint] = {angle};
           if (stand(r)) return writePosture(r, share, start_, least);
         }
     guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
@@ -422,7 +429,7 @@ class Adopter {
   Workspace ws_;
   std::vector<FoundFoot> feet_;
   std::vector<Motor> motors_;
-  bool has_made_frames_ = false, is_carried_ = false;
+  bool has_made_frames_ = false, are_turned_ = false, is_carried_ = false;
   double work_ = 0;  // on postures
   std::optional<Model> with_feet_;
   YAML::Emitter out_;

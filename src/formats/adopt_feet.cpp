@@ -10,6 +10,7 @@ namespace bielle {
 namespace {
 
 constexpr double kUpright = 0.9;                      // least cosine between the z axis of a sole and up
+constexpr double kBackward = -0.7;                    // most cosine between the x axis of a frame and forward
 constexpr double kMirror = 0.06, kSameHeight = 0.02;  // of a pair of feet, m: published models are not quite symmetric
 constexpr double kLevel = 0.01;                       // of the feet of a robot with more than two legs, m
 constexpr double kTouching = 0.005;  // m; shapes of a foot that reach as low as this over its lowest point are its sole
@@ -168,6 +169,19 @@ std::vector<FoundFoot> findFeet(const Model& model, const Workspace& ws) {
   // Left is where y is positive.
   if (feet.size() == 2 && feet[0].X_WF.p.y() < 0) std::swap(feet[0], feet[1]);
   return feet;
+}
+
+bool turnForward(std::vector<FoundFoot>& feet) {
+  const auto is_backward = [](const FoundFoot& foot) { return foot.X_WF.R(0, 0) < kBackward; };
+  if (std::none_of(feet.begin(), feet.end(), is_backward)) return false;
+  for (FoundFoot& foot : feet) {
+    foot.frame.clear();
+    if (!is_backward(foot)) continue;
+    const SE3 turn((Matrix3d() << -1, 0, 0, 0, -1, 0, 0, 0, 1).finished(), Vector3d::Zero());
+    foot.X_BF = foot.X_BF * turn;
+    foot.X_WF = foot.X_WF * turn;
+  }
+  return true;
 }
 
 std::optional<ContactFrame> measureFoot(const Model& model, const FoundFoot& foot) {

@@ -24,6 +24,10 @@ struct FoundFoot {
 /// - of a robot without shapes the lowest frames with z up. Empty if there are none.
 std::vector<FoundFoot> findFeet(const Model& model, const Workspace& ws);
 
+/// Where frames with z up face backward, as on legs whose links are turned by half a turn: new frames there, without names, that face
+/// forward. \returns whether there are any
+bool turnForward(std::vector<FoundFoot>& feet);
+
 /// What a foot stands on, without a name: the extent of its shapes along x and y of its frame; empty without shapes. A capsule along
 /// x, and a box that is hardly wider than a rod, are blades; a ball is a point.
 std::optional<ContactFrame> measureFoot(const Model& model, const FoundFoot& foot);

@@ -1,6 +1,8 @@
 #include "formats/adopt_freedoms.h"
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <limits>
 #include <set>
 
@@ -95,6 +97,25 @@ std::vector<Motor> guessMotors(const Model& model, ConstVectorRef q, const std::
   }
   std::sort(motors.begin(), motors.end(), [](const Motor& a, const Motor& b) { return a.joint < b.joint; });
   return motors;
+}
+
+std::map<std::string, double> bendKnees(const Model& model, const Workspace& ws, const std::vector<FoundFoot>& feet) {
+  constexpr double kPitch = 0.7;  // least cosine between an axis and left
+  constexpr double kBends[] = {-0.4, 0.8, -0.4};
+  std::map<std::string, double> angles;
+  for (const FoundFoot& foot : feet) {
+    std::vector<std::pair<int, double>> pitches;  // bodies/joints from the base on, y of their axes
+    for (int i = foot.body; i > 1; i = model.joints()[static_cast<size_t>(i)].parent) {
+      const Joint& joint = model.joints()[static_cast<size_t>(i)];
+      const double left = (ws.X_WB[static_cast<size_t>(i)].R * joint.axis).y();
+      if (joint.nv == 1 && joint.kind != JointKind::Prismatic && std::abs(left) > kPitch)
+        pitches.insert(pitches.begin(), {i, left});
+    }
+    for (size_t k = 0; k < std::min(std::size(kBends), pitches.size()); ++k)
+      angles[model.joints()[static_cast<size_t>(pitches[k].first)].name] =
+          std::copysign(1.0, pitches[k].second) * kBends[k];
+  }
+  return angles;
 }
 
 bool canTurn(const Model& model, ConstVectorRef q, const FoundFoot& foot) {

@@ -15,6 +15,10 @@ namespace bielle {
 std::vector<Motor> guessMotors(const Model& model, ConstVectorRef q, const std::vector<FoundFoot>& feet,
                                const std::map<std::string, double>& efforts);
 
+/// Angles of joints that turn about the left, by name, at which legs that are straight in the posture of the workspace are bent: thighs
+/// forward, shanks backward, feet level.
+std::map<std::string, double> bendKnees(const Model& model, const Workspace& ws, const std::vector<FoundFoot>& feet);
+
 /// Whether a foot can turn about its point near q, while the base stands still: one that cannot does not lie flat on a sole in more
 /// than single postures.
 bool canTurn(const Model& model, ConstVectorRef q, const FoundFoot& foot);
