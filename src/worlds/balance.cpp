@@ -13,7 +13,7 @@ namespace {
 constexpr double kTimeConstants = 3;    // for which a robot that stands was at rest or over its support
 constexpr double kCarriedShare = 0.25;  // of the weight, of a sole that carries
 constexpr double kTurnedOver = 0.2;     // of such a sole, rad: what lets go turns by less (describeFeet())
-constexpr double kLate = 0.25;          // of a time constant, by which a foot may land late
+constexpr double kLate = 0.1;           // of a time constant, by which a foot may land late
 constexpr double kRest = 1e-6;          // kinetic energy of a robot at rest, of m |g| z
 
 }  // namespace
