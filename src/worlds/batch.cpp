@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <stdexcept>
 
@@ -13,6 +12,7 @@
 #include "solve/team.h"
 #include "worlds/leapfrog.h"
 #include "worlds/left_out.h"
+#include "worlds/torque_pipe.h"
 
 namespace bielle::worlds {
 namespace {
@@ -39,40 +39,6 @@ void takeParameters(const M& given, const char* name, const char* wanted, const 
     }
   out = given;
 }
-
-// Torques on their way to the motors of a world, from those that act on; grows to what a delay needs.
-class Pipe {
- public:
-  void clear() { size_ = 0; }
-  // \param time  when they act; those that are overtaken never do
-  void send(double time, ConstVectorRef u) {
-    while (size_ > 1 && get(size_ - 1).time >= time) --size_;
-    if (size_ == ring_.size()) {
-      std::rotate(ring_.begin(), ring_.begin() + static_cast<std::ptrdiff_t>(first_), ring_.end());
-      first_ = 0;
-      ring_.emplace_back();
-    }
-    Torques& last = get(size_++);
-    last.time = time;
-    last.u = u;
-  }
-  // Those that act at a time.
-  const VectorXd& take(double time) {
-    for (; size_ > 1 && get(1).time <= time; --size_) first_ = (first_ + 1) % ring_.size();
-    return get(0).u;
-  }
-  // When others act, after take().
-  double getNext() { return size_ > 1 ? get(1).time : std::numeric_limits<double>::infinity(); }
-
- private:
-  struct Torques {
-    double time = 0;
-    VectorXd u;
-  };
-  Torques& get(size_t age) { return ring_[(first_ + age) % ring_.size()]; }
-  std::vector<Torques> ring_;
-  size_t first_ = 0, size_ = 0;
-};
 
 // Of a thread: allocated once, since worlds step in loops.
 struct Worker {
@@ -144,7 +110,7 @@ struct WorldBatch::Data {
   std::vector<Steps::State> groups;  // of kLane worlds
   WorldParameters parameters;
   std::vector<std::shared_ptr<const Terrain>> terrains;  // of parameters.grounds
-  std::vector<Pipe> pipes;                               // empty where no torques are delayed
+  std::vector<TorquePipe> pipes;                         // empty where no torques are delayed
   MatrixXd q, v, torques, wrenches;
   Workspace ws;  // of springs()
   VectorXd times, shortest_steps, longest_steps;
