@@ -147,12 +147,9 @@ MatrixXd calcDifference(const Model& model, const Start& starts, const WorldPara
 }  // namespace
 
 TEST_CASE("batch: a step is that of a single world") {
-  // Rounding: 4e-12 to 1e-11 over draws of a hundred robots, and as much again where the linker takes kernels of Eigen from other
-  // objects. A thousandth of the friction moves them by 8e-3.
-  constexpr double kRounding = 5e-11;
   for (double h : {2.5e-4, 1e-3}) {
     const WorldBatchOptions options = makeOptions(h);
-    CHECK(compareStep(getBipetto(), options, options.world, 100) < kRounding);
+    CHECK(compareStep(getBipetto(), options, options.world, 100) < 1e-11);
     BielleWorldOptions other = options.world;
     other.world.ground.friction = 0.7007;
     CHECK(compareStep(getBipetto(), options, other, 20) > 1e-9);

@@ -289,15 +289,15 @@ TEST_CASE("friction that is larger at rest arrives, and is written as it is read
 TEST_CASE("play is for worlds: the robot is the one without, and a file that completes it has the last word") {
   const RobotDirectory directory;
   const std::string armature = std::string(kToyYaml) + "armature: {shoulder: 0.01}\n";
-  const std::string file = loadRobot(directory.writeRobot(kToyUrdf, armature + "play: {shoulder: 0.002}")).file;
-  CHECK(loadRobot(file).model.nv() == load(kToyUrdf, armature).nv());
-  const std::vector<Play> plays = listPlays(file);
+  const LoadedRobot toy = loadRobot(directory.writeRobot(kToyUrdf, armature + "play: {shoulder: 0.002}"));
+  CHECK(toy.model.nv() == load(kToyUrdf, armature).nv());
+  const std::vector<Play>& plays = toy.wear.plays;
   REQUIRE(plays.size() == 1);
   CHECK((plays[0].name == "shoulder" && plays[0].size == 0.002));
-  CHECK(addPlay(loadRobot(file).model, plays).nv() == loadRobot(file).model.nv() + 1);
+  CHECK(addPlay(toy.model, plays).nv() == toy.model.nv() + 1);
   directory.write("own/own.yaml", "model: " + directory.path() + "/robot.urdf\nplay: {\"sh*\": 0.001}\n");
   const LoadedRobot own = loadRobot(directory.path() + "/own");
-  const Model played = addPlay(own.model, listPlays(own.file));
+  const Model played = addPlay(own.model, own.wear.plays);
   CHECK(played.upperLimits()[played.joints()[played.findJoint("shoulder.play")].idx_v] == 0.0005);
 }
 
