@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "bielle/dynamics/linkage.h"
@@ -218,7 +219,7 @@ class RequestSolver {
     if (refined) improve(refined->motion, refined->start, again, "with stages half as long", solution, record);
     if (const auto apart = avoidDeadPoints(refined ? refined->motion : solution.motion, record))
       improve(*apart, {apart->guess}, from_guess, "with linkages farther from dead points", solution, record);
-    if (options_.keep_apart && !(apart_ && solution.motion.problem == motion_.problem))
+    if (options_.keep_apart && !apart_)
       if (const auto apart = keepFromDeadPoints(solution.motion, record)) keepApart(*apart, again, solution, record);
     refuseLongStages(record, solution);
     if (!refined && solution.converged()) warnOfMovingSoles(solution, record);
@@ -228,14 +229,16 @@ class RequestSolver {
  private:
   // Looks at dead points as soon as the course of the motion is clear: a motion that is solved again needs no end.
   Solution solveApart(const FddpOptions& solver, const FddpOptions& again, StartingPoint start) {
-    constexpr double kClear = 0.01;  // violation and gaps
+    constexpr double kClear = 0.01;  // violation, gaps, and change of the cost relative to it
     const auto& callback = observer_.motion.callback;
+    double last_cost = std::numeric_limits<double>::infinity();
     bool looks =
         options_.keep_apart && !motion_.cycle && motion_.problem_options.objective.objective != Objective::PeakTorque;
     FddpObserver observer = observer_.motion;
     observer.callback = [&](const FddpIteration& line, const ShootingTrajectory& nodes) {
       if (callback && callback(line, nodes) == FddpAction::Stop) return FddpAction::Stop;
-      if (!looks || line.violation > kClear || line.gap > kClear) return FddpAction::Continue;
+      const bool rests = std::abs(line.cost - std::exchange(last_cost, line.cost)) <= kClear * std::abs(line.cost);
+      if (!looks || !rests || line.violation > kClear || line.gap > kClear) return FddpAction::Continue;
       looks = false;
       apart_ = keepFromDeadPoints(motion_, makeRecord(motion_, nodes));
       return apart_ ? FddpAction::Stop : FddpAction::Continue;

@@ -323,7 +323,10 @@ void Rollout::checkArrivals(const RolloutInput& input, int num_tracks, Trial& tr
     arrivals_.push_back({track.end, input.evaluations.getIterate()[track.end].get(), &track.arrival, &track.arrived});
   }
   if (arrivals_.empty()) return;
-  input.problem.integrate(arrivals_.data(), static_cast<int>(arrivals_.size()), input.evaluations.getScratch(0));
+  const size_t size = static_cast<size_t>(input.problem.batchSize());
+  for (size_t first = 0; first < arrivals_.size(); first += size)
+    input.problem.integrate(&arrivals_[first], static_cast<int>(std::min(size, arrivals_.size() - first)),
+                            input.evaluations.getScratch(0));
   for (int s = 0; s + 1 < num_tracks; ++s) {
     const Track& track = tracks_[s];
     const auto is = [&](const IntegrateTask& task) { return task.x_out == &track.arrived; };

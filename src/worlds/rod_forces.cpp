@@ -47,8 +47,9 @@ double RodForces::update(const Workspace& ws, ConstVectorRef a, const VectorXd& 
     }
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
     factors.setThreshold(kRankTolerance);
-    factors.compute(J(Eigen::all, cluster.dofs).transpose());
-    const VectorXd lambda = factors.solve(held(cluster.dofs));
+    const MatrixXd transposed = J(Eigen::all, cluster.dofs).transpose();  // decompositions.h: no other expressions
+    factors.compute(transposed);
+    const VectorXd load = held(cluster.dofs), lambda = factors.solve(load);
     for (size_t b = 0; b < bearings_.size(); ++b)
       for (size_t i = 0; i < cluster.closures.size(); ++i)
         if (cluster.closures[i] == bearings_[b].closure)
