@@ -13,6 +13,7 @@
 #include "dynamics/linkage_ratio.h"
 #include "dynamics/linkage_workspace.h"
 #include "leg_biped.h"
+#include "own_robots.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -182,6 +183,30 @@ VectorXd closeAnkle(const Model& model, double pitch, double roll) {
 }
 
 }  // namespace
+
+TEST_CASE("linkages: no dead point is passed by on the way to it") {
+  const Model& model = getBipetto();
+  VectorXd q = findClosedConfiguration(model).q;
+  const Linkage knee = makeLinkage(model, q, {"knee_left"});
+  LoopCloser closer(model, q, {"knee_left"});
+  const int angle = model.joints()[model.findJoint("knee_left")].idx_q;
+  double last = kFarthestDeadPoint;
+  int found = 0;
+  for (int side : {1, -1}) {
+    VectorXd p = q;
+    last = kFarthestDeadPoint;
+    for (int i = 0; i < 800 && last > 0.01; ++i) {
+      p[angle] += 0.003 * side;
+      if (closer.close(p).status != NumericalStatus::Ok) break;
+      const double distance = std::min(findDeadPoint(knee, model, p).distance, kFarthestDeadPoint);
+      CAPTURE(side, i, distance, last);
+      if (last < kFarthestDeadPoint) REQUIRE(distance < last + 0.01);
+      found += distance < 0.1;
+      last = distance;
+    }
+  }
+  CHECK(found > 3);
+}
 
 TEST_CASE("transmission: joints and bodies agree next to a dead point of the motor, and are infinite at it") {
   const std::vector<double> rates = {1e-3, 1e-8, 1e-300, -1e-8};

@@ -92,7 +92,7 @@ double follow(const Linkage& linkage, const VectorXd& start, DeadPointKind kind,
     }
     const double rate = (N.transpose() * way).dot(gradient);
     const double root = rate < 0 ? volume / -rate : kNone;
-    if (root < kLongestStep) near = true;
+    if (root < 2 * kLongestStep) near = true;  // a longest step may pass it by
     const VectorXd move = std::min(root, kLongestStep) * way;
     if (!there.point.close(cluster, here.point.basis(), move, VectorXd())) {
       // Where the volume vanishes loops may lose rank, so that there is no basis: short of it, then.
