@@ -13,7 +13,7 @@ STONES = common.SOURCE / "examples/stones.yaml"
 RIGID = ["--set", "rigid_landing=true"]
 SOFT = [*RIGID, "--set", "landing_speed=0.05"]
 # Title, robot, motion, options.
-SQUATS = [(f"{depth}", "bipetto", "squat", ["--depth", depth]) for depth in (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.15, 1.2)]
+SQUATS = [(f"{depth}", "bipetto", "squat", ["--depth", depth]) for depth in (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.15, 1.16)]
 BIPETTO = [
     ("squat to 0.7", "bipetto", "squat", ["--depth", 0.7]),
     *((f"walk, {speed} m/s", "bipetto", "walk", ["--speed", speed]) for speed in (0.3, 0.5, 0.8, 1.0, 1.2)),
