@@ -156,13 +156,14 @@ FddpSolve::End FddpSolve::updateMultipliers() {
 }
 
 // Leaves the accepted trial in accepted_, or renewed_ set. Where constraints and gaps are small, full steps that violate rows are
-// cheaper by holding these rows or by more regularization than a shorter one.
+// cheaper by holding these rows or by more regularization than a shorter one. Far from there, steps that follow a shortened one are
+// rolled out in one piece: in segments some motions end where no step is acceptable.
 FddpSolve::End FddpSolve::searchLine() {
   const int segments = getNumSegments();
   const bool near = line_.violation < kClose && line_.gap <= kClose;
   const bool settles = near && calcForeseen() <= kClose * std::abs(line_.cost);
   renewed_ = false;
-  if (segments > 1 && first_step_ == 1) {
+  if (segments > 1 && first_step_ == 1 && (near || last_step_ == 1)) {
     if (tryFullStep(segments)) return {};
     if (settles && tryShorterStep(segments)) return {};
     if (near && hasViolatedFreeRows()) {
@@ -170,7 +171,7 @@ FddpSolve::End FddpSolve::searchLine() {
       if (accepted_ || renewed_ || regularization_ < kMuch) return {};
     }
   }
-  if (mustClose() || !tryShorterSteps(segments)) searchInOnePiece(startSearch());
+  if (!near || mustClose() || !tryShorterSteps(segments)) searchInOnePiece(startSearch());
   return {};
 }
 
