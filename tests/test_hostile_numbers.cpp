@@ -321,7 +321,7 @@ void tryMotion(Random& rng, const Model& model, Motion (*make)(const Model&, con
 TEST_CASE("motions with numbers that nobody should ask for") {
   const Model model = loadRobot("bipetto").model;
   int solved = 0, refused = 0;
-  for (unsigned seed = 0; seed < 40; ++seed) {
+  for (unsigned seed = 0; seed < 48; ++seed) {
     Random rng(seed);
     CAPTURE(seed);
     tryMotion<SquatOptions>(rng, model, makeSquat, solved, refused);
