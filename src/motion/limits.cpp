@@ -106,6 +106,7 @@ std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd
   for (const Linkage& linkage : listLinkages(model, q0)) {
     double margin = options.dead_point_margin;
     if (const auto own = margins.extract(linkage.output)) margin = std::max(margin, own.mapped());
+    if (margin == 0) continue;
     bounds.push_back(makeBound("dead points of " + linkage.output, margin, 1 / margin, makeTransmission(linkage)));
     bounds.back().scale[0] = 1;
   }
@@ -132,7 +133,8 @@ Limits::Limits(const Model& model, const LimitOptions& options, const VectorXd& 
   efforts_ = getEffortLimits(model, options);
   states_ = listRanges(model, q0);
   append(listVelocities(model, options), states_);
-  if (options.dead_point_margin > 0) append(listTransmissions(model, q0, options), states_);
+  if (options.dead_point_margin > 0 || !options.dead_point_margins.empty())
+    append(listTransmissions(model, q0, options), states_);
   powers_ = listPowers(model, options);
   voltages_ = listVoltages(model);
 }

@@ -62,7 +62,12 @@ void recordStage(const RobotProblem& problem, RobotEvaluator& evaluator, const V
 
 }  // namespace
 
-void resizeRecord(int stages, MotionRecord& record) {
+void startRecord(const Model& model, int stages, MotionRecord& record) {
+  record.q_names = makePositionNames(model);
+  record.v_names = makeVelocityNames(model);
+  record.u_names = getNames(model.motors());
+  record.closure_names = getNames(model.closures());
+  record.contact_names = getNames(model.contacts());
   record.time.resize(stages + 1);
   for (const RecordTable& table : listTables(record))
     (record.*table.data).resize(stages + (table.per == RecordTable::Per::Node ? 1 : 0), table.columns.size());
@@ -112,13 +117,8 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
   const Model& model = problem.model();
   const int stages = problem.numStages();
   MotionRecord record;
-  record.q_names = makePositionNames(model);
-  record.v_names = makeVelocityNames(model);
-  record.u_names = getNames(model.motors());
-  record.closure_names = getNames(model.closures());
-  record.contact_names = getNames(model.contacts());
   record.has_midpoints = problem.spec(0).step == StepRule::Midpoint;
-  resizeRecord(stages, record);
+  startRecord(model, stages, record);
   Workspace ws(model);
   double time = 0;
   for (int k = 0; k <= stages; ++k) {

@@ -17,8 +17,8 @@ inline constexpr int kCycleEntries = 4;  // of MotionRecord::cycle, where there 
 
 std::vector<RecordTable> listTables(const MotionRecord& record);
 
-// Sets the size of every table; the names must be set.
-void resizeRecord(int stages, MotionRecord& record);
+// Sets the names of the model's columns and the size of every table; `has_midpoints` must be set.
+void startRecord(const Model& model, int stages, MotionRecord& record);
 
 // Throws InputError unless every table has as many rows and columns as times and names ask for.
 void requireWhole(const MotionRecord& record);

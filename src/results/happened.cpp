@@ -32,12 +32,7 @@ MotionRecord makeRecord(const Model& model, const HappenedMotion& motion) {
   requireTable(motion.v, nodes, model.nv(), "v");
   requireTable(motion.u, stages, model.nu(), "u");
   MotionRecord record;
-  record.q_names = makePositionNames(model);
-  record.v_names = makeVelocityNames(model);
-  record.u_names = getNames(model.motors());
-  record.closure_names = getNames(model.closures());
-  record.contact_names = getNames(model.contacts());
-  resizeRecord(static_cast<int>(stages), record);
+  startRecord(model, static_cast<int>(stages), record);
   record.time = motion.time;
   record.q = motion.q;
   record.v = motion.v;

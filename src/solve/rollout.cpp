@@ -327,16 +327,13 @@ void Rollout::checkArrivals(const RolloutInput& input, int num_tracks, Trial& tr
   for (size_t first = 0; first < arrivals_.size(); first += size)
     input.problem.integrate(&arrivals_[first], static_cast<int>(std::min(size, arrivals_.size() - first)),
                             input.evaluations.getScratch(0));
-  for (int s = 0; s + 1 < num_tracks; ++s) {
-    const Track& track = tracks_[s];
-    const auto is = [&](const IntegrateTask& task) { return task.x_out == &track.arrived; };
-    if (std::none_of(arrivals_.begin(), arrivals_.end(), is)) continue;
-    const auto arrived = getEvaluation(input, track, track.end - 1)->x_next.array();
-    const auto same = track.arrived.array();
+  for (const IntegrateTask& task : arrivals_) {
+    const auto& arrived = input.evaluations.trial()[task.node - 1]->x_next.array();
+    const auto& same = task.x_out->array();
     // Entries up to their signs: quaternions may have either.
     if ((arrived - same).abs().min((arrived + same).abs()).maxCoeff() <= kSame) continue;
     trial.ok = false;
-    trial.failed_node = track.end;
+    trial.failed_node = task.node;
     trial.failure = "a step in segments leads beyond the range of the coordinates about the iterate";
   }
 }

@@ -38,12 +38,7 @@ bool isWithinStops(const Model& model, const VectorXd& q) {
 
 MotionRecorder::MotionRecorder(const World& world, int stages)
     : world_(world), model_(world_.model()), loops_(makeConstraintSet(model_)), terrain_(world.ground()), ws_(model_) {
-  record_.q_names = makePositionNames(model_);
-  record_.v_names = makeVelocityNames(model_);
-  record_.u_names = getNames(model_.motors());
-  record_.closure_names = getNames(model_.closures());
-  record_.contact_names = getNames(model_.contacts());
-  resizeRecord(stages, record_);
+  startRecord(model_, stages, record_);
 }
 
 void MotionRecorder::addNode(const std::vector<PredictedFoothold>& footholds) {

@@ -86,8 +86,10 @@ int main(int argc, char** argv) {
   SimulateArguments arguments;
   addOptions(app, arguments);
   app.footer(
-      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or its centre of mass is less\n"
-      "than 0.6 times as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. With\n"
+      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or its centre of mass is "
+      "less\n"
+      "than 0.6 times as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. "
+      "With\n"
       "--control mpc, a joint driven by a linkage counts only if the linkage has passed a dead point or the joint is "
       "half\n"
       "a turn away. It stands if it has been at rest, or its capture point over its soles, for the last three time\n"

@@ -38,7 +38,7 @@ struct Run {
 struct Shared {
   Plan plan;
   PlanController controller;
-  std::vector<GoalOutcome> planned;   // goals of the plan
+  std::vector<GoalOutcome> planned;  // goals of the plan
 };
 
 bool isAlike(const SimulateArguments& a, const SimulateArguments& b) {
@@ -160,16 +160,6 @@ int simulateTogether(const std::string& file, const std::vector<std::string>& co
   makeOutputDirectory(all.output());
   Log log(all.output() + "/runs.jsonl");
   watchInterrupts();
-  // What is refused is told; else whether it was done.
-  const auto attempt = [&log](Run& run, const std::function<void()>& task) {
-    try {
-      task();
-      return true;
-    } catch (const InputError& error) {
-      log.add(run, kBadInput, error.what());
-      return false;
-    }
-  };
   std::vector<Run*> left;
   for (Run& run : all.runs()) left.push_back(&run);
   std::set<std::string> told;
@@ -182,12 +172,12 @@ int simulateTogether(const std::string& file, const std::vector<std::string>& co
     std::vector<std::pair<Run*, Scene>> groups[2];  // by whether their grounds have steps
     for (Run* run : alike) {
       SimulateArguments arguments = run->arguments;
-      attempt(*run, [&] {
+      try {
         parseOptions(arguments);
         requireShortSteps(arguments, "--control-period", arguments.execution.control_period);
         if (!fitsBatch(arguments) || !isOfPlan(arguments) || !arguments.robot.empty() || isInterrupted()) {
           if (!isInterrupted()) log.add(*run, alone(run->arguments, run->command));
-          return;
+          continue;
         }
         adaptToPlan(arguments);
         if (!shared) {
@@ -200,11 +190,13 @@ int simulateTogether(const std::string& file, const std::vector<std::string>& co
         const Wear wear = makeWear(arguments, scene.robot);
         if (!wear.plays.empty() || !wear.frictions.empty()) {
           log.add(*run, alone(run->arguments, run->command));
-          return;
+          continue;
         }
         run->arguments = arguments;
         groups[!scene.ground.steps.empty()].emplace_back(run, std::move(scene));
-      });
+      } catch (const InputError& error) {
+        log.add(*run, kBadInput, error.what());
+      }
     }
     for (auto& group : groups)
       if (!group.empty()) carryOut(*shared, group, log, told);
