@@ -5,6 +5,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
+#include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "formats/text_file.h"
 #include "model/number_text.h"
