@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "bielle/model/error.h"
+
 namespace bielle {
 namespace {
 
