@@ -38,6 +38,7 @@ struct SolveArguments {
   std::vector<std::string> settings;                                      // name=value
   std::set<std::string> flags;                                            // options of the motion that are given so
   std::vector<std::string> effort_limits, velocity_limits, power_limits;  // motor=value
+  std::vector<std::string> dead_point_margins;                            // linkage=value
   TimingArguments timings;
   FddpOptions solver = makeMotionSolverOptions();
   std::string warm_start;  // directory of a result, or empty
@@ -54,6 +55,8 @@ LimitOptions makeLimits(const SolveArguments& arguments) {
   read("--limit", arguments.effort_limits, "motor_knee_right=12", limits.efforts);
   read("--velocity-limit", arguments.velocity_limits, "motor_knee_right=15", limits.velocities);
   read("--power-limit", arguments.power_limits, "motor_knee_right=40", limits.powers);
+  read("--dead-point-margin-of", arguments.dead_point_margins, "'ankley_left, anklex_left=0.5'",
+       limits.dead_point_margins);
   requireOption(limits.enforced || !limits.areGiven(), "no-limits", "it contradicts the limit given for a motor",
                 "leave out one of them");
   return limits;
@@ -256,7 +259,8 @@ std::vector<std::string> listIdleOptions(const SolveArguments& arguments) {
   check(objective.objective == Objective::Effort && objective.regularization.has_value(), "--regularization",
         "the objective is effort");
   const LimitOptions& limits = arguments.problem.limits;
-  const bool has_margin = limits.dead_point_margin != LimitOptions().dead_point_margin;
+  const bool has_margin =
+      limits.dead_point_margin != LimitOptions().dead_point_margin || !arguments.dead_point_margins.empty();
   check(has_margin && arguments.serial, "--dead-point-margin", "the serial model has no linkages");
   check(has_margin && !limits.enforced, "--dead-point-margin", "--no-limits leaves out all bounds");
   for (const std::string& setting : arguments.settings) {
@@ -365,6 +369,8 @@ void describe(OptionFields& f, SolveArguments& a) {
   f.texts("velocity_limit", a.velocity_limits,
           "motor=largest velocity [rad/s], instead of the robot's; may be repeated");
   f.texts("power_limit", a.power_limits, "motor=largest mechanical power [W], driving or braking; may be repeated");
+  f.texts("dead_point_margin_of", a.dead_point_margins,
+          "linkage=its margin, where that is larger than --dead-point-margin; may be repeated");
   f.choice(
       "step", a.step, {"euler", "midpoint"},
       "midpoint: second-order steps; euler: first-order steps, as in the paper, which --model serial uses unless a "

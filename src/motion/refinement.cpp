@@ -163,11 +163,15 @@ std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const Moti
   ProblemOptions problem = solved.problem_options;
   LimitOptions& limits = problem.limits;
   if (!limits.enforced || limits.dead_point_margin < LimitOptions().dead_point_margin) return {};
-  if (!limits.dead_point_margins.empty()) return {};
   if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
-  for (const auto& [linkage, margin] : findMargins(solved, record))
-    if (margin > limits.dead_point_margin) limits.dead_point_margins[linkage] = margin;
-  if (limits.dead_point_margins.empty()) return {};
+  bool larger = false;
+  for (const auto& [linkage, needed] : findMargins(solved, record)) {
+    const auto given = limits.dead_point_margins.find(linkage);
+    if (needed <= (given == limits.dead_point_margins.end() ? limits.dead_point_margin : given->second)) continue;
+    limits.dead_point_margins[linkage] = needed;
+    larger = true;
+  }
+  if (!larger) return {};
   RefinedMotion apart{makeMotion(model, *solved.request, problem), {}};
   apart.start = makeStart(record, apart.motion);
   return apart;

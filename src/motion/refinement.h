@@ -41,8 +41,7 @@ inline constexpr double kWideDeadPointMargin = 0.4;
 
 /// The motion of the same request, with linkages that keep kNearDeadPoint from dead points that the solution comes nearer to, and
 /// that solution to start from: their margins are the transmissions that they have at that distance. Made only if the margin is
-/// the default or more, no linkage has one of its own, the start leaves room for a larger one, no duration is free, and the
-/// objective is not the peak torque.
+/// the default or more, the start leaves room for a larger one, no duration is free, and the objective is not the peak torque.
 std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const MotionRecord& record);
 
 }  // namespace bielle

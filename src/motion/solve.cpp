@@ -19,6 +19,7 @@ namespace bielle {
 namespace {
 
 constexpr double kCautious = 1e-2;  // regularization of a second attempt
+constexpr int kMostMargins = 3;     // times that margins grow: another linkage may then come near a dead point
 
 // Whether a problem has these rows of constraints at its nodes.
 bool haveRows(const ShootingProblem& problem, const Multipliers& multipliers) {
@@ -121,21 +122,38 @@ ShootingTrajectory holdPosture(const RobotProblem& problem, ShootingTrajectory t
   return trajectory;
 }
 
+// A first attempt that ends as soon as it has gone astray: far from a solution, no step is acceptable without much regularization,
+// as where a linkage is about to snap. Dozens of iterations lead out of there, if any do.
+Solution attemptFirst(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
+                      const StartingPoint& start) {
+  constexpr double kMuch = 1e3, kFar = 0.03;  // regularization; violation
+  bool astray = false;
+  FddpObserver watching = observer;
+  watching.callback = [&](const FddpIteration& line, const ShootingTrajectory& nodes) {
+    if (observer.callback && observer.callback(line, nodes) == FddpAction::Stop) return FddpAction::Stop;
+    astray = line.regularization >= kMuch && line.violation > kFar;
+    return astray ? FddpAction::Stop : FddpAction::Continue;
+  };
+  Solution result = attempt(motion, options, watching, start);
+  if (astray) result.summary.termination = FddpTermination::Infeasible;
+  return result;
+}
+
 // The motion as it is.
 Solution solveAlone(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                     StartingPoint start) {
-  Solution result = attempt(motion, options, observer, start);
+  const bool is_first = options.initial_regularization < kCautious;
+  const auto run = is_first ? attemptFirst : attempt;
+  Solution result = run(motion, options, observer, start);
   if (result.summary.termination == FddpTermination::Failed && result.summary.iterations == 0) {
     start = {holdPosture(*motion.problem, std::move(start.trajectory)), {}};
-    result = attempt(motion, options, observer, start);
+    result = run(motion, options, observer, start);
   }
-  if (result.summary.termination == FddpTermination::Infeasible && options.initial_regularization < kCautious) {
-    FddpOptions cautious = options;
-    cautious.initial_regularization = kCautious;
-    start.multipliers = {};
-    result = join(std::move(result), attempt(motion, cautious, observer, start));
-  }
-  return result;
+  if (!is_first || result.summary.termination != FddpTermination::Infeasible) return result;
+  FddpOptions cautious = options;
+  cautious.initial_regularization = kCautious;
+  start.multipliers = {};
+  return join(std::move(result), attempt(motion, cautious, observer, start));
 }
 
 FddpOptions dampGuess(FddpOptions options) {
@@ -219,8 +237,12 @@ class RequestSolver {
     if (refined) improve(refined->motion, refined->start, again, "with stages half as long", solution, record);
     if (const auto apart = avoidDeadPoints(refined ? refined->motion : solution.motion, record))
       improve(*apart, {apart->guess}, from_guess, "with linkages farther from dead points", solution, record);
-    if (options_.keep_apart && !apart_)
-      if (const auto apart = keepFromDeadPoints(solution.motion, record)) keepApart(*apart, again, solution, record);
+    const auto getMargins = [](const Motion& motion) { return motion.problem_options.limits.dead_point_margins; };
+    const bool in_vain = apart_ && getMargins(solution.motion) == getMargins(motion_);
+    for (int i = 0; i < kMostMargins && options_.keep_apart && !in_vain; ++i) {
+      const auto apart = keepFromDeadPoints(solution.motion, record);
+      if (!apart || !keepApart(*apart, again, solution, record)) break;
+    }
     refuseLongStages(record, solution);
     if (!refined && solution.converged()) warnOfMovingSoles(solution, record);
     return solution;
@@ -229,15 +251,17 @@ class RequestSolver {
  private:
   // Looks at dead points as soon as the course of the motion is clear: a motion that is solved again needs no end.
   Solution solveApart(const FddpOptions& solver, const FddpOptions& again, StartingPoint start) {
-    constexpr double kClear = 0.01;  // violation, gaps, and change of the cost relative to it
+    constexpr double kClear = 0.01;  // violation, gaps, and change of the cost by a full step, relative to it
     const auto& callback = observer_.motion.callback;
-    double last_cost = std::numeric_limits<double>::infinity();
+    double last_cost = std::numeric_limits<double>::infinity(), last_step = 0;
     bool looks =
         options_.keep_apart && !motion_.cycle && motion_.problem_options.objective.objective != Objective::PeakTorque;
     FddpObserver observer = observer_.motion;
     observer.callback = [&](const FddpIteration& line, const ShootingTrajectory& nodes) {
       if (callback && callback(line, nodes) == FddpAction::Stop) return FddpAction::Stop;
-      const bool rests = std::abs(line.cost - std::exchange(last_cost, line.cost)) <= kClear * std::abs(line.cost);
+      const double change = line.cost - std::exchange(last_cost, line.cost);
+      const bool rests = last_step == 1 && std::abs(change) <= kClear * std::abs(line.cost);
+      last_step = line.step;
       if (!looks || !rests || line.violation > kClear || line.gap > kClear) return FddpAction::Continue;
       looks = false;
       apart_ = keepFromDeadPoints(motion_, makeRecord(motion_, nodes));
@@ -320,7 +344,7 @@ class RequestSolver {
   }
 
   // Solves a motion in place of one that comes near dead points, and takes it if it converges and its stages are no worse.
-  void keepApart(const RefinedMotion& apart, FddpOptions solver, Solution& solution, MotionRecord& record) const {
+  bool keepApart(const RefinedMotion& apart, FddpOptions solver, Solution& solution, MotionRecord& record) const {
     constexpr int kMostIterations = 60;  // it begins at a solution
     std::string margins;
     for (const auto& [linkage, margin] : apart.motion.problem_options.limits.dead_point_margins)
@@ -334,9 +358,10 @@ class RequestSolver {
       kept.summary = addUp(solution.summary, std::move(kept.summary));
       solution = std::move(kept);
       record = std::move(kept_record);
-      return;
+      return true;
     }
     solution.summary = addUp(kept.summary, std::move(solution.summary));
+    return false;
   }
 
   ShootingTrajectory startFromParts() const {
@@ -392,6 +417,7 @@ class RequestSolver {
 FddpOptions makeMotionSolverOptions() {
   FddpOptions out;
   out.acceptable_decrease = 1e-4;
+  out.short_step = 0.125;  // far from a solution dozens of short steps could follow each other
   return out;
 }
 
