@@ -7,6 +7,8 @@
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/closure.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/results/robot_info.h"
 #include "bielle/robots/robot_loader.h"
@@ -177,6 +179,35 @@ TEST_CASE(
       CHECK((X.R - X_read.R).norm() < 1e-15);
     }
     checkTurns(read.model);
+  }
+}
+
+TEST_CASE("frames of pins that rounding turns out of the plane have no rows of next to nothing") {
+  constexpr double kNothing = 1e-14, kSomething = 1e-3;
+  const RobotDirectory directory;
+  std::string urdf = replaceOnce(makeUrdf("1.5708"), "xyz=\"0.35 0.1 0\" rpy=\"0 0 0\"",
+                                 "xyz=\"0.35 0.1 0\" rpy=\"-0.00002 -0.00001 0\"");
+  urdf = replaceOnce(urdf, "xyz=\"-0.05 0 0.2\" rpy=\"1.5708 0 0\"", "xyz=\"-0.05 0 0.2\" rpy=\"1.57078 0 -0.00001\"");
+  directory.write("robot.urdf", urdf);
+  for (const char* type : {"3d", "5d, axis: [0.00001, -0.00002, 1]"}) {
+    CAPTURE(type);
+    directory.write("robot.yaml", makeYaml(type));
+    const LoadedRobot robot = loadRobot(directory.path());
+    const Model& model = robot.model;
+    CHECK(countWarnings(robot, "as a plane linkage") == 1);
+    const Closure& pin = model.closures()[0];
+    MatrixXd J = MatrixXd::Zero(getRows(pin.kind), model.nv());
+    Workspace ws(model);
+    updatePositions(model, ws, closeConfiguration(model, VectorXd::Constant(3, 0.1)).q);
+    calcClosureJacobian(ws, pin, J);
+    for (Eigen::Index i = 0; i < J.rows(); ++i) CHECK((J.row(i).norm() < kNothing || J.row(i).norm() > kSomething));
+    checkTurns(model);
+
+    const RobotDirectory again;
+    writeRobot(model, again.path() + "/written");
+    const Closure read = loadRobot(again.path() + "/written").model.closures()[0];
+    CHECK((read.axis - pin.axis).norm() == 0);
+    CHECK((read.X_B1.R - pin.X_B1.R).norm() < 1e-15);
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/loop_problem.h"
+#include "dynamics/rounded_linkages.h"
 #include "math/decompositions.h"
 #include "math/direction.h"
 #include "math/largest.h"
@@ -100,16 +101,16 @@ void FollowedLinkage::findPlaneLoops(const VectorXd& q, double most) {
       const Vector3d direction = getDirection(axis.place);
       is_plane = is_plane && (axis.slides ? std::abs(direction.dot(normal)) : direction.cross(normal).norm()) < most;
     }
-    if (is_plane) plane_loops_.push_back(loop);
+    if (is_plane) plane_loops_.push_back({c, loop});
   }
 }
 
 FollowedLinkage::Rows FollowedLinkage::calcParallelRows(const VectorXd& q) {
   updatePositions(model_, ws_, q);
   Eigen::Index count = 0, row = 0;
-  for (const std::vector<Axis>& loop : plane_loops_) count += 2 * static_cast<Eigen::Index>(loop.size());
+  for (const PlaneLoop& loop : plane_loops_) count += 2 * static_cast<Eigen::Index>(loop.axes.size());
   Rows out{VectorXd::Zero(count), {}, MatrixXd::Zero(count, 6 * static_cast<Eigen::Index>(changes_.size()))};
-  for (const std::vector<Axis>& loop : plane_loops_) {
+  for (const auto& [closure, loop] : plane_loops_) {
     const Vector3d normal = getDirection(loop[0].place);
     const Matrix3d turn = calcRotationOfZ(normal);
     for (size_t i = 1; i < loop.size(); ++i, row += 2) {
@@ -140,6 +141,29 @@ void FollowedLinkage::change(const VectorXd& twists) {
     change = change * more;
     SE3& X = findPlacement(parts, place);
     X = X * more;
+  }
+  model_ = ModelBuilder::restore(std::move(parts));
+  set_ = makeConstraintSet(model_);
+}
+
+void FollowedLinkage::alignFrames(const VectorXd& q) {
+  updatePositions(model_, ws_, q);
+  ModelParts parts = takeParts(model_);
+  for (const PlaneLoop& loop : plane_loops_) {
+    Closure& closure = parts.closures[static_cast<size_t>(loop.closure)];
+    const bool is_hinge = closure.kind == ClosureKind::Hinge5D;
+    if (!is_hinge && closure.kind != ClosureKind::Ball3D) continue;
+    const Matrix3d R_W1 = ws_.X_WB[closure.body1].R * closure.X_B1.R;
+    const Vector3d normal = R_W1.transpose() * getDirection(loop.axes[0].place);
+    Eigen::Index k = 0;
+    normal.cwiseAbs().maxCoeff(&k);
+    const Vector3d sine = Vector3d::Unit(k).cross(normal) * std::copysign(1.0, normal[k]);
+    if (sine.isZero(0) || sine.norm() > kMostAngleRounding) continue;
+    const Matrix3d turn = exp3(Vector3d(std::asin(sine.norm()) * sine.normalized()));
+    closure.X_B1.R = closure.X_B1.R * turn;
+    if (!is_hinge) continue;
+    closure.X_B2.R = closure.X_B2.R * turn;
+    closure.axis = Vector3d::Unit(k) * std::copysign(1.0, closure.axis[k]);  // along the normal, to the last digits
   }
   model_ = ModelBuilder::restore(std::move(parts));
   set_ = makeConstraintSet(model_);

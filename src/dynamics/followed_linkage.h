@@ -53,11 +53,20 @@ class FollowedLinkage {
   // Adds twists, six a place, to the changes.
   void change(const VectorXd& twists);
 
+  // Turns the frames of balls and hinges of plane loops, with the axes in them, so that one of their own axes is across the plane, if
+  // rounding has turned it away. The mechanism is the same, but rows across the plane, which say nothing, are zero: rows that are a
+  // millionth of the others count as much as these, and so does their rounding.
+  void alignFrames(const VectorXd& q);
+
  private:
   // Of a loop: that of a joint, or of frame 1 of a hinge.
   struct Axis {
     ModelPlace place;
     bool slides = false;
+  };
+  struct PlaneLoop {
+    int closure;
+    std::vector<Axis> axes;
   };
   SE3 getPlacementInWorld(const ModelPlace& place) const;
   Vector3d getDirection(const ModelPlace& place) const;
@@ -76,7 +85,7 @@ class FollowedLinkage {
   double length_;
   std::vector<double> units_;  // of dofs, rad or m
   std::vector<PlaceChange> changes_;
-  std::vector<std::vector<Axis>> plane_loops_;
+  std::vector<PlaneLoop> plane_loops_;
 };
 
 // Eq. (1) at a posture.

@@ -239,6 +239,7 @@ Finding examine(FollowedLinkage& linkage, Starts& starts, const std::vector<Roun
     const FollowedLinkage written = linkage;
     linkage.findPlaneLoops(start->q, opening);
     if (makeIdeal(linkage, way.postures, found, tolerances)) {
+      linkage.alignFrames(found.q);
       found.mended = true;
       return found;
     }
@@ -264,6 +265,7 @@ void setPlacement(const ModelParts& changed, ModelPlace place, const std::vector
     if (frame.body == body && frame.name != parts.bodies[body].name && frame.X_BF.p == X_BF.p && frame.X_BF.R == X_BF.R)
       frame.X_BF = X;
   X_BF = X;
+  closure.axis = changed.closures[place.index].axis;
 }
 
 RoundedLinkage describe(const Model& model, const LoopCluster& cluster, const FollowedLinkage& linkage,
