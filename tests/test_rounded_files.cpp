@@ -284,7 +284,7 @@ TEST_CASE(
 <equality><connect site1="a" site2="b"/></equality><actuator><motor joint="crank"/></actuator></mujoco>)"));
   };
   const std::string turned_site = "<site quat=\"0.923879532511287 0 0.38268343236509 0\"/>";
-  for (const std::string& turn : {R"(euler="89.9999 0 0")", R"(axisangle="1 0 0 89.9999")"}) {
+  for (const char* turn : {R"(euler="89.9999 0 0")", R"(axisangle="1 0 0 89.9999")"}) {
     const LoadedRobot robot = load(turn, "0.35 0 0.1", turned_site);
     CHECK(countWarnings(robot, "as a plane linkage: axes of crank, rod, rocker made parallel") == 1);
     checkTurns(robot.model);

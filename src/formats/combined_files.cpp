@@ -1,5 +1,6 @@
 // The model of a URDF, or of what stands for it, and a YAML file.
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "bielle/model/builder.h"
@@ -9,7 +10,9 @@
 #include "formats/reader_loops.h"
 #include "formats/robot_files.h"
 #include "formats/rounding_warnings.h"
+#include "math/constants.h"
 #include "model/listing.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -282,6 +285,25 @@ RoundingTolerance findTolerance(const UrdfFile& urdf, const YamlFile& yaml) {
   return tolerance;
 }
 
+// Ranges of hinges that are many turns, as those of files whose authors took degrees for radians.
+void warnOfDegrees(const UrdfFile& urdf, std::vector<std::string>& warnings) {
+  constexpr double kLeast = 15, kMost = 720;  // others are placeholders, such as 1e4
+  std::string names, range, radians;
+  for (const UrdfJoint& own : urdf.joints) {
+    if (own.joint.kind != JointKind::Revolute || own.lower.size() != 1 || own.upper.size() != 1) continue;
+    const double lower = own.lower[0], upper = own.upper[0], most = std::max(std::abs(lower), std::abs(upper));
+    if (!(most >= kLeast && most <= kMost)) continue;
+    names += (names.empty() ? "'" : ", '") + own.joint.name + "'";
+    if (!range.empty()) continue;
+    range = formatNumber(lower) + " .. " + formatNumber(upper);
+    radians = formatNumber(lower * kDegree) + " .. " + formatNumber(upper * kDegree);
+  }
+  if (names.empty()) return;
+  warnings.push_back(urdf.path + ": joints " + names + ": ranges such as " + range +
+                     " rad are many turns: if they are degrees, give radians (" + radians +
+                     "), and none where there is no limit");
+}
+
 }  // namespace
 
 Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, LoadedRobot* told) {
@@ -307,6 +329,7 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, LoadedR
   if (warnings) {
     for (const std::vector<std::string>* own : {&urdf.warnings, &yaml.warnings})
       warnings->insert(warnings->end(), own->begin(), own->end());
+    warnOfDegrees(urdf, *warnings);
     if (const size_t count = urdf.harmless.size(); count > 0)  // one line, so that it does not bury the others
       warnings->push_back(urdf.path + ": what changes no mechanism is left out (" + std::to_string(count) +
                           (count > 1 ? " kinds" : " kind") + " of elements; `bielle info " + urdf.path +
@@ -323,7 +346,7 @@ Model combineFiles(RobotFiles files, std::optional<BaseKind> overriding, LoadedR
     // Only to check them: worlds have play and friction of rods, the model does not.
     addPlay(linkages.model, yaml.wear.plays);
     makeRodBearings(linkages.model, yaml.wear.frictions);
-  } catch (const InputError& error) {          // which knows no file
+  } catch (const InputError& error) {  // which knows no file
     throw InputError(settings, error.element(), error.problem(), error.remedy());
   }
   if (told) told->wear = {listPlays(linkages.model, yaml.wear.plays), yaml.wear.frictions};
