@@ -246,6 +246,17 @@ TEST_CASE("a robot that cannot be adopted is named as in all other messages") {
   CHECK(getError([&] { adoptRobot(loadRobot(path), "../../arm.xml"); }).rfind(path + ": robot ", 0) == 0);
 }
 
+TEST_CASE("a robot whose gravity is not along -z cannot be adopted, since the ground is level there") {
+  const RobotDirectory directory;
+  const LoadedRobot robot = loadRobot(directory.write(
+      "robot.xml",
+      "<mujoco><option gravity='0 -9.81 0'/><worldbody><body name='trunk'><freejoint/><geom size='.1'/><body "
+      "name='leg'><joint name='hip' axis='0 0 1'/><geom pos='0 -.4 0' "
+      "size='.03'/></body></body></worldbody></mujoco>"));
+  CHECK_THAT(getError([&] { adoptRobot(robot, "robot.xml"); }),
+             Catch::Contains("gravity points along (0, -9.81, 0)") && Catch::Contains("turn it"));
+}
+
 TEST_CASE("an adopted robot says where the dead points of its linkages are") {
   // A four-bar at the knee whose crank turns wholly (robots/parts/knee/four_bar.yaml): the knee turns back where crank and rod are in
   // line, l +- c from the motor to the end of the arm, which is at the angle psi from the thigh, cos psi = sin(knee - middle).
@@ -461,6 +472,48 @@ TEST_CASE("a robot of more than two legs is adopted with a point for each foot, 
   }
 }
 
+TEST_CASE("legs of a robot without shapes end where their last links do, if these are rods, on points") {
+  const auto link = [](const std::string& name, double length) {  // a rod of that length downwards
+    const double mass = 0.3, moment = mass * length * length / 12;
+    return "<link name=\"" + name + "\"><inertial><origin xyz=\"0 0 " + formatNumber(-length / 2) +
+           "\"/><mass value=\"" + formatNumber(mass) + "\"/><inertia ixx=\"" + formatNumber(moment) +
+           "\" ixy=\"0\" ixz=\"0\" iyy=\"" + formatNumber(moment) + "\" iyz=\"0\" izz=\"0\"/></inertial></link>";
+  };
+  const auto joint = [](const std::string& parent, const std::string& child, const std::string& place,
+                        const std::string& axis) {
+    return "<joint name=\"to_" + child + "\" type=\"revolute\"><parent link=\"" + parent + "\"/><child link=\"" +
+           child + "\"/><origin xyz=\"" + place + "\"/><axis xyz=\"" + axis +
+           "\"/><limit lower=\"-10\" upper=\"10\" effort=\"9\" velocity=\"9\"/></joint>";
+  };
+  std::string urdf =
+      "<robot name=\"cheetah\"><link name=\"trunk\"><inertial><mass value=\"5\"/><inertia ixx=\"0.1\" ixy=\"0\" "
+      "ixz=\"0\" "
+      "iyy=\"0.1\" iyz=\"0\" izz=\"0.1\"/></inertial></link>";
+  for (const auto& [leg, hip] :
+       {std::pair("fl", "0.2 0.1 0"), {"fr", "0.2 -0.1 0"}, {"bl", "-0.2 0.1 0"}, {"br", "-0.2 -0.1 0"}}) {
+    const std::string name = leg;
+    urdf += link(name + "_hip", 0.05) + link(name + "_thigh", 0.2) + link(name + "_shank", 0.18) +
+            joint("trunk", name + "_hip", hip, "1 0 0") + joint(name + "_hip", name + "_thigh", "0 0 0", "0 1 0") +
+            joint(name + "_thigh", name + "_shank", "0 0 -0.2", "0 1 0");
+  }
+  const RobotDirectory directory;
+  const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(urdf + "</robot>", "")), "../robot.urdf");
+  CAPTURE(adoption.yaml);
+  CHECK_THAT(adoption.yaml, Catch::Contains("uniform rods"));
+  const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+  REQUIRE(model.contacts().size() == 4);
+  const AssemblyResult posture = assembleReference(model, "half_sitting");
+  REQUIRE(posture.status == NumericalStatus::Ok);
+  Workspace ws(model);
+  updatePositions(model, ws, posture.q);
+  for (const ContactFrame& contact : model.contacts()) {
+    CHECK(contact.kind == ContactKind::Point3D);
+    CHECK(model.bodies()[static_cast<size_t>(contact.body)].name.find("_shank") != std::string::npos);
+    CHECK((contact.X_BF.p - Vector3d(0, 0, -0.18)).norm() < 1e-6);
+    CHECK(std::abs(getPlacement(ws, contact.body, contact.X_BF).p.z()) < 1e-9);
+  }
+}
+
 TEST_CASE("feet whose frames face backward get frames that face forward, so that they can stand") {
   // Four legs without shapes whose thighs are turned by half a turn.
   const auto link = [](const std::string& name, double mass) {
@@ -499,6 +552,7 @@ TEST_CASE("feet whose frames face backward get frames that face forward, so that
     CHECK(model.bodies()[static_cast<size_t>(contact.body)].name.find("_toes") != std::string::npos);
   }
   CHECK(std::abs(calcCom(model, ws).x()) < 0.01);
+  CHECK_THAT(adoption.yaml, Catch::Contains("Where legs reach below these frames"));
 }
 
 TEST_CASE(

@@ -27,7 +27,8 @@ using YAML::BeginMap, YAML::BeginSeq, YAML::EndMap, YAML::EndSeq, YAML::Flow, YA
 constexpr double kHighest = 0.94, kLowest = 0.5, kStep = 0.04;  // shares of the height of the base
 constexpr double kOver = 0.005;                                 // from the centre of mass to the middle of the feet, m
 constexpr int kShifts = 20;
-constexpr double kMostWork = 1e9;  // iterations times nv^3 for a posture: some ten seconds
+constexpr double kJointWeight = 0.01, kBentWeight = 0.1;  // of joints; knees that are bent are to stay so
+constexpr double kMostWork = 1e9;                         // iterations times nv^3 for a posture: some ten seconds
 constexpr double kRotor = 1e-3, kLever = 0.02, kSole = 0.1;
 
 std::string format(double value) { return formatNumber(std::abs(value) < 1e-9 ? 0.0 : value, "%.4g"); }
@@ -48,6 +49,10 @@ class Adopter {
       fail("it has a fixed base",
            "only robots that stand on feet can be adopted; complete others by hand, with a YAML file that has the key "
            "`model`, motors and a reference");
+    if (const Vector3d& down = model_.gravity(); !(down.z() <= -0.9 * down.norm()))
+      fail("its gravity points along (" + format(down.x()) + ", " + format(down.y()) + ", " + format(down.z()) +
+               "), but the ground is level where z is up",
+           "turn it so that z is up");
     const AssemblyResult closed = findClosedConfiguration(model_);
     if (closed.status != NumericalStatus::Ok) fail("its loops do not close: " + closed.message, "correct the robot");
     q_ = closed.q;
@@ -95,6 +100,10 @@ class Adopter {
     if (feet_.empty())
       fail("no frame on a leg has its z axis up in the closed neutral configuration, and no body has a shape",
            "add a link without mass under each foot, z up and x forward");
+    const std::vector<FoundFoot> ends = findLegEnds(model_, ws_, feet_);
+    are_ends_ = !ends.empty() && std::none_of(ends.begin(), ends.end(),
+                                              [this](const FoundFoot& end) { return canTurn(model_, q_, end); });
+    if (are_ends_) feet_ = ends;
     are_turned_ = turnForward(feet_);
     has_made_frames_ = feet_[0].frame.empty();
     for (size_t i = 0; i < feet_.size() && has_made_frames_; ++i) {
@@ -204,6 +213,8 @@ class Adopter {
     }
     guess(std::string(are_turned_
                           ? "Feet: new frames where the lowest ones with z up are, since some of these face backward"
+                      : are_ends_ ? "Feet: new frames where legs end if their last links are uniform rods, since no "
+                                    "shapes and no frames tell"
                       : has_made_frames_ ? "Feet: new frames on the lowest points of shapes in the posture below"
                                          : "Feet: the lowest frames with z up" +
                                                std::string(feet_[0].is_named ? " that are named like feet"
@@ -213,7 +224,7 @@ class Adopter {
                        : is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
                                      : "Soles: 0.1 m square, because the feet have no readable shapes.");
     if (!is_flat && !is_held) guesses_.back() += " Narrow or round ones are edges (5d) or points (3d), which roll.";
-    if (!is_measured && !has_made_frames_ && !feet_[0].is_named)
+    if (!is_measured && (!has_made_frames_ || are_turned_) && !feet_[0].is_named)
       guesses_.back() +=
           " Where legs reach below these frames, add a link without mass under each foot, z up and x forward.";
     with_feet_ = ModelBuilder::restore(std::move(parts));
@@ -278,14 +289,13 @@ class Adopter {
 
   // Whether it closes within the ranges of the joints; moves the base so that the centre of mass is over the feet. The base weighs
   // more than other joints that are given; if there are any, all get the values that they have there.
-  bool stand(Reference& reference) {
-    constexpr double kJointWeight = 0.01;
+  bool stand(Reference& reference, double joint_weight = kJointWeight) {
     Workspace ws(*with_feet_);
     std::vector<double>& base = reference.joints.at(model_.joints()[1].name);
     double off = 0;
     for (int i = 0; i < kShifts; ++i) {
       AssemblyProblem problem = makeReferenceProblem(*with_feet_, reference);
-      problem.weights.tail(model_.nv() - 6) = problem.weights.tail(model_.nv() - 6).cwiseMin(kJointWeight);
+      problem.weights.tail(model_.nv() - 6) = problem.weights.tail(model_.nv() - 6).cwiseMin(joint_weight);
       const AssemblyResult result = assemble(*with_feet_, problem);
       work_ += result.iterations * std::pow(model_.nv(), 3);
       if (result.status != NumericalStatus::Ok) return false;
@@ -310,19 +320,20 @@ class Adopter {
   }
 
   enum class Bend { None, IntoRanges, Knees };
+  static constexpr int kBends = 3;
 
   void writePosture() {
     if (!model_.references().empty() && writeGivenPosture(model_.references().front())) return;
     const bool may_be_nearer = feet_.size() == 2 && with_feet_->contacts()[0].half_width > 0;
     for (const double least : {1.0, 0.5})  // legs without a roll of the ankle stand where they are alone, to all digits
       for (const Bend bend : {Bend::None, Bend::IntoRanges, Bend::Knees})
-        for (double share = kHighest; share > kLowest && work_ < kMostWork && (least == 1 || may_be_nearer);
-             share -= kStep) {
+        for (double share = kHighest; share > kLowest && (least == 1 || may_be_nearer); share -= kStep) {
+          if (work_ > kMostWork * (1 + static_cast<int>(bend)) / kBends) break;  // each has its share of it
           Reference r = makePosture(ws_, share, least);
           if (bend == Bend::IntoRanges) preferRanges(r);
           if (bend == Bend::Knees)
             for (const auto& [joint, angle] : bendKnees(model_, ws_, feet_)) r.joints[joint] = {angle};
-          if (stand(r)) return writePosture(r, share, start_, least);
+          if (stand(r, bend == Bend::Knees ? kBentWeight : kJointWeight)) return writePosture(r, share, start_, least);
         }
     guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
   }
@@ -429,7 +440,7 @@ class Adopter {
   Workspace ws_;
   std::vector<FoundFoot> feet_;
   std::vector<Motor> motors_;
-  bool has_made_frames_ = false, are_turned_ = false, is_carried_ = false;
+  bool has_made_frames_ = false, are_turned_ = false, are_ends_ = false, is_carried_ = false;
   double work_ = 0;  // on postures
   std::optional<Model> with_feet_;
   YAML::Emitter out_;

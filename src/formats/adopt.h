@@ -15,7 +15,7 @@ struct Adoption {
 /// Guesses from the closed configuration nearest to neutral or, where no posture is found from there, nearest to the middle of all
 /// ranges of joints, x forward and z up:
 /// - feet (formats/adopt_feet.h): the lowest frames whose z axis is up and that are named foot or sole, or new ones on the lowest
-///   points of shapes; two of them, if one is the mirror image of the other, or one on each of more legs;
+///   points of shapes or, where there are none, where legs that cannot turn their feet end; two of them, if one is the mirror image of the other, or one on each of more legs;
 /// - soles: the extent of the shapes of the foot; narrow ones are edges, balls are points, as are all feet that cannot turn about their
 ///   point (formats/adopt_freedoms.h); without shapes, 0.1 m square;
 /// - the posture `half_sitting`: feet flat, as far apart as there and two soles at least, or one sole where that cannot be, the centre
@@ -27,7 +27,7 @@ struct Adoption {
 /// - serial joints: those from base to foot, if they are six of one coordinate each. Dead points of their linkages that they can
 ///   reach from the posture are told, and that one lies between it and the neutral configuration.
 /// \param model  value of the key `model`: the path of the robot, as the file will name it
-/// \throws InputError when the robot has no free base, no loop that closes or no such foot
+/// \throws InputError when the robot has no free base, gravity that is not along -z, no loop that closes or no such foot
 Adoption adoptRobot(const LoadedRobot& robot, const std::string& model);
 
 }  // namespace bielle

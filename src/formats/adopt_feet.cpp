@@ -184,6 +184,27 @@ bool turnForward(std::vector<FoundFoot>& feet) {
   return true;
 }
 
+std::vector<FoundFoot> findLegEnds(const Model& model, const Workspace& ws, const std::vector<FoundFoot>& feet) {
+  constexpr double kLeast = 0.01;  // m, from a joint to a centre of mass
+  std::vector<FoundFoot> ends;
+  if (!model.shapes().empty()) return {};
+  for (const FoundFoot& foot : feet) {
+    const Inertia& link = model.bodies()[static_cast<size_t>(foot.body)].inertia;
+    const double away = link.com.norm();
+    if (foot.is_named || !foot.X_BF.p.isZero(0) || !(away > kLeast)) return {};
+    const Vector3d along = link.com / away;
+    const double across = link.I_com.trace() / 2;  // of a rod of length 2 l, m (2 l)^2 / 12, however the axes are given
+    FoundFoot end = foot;
+    end.X_BF.p = (away + std::sqrt(3 * across / link.mass)) * along;
+    end.X_WF = {Matrix3d::Identity(), ws.X_WB[static_cast<size_t>(foot.body)].act(end.X_BF.p)};
+    end.X_BF.R = ws.X_WB[static_cast<size_t>(foot.body)].R.transpose();
+    if (end.X_WF.p.z() > foot.X_WF.p.z() - kLeast) return {};
+    end.frame.clear();
+    ends.push_back(end);
+  }
+  return ends;
+}
+
 std::optional<ContactFrame> measureFoot(const Model& model, const FoundFoot& foot) {
   Eigen::Vector2d half = Eigen::Vector2d::Zero();
   double radius = std::numeric_limits<double>::infinity();

@@ -28,6 +28,10 @@ std::vector<FoundFoot> findFeet(const Model& model, const Workspace& ws);
 /// forward. \returns whether there are any
 bool turnForward(std::vector<FoundFoot>& feet);
 
+/// Of a robot without shapes whose `feet` are the frames of its last links, at their joints: new frames, z up, where the legs end if these
+/// links are uniform rods with their centres of mass and moments of inertia. Empty if links have no length, or frames tell where they end.
+std::vector<FoundFoot> findLegEnds(const Model& model, const Workspace& ws, const std::vector<FoundFoot>& feet);
+
 /// What a foot stands on, without a name: the extent of its shapes along x and y of its frame; empty without shapes. A capsule along
 /// x, and a box that is hardly wider than a rod, are blades; a ball is a point.
 std::optional<ContactFrame> measureFoot(const Model& model, const FoundFoot& foot);
