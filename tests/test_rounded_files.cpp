@@ -387,6 +387,19 @@ TEST_CASE("a linkage without motors that is locked by rounding is told, too") {
   CHECK(countWarnings(robot, "it is locked as it is written: axes of ") == 1);
 }
 
+TEST_CASE("what does not move at all is described like others") {
+  const RobotDirectory directory;
+  const LoadedRobot robot = loadRobot(directory.write(
+      "truss.xml",
+      "<mujoco><worldbody><body name=\"a\"><joint axis=\"0 1 0\"/><geom size=\".1\"/></body><body name=\"b\" "
+      "pos=\"1 0 0\"><joint axis=\"0 1 0\"/><geom size=\".1\"/></body></worldbody><equality><connect body1=\"a\" "
+      "body2=\"b\" anchor=\".5 0 .3\"/></equality></mujoco>"));
+  const nlohmann::json info = nlohmann::json::parse(makeRobotInfo(robot));
+  CHECK(info["mobility"]["mobility"] == 0);
+  CHECK(info["mobility"]["rank"] == 2);
+  CHECK(info["dead_points"].empty());
+}
+
 TEST_CASE("left and right linkages that are mirror images stay so") {
   const SE3 mirror(Matrix3d(Vector3d(1, -1, 1).asDiagonal()), Vector3d::Zero());
   std::mt19937 rng(5);

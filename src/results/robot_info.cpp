@@ -204,6 +204,7 @@ Json describeMobility(const LoadedRobot& robot, const std::vector<Posture>& post
 
 // Of every linkage.
 void addDeadPoints(const Model& model, const Posture& posture, Json& out) {
+  if (calcMobility(model, posture.q).mobility == 0) return;  // nothing moves
   for (const DeadPointTrace& linkage : traceDeadPoints(model, posture.q.transpose())) {
     const DeadPoint& nearest = linkage.getNearest();
     const bool far = nearest.kind == DeadPointKind::None;
