@@ -279,6 +279,9 @@ TEST_CASE("messages name a file by one path, however it is given") {
 TEST_CASE("files that are no robot at all are errors") {
   const RobotDirectory directory;
   CHECK(getErrorOfLoading(directory.writeRobot("", "")).find("not well-formed XML") != std::string::npos);
+  for (const char* text : {"{\n\"motion\": \"squat\"}", "  time,q\n0,1\n", "PK\x03\x04\x14\xeb"})  // of results
+    CHECK_THAT(getErrorOfLoading(directory.writeRobot(text, "")),
+               Catch::Contains("it is no XML") && Catch::Contains("the directory of a result"));
   CHECK(getErrorOfLoading(directory.writeRobot("<world/>", "")).find("not <robot>") != std::string::npos);
   CHECK(getErrorOfLoading(directory.writeRobot("<robot name='a'/>", "")).find("no link") != std::string::npos);
   CHECK(getErrorOfLoading(directory.writeRobot("<robot name='a'><link name='b'/></robot>", "base: fixed"))

@@ -1,5 +1,6 @@
 #include "formats/xml_document.h"
 
+#include <algorithm>
 #include <set>
 
 #include "bielle/model/error.h"
@@ -32,6 +33,16 @@ void refuseEntities(const XMLDocument& document, const std::string& path) {
   }
 }
 
+// Logs and results are taken for robots.
+void requireElements(const std::string& text, const std::string& path) {
+  const unsigned char first =
+      static_cast<unsigned char>(text[std::min(text.find_first_not_of(" \t\r\n"), text.size())]);
+  if (first > ' ' && first < 0x80 && first != '<')  // others are of another encoding
+    throw InputError(path, "document",
+                     "it is no XML: it begins with '" + std::string(1, static_cast<char>(first)) + "'",
+                     "give a robot (URDF, MuJoCo's XML, SDF, USD or YAML), or the directory of a result");
+}
+
 class Printer : public tinyxml2::XMLPrinter {
   void PrintSpace(int depth) override {
     for (int i = 0; i < depth; ++i) Write("  ", 2);
@@ -42,6 +53,7 @@ class Printer : public tinyxml2::XMLPrinter {
 
 const XMLElement& parseXml(const std::string& xml, const std::string& path, const std::string& root,
                            XMLDocument& document) {
+  requireElements(xml, path);
   requireUtf8(xml, path);
   if (document.Parse(xml.c_str()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED)
     throw InputError(path, "document", "elements are nested deeper than " + std::to_string(TINYXML2_MAX_ELEMENT_DEPTH),
