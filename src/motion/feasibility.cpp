@@ -18,42 +18,10 @@
 #include "model/rounded_text.h"
 #include "motion/applied_options.h"
 #include "motion/com_reach.h"
-#include "motion/motor_scale.h"
-#include "motion/statics.h"
+#include "motion/posture_checks.h"
 
 namespace bielle {
 namespace {
-
-// Of the limits, at a start at rest. It need not be held: a squat may begin to sink at once, and a biped with serial knees straightens
-// its legs first with limits that are 1.4 times too low; with 1.75 and 2.3 times no motion was found.
-constexpr double kTooWeak = 1.5;
-
-// Velocities are those between postures that are so far apart, since the guess goes from one to the next in small jumps, s.
-constexpr double kApart = 0.1;
-
-// Of the friction that a force along an axis of a sole needs, over its slope: pyramids are in the cones, with a margin.
-const double kPyramid = std::sqrt(2) / (1 - kConeMargin);
-
-std::string quote(const std::string& kind, const std::string& name) { return kind + " '" + name + "'"; }
-
-// A posture of the plan that is compared.
-struct Moment {
-  int node = 0;
-  double time = 0;  // s, with free durations at their longest
-  const ContactPhase* phase = nullptr;
-  double load = 1;      // on the feet, mean over the phase, over the weight
-  bool middle = false;  // of the phase; or its first node
-
-  std::string describe() const { return "in '" + phase->name + "' at " + formatNumber(time, "%.3g") + " s"; }
-};
-
-// What the plan needs of a motor or joint, where that is most of what is allowed.
-struct Need {
-  double needed = 0, allowed = std::numeric_limits<double>::infinity();
-  Moment moment;
-
-  double share() const { return needed / allowed; }
-};
 
 class FeasibilityCheck {
  public:
@@ -61,74 +29,40 @@ class FeasibilityCheck {
       : motion_(motion),
         problem_(*motion.problem),
         model_(problem_.model()),
-        warn_(warn),
+        start_(motion.schedule.phases.front().contacts),
         ws_(model_),
         gravity_(model_.gravity().norm()) {
-    start_.phase = &motion.schedule.phases.front();
+    if (warn)
+      tell_ = [&warn](const std::string& doubt, const std::string& remedy) {
+        warn("warning: " + doubt + "; " + remedy);
+      };
     updatePositions(model_, ws_, getStart());
     com_ = calcCom(model_, ws_);
-    listMoments();
   }
 
   void check(const StartingPoint* given) {
     checkTrajectory(given ? given->trajectory : motion_.guess, given ? "start" : "guess");
-    requireSolesApart(model_, start_.phase->contacts);
+    requireSolesApart(model_, start_);
     if (model_.nu() == 0 && model_.hasFreeFlyer())
       throw InputError(model_.name(), "motors", "the robot has none, so nothing holds it on its feet",
                        "name the joints that motors drive under `motors` in its YAML file");
     checkHeights();
-    if (!motion_.cycle) checkStartingMotors();  // a cycle starts in motion
-    if (!warn_) return;
+    PostureChecks postures(motion_, tell_, com_);
+    if (!motion_.cycle) postures.checkStart();  // a cycle starts in motion
+    if (!tell_) return;
     doubtUnits();
     if (!motion_.cycle) doubtBalance();
     doubtSlopes();
     doubtTurns();
     doubtSpeed();
     doubtDampers();
-    doubtPostures();
+    postures.doubt();
     if (given) doubtLoops(given->trajectory);
   }
 
  private:
   VectorXd getStart() const { return problem_.initialState().head(model_.nq()); }
-  // Before, it has stood there.
-  bool startsAtRest() const { return problem_.initialState().segment(model_.nq(), model_.nv()).isZero(0); }
-  VectorXd getPosture(int node) const { return motion_.guess.xs[static_cast<size_t>(node)].head(model_.nq()); }
   const ContactFrame& getContact(const ContactTarget& target) const { return model_.contacts()[target.contact]; }
-
-  void tell(const std::string& doubt, const std::string& remedy) const { warn_("warning: " + doubt + "; " + remedy); }
-
-  std::string formatEffort(const Motor& motor, double value) const {
-    return formatNumber(value, "%.3g") + (isLinear(model_, motor) ? " N" : " N m");
-  }
-
-  // The first and the middle node of every phase with feet on the ground.
-  void listMoments() {
-    std::vector<const ContactPhase*> phases;
-    for (const ContactPhase& phase : motion_.schedule.phases)
-      if (phase.dt > 0 || phase.contacts.empty()) phases.push_back(&phase);
-    const auto getFlight = [&](size_t i) {  // s
-      return i < phases.size() && phases[i]->contacts.empty() ? phases[i]->nodes * phases[i]->dt : 0;
-    };
-    int node = 0;
-    double time = 0;
-    size_t i = 0;
-    for (const ContactPhase& phase : motion_.schedule.phases) {
-      const bool timed = i < phases.size() && phases[i] == &phase;
-      const StageSpec& spec = problem_.spec(node);
-      const double dt = phase.dt * (spec.timing.phase >= 0 ? spec.timing.upper : 1);
-      if (timed && !phase.contacts.empty()) {
-        // A flight of the time T takes off, and ends, with the velocity g T / 2, which the ground gives, and takes.
-        const double flights = (i > 0 ? getFlight(i - 1) : 0) + getFlight(i + 1);
-        const double load = 1 + 0.5 * flights / (phase.nodes * phase.dt);
-        moments_.push_back({node, time, &phase, load, false});
-        moments_.push_back({node + phase.nodes / 2, time + phase.nodes / 2 * dt, &phase, load, true});
-      }
-      node += phase.nodes;
-      time += phase.nodes * dt;
-      if (timed) ++i;
-    }
-  }
 
   // Numbers that are not finite would be reported by whatever they meet first.
   void checkTrajectory(const ShootingTrajectory& trajectory, const std::string& what) const {
@@ -171,12 +105,12 @@ class FeasibilityCheck {
       if (goal.kind != GoalKind::Height) continue;
       double level = 0;
       std::vector<FrameTarget> feet;
-      for (const ContactTarget& target : start_.phase->contacts) {
-        level += target.X_WT.p.z() / static_cast<double>(start_.phase->contacts.size());
+      for (const ContactTarget& target : start_) {
+        level += target.X_WT.p.z() / static_cast<double>(start_.size());
         feet.push_back(makeFrameTarget(getContact(target), target.X_WT));
       }
       const double start = com_.z() - level, needed = start * goal.requested;
-      const ConstraintSet constraints = makeConstraintSet(model_, start_.phase->contacts);
+      const ConstraintSet constraints = makeConstraintSet(model_, start_);
       const double reached = calcReachedComHeight(model_, constraints, feet, getStart(), level + needed) - level;
       if (std::abs(reached - needed) <= start * goal.tolerance) continue;
       const bool too_high = reached < needed;
@@ -191,115 +125,46 @@ class FeasibilityCheck {
     }
   }
 
-  // Acceleration of the centre of mass beyond that at rest; in single support, while the weight falls past a sole that is not under
-  // it as the linear inverted pendulum does, from the nearest place of the sole.
-  Vector3d calcFall(const Moment& moment, const Vector3d& com) const {
-    Vector3d a = (moment.load - 1) * gravity_ * Vector3d::UnitZ();
-    const std::vector<ContactTarget>& feet = moment.phase->contacts;
-    if (feet.size() == 1 && model_.hasFreeFlyer()) {
-      const ContactFrame& sole = getContact(feet[0]);
-      Vector3d p = feet[0].X_WT.inverse().act(com);
-      const double height = com.z() - feet[0].X_WT.p.z();
-      p = feet[0].X_WT.act(Vector3d(std::clamp(p.x(), -sole.half_length, sole.half_length),
-                                    std::clamp(p.y(), -sole.half_width, sole.half_width), 0));
-      if (height > 0) a.head<2>() = moment.load * gravity_ / height * (com - p).head<2>();
-    }
-    return a;
-  }
-
-  // Torques that hold a posture of the plan.
-  HoldingShare calcShare(const Moment& moment, ConstVectorRef q, const Vector3d& com, const VectorXd& limits) const {
-    return calcHoldingShare(model_, makeConstraintSet(model_, moment.phase->contacts), q, calcFall(moment, com), limits,
-                            motion_.ground.friction);
-  }
-
-  // With the voltage of the supply, at standstill.
-  VectorXd getLimits(int node) const {
-    VectorXd limits = problem_.spec(node).effort_limits;
-    if (limits.size() == 0) limits.setConstant(model_.nu(), std::numeric_limits<double>::infinity());
-    for (int m = 0; m < model_.nu(); ++m)
-      if (const Motor& motor = model_.motors()[static_cast<size_t>(m)];
-          motor.hasEnvelope() && motion_.problem_options.limits.enforced)
-        limits[m] = std::min(limits[m], motor.drive.voltage / motor.voltsPerEffort());
-    return limits;
-  }
-
-  std::string listMotors(const VectorXd& u, const VectorXd& limits) const {
-    std::string list;
-    for (int m = 0; m < model_.nu(); ++m)
-      if (std::abs(u[m]) > limits[m]) {
-        const Motor& motor = model_.motors()[static_cast<size_t>(m)];
-        list += (list.empty() ? "" : ", ") + motor.name + " needs " + formatEffort(motor, std::abs(u[m])) +
-                ", its limit is " + formatEffort(motor, limits[m]);
-      }
-    return list;
-  }
-
-  void checkStartingMotors() {
-    const VectorXd limits = getLimits(0);
-    if (start_.phase->contacts.empty() && model_.hasFreeFlyer()) return;
-    const HoldingShare share = calcShare(start_, getStart(), com_, limits);
-    if (!share.isTooMuch()) return;
-    int weakest = 0;
-    std::string remedy;
-    for (int m = 0; m < model_.nu(); ++m) {
-      if (std::abs(share.u[m]) / limits[m] > std::abs(share.u[weakest]) / limits[weakest]) weakest = m;
-      if (std::abs(share.u[m]) > limits[m])
-        remedy += " --limit " + model_.motors()[static_cast<size_t>(m)].name + "=" +
-                  formatNumber(1.05 * std::abs(share.u[m]), "%.3g");
-    }
-    const std::string problem = "the starting posture cannot be held: " + listMotors(share.u, limits) +
-                                " (however the load is shared, " + formatNumber(share.least, "%.3g") +
-                                " times the limits)";
-    remedy =
-        "give larger limits (" + remedy.substr(1) + "), a start with straighter legs, or ignore them (--no-limits)";
-    held_ = true;
-    if (startsAtRest() && share.least > kTooWeak)
-      throw InputError(model_.name(), quote("motor", model_.motors()[static_cast<size_t>(weakest)].name), problem,
-                       remedy);
-    if (warn_) tell(problem, remedy);
-  }
-
   void doubtUnits() const {
     constexpr double kLowest = 0.02, kHighest = 10, kLightest = 0.02, kHeaviest = 5000;  // m, kg
     constexpr double kWeakest = 0.5, kStrongest = 30, kTilted = 0.01;                    // m/s^2, rad
     constexpr double kEarths = 0.05;  // from 1 m/s^2, which no planet or large moon has
     constexpr double kDensest = 5e4;  // mass over the cube of the height, kg/m^3: robots have 100 to 1000
     double ground = com_.z();
-    for (const ContactTarget& foot : start_.phase->contacts) ground = std::min(ground, foot.X_WT.p.z());
+    for (const ContactTarget& foot : start_) ground = std::min(ground, foot.X_WT.p.z());
     const double height = com_.z() - ground;
     if (height > 0 && (height < kLowest || height > kHighest))
-      tell("the centre of mass is " + formatNumber(height) + " m high at the start",
-           "give lengths in m if the robot's file has other ones (`scale` of meshes, millimetres of a CAD program)");
+      tell_("the centre of mass is " + formatNumber(height) + " m high at the start",
+            "give lengths in m if the robot's file has other ones (`scale` of meshes, millimetres of a CAD program)");
     if (model_.mass() < kLightest || model_.mass() > kHeaviest)
-      tell("the robot has a mass of " + formatNumber(model_.mass()) + " kg",
-           "give masses in kg if they are in other units");
+      tell_("the robot has a mass of " + formatNumber(model_.mass()) + " kg",
+            "give masses in kg if they are in other units");
     else if (height > 0 && model_.mass() > kDensest * height * height * height)
-      tell("the robot has a mass of " + formatNumber(model_.mass()) + " kg, and its centre of mass is " +
-               formatNumber(height, "%.3g") + " m high",
-           "give masses in kg if they are in g");
+      tell_("the robot has a mass of " + formatNumber(model_.mass()) + " kg, and its centre of mass is " +
+                formatNumber(height, "%.3g") + " m high",
+            "give masses in kg if they are in g");
     if (gravity_ < kWeakest || gravity_ > kStrongest)
-      tell("gravity is " + formatNumber(gravity_) + " m/s^2", "give it in m/s^2 if it is not meant so");
+      tell_("gravity is " + formatNumber(gravity_) + " m/s^2", "give it in m/s^2 if it is not meant so");
     else if (std::abs(gravity_ - 1) < kEarths)
-      tell("gravity is " + formatNumber(gravity_) + " m/s^2, a tenth of the Earth's",
-           "give [0, 0, -9.81] if it is meant as a multiple of that");
+      tell_("gravity is " + formatNumber(gravity_) + " m/s^2, a tenth of the Earth's",
+            "give [0, 0, -9.81] if it is meant as a multiple of that");
     const double tilt = std::acos(std::clamp(-model_.gravity().z() / gravity_, -1.0, 1.0));
     if (tilt > kTilted)
-      tell("gravity points " + formatNumber(tilt, "%.3g") + " rad beside down",
-           "motions are planned for level ground: give [0, 0, -9.81] if that is not meant");
+      tell_("gravity points " + formatNumber(tilt, "%.3g") + " rad beside down",
+            "motions are planned for level ground: give [0, 0, -9.81] if that is not meant");
   }
 
   // Whether the weight falls into the area between the soles.
   void doubtBalance() const {
     constexpr int kDirections = 720;
     constexpr double kBeyond = 1e-3;  // m
-    if (!model_.hasFreeFlyer() || start_.phase->contacts.empty()) return;
+    if (!model_.hasFreeFlyer() || start_.empty()) return;
     double most = -std::numeric_limits<double>::infinity();
     for (int i = 0; i < kDirections; ++i) {
       const double angle = 2 * kPi * i / kDirections;
       const Vector3d out(std::cos(angle), std::sin(angle), 0);
       double beyond = std::numeric_limits<double>::infinity();
-      for (const ContactTarget& foot : start_.phase->contacts)
+      for (const ContactTarget& foot : start_)
         for (double x : {-1, 1})
           for (double y : {-1, 1}) {
             const ContactFrame& sole = getContact(foot);
@@ -310,9 +175,9 @@ class FeasibilityCheck {
       most = std::max(most, beyond);
     }
     if (most > kBeyond)
-      tell("the robot falls over where it starts: its centre of mass is " + formatNumber(most, "%.3g") +
-               " m beyond its soles",
-           "give a reference in which it is above them");
+      tell_("the robot falls over where it starts: its centre of mass is " + formatNumber(most, "%.3g") +
+                " m beyond its soles",
+            "give a reference in which it is above them");
   }
 
   // A foot that stands alone on an inclined foothold must not slip.
@@ -329,11 +194,11 @@ class FeasibilityCheck {
       steepest = &phase;
     }
     if (most > motion_.ground.friction)
-      tell(getContact(steepest->contacts[0]).name +
-               " would slip on an inclined foothold on which it stands alone: it needs a friction of " +
-               formatAbove(most, 3) + " (with the pyramids and the margin of docs/constraints.md), the ground has " +
-               formatNumber(motion_.ground.friction),
-           "give a less inclined foothold, or `friction`");
+      tell_(getContact(steepest->contacts[0]).name +
+                " would slip on an inclined foothold on which it stands alone: it needs a friction of " +
+                formatAbove(most, 3) + " (with the pyramids and the margin of docs/constraints.md), the ground has " +
+                formatNumber(motion_.ground.friction),
+            "give a less inclined foothold, or `friction`");
   }
 
   // Feet that turn far against each other, or in a step: angles may have been meant as degrees.
@@ -355,8 +220,8 @@ class FeasibilityCheck {
         headings[target.contact] = heading;
       }
     if (most > kLargeTurn)
-      tell(turned + " turns by " + formatNumber(most, "%.3g") + " rad",
-           "give radians if degrees were meant, or turn less at a time");
+      tell_(turned + " turns by " + formatNumber(most, "%.3g") + " rad",
+            "give radians if degrees were meant, or turn less at a time");
   }
 
   // R. McN. Alexander, "The gaits of bipedal and quadrupedal animals", 1984: at a Froude number v^2 / (g l) of 1 the weight does
@@ -366,13 +231,13 @@ class FeasibilityCheck {
       if (phase.contacts.empty()) return;
     for (const Goal& goal : motion_.goals) {
       if (goal.kind != GoalKind::Speed) continue;
-      const double length = com_.z() - start_.phase->contacts.front().X_WT.p.z();
+      const double length = com_.z() - start_.front().X_WT.p.z();
       const double froude = goal.requested * goal.requested / (gravity_ * length);
       if (froude > 1)
-        tell("a walk of " + formatNumber(goal.requested) + " m/s has a Froude number of " +
-                 formatNumber(froude, "%.2g") + ", walks have less than 1: up to " +
-                 formatBelow(std::sqrt(gravity_ * length), 2) + " m/s",
-             "request a lower speed, or a run");
+        tell_("a walk of " + formatNumber(goal.requested) + " m/s has a Froude number of " +
+                  formatNumber(froude, "%.2g") + ", walks have less than 1: up to " +
+                  formatBelow(std::sqrt(gravity_ * length), 2) + " m/s",
+              "request a lower speed, or a run");
     }
   }
 
@@ -389,7 +254,8 @@ class FeasibilityCheck {
       for (const ContactTarget& target : phase.contacts) feet.push_back(target.contact);
       if (phase.dt > 0 && !model_.jointForces().empty() && seen.insert(feet).second) {
         const SmoothFriction found =
-            calcSmoothFriction(model_, problem_.spec(node).constraints, getPosture(node), phase.dt);
+            calcSmoothFriction(model_, problem_.spec(node).constraints,
+                               motion_.guess.xs[static_cast<size_t>(node)].head(model_.nq()), phase.dt);
         if (found.rate * phase.dt > std::max(kBorne, fastest.rate * step)) fastest = found, step = phase.dt;
         for (const JointForce& force : found.raised)
           if (const auto at = raised.try_emplace(force.joint, force).first;
@@ -402,10 +268,10 @@ class FeasibilityCheck {
     const std::string steps = formatNumber(1e3 * step, "%.3g") + " ms",
                       borne = ", steps bear " + formatNumber(kBorne / step, "%.2g");
     if (const double rate = raised.empty() ? fastest.rate : fastest.damped; rate * step > kBorne)
-      return tell("steps of " + steps + " are too long for the damper of " +
-                      quote("joint", model_.joints()[static_cast<size_t>(fastest.joint)].name) +
-                      ": motions near rest decay at " + formatNumber(rate, "%.2g") + "/s" + borne,
-                  "give shorter ones (--set time_step=" + formatNumber(1 / rate, "%.1g") + ")");
+      return tell_("steps of " + steps + " are too long for the damper of " + "joint '" +
+                       model_.joints()[static_cast<size_t>(fastest.joint)].name + "'" +
+                       ": motions near rest decay at " + formatNumber(rate, "%.2g") + "/s" + borne,
+                   "give shorter ones (--set time_step=" + formatNumber(1 / rate, "%.1g") + ")");
     std::string names, entries;
     for (WholeJointForce whole : joinJointForces(model_)) {
       const auto at = raised.find(whole.force.joint);
@@ -419,115 +285,10 @@ class FeasibilityCheck {
       for (const auto& [key, value] : getJointForceData(whole))
         entries += std::string(key) + ": " + value + (key == std::string("friction_speed") ? "}" : ", ");
     }
-    tell("steps of " + steps + " are too long for the friction of " + names +
-             ", which acts like a damper below its friction_speed: motions near rest decay at " +
-             formatNumber(fastest.rate, "%.2g") + "/s" + borne,
-         "give larger speeds in the robot's YAML file (`joint_forces: {" + entries + "}`)");
-  }
-
-  // Motors, joints and legs in the planned postures, of the guess.
-  void doubtPostures() {
-    std::vector<Need> efforts(static_cast<size_t>(model_.nu())), speeds(static_cast<size_t>(model_.nv()));
-    const VectorXd velocity_limits = motion_.problem_options.limits.enforced
-                                         ? getVelocityLimits(model_, motion_.problem_options.limits)
-                                         : VectorXd::Constant(model_.nv(), std::numeric_limits<double>::infinity());
-    Need reach, friction{0, motion_.ground.friction, {}};
-    std::string foot;
-    const Moment* before = nullptr;
-    for (const Moment& moment : moments_) {
-      const VectorXd q = getPosture(moment.node);
-      updatePositions(model_, ws_, q);
-      if (needReach(moment, reach, foot)) {
-        before = nullptr;  // such a posture says nothing of motors
-        continue;
-      }
-      needFriction(moment, friction);
-      if (moment.middle && !held_) needEfforts(moment, q, efforts);
-      if (before && moment.time - before->time < kApart) continue;
-      if (before) needSpeeds(*before, moment, velocity_limits, speeds);
-      before = &moment;
-    }
-    if (reach.needed > 0)
-      tell("no posture was found in which the legs reach: " + foot + " stays " + formatNumber(reach.needed, "%.2g") +
-               " m (or rad) off its place " + reach.moment.describe(),
-           "request shorter, lower or less turned steps");
-    if (friction.needed > friction.allowed)
-      tell(getContact(friction.moment.phase->contacts[0]).name + " would slip: the weight, as planned " +
-               friction.moment.describe() + ", needs a friction of " + formatAbove(friction.needed, 2) +
-               " at least, the ground has " + formatNumber(friction.allowed),
-           "request a slower motion or shorter steps, or give `friction` if the ground has more");
-    tellEfforts(efforts);
-    tellSpeeds(speeds);
-  }
-
-  // Of a level foot that stands alone; doubtSlopes() sees the others.
-  void needFriction(const Moment& moment, Need& friction) const {
-    constexpr double kLevel = 1e-3;  // rad
-    const std::vector<ContactTarget>& feet = moment.phase->contacts;
-    if (feet.size() != 1 || !(feet[0].X_WT.R.row(2).head<2>().norm() < kLevel)) return;
-    const Vector3d a = feet[0].X_WT.R.transpose() * calcFall(moment, calcCom(model_, ws_));
-    const double needed = kPyramid * std::max(std::abs(a.x()), std::abs(a.y())) / (moment.load * gravity_);
-    if (needed > friction.needed) friction.needed = needed, friction.moment = moment;
-  }
-
-  // Whether feet of the guess are off their places.
-  bool needReach(const Moment& moment, Need& reach, std::string& foot) {
-    constexpr double kOff = 5e-3;  // m, rad
-    bool off = false;
-    for (const ContactTarget& target : moment.phase->contacts) {
-      const ContactFrame& contact = getContact(target);
-      const SE3 error = target.X_WT.inverseTimes(getPlacement(ws_, contact.body, contact.X_BF));
-      double size = error.p.norm();
-      if (contact.kind == ContactKind::Surface6D) size = std::max(size, log3(error.R).norm());
-      if (!(size > kOff)) continue;
-      off = true;
-      if (size <= reach.needed) continue;
-      reach = {size, 0, moment};
-      foot = contact.name;
-    }
-    return off;
-  }
-
-  void needEfforts(const Moment& moment, const VectorXd& q, std::vector<Need>& efforts) {
-    const VectorXd limits = getLimits(moment.node);
-    const HoldingShare share = calcShare(moment, q, calcCom(model_, ws_), limits);
-    if (!share.isTooMuch()) return;
-    for (size_t m = 0; m < efforts.size(); ++m) {
-      const Need need{std::abs(share.u[static_cast<Eigen::Index>(m)]), limits[static_cast<Eigen::Index>(m)], moment};
-      if (need.share() > std::max(1.0, efforts[m].share())) efforts[m] = need;
-    }
-  }
-
-  void needSpeeds(const Moment& before, const Moment& after, const VectorXd& limits, std::vector<Need>& speeds) const {
-    const VectorXd v = model_.difference(getPosture(before.node), getPosture(after.node)) / (after.time - before.time);
-    for (size_t k = 0; k < speeds.size(); ++k) {
-      const Need need{std::abs(v[static_cast<Eigen::Index>(k)]), limits[static_cast<Eigen::Index>(k)], before};
-      if (need.share() > std::max(1.0, speeds[k].share())) speeds[k] = need;
-    }
-  }
-
-  void tellEfforts(const std::vector<Need>& efforts) const {
-    for (size_t m = 0; m < efforts.size(); ++m)
-      if (efforts[m].needed > 0) {
-        const Motor& motor = model_.motors()[m];
-        tell(quote("motor", motor.name) + " may be too weak: the posture planned " + efforts[m].moment.describe() +
-                 " needs " + formatEffort(motor, efforts[m].needed) + ", its limit is " +
-                 formatEffort(motor, efforts[m].allowed),
-             "give a larger limit (--limit " + motor.name + "=" + formatNumber(1.05 * efforts[m].needed, "%.3g") +
-                 "), or request a slower or shorter motion");
-      }
-  }
-
-  void tellSpeeds(const std::vector<Need>& speeds) const {
-    for (size_t k = 0; k < speeds.size(); ++k)
-      if (speeds[k].needed > 0) {
-        const Joint& joint = model_.joints()[static_cast<size_t>(model_.dofs()[k].joint)];
-        const std::string unit = joint.kind == JointKind::Prismatic ? " m/s" : " rad/s";
-        tell(quote("joint", joint.name) + " may be too slow: from one planned posture to the next, " +
-                 speeds[k].moment.describe() + ", it needs " + formatNumber(speeds[k].needed, "%.3g") + unit +
-                 ", its limit is " + formatNumber(speeds[k].allowed, "%.3g") + unit,
-             "request a slower or shorter motion, longer phases, or a larger limit");
-      }
+    tell_("steps of " + steps + " are too long for the friction of " + names +
+              ", which acts like a damper below its friction_speed: motions near rest decay at " +
+              formatNumber(fastest.rate, "%.2g") + "/s" + borne,
+          "give larger speeds in the robot's YAML file (`joint_forces: {" + entries + "}`)");
   }
 
   // Of a start: that of another robot has open loops here.
@@ -547,20 +308,18 @@ class FeasibilityCheck {
       }
     }
     if (most > kOpen)
-      tell("the start has open loops, by " + formatNumber(most, "%.2g") + " m (or rad) in '" + widest,
-           "it is of another robot, or of this one before it was changed: give a result of this robot");
+      tell_("the start has open loops, by " + formatNumber(most, "%.2g") + " m (or rad) in '" + widest,
+            "it is of another robot, or of this one before it was changed: give a result of this robot");
   }
 
   const Motion& motion_;
   const RobotProblem& problem_;
   const Model& model_;
-  const std::function<void(const std::string&)>& warn_;
+  const std::vector<ContactTarget>& start_;
+  TellDoubt tell_;
   Workspace ws_;
   double gravity_;  // m/s^2
   Vector3d com_;    // at the start
-  Moment start_;
-  std::vector<Moment> moments_;
-  bool held_ = false;  // told that motors cannot hold the start
 };
 
 }  // namespace

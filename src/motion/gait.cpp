@@ -7,6 +7,7 @@
 #include "bielle/motion/motion.h"
 #include "math/constants.h"
 #include "math/so3.h"
+#include "model/number_text.h"
 #include "motion/quintic.h"
 
 namespace bielle {
@@ -24,7 +25,8 @@ void check(const GaitTiming& t, size_t steps) {
   for (const auto& [name, value] : {std::pair("start_support", t.start), std::pair("single_support", t.single),
                                     std::pair("double_support", t.both), std::pair("end_support", t.end)})
     requireOption(value < 60 && countNodes(value, h) >= 1, name,
-                  "it is shorter than a time step, or longer than a minute", "give seconds");
+                  "it is shorter than a time step, or longer than a minute",
+                  "give seconds, e.g. " + formatNumber(std::max(0.1, 4 * h)));
   requireStages(t.start + steps * t.stepDuration() + t.end, h);
   requireOption(t.flight == 0 || (countNodes(t.flight, h) >= 2 && t.flight <= 1), "flight",
                 "it is outside two time steps .. 1 s", "give seconds, e.g. 0.1");

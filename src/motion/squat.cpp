@@ -5,6 +5,8 @@
 
 #include "bielle/model/error.h"
 #include "math/constants.h"
+#include "model/number_text.h"
+#include "model/rounded_text.h"
 #include "motion/feasibility.h"
 #include "motion/foot_tasks.h"
 #include "motion/robot_size.h"
@@ -15,10 +17,14 @@ namespace {
 
 constexpr double kTimeStep = 0.015;  // s
 
-void check(const Model& model, const SquatOptions& o) {
+// \param given  time_step, 0 for the usual one
+void check(const Model& model, const SquatOptions& o, double given) {
   listOptions(o).check();
+  requireOption(given > 0 || o.time_step <= o.duration / 4, "duration",
+                "it is shorter than four stages of " + formatNumber(1e3 * o.time_step, "%.3g") + " ms",
+                "give seconds, e.g. 3");
   requireOption(o.time_step <= o.duration / 4, "time_step", "it exceeds a quarter of the motion",
-                "give seconds, e.g. 0.015");
+                "give seconds, e.g. " + formatBelow(std::min(kTimeStep, o.duration / 4), 2));
   requireStages(o.duration + 2 * o.settle, o.time_step);
   requireGravity(model, o.friction);
   if (model.contacts().empty())
@@ -74,7 +80,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& requested, const St
   SquatOptions options = requested;
   if (options.time_step == 0)
     options.time_step = std::min(kTimeStep, calcSpringStage(model, standing.q, makeContactTargets(standing, 0, 0)));
-  check(model, options);
+  check(model, options, requested.time_step);
   const RobotSize size = calcRobotSize(model, standing);
   scaleWeights(size, options);
   options.com_weight /= size.length * size.length * size.time;
