@@ -29,12 +29,13 @@ class Puppet : public World {
     soles_ = soles;
     report();
   }
-  // All of it is shifted by x at a speed, m and m/s along x.
-  void move(double x, double speed) {
+  // All of it is shifted by x at a speed, m and m/s along x, and sinks, m/s.
+  void move(double x, double speed, double sinking = 0) {
     q_ = makeStandingPosture(model_);
     q_[0] += x;
     v_.setZero();
     v_[0] = speed;
+    v_[2] = -sinking;
     report();
   }
   double fails_at = 1e9;  // s
@@ -163,6 +164,27 @@ TEST_CASE("balance: after a push or an excursion three time constants have to pa
       balance.update(0, {}, false);
       CAPTURE(pushed, share);
       CHECK(balance.stands() == (share > 1));
+    }
+  }
+}
+
+TEST_CASE("balance: a robot whose legs give way does not stand, though its capture point stays over its soles") {
+  for (const Model& model : {getBipetto(), makeOnMoon()}) {
+    const double tau = measure(model).tau, height = tau * tau * model.gravity().norm();
+    for (const double share : {-1.0, 0.09, 0.11, 1.0}) {
+      CAPTURE(model.gravity().z(), share);
+      Puppet world(model);
+      Balance balance(world, {});
+      world.move(0, 0, share * height / tau);
+      balance.update(0, {}, false);
+      CHECK(balance.stands() == (share < 0.1));
+      world.move(0, 0);
+      world.advance(2.9 * tau);
+      balance.update(0, {}, false);
+      CHECK(balance.stands() == (share < 0.1));
+      world.advance(0.2 * tau);
+      balance.update(0, {}, false);
+      CHECK(balance.stands());
     }
   }
 }

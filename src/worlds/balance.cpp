@@ -15,6 +15,7 @@ constexpr double kCarriedShare = 0.25;  // of the weight, of a sole that carries
 constexpr double kTurnedOver = 0.2;     // of such a sole, rad: what lets go turns by less (describeFeet())
 constexpr double kLate = 0.1;           // of a time constant, by which a foot may land late
 constexpr double kRest = 1e-6;          // kinetic energy of a robot at rest, of m |g| z
+constexpr double kSinking = 0.1;        // of z in a time constant: soles say nothing of legs that give way
 
 }  // namespace
 
@@ -43,15 +44,16 @@ void Balance::update(double plan_time, const std::vector<PredictedFoothold>& for
   speed_ = velocity.norm();
   const double g = model.gravity().norm(), kinetic = calcKineticEnergy(model, ws_);
   excess_ = std::numeric_limits<double>::infinity();
-  bool is_at_rest = kinetic == 0;
+  bool is_at_rest = kinetic == 0, is_sinking = false;
   if (g > 0 && !support_.empty()) {
     const double height = std::max(0.0, up_.dot(com) - ground_);
     tau_ = std::sqrt(height / g);
     excess_ = calcExcess(across_ * (com + tau_ * velocity));
     is_at_rest = kinetic <= kRest * model.mass() * g * height;
+    is_sinking = -tau_ * up_.dot(velocity) > kSinking * height;
   }
   is_calm_ = (touches_ && is_at_rest) || (excess_ <= 0 && !is_turned_over_);
-  if (is_pushed || (touches_ && !is_calm_)) disturbed_ = world_.time();
+  if (is_pushed || (touches_ && (!is_calm_ || is_sinking))) disturbed_ = world_.time();
 }
 
 bool Balance::stands() const {

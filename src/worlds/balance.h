@@ -22,8 +22,8 @@ namespace bielle::worlds {
 ///
 /// At an instant this says little: a controller may let x drift out of the support. A robot stands that has been at rest,
 /// or whose x has been over its support, for three time constants, in which a deviation that nothing held would have
-/// grown twentyfold, in which nothing pushed it, and no sole that carried it was turned over an edge. Before its start it
-/// was at rest. While no sole touches the ground nothing is decided.
+/// grown twentyfold, in which nothing pushed it, no sole that carried it was turned over an edge, and z did not decrease by
+/// more than a tenth of it in a time constant. Before its start it was at rest. While no sole touches the ground nothing is decided.
 class Balance {
  public:
   /// \param world  must outlive it   \param planned  contacts of the plan, whose footholds count where a controller foresees none
@@ -61,7 +61,7 @@ class Balance {
   double tau_ = 0, excess_ = 0,
          speed_ = 0;  // s; of the capture point beyond the support, m; of the centre of mass, m/s
   std::optional<double>
-      disturbed_;  // the last instant at which it was pushed, or neither at rest nor over its support, s
+      disturbed_;  // the last instant at which it was pushed, sank, or was neither at rest nor over its support, s
   bool touches_ = true, is_turned_over_ = false, is_flight_planned_ = false, is_calm_ = true;
 };
 
