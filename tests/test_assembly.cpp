@@ -163,6 +163,42 @@ TEST_CASE("assembly: the shortest steps close the same robot, and change nothing
   CHECK(assemble(model, problem, options).status == NumericalStatus::NotClosed);
 }
 
+TEST_CASE("assembly: without patience what is just out of reach is told sooner, and what is within reach the same") {
+  const Model model = loadOwn("bipetto").model;
+  const VectorXd standing = assembleReference(model, "half_sitting").q;
+  Workspace ws(model);
+  updatePositions(model, ws, standing);
+  AssemblyOptions patient;
+  patient.step = AssemblyStep::Shortest;
+  patient.max_iterations = 15;
+  patient.continuation_steps = 0;
+  AssemblyOptions impatient = patient;
+  impatient.patience = 2;
+  int within = 0, beyond = 0;
+  for (int i = -8; i <= 17; ++i) {  // of the trunk over feet that stay, cm; farther ones are refused without a step
+    CAPTURE(i);
+    AssemblyProblem problem;
+    problem.q_ref = standing;
+    problem.q_ref[2] += 0.01 * i;
+    problem.frames.push_back({"trunk", 1, SE3(), {Matrix3d::Identity(), problem.q_ref.head<3>()}});
+    for (const ContactFrame& foot : model.contacts())
+      problem.frames.push_back(makeFrameTarget(foot, getPlacement(ws, foot.body, foot.X_BF)));
+    const AssemblyResult a = assemble(model, problem, patient), b = assemble(model, problem, impatient);
+    CHECK(a.status == b.status);
+    if (a.status == NumericalStatus::Ok) {
+      ++within;
+      CHECK(a.iterations == b.iterations);
+      CHECK(a.q == b.q);
+    } else {
+      ++beyond;
+      CHECK(a.iterations == 15);
+      CHECK(b.iterations <= 11);
+    }
+  }
+  CHECK(within > 8);
+  CHECK(beyond > 4);
+}
+
 TEST_CASE("assembly: feet that are farther apart than legs are long are refused without a step") {
   const Model& model = getBipetto();
   Reference reference = model.references()[0];

@@ -26,20 +26,24 @@ class FeetPlacer {
     options_.continuation_steps = 0;
   }
 
-  // None where no posture is found, after dozens of assemblies.
-  std::optional<VectorXd> place(const PlannedPosture& planned, const VectorXd& before) {
+  // None where no posture is found, after dozens of assemblies. Beside a posture that was found, the stance leads to others only where a
+  // sole is free to turn: legs with flat soles under a given base have nothing to choose.
+  // \param found  whether `before` is one
+  std::optional<VectorXd> place(const PlannedPosture& planned, const VectorXd& before, bool found) {
     constexpr std::array<bool, 2> kBoth{true, true};
     constexpr double kNear = 0.06;  // of the base, over the height of the centre of mass
     const std::vector<const VectorXd*> starts = {&before, &stance_.q};
-    std::optional<VectorXd> q = placeNear(planned, kBoth, starts, kNear, kEasyTransmission);
-    if (!q && planned.stands != kBoth) q = placeNear(planned, planned.stands, starts, kNear, kEasyTransmission);
-    if (!q) q = placeNear(planned, planned.stands, starts, kFar, kLeastTransmission);
+    std::optional<VectorXd> q =
+        placeNear(planned, kBoth, found ? std::vector{&before} : starts, found, {0, kNear}, kEasyTransmission);
+    if (!q && planned.stands != kBoth)
+      q = placeNear(planned, planned.stands, starts, found, {0, kNear}, kEasyTransmission);
+    if (!q) q = placeNear(planned, planned.stands, starts, found, {kNear, kFar}, kLeastTransmission);
     return q;
   }
 
   // Whether there is such a posture, as far as that of the stance leads to it.
   bool reaches(const PlannedPosture& planned) {
-    return placeNear(planned, planned.stands, {&stance_.q}, kFar, kLeastTransmission).has_value();
+    return placeNear(planned, planned.stands, {&stance_.q}, true, {0, kFar}, kLeastTransmission).has_value();
   }
 
   // With soles as they come to lie, or those of the stance.
@@ -105,20 +109,34 @@ class FeetPlacer {
     double transmission;  // the least, or the least inverse, over that of the stance
   };
 
-  // With the base as little raised or lowered as can be; the first whose transmission is easy enough, else the first.
-  // \param most  of the way of the base, over the height of the centre of mass
+  // With the base as little raised or lowered as can be; the first whose transmission is easy enough, else the first. Heights at which
+  // legs reach are an interval: behind its ends none is tried.
+  // \param sure  where the first start does not lead to a posture, the others do not, either
+  // \param ways  of the base, up and down, over the height of the centre of mass: the longest that failed before, and that is tried
   std::optional<VectorXd> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
-                                    const std::vector<const VectorXd*>& starts, double most, double easy) {
-    const double step = most / 4;
+                                    const std::vector<const VectorXd*>& starts, bool sure,
+                                    const std::array<double, 2>& ways, double easy) {
+    const double step = ways[1] / 4;
     std::optional<VectorXd> first;
+    int at = 0, highest = -4, lowest = 4;  // steps downwards: of the first, and of those that are left
     for (int i = 0; i <= 4; i = i > 0 ? -i : 1 - i) {
+      if (i < highest || i > lowest || (ways[0] > 0 && std::abs(i) * step < ways[0] + 1e-9)) continue;
       VectorXd base = planned.q.head<7>();
       base[2] -= i * step * height_;
+      bool reaches = false;
       for (const VectorXd* start : starts) {
         std::optional<Posture> posture = assemble(base, planned.feet, flat, *start);
         if (posture && posture->transmission > easy) return std::move(posture->q);
-        if (posture && !first) first = std::move(posture->q);
+        reaches = reaches || posture;
+        if (posture && !first) {
+          first = std::move(posture->q);
+          at = i;
+          if (i > 0) highest = i;
+          if (i < 0) lowest = i;
+        }
+        if (!reaches && sure) break;
       }
+      if (first && !reaches) (i < at ? highest : lowest) = i;
     }
     return first;
   }
@@ -135,6 +153,7 @@ class FeetPlacer {
       problem.frames.push_back(makeFrameTarget(model_.contacts()[stance_.contacts[i]], feet[i]));
       if (!flat[i]) problem.frames.back().mask.tail<3>().setConstant(false);
     }
+    options_.patience = flat[0] && flat[1] ? 2 : 0;  // soles that are free to turn often pass postures that are worse
     AssemblyResult result = bielle::assemble(model_, problem, options_);
     if (result.status != NumericalStatus::Ok || !keepsRanges(result.q)) return {};
     const double transmission = calcTransmission(result.q);
@@ -188,7 +207,7 @@ std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const 
     }
     const PlannedPosture& planned = postures[qs.size()];
     std::optional<VectorXd> q;
-    if (found || placer.reaches(planned)) q = placer.place(planned, qs.empty() ? stance.q : qs.back());
+    if (found || placer.reaches(planned)) q = placer.place(planned, qs.empty() ? stance.q : qs.back(), found);
     found = q.has_value();
     qs.push_back(found ? std::move(*q) : placer.hang(planned));
   }
