@@ -128,7 +128,8 @@ class ReferenceFeet {
   }
 
   // Axes z and x of the soles, in the mean.
-  std::pair<Vector3d, Vector3d> findSoles(const VectorXd& q) {
+  using Soles = std::pair<Vector3d, Vector3d>;
+  Soles findSoles(const VectorXd& q) {
     updatePositions(model_, ws_, q);
     Vector3d up = Vector3d::Zero(), ahead = Vector3d::Zero();
     for (const ContactFrame& contact : model_.contacts()) {
@@ -140,11 +141,27 @@ class ReferenceFeet {
     return {up, ahead};
   }
 
-  // Attitude of a base that need not have z up and x ahead, nearest to that in which its soles on unbent legs have so: by right angles,
-  // and not where those by the given angles tell otherwise, as of feet that hang down from unbent legs.
+  // Attitude of a base that need not have z up and x ahead: that in which its soles on unbent legs have so. By right angles, unless
+  // only another one lays them flat by the given angles, too: feet may hang down from unbent legs.
   Matrix3d findUpright(const VectorXd& q_ref) {
+    constexpr double kInclined = 0.01;  // rad, of soles by right angles
+    constexpr double kFlat = 0.1;       // of that
+    constexpr double kBent = 1e-3;      // rad or m
+    const Soles unbent = findSoles(unbent_), given = findSoles(q_ref);
+    const Matrix3d right = findRightAngles(unbent, given);
+    if (unbent.first.isZero(0) || (q_ref - unbent_).tail(model_.nq() - 7).isZero(kBent)) return right;
+    const Matrix3d R = makeAttitude(unbent), flat = makeAttitude(given);
+    const double inclined = log3(right * flat).norm();
+    return inclined > kInclined && log3(R.transpose() * flat).norm() < kFlat * inclined ? R.transpose() : right;
+  }
+
+  static Matrix3d makeAttitude(const Soles& soles) {
+    const Vector3d z = soles.first.normalized(), y = z.cross(soles.second).normalized();
+    return (Matrix3d() << y.cross(z), y, z).finished();
+  }
+
+  Matrix3d findRightAngles(const Soles& unbent, const Soles& given) const {
     constexpr double kQuarter = 1.57079632679489662;  // turn
-    const auto unbent = findSoles(unbent_), given = findSoles(q_ref);
     if (unbent.first.isZero(0)) return Matrix3d::Identity();
     Matrix3d upright = findUprightAxes(unbent.first).transpose();
     if (!((upright * given.first).z() > given.first.z())) upright.setIdentity();
