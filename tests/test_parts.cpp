@@ -526,6 +526,8 @@ TEST_CASE("parts: errors give the file, the line, the name and what to do") {
   refuse(kRobotOfRods, "length: span/2", "length: spam/2", {"'spam' is unknown; known are", "line"});
   refuse(kRobotOfRods, "length: span/2", "length: span/", {"is not an expression", "key 'length'"});
   refuse(kRobotOfRods, "length: span/2", "length: -span", {"the rod has no length", "make it longer"});
+  refuse(kRobotOfRods, "length: span}}", "length: span, radius: -0.2}}",
+         {"bad.yaml: key 'tree': key 'upper': key 'set': key 'radius' (line ", "-0.2 is outside 0.001 .. 0.1"});
   refuse(kRobotOfRods, "lower: {part: rod,", "upper: {part: rod,", {"given twice"});
   refuse(kSlider, "hinges: {pivot", "hinges: {pivots", {"there is no point 'pivots'; known are end, pin, pivot"});
   refuse(kSlider, "rod: [end, pin]", "rod: [end]", {"a bar joins two points or more"});

@@ -5,6 +5,7 @@
 
 #include "formats/motor_catalogue.h"
 #include "model/listing.h"
+#include "model/number_text.h"
 #include "robots/part_parameters.h"
 #include "robots/part_solids.h"
 #include "robots/part_tree.h"
@@ -299,6 +300,15 @@ class PartComposer {
     part.chosen = listBoundChoices(file_, mounting, chosen);
     part.values = bindValues(file, mounting, part.chosen);
     part.points = bindPoints(file, mounting);
+    try {
+      composeSides(file, mounting, part);
+    } catch (const InputError&) {
+      refuseOutside(file, mounting, part.chosen);
+      throw;
+    }
+  }
+
+  void composeSides(const PartFile& file, const PartMounting& mounting, MountedPart& part) {
     const YamlEntry* sides = find(mounting.fields, "sides");
     if (!sides) {
       part.mounts = bindMounts(file, mounting, "");
@@ -310,6 +320,18 @@ class PartComposer {
       part.suffix = part_.suffix + suffix;
       PartComposer(file, part, out_).compose();
       part.side = -part.side;
+    }
+  }
+
+  // Whoever sets a parameter beyond its bounds is told that, and not of what it leads to in the part.
+  void refuseOutside(const PartFile& file, const PartMounting& mounting, const PartChoices& chosen) {
+    for (const PartParameter& p : listParameters(out_.library, file, chosen)) {
+      const YamlEntry* set = mounting.findSet(p.option.name);
+      if (!set || !std::holds_alternative<double>(p.option.value)) continue;
+      const double value = set->getNumber();
+      if (!(value >= p.option.bounds.lower && value <= p.option.bounds.upper))
+        set->fail(formatNumber(value) + " is outside " + p.option.describeValues() + ", and the part cannot be made so",
+                  "give a number within");
     }
   }
 
