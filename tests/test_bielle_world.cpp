@@ -10,6 +10,7 @@
 #include "bielle/motion/motion.h"
 #include "bielle/worlds/bielle_world.h"
 #include "count_allocations.h"
+#include "edge_trials.h"
 #include "mechanisms.h"
 #include "own_robots.h"
 #include "selection.h"

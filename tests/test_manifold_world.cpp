@@ -6,6 +6,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/worlds/bielle_world.h"
+#include "edge_trials.h"
 #include "mechanisms.h"
 #include "own_robots.h"
 #include "selection.h"

@@ -1,6 +1,8 @@
 // The world of MuJoCo: the trials of all worlds, and what is particular to it.
 #include <catch2/catch.hpp>
 #include <filesystem>
+#include <iomanip>
+#include <sstream>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -9,6 +11,10 @@
 #include "bielle/robots/robot_loader.h"
 #include "bielle/worlds/bielle_world.h"
 #include "count_allocations.h"
+#include "edge_trials.h"
+#include "load_mujoco.h"
+#include "robot_directory.h"
+#include "selection.h"
 #include "world_trials.h"
 #include "worlds/made_ground.h"
 #include "worlds/mujoco_model.h"
@@ -89,6 +95,36 @@ TEST_CASE("mujoco world: soles and edges rest on the side of a step", "[sweep]")
   testing::checkOverhangs([](const Model& model, const WorldOptions& options) {
     return makeMujocoWorld(model, {options, {}});
   });
+}
+
+TEST_CASE("mujoco world: in a scene of one's own, soles and edges of an exported file rest on the side of a step",
+          "[sweep]") {
+  bielle::testing::Selection selection(9);
+  for (const testing::EdgeTrial& trial : testing::makeEdgeTrials(300)) {
+    if (selection.isLeftOut()) continue;
+    const ContactFrame& foot = trial.model.contacts()[0];
+    CAPTURE(trial.step.top.transpose(), trial.step.length, trial.step.width, trial.step.yaw, trial.q.transpose(),
+            foot.half_length, foot.half_width);
+    MjcfOptions options;
+    options.ground_height = trial.step.top.z() - 0.3;
+    std::string xml = formatMjcf(trial.model, trial.model.makeNeutral(), options).xml;
+    std::ostringstream box;
+    box << std::setprecision(17) << "<geom type=\"box\" pos=\"" << trial.step.top.x() << ' ' << trial.step.top.y()
+        << ' ' << trial.step.top.z() - 0.5 << "\" euler=\"0 0 " << trial.step.yaw << "\" size=\""
+        << trial.step.length / 2 << ' ' << trial.step.width / 2 << " 0.5\"/>";
+    xml.insert(xml.find("</worldbody>"), box.str());
+    const bielle::testing::RobotDirectory directory;
+    const auto mj = bielle::testing::loadMujoco(directory.write("scene.xml", xml));
+    const bielle::testing::MjData data(mj_makeData(mj.get()), mj_deleteData);
+    // MuJoCo's quaternions begin with their real part.
+    const VectorXd start = (VectorXd(7) << trial.q.head<3>(), trial.q[6], trial.q.segment<3>(3)).finished();
+    VectorXd::Map(data->qpos, 7) = start;
+    while (data->time < 0.3) mj_step(mj.get(), data.get());
+    const VectorXd end = VectorXd::Map(data->qpos, 7);
+    CHECK((end - start).head<3>().norm() < 1e-3);
+    CHECK(2 * (end - start).tail<4>().norm() < 0.01);
+    CHECK(data->ncon > 0);
+  }
 }
 
 TEST_CASE("mujoco world: a sole bears the same moment about its normal on level ground and on steps") {

@@ -6,6 +6,7 @@
 #include "bielle/model/builder.h"
 #include "bielle/motion/walk.h"
 #include "bielle/worlds/bielle_world.h"
+#include "edge_trials.h"
 #include "own_robots.h"
 #include "world_trials.h"
 #include "worlds/simbody_world.h"

@@ -20,16 +20,6 @@ struct TrialTolerances {
   double creep = 1e-6;    // of a robot that stands, m in half a second
   double gap = 1e-8;      // m
 };
-// A block on one contact, of 0.1 by 0.06 m or 0.1 m, whose weight bears at a place in its frame, m.
-Model makeBlock(ContactKind kind, const Vector3d& com);
-// Soles and edges of a block overhang the sides and corners of steps by up to half of their length, and stay where they are.
-void checkOverhangs(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld);
-// The moment about the normal under which a sole or an edge turns is that of corners that each bear their share of the weight, on level
-// ground, where a step is elsewhere, and where half of it overhangs one.
-void checkTwists(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld);
-// A block slides over a step and against the side of the next one, which holds it.
-void checkRisers(const std::function<std::unique_ptr<World>(const Model&, const WorldOptions&)>& makeWorld);
-
 // Each takes a world of Bipetto on flat ground at height 0 and friction 0.7.
 void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances);
 void checkDropped(World& world, const Model& model, const TrialTolerances& tolerances);

@@ -137,18 +137,19 @@ ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, const T& mu, const C
       calcMeanDepth<T>(touch.depth - 0.5 * h * before, touch.depth + 0.5 * h * (2 * approach - before));
   const auto touches = mean.depth > T(0);
   if (!any(touches)) return out;
-  NormalForce<T> normal = calcNormalForce<T>(point.stiffness, point.damping, mean.depth, approach);
+  const T stiffness = point.share * point.stiffness, shear_stiffness = point.share * point.shear_stiffness,
+          shear_damping = point.share * point.shear_damping;
+  NormalForce<T> normal = calcNormalForce<T>(stiffness, point.damping, mean.depth, approach);
   normal.rate += normal.force / mean.depth * mean.rate * h;
   const T limit = mu * normal.force;
   const Vector3<T> anchor = select(point.touches, point.anchor, x);
   out.shift = 0.5 * h * (velocity - step.before);
   const Vector3<T> shift = x + out.shift - anchor, sliding = velocity + approach * n;
-  const Vector3<T> held = -point.shear_stiffness * (shift - n.dot(shift) * n);
+  const Vector3<T> held = -shear_stiffness * (shift - n.dot(shift) * n);
   out.spring = shorten<T>(held, limit);
-  const Vector3<T> wanted = out.spring - point.shear_damping * sliding, friction = shorten<T>(wanted, limit);
+  const Vector3<T> wanted = out.spring - shear_damping * sliding, friction = shorten<T>(wanted, limit);
   out.force = normal.force * n + friction;
-  out.elastic =
-      0.5 * point.stiffness * mean.depth * mean.depth + 0.5 * out.spring.squaredNorm() / point.shear_stiffness;
+  out.elastic = 0.5 * stiffness * mean.depth * mean.depth + 0.5 * out.spring.squaredNorm() / shear_stiffness;
   const T stretch = calcNorm(held), size = calcNorm(wanted);
   const auto drags = stretch > limit, slips = size > limit;
   out.slides = touches && (drags || slips);
@@ -156,8 +157,8 @@ ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, const T& mu, const C
     const Matrix3<T> along = n * n.transpose();
     const T limit_rate = mu * normal.rate;  // the cone narrows as the point lifts
     const Matrix3<T> across = Matrix3<T>::Identity() - along;
-    const T stiff = 0.5 * h * point.shear_stiffness;
-    const Matrix3<T> damper = point.shear_damping * across;
+    const T stiff = 0.5 * h * shear_stiffness;
+    const Matrix3<T> damper = shear_damping * across;
     Matrix3<T> shear = damper;
     if (!all(drags)) shear += stiff * across;
     if (any(drags)) {
@@ -194,7 +195,7 @@ void updateAnchor(const GroundsOf<T>& grounds, const Vector3<T>& x, const Contac
   point.touches = touch.depth > T(0);
   point.anchor = point.from = at;
   if (!any(point.touches)) return;
-  point.anchor = select(point.touches, Vector3<T>(at + force.spring / point.shear_stiffness), at);
+  point.anchor = select(point.touches, Vector3<T>(at + force.spring / (point.share * point.shear_stiffness)), at);
   point.from = select(point.touches, Vector3<T>(at + touch.depth * touch.normal), at);
 }
 
@@ -207,6 +208,7 @@ ContactPoint takeLane(const ContactPointOf<Lanes>& point, int lane) {
   out.stiffness = point.stiffness[lane];
   out.shear_stiffness = point.shear_stiffness[lane];
   out.shear_damping = point.shear_damping[lane];
+  out.share = point.share[lane];
   out.touches = point.touches[lane];
   for (int i = 0; i < 3; ++i) {
     out.p[i] = point.p[i][lane];
@@ -222,10 +224,11 @@ std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<
     const ContactFrame& contact = model.contacts()[points[i].contact];
     if (contact.kind == ContactKind::Point3D) continue;
     if (i == 0 || points[i].contact != points[i - 1].contact)
-      areas.push_back({contact.body, contact.X_BF, contact.half_length, contact.half_width, i, {}, {}});
+      areas.push_back({contact.body, contact.X_BF, contact.half_length, contact.half_width, 1, i, {}, {}});
     areas.back().homes.push_back(contact.X_BF.inverse().act(points[i].p));
     areas.back().places.push_back({});
     areas.back().places.back().is_corner = points[i].is_corner;
+    if (!points[i].is_corner) areas.back().corner_share = points[areas.back().first].stiffness / points[i].stiffness;
   }
   for (ContactArea& area : areas) area.lane.resize(area.first + area.homes.size());
   return areas;
@@ -251,9 +254,11 @@ void settle<double>(const GroundsOf<double>& grounds, const SE3& X_WF, ContactAr
     const Eigen::Vector2d there =
         is_home ? Eigen::Vector2d(home.head<2>()) : Eigen::Vector2d(back * (support - centre));
     ContactPoint& point = points[area.first + i];
-    const Vector3d p = area.X_BF.act(Vector3d(there.x(), there.y(), home.z()));
+    const bool is_added = area.places[i].takes_corner && !area.places[i].is_corner;
+    const Vector3d p = area.X_BF.act(Vector3d(there.x(), there.y(), is_added ? 0 : home.z()));
     const Vector3d shift = R * (area.X_BF.R.transpose() * (p - point.p));
     point.p = p;
+    point.share = is_added ? area.corner_share : 1;
     point.anchor += shift;
     point.from += shift;
     // What lies on an edge has come from above, though the foot slips over it.
@@ -277,9 +282,11 @@ void settle<Lanes>(const GroundsOf<Lanes>& grounds, const SE3Of<Lanes>& X_WF, Co
       for (int part = 0; part < 3; ++part)
         for (int i = 0; i < 3; ++i) (one[k].*kOwn[part])[i] = (points[k].*kParts[part])[i][l];
     settle<double>(*grounds.terrains[l], X, area, one);
-    for (size_t k = area.first; k < area.first + area.homes.size(); ++k)
+    for (size_t k = area.first; k < area.first + area.homes.size(); ++k) {
+      points[k].share.set(l, one[k].share);
       for (int part = 0; part < 3; ++part)
         for (int i = 0; i < 3; ++i) (points[k].*kParts[part])[i].set(l, (one[k].*kOwn[part])[i]);
+    }
   }
 }
 

@@ -58,6 +58,7 @@ struct ContactPointOf {
   T stiffness = 0;                           ///< k, N/m
   double damping = 0;                        ///< c, s/m
   T shear_stiffness = 0, shear_damping = 0;  ///< k_t, N/m; c_t, N s/m
+  T share = 1;                               ///< of k, k_t and c_t: 1, or more where settle() says so
   Vector3<T> anchor = Vector3<T>::Zero();    ///< a, m (world)
   MaskOf<T> touches = makeMask<T>(false);    ///< as of the last update of the anchor
   Vector3<T> from =
@@ -70,6 +71,7 @@ struct ContactArea {
   int body = 0;
   SE3 X_BF;
   double half_length = 0, half_width = 0;  ///< m
+  double corner_share = 1;                 ///< k of a corner over that of a point between them
   size_t first = 0;                        ///< of its points
   std::vector<Vector3d> homes;             ///< in the frame of the contact, m
   std::vector<Terrain::Place> places;      ///< as settle() found them
@@ -145,6 +147,7 @@ inline void updateAnchor(const Terrain& terrain, const Vector3d& x, const Contac
 ContactPoint takeLane(const ContactPointOf<Lanes>& point, int lane);
 
 /// Moves points of an area that overhang a step onto its edge, where they are nearest, and back. Their bristles stay as they are bent.
+/// What lies on a step may have more corners than the sole; points of the grid that take them bear like corners there.
 template <typename T>
 void settle(const GroundsOf<T>& grounds, const SE3Of<T>& X_WF, ContactArea& area,
             std::vector<ContactPointOf<T>>& points);

@@ -72,6 +72,7 @@ void assignPoints(const MaskOf<T>& mask, const std::vector<ContactPointOf<T>>& f
     for (auto part : {&ContactPointOf<T>::p, &ContactPointOf<T>::anchor, &ContactPointOf<T>::from})
       assignLanes(mask, from[i].*part, to[i].*part);
     to[i].touches = select(mask, from[i].touches, to[i].touches);
+    assignLanes(mask, from[i].share, to[i].share);
   }
 }
 

@@ -23,7 +23,10 @@ class MujocoGround {
   void bind(const mjModel& mj);
   /// Moves boxes under the soles as they stand in `data`. To be called whenever these may have moved by kReach.
   /// \returns false if there are too many boxes under the soles
-  bool update(mjModel& mj, const mjData& data) const;
+  bool update(mjModel& mj, const mjData& data);
+  /// Before every step: this way, then that way, by less than can be measured. MuJoCo 2.2.2 takes the normal of two boxes whose
+  /// edges are parallel to within 1e-13 rad from rounding, and throws the one off the other.
+  void tilt(mjModel& mj, bool is_back) const;
 
   static constexpr double kReach = 0.02;  ///< m
 
@@ -42,7 +45,8 @@ class MujocoGround {
   Model model_;
   double height_;
   std::vector<Box> boxes_;
-  std::vector<int> geoms_;  // of the boxes that MuJoCo has
+  std::vector<int> geoms_;         // of the boxes that MuJoCo has
+  std::vector<const Box*> shown_;  // as the first of these
   std::vector<Sole> soles_;
 };
 

@@ -231,7 +231,8 @@ static void giveCorners(const void* top, const Clipped& part, const Terrain::Cor
     const auto isHere = [&](const Eigen::Vector2d& at) { return (at - part[i]).squaredNorm() < kInside * kInside; };
     bool is_held = std::any_of(corners.begin(), corners.end(), isHere);
     for (Place& place : places) {
-      if (!isHere(place.support) || (isFree(place) && place.distance > 4 * kInside * kInside)) continue;
+      if (!place.is_corner || !isHere(place.support)) continue;
+      if (isFree(place) && place.distance > 4 * kInside * kInside) continue;
       place.top = nullptr;
       is_held = true;
     }
@@ -262,6 +263,7 @@ static void giveCorners(const void* top, const Clipped& part, const Terrain::Cor
     if (!taker) return;
     taker->support = corner;
     taker->top = nullptr;
+    taker->takes_corner = true;
     left[farthest] = left[num_left - 1];
     held[num_held++] = corner;
   }
@@ -275,7 +277,10 @@ void Terrain::findSupports(const Corners& corners, const Vector3d& plane, double
     high = high.cwiseMax(corner);
   }
   const auto calcHeight = [&](const Eigen::Vector2d& at) { return plane[0] + plane.tail<2>().dot(at); };
-  for (Place& place : places) place.support = place.home;
+  for (Place& place : places) {
+    place.support = place.home;
+    place.takes_corner = false;
+  }
   // Most soles are in the air, or within the sides of one step.
   double lowest = std::numeric_limits<double>::infinity(), peak = ground_.height;
   for (const Eigen::Vector2d& corner : corners) lowest = std::min(lowest, calcHeight(corner));
