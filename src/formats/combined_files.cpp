@@ -287,12 +287,12 @@ RoundingTolerance findTolerance(const UrdfFile& urdf, const YamlFile& yaml) {
 
 // Ranges of hinges that are many turns, as those of files whose authors took degrees for radians.
 void warnOfDegrees(const UrdfFile& urdf, std::vector<std::string>& warnings) {
-  constexpr double kLeast = 15, kMost = 720;  // others are placeholders, such as 1e4
+  constexpr double kLeast = 15, kMost = 720, kStep = 5;  // others are placeholders, such as 1e4
   std::string names, range, radians;
   for (const UrdfJoint& own : urdf.joints) {
     if (own.joint.kind != JointKind::Revolute || own.lower.size() != 1 || own.upper.size() != 1) continue;
     const double lower = own.lower[0], upper = own.upper[0], most = std::max(std::abs(lower), std::abs(upper));
-    if (!(most >= kLeast && most <= kMost)) continue;
+    if (!(most >= kLeast && most <= kMost) || std::fmod(lower, kStep) != 0 || std::fmod(upper, kStep) != 0) continue;
     names += (names.empty() ? "'" : ", '") + own.joint.name + "'";
     if (!range.empty()) continue;
     range = formatNumber(lower) + " .. " + formatNumber(upper);
