@@ -5,6 +5,7 @@
 #include <set>
 
 #include "bielle/formats/robot_writer.h"
+#include "bielle/model/error.h"
 #include "formats/robot_text.h"
 #include "math/direction.h"
 #include "model/number_text.h"
@@ -38,8 +39,10 @@ class UrdfWriter {
     for (int i = 1; i < model_.numBodies(); ++i) {
       const JointKind kind = model_.joints()[i].kind;
       if (!for_drake && (kind == JointKind::Spherical || kind == JointKind::Universal))
-        refuseToWrite(model_, std::string(getName(kind)) + " joint '" + model_.joints()[i].name + "'",
-                      "URDF does not support such joints");
+        throw InputError(
+            model_.name(), std::string(getName(kind)) + " joint '" + model_.joints()[i].name + "'",
+            "URDF does not have such joints",
+            "write another format: a URDF with a YAML file (--to bielle), MJCF (--to mjcf), SDF or Drake's");
     }
     for (const Closure& c : model_.closures()) {
       if (for_drake && c.kind != ClosureKind::Coupler) continue;
