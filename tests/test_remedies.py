@@ -72,6 +72,15 @@ def test_following():
     assert not os.path.exists("nowhere"), "a dry run wrote something"
 
 
+def test_layers():
+    """Those of the page are those that the command knows, and tells."""
+    scene = (SOURCE / "src/report/scene.js").read_text()
+    layers = re.findall(r"\['(\w+)', '[^']*', (?:true|false)\]", scene[scene.index("const LAYERS"):scene.index("class Scene")])
+    told = run("report nowhere --hide com,foo").stderr
+    assert "--hide 'foo'" in told and f"choose some of: {', '.join(layers)};" in told, (layers, told)
+    assert "no such layer" not in run("report nowhere --show " + ",".join(layers)).stderr
+
+
 def list_options(text):
     return set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", text))
 
@@ -95,4 +104,5 @@ def test_options():
 
 
 test_following()
+test_layers()
 test_options()

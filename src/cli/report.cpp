@@ -5,11 +5,14 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <sstream>
 
 #include "bielle/model/error.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/film.h"
+#include "model/listing.h"
+#include "model/number_text.h"
 #include "results/option_flags.h"
 #include "results/output_place.h"
 #include "results/result_files.h"
@@ -52,9 +55,31 @@ void readSize(const std::string& text, FilmOptions& film) {
                      "e.g. --size 640x480");
 }
 
+// Those of src/report/scene.js.
+const std::vector<std::string> kLayers = {"locks",      "contactForces", "closureForces", "com", "traces",
+                                          "footprints", "footholds",     "plan",          "push"};
+
+void requireLayers(const std::string& option, const std::string& names) {
+  std::istringstream text(names);
+  for (std::string name; std::getline(text, name, ',');)
+    if (!contains(kLayers, name))
+      throw InputError("", option + " '" + name + "'", "there is no such layer",
+                       "choose some of: " + listItems(kLayers) + "; separated by commas");
+}
+
+void requireWithin(const std::vector<double>& times, double end) {
+  for (double time : times)
+    if (time > end + 1e-3)  // as films round
+      throw InputError("", "--times " + formatNumber(time), "the motion ends at " + formatNumber(end) + " s",
+                       "give times up to it");
+}
+
 int writePages(const ReportArguments& arguments) {
   FilmOptions film = arguments.film;
   readSize(arguments.size, film);
+  requireLayers("--show", film.show);
+  requireLayers("--hide", film.hide);
+  if (!film.times.empty()) requireWithin(film.times, calcDuration(arguments.directories));
   film.side_by_side = !arguments.ghosts;
   const auto first = fs::path(arguments.directories.front());
   const std::string page = arguments.output.empty() ? (first / "report.html").string() : arguments.output;
@@ -86,9 +111,7 @@ void describe(OptionFields& f, ReportArguments& a) {
   f.text("view", a.film.view, "direction of view");
   f.flag("ghosts", a.ghosts, "show several robots in one place, not side by side");
   f.flag("see_through", a.film.see_through, "make bodies transparent");
-  f.text("show", a.film.show,
-         "layers to show (locks, contactForces, closureForces, com, traces, footprints, plan, push; separated by "
-         "commas)");
+  f.text("show", a.film.show, "layers to show (" + listItems(kLayers) + "; separated by commas)");
   f.text("hide", a.film.hide, "layers to hide");
 }
 
