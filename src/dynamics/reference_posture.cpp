@@ -141,8 +141,8 @@ class ReferenceFeet {
     return {up, ahead};
   }
 
-  // Attitude of a base that need not have z up and x ahead: that in which its soles on unbent legs have so. By right angles, unless
-  // only another one lays them flat by the given angles, too: feet may hang down from unbent legs.
+  // Attitude of a base that need not have z up and x ahead: that in which its soles on unbent legs have so. By right angles,
+  // unless only another one lays them flat by the given angles, too: feet may hang down from unbent legs.
   Matrix3d findUpright(const VectorXd& q_ref) {
     constexpr double kInclined = 0.01;  // rad, of soles by right angles
     constexpr double kFlat = 0.1;       // of that

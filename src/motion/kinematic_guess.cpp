@@ -26,8 +26,8 @@ class FeetPlacer {
     options_.continuation_steps = 0;
   }
 
-  // None where no posture is found, after dozens of assemblies. Beside a posture that was found, the stance leads to others only where a
-  // sole is free to turn: legs with flat soles under a given base have nothing to choose.
+  // None where no posture is found, after dozens of assemblies. Beside a posture that was found, the stance leads to others only
+  // where a sole is free to turn: legs with flat soles under a given base have nothing to choose.
   // \param found  whether `before` is one
   std::optional<VectorXd> place(const PlannedPosture& planned, const VectorXd& before, bool found) {
     constexpr std::array<bool, 2> kBoth{true, true};
@@ -109,10 +109,11 @@ class FeetPlacer {
     double transmission;  // the least, or the least inverse, over that of the stance
   };
 
-  // With the base as little raised or lowered as can be; the first whose transmission is easy enough, else the first. Heights at which
-  // legs reach are an interval: behind its ends none is tried.
+  // With the base as little raised or lowered as can be; the first whose transmission is easy enough, else the first. Heights at
+  // which legs reach are an interval: behind its ends none is tried.
   // \param sure  where the first start does not lead to a posture, the others do not, either
-  // \param ways  of the base, up and down, over the height of the centre of mass: the longest that failed before, and that is tried
+  // \param ways  of the base, up and down, over the height of the centre of mass: the longest that failed before, and the longest
+  // that is tried
   std::optional<VectorXd> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
                                     const std::vector<const VectorXd*>& starts, bool sure,
                                     const std::array<double, 2>& ways, double easy) {

@@ -13,8 +13,8 @@
 namespace bielle {
 namespace {
 
-// Of the limits, at a start at rest. It need not be held: a squat may begin to sink at once, and a biped with serial knees straightens
-// its legs first with limits that are 1.4 times too low; with 1.75 and 2.3 times no motion was found.
+// Of the limits, at a start at rest. It need not be held: a squat may begin to sink at once, and a biped with serial knees
+// straightens its legs first with limits that are 1.4 times too low; with 1.75 and 2.3 times no motion was found.
 constexpr double kTooWeak = 1.5;
 
 // Velocities are those between postures that are so far apart, since the guess goes from one to the next in small jumps, s.

@@ -24,7 +24,7 @@ class PostureChecks {
   // \param tell  may be null  \param com  of the robot where it starts, m (world)
   PostureChecks(const Motion& motion, const TellDoubt& tell, const Vector3d& com);
 
-  // That motors hold the posture in which the motion starts. \throws InputError naming them where they are far too weak for it
+  // That motors hold the posture in which the motion starts. \throws InputError naming them where they are far too weak
   void checkStart();
   // Tells of motors that are too weak or too slow for the guess, of feet that would slip, and of legs that do not reach.
   void doubt();

@@ -15,7 +15,7 @@ constexpr double kCarriedShare = 0.25;  // of the weight, of a sole that carries
 constexpr double kTurnedOver = 0.2;     // of such a sole, rad: what lets go turns by less (describeFeet())
 constexpr double kLate = 0.1;           // of a time constant, by which a foot may land late
 constexpr double kRest = 1e-6;          // kinetic energy of a robot at rest, of m |g| z
-constexpr double kSinking = 0.1;        // of z in a time constant: soles say nothing of legs that give way
+constexpr double kSinking = 0.3;        // of z in a time constant: its legs give way, which soles do not tell
 
 }  // namespace
 

@@ -23,7 +23,8 @@ namespace bielle::worlds {
 /// At an instant this says little: a controller may let x drift out of the support. A robot stands that has been at rest,
 /// or whose x has been over its support, for three time constants, in which a deviation that nothing held would have
 /// grown twentyfold, in which nothing pushed it, no sole that carried it was turned over an edge, and z did not decrease by
-/// more than a tenth of it in a time constant. Before its start it was at rest. While no sole touches the ground nothing is decided.
+/// more than three tenths of it in a time constant. Before its start it was at rest. While no sole touches the ground
+/// nothing is decided.
 class Balance {
  public:
   /// \param world  must outlive it   \param planned  contacts of the plan, whose footholds count where a controller foresees none
