@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/robots/robot_loader.h"
 #include "formats/sdf.h"
@@ -177,6 +178,22 @@ TEST_CASE("joints of SDF: frames that poses are relative to, ranges, springs, an
   CHECK(getSdfJoint(model, "socket").kind == JointKind::Spherical);
   CHECK(getSdfJoint(model, "ja").kind == JointKind::Continuous);
   CHECK(warnsOf(robot, "<model> <plugin> (line "));
+}
+
+TEST_CASE("an axis that is beside one of its frame by rounding turns this frame, so that no row is next to nothing") {
+  const Model model = loadSdf(makeFourBar("", R"(
+<joint name="close" type="revolute"><parent>b</parent><child>c</child><pose relative_to="c">0 0 1 0.000002 0 0.000001</pose>
+<axis><xyz expressed_in="__model__">0 1 0</xyz></axis></joint>)"))
+                          .model;
+  const Closure& close = model.closures()[0];
+  CHECK((close.axis - Vector3d::UnitY()).norm() == 0);
+  Workspace ws(model);
+  updatePositions(model, ws, model.makeNeutral());
+  const int body = close.body1;
+  CHECK((ws.X_WB[body].R * close.X_B1.R * close.axis - Vector3d::UnitY()).norm() < 1e-15);
+  MatrixXd J = MatrixXd::Zero(5, model.nv());
+  calcClosureJacobian(ws, close, J);
+  for (Eigen::Index i = 0; i < J.rows(); ++i) CHECK((J.row(i).norm() < 1e-14 || J.row(i).norm() > 1e-3));
 }
 
 TEST_CASE("loops of SDF are cut at their balls, wherever these are in the file, and other joints keep their ranges") {

@@ -1,9 +1,11 @@
 // Joints of SDF files: those that carry links, and those that close loops.
 #include <cmath>
+#include <limits>
 
 #include "bielle/model/error.h"
 #include "formats/reader_loops.h"
 #include "formats/reader_sdf.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {
@@ -11,6 +13,18 @@ namespace {
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 std::string describeSdf(const sdf::Joint& joint) { return "joint '" + joint.Name() + "'"; }
+
+// The rotation to an axis from that of the coordinate axes which it is but for rounding, and which it becomes: else none. Rows across
+// the plane of a linkage are zero so, not a millionth of the others.
+Matrix3d turnToAxis(Vector3d& axis) {
+  constexpr double kNearly = 1e-3;
+  Eigen::Index k = 0;
+  axis.cwiseAbs().maxCoeff(&k);
+  const Vector3d nearest = Vector3d::Unit(k) * std::copysign(1.0, axis[k]), sine = nearest.cross(axis.normalized());
+  if (sine.isZero(0) || sine.norm() > kNearly) return Matrix3d::Identity();
+  axis = nearest;
+  return exp3(Vector3d(std::asin(sine.norm()) * sine.normalized()));
+}
 
 }  // namespace
 
@@ -178,6 +192,11 @@ void SdfReader::addClosure(const sdf::Joint& joint) {
       tree_.warnings.push_back(path_ + ": " + describeSdf(joint) +
                                ": it closes a loop: its range, spring, damping and friction are left out");
     yaml_.joint_forces.resize(forces);
+    if (kind == ClosureKind::Hinge5D) {
+      const Matrix3d turn = turnToAxis(axis);
+      X_WP.R = X_WP.R * turn;
+      X_WC.R = X_WC.R * turn;
+    }
   }
   addClosure(joint.Name(), kind, axis, parent, X_WP, child, X_WC);
 }
