@@ -107,6 +107,21 @@ TEST_CASE(
   CHECK((a.q - b.q).cwiseAbs().maxCoeff() < 1e-7);  // the angle was rounded by 1e-9
 }
 
+TEST_CASE("free motion: it is told where a world did not hold the loops, and only there") {
+  const FreeScratch scratch;
+  const auto spin = [&](double speed, const std::string& world) {
+    const std::string state =
+        scratch.write("spin.json", nlohmann::json{{"joints", {{"crank_joint", {{"q", 1}, {"v", speed}}}}}}.dump());
+    return move(kFreeFourbar, scratch.path / "spin", {"--state", state, "--duration", "0.02", "--world", world});
+  };
+  const CommandResult open = spin(1e3, "mujoco");
+  CHECK(open.status == 0);
+  CHECK(open.err.find("world mujoco: closures opened by up to 0.0") != std::string::npos);
+  CHECK(readFile(scratch.path / "spin/summary.json").find("closures opened by") != std::string::npos);
+  CHECK(spin(1e2, "mujoco").err.find("closures opened") == std::string::npos);
+  CHECK(spin(1e3, "bielle").err.find("closures opened") == std::string::npos);
+}
+
 TEST_CASE("free motion: several worlds agree, and are compared on one page") {
   const FreeScratch scratch;
   const std::string torques =

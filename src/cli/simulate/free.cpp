@@ -333,6 +333,7 @@ bool simulateFreely(const SimulateArguments& given, const std::vector<std::strin
         moveFreely(*world, start.q, start.v, options, [&](double time, double duration, const ExecutionSoFar& so_far) {
           if (!arguments.summary_only) watch.update(time, duration, so_far);
         });
+    noteOpenLoops(name, run.motion.execution, run.warnings);
     has_ended = has_ended && run.motion.execution.outcome == Outcome::Ended;
     printRun(run);
     makeOutputDirectory(run.directory);

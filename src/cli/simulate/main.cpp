@@ -68,6 +68,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   }
   requireNoInterrupt();
   const Execution execution = carryOut(plan, *controller.law, *world, arguments.perception, options, observer);
+  noteOpenLoops(arguments.world, execution, warnings);
   print(carried, reason, execution);
   for (const std::string& path : writeFiles(execution)) std::cout << "  " << path << "\n";
   return getStatus(execution.outcome);

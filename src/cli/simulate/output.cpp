@@ -329,6 +329,14 @@ void tell(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) std::cerr << "bielle: warning: " << warning << "\n";
 }
 
+void noteOpenLoops(const std::string& world, const Execution& execution, std::vector<std::string>& warnings) {
+  constexpr double kOpen = 1e-3;  // m
+  if (!(execution.largest_gap > kOpen)) return;
+  warnings.push_back("world " + world + ": closures opened by up to " + formatNumber(execution.largest_gap, "%.2g") +
+                     " m: its loops are too soft for this motion; world bielle closes them to rounding");
+  tell({warnings.back()});
+}
+
 Json listPushes(const std::vector<Push>& pushes) {
   auto list = Json::array();
   for (const Push& push : pushes)

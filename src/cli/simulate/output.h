@@ -12,6 +12,8 @@ Json listPushes(const std::vector<Push>& pushes);
 Json listIntegration(const Integration& integration);
 /// To the user, on standard error.
 void tell(const std::vector<std::string>& warnings);
+/// Adds and tells that closures of a world did not hold, if it is so.
+void noteOpenLoops(const std::string& world, const Execution& execution, std::vector<std::string>& warnings);
 
 /// What is told besides what happened: who asked for what.
 struct CarriedOut {

@@ -29,7 +29,7 @@ void Watch::show(const Execution& execution) {
 void Watch::update(double time, double duration, const ExecutionSoFar& so_far) {
   const Clock::time_point now = Clock::now();
   if (now >= next_line_) {
-    std::cerr << "bielle: " << formatNumber(time, "%.1f") << " of " << formatNumber(duration, "%.1f") << " s\n";
+    std::cerr << "bielle: " << formatNumber(time, "%.3g") << " of " << formatNumber(duration, "%.3g") << " s\n";
     next_line_ = now + kBetweenLines;
   }
   if (show_ && now >= next_page_) {
