@@ -163,7 +163,7 @@ TEST_CASE("assembly: the shortest steps close the same robot, and change nothing
   CHECK(assemble(model, problem, options).status == NumericalStatus::NotClosed);
 }
 
-TEST_CASE("assembly: without patience what is just out of reach is told sooner, and what is within reach the same") {
+TEST_CASE("assembly: with little patience what is just out of reach is told sooner; what is within reach is found as well") {
   const Model model = loadOwn("bipetto").model;
   const VectorXd standing = assembleReference(model, "half_sitting").q;
   Workspace ws(model);

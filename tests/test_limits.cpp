@@ -201,6 +201,19 @@ TEST_CASE(
   REQUIRE(!getLimits(apart).dead_point_margins.empty());
   for (const auto& [linkage, margin] : getLimits(apart).dead_point_margins)
     CHECK(margin > LimitOptions().dead_point_margin);
+  // Margins that are given from the beginning suffice; those that do not, grow, and one below the general margin changes nothing.
+  ProblemOptions given;
+  given.limits.dead_point_margins = getLimits(apart).dead_point_margins;
+  const Solution same = solve(makeMotion(model, request, given));
+  REQUIRE(same.converged());
+  CHECK(getLimits(same).dead_point_margins == given.limits.dead_point_margins);
+  CHECK(same.summary.cost == Approx(apart.summary.cost).epsilon(1e-6));
+  CHECK(same.summary.iterations < apart.summary.iterations);
+  const std::string first = given.limits.dead_point_margins.begin()->first;
+  given.limits.dead_point_margins = {{first, 0.1}};
+  const Solution grown = solve(makeMotion(model, request, given));
+  REQUIRE(grown.converged());
+  CHECK(getLimits(grown).dead_point_margins == getLimits(apart).dead_point_margins);
   // Who asks for less than the default gets it.
   ProblemOptions nearer;
   nearer.limits.dead_point_margin = 0.14;

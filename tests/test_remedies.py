@@ -22,6 +22,7 @@ FOLLOWED = [  # command, what it refuses, the remedy, and what follows it: {} is
     (SOLVE.format("side-walk"), "--set speed=2", r"e\.g\. ([\d.]+) m/s", "--set speed={}"),
     (SOLVE.format("side-walk").replace("bipetto", "rsu_biped"), "--set speed=-2", r"e\.g\. (-[\d.]+) m/s", "--set speed={}"),
     (SOLVE.format("run"), "--set speed=-6", r"e\.g\. (-[\d.]+) m/s", "--set speed={}"),
+    (SOLVE.format("walk"), "--dead-point-margin-of knee_left=1.2", r"e\.g\. ([\d.]+)", "--dead-point-margin-of knee_left={}"),
     (SOLVE.format("walk"), "--set swing_height=2", r"e\.g\. ([\d.]+)", "--set swing_height={}"),
     (SOLVE.format("walk"), "--set time_step=0.2", r"e\.g\. ([\d.]+)", "--set time_step={}"),
     (SOLVE.format("walk") + "--set time_step=0.02 ", "--set single_support=0.03", r"e\.g\. ([\d.]+)", "--set single_support={}"),

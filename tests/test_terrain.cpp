@@ -99,6 +99,40 @@ TEST_CASE("terrain: a sole rests with its own points within one step and in the 
   CHECK(kept > 10000);
 }
 
+TEST_CASE("terrain: where a sole rests does not depend on the cells in which a step is looked up") {
+  Ground ground;
+  ground.steps.push_back({{0, 0, 0.1}, 2, 0.018});  // what of a sole lies on it may have six corners, or eight
+  const Terrain coarse(ground);
+  for (int i = 0; i < 30; ++i) ground.steps.push_back({{0.05 * i - 0.75, 0.5, 0.1}, 0.02, 0.02});
+  const Terrain fine(ground);
+  std::mt19937 generator(11);
+  std::uniform_real_distribution<double> anywhere(-0.02, 0.02), along(-0.7, 0.7), angle(-0.4, 0.4);
+  int added = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector2d middle(along(generator), anywhere(generator));
+    const Eigen::Matrix2d R = Eigen::Rotation2Dd(angle(generator)).toRotationMatrix();
+    const auto at = [&](double x, double y) -> Eigen::Vector2d {
+      return middle + R * Eigen::Vector2d(0.1 * x, 0.02 * y);
+    };
+    const Terrain::Corners corners = {at(1, 1), at(-1, 1), at(-1, -1), at(1, -1)};
+    std::vector<Terrain::Place> places;
+    for (double x = -1; x <= 1; x += 0.5)
+      for (double y = -1; y <= 1; y += 0.5) {
+        places.push_back({at(x, y), Eigen::Vector2d::Zero()});
+        places.back().is_corner = std::abs(x * y) == 1;
+      }
+    std::vector<Terrain::Place> same = places;
+    coarse.findSupports(corners, Vector3d(0.1, 0, 0), 2e-4, 5e-3, places);
+    fine.findSupports(corners, Vector3d(0.1, 0, 0), 2e-4, 5e-3, same);
+    for (size_t k = 0; k < places.size(); ++k) {
+      REQUIRE(same[k].support == places[k].support);
+      REQUIRE(same[k].takes_corner == places[k].takes_corner);
+      added += places[k].takes_corner && !places[k].is_corner;
+    }
+  }
+  CHECK(added > 50);
+}
+
 TEST_CASE("terrain: ramps start level, up and down") {
   for (double slope : {0.1, -0.1}) {
     const Terrain terrain(makeRamp({slope, 0.3, 5, 4}));

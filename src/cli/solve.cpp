@@ -1,6 +1,5 @@
 // bielle solve MOTION: makes the problem, solves it, writes the result.
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -58,6 +57,7 @@ LimitOptions makeLimits(const SolveArguments& arguments) {
   read("--power-limit", arguments.power_limits, "motor_knee_right=40", limits.powers);
   read("--dead-point-margin-of", arguments.dead_point_margins, "'ankley_left, anklex_left=0.5'",
        limits.dead_point_margins);
+  if (arguments.serial) limits.dead_point_margins.clear();
   requireOption(limits.enforced || !limits.areGiven(), "no-limits", "it contradicts the limit given for a motor",
                 "leave out one of them");
   return limits;
@@ -131,10 +131,12 @@ std::vector<std::string> listIdleOptions(const SolveArguments& arguments) {
   check(objective.objective == Objective::Effort && objective.regularization.has_value(), "--regularization",
         "the objective is effort");
   const LimitOptions& limits = arguments.problem.limits;
-  const bool has_margin =
-      limits.dead_point_margin != LimitOptions().dead_point_margin || !arguments.dead_point_margins.empty();
-  check(has_margin && arguments.serial, "--dead-point-margin", "the serial model has no linkages");
-  check(has_margin && !limits.enforced, "--dead-point-margin", "--no-limits leaves out all bounds");
+  const auto checkMargin = [&](bool is_given, const std::string& option) {
+    check(is_given && arguments.serial, option, "the serial model has no linkages");
+    check(is_given && !limits.enforced, option, "--no-limits leaves out all bounds");
+  };
+  checkMargin(limits.dead_point_margin != LimitOptions().dead_point_margin, "--dead-point-margin");
+  checkMargin(!arguments.dead_point_margins.empty(), "--dead-point-margin-of");
   for (const std::string& setting : arguments.settings) {
     const std::string name = splitSetting("--set", setting, "com_weight=1e5").first,
                       last = name.substr(name.rfind('.') + 1);

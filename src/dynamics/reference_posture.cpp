@@ -147,9 +147,12 @@ class ReferenceFeet {
     constexpr double kInclined = 0.01;  // rad, of soles by right angles
     constexpr double kFlat = 0.1;       // of that
     constexpr double kBent = 1e-3;      // rad or m
+    constexpr double kAlike = 0.1;      // of their axes z in the mean: x axes that cancel face nowhere
     const Soles unbent = findSoles(unbent_), given = findSoles(q_ref);
     const Matrix3d right = findRightAngles(unbent, given);
     if (unbent.first.isZero(0) || (q_ref - unbent_).tail(model_.nq() - 7).isZero(kBent)) return right;
+    for (const Soles& soles : {unbent, given})
+      if (!(soles.first.cross(soles.second).norm() > kAlike * soles.first.squaredNorm())) return right;
     const Matrix3d R = makeAttitude(unbent), flat = makeAttitude(given);
     const double inclined = log3(right * flat).norm();
     return inclined > kInclined && log3(R.transpose() * flat).norm() < kFlat * inclined ? R.transpose() : right;

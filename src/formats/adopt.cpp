@@ -24,6 +24,7 @@ namespace {
 
 using YAML::BeginMap, YAML::BeginSeq, YAML::EndMap, YAML::EndSeq, YAML::Flow, YAML::Key, YAML::Value;
 
+constexpr double kDownward = 0.9;                               // cosine of gravity and -z, at least
 constexpr double kHighest = 0.94, kLowest = 0.5, kStep = 0.04;  // shares of the height of the base
 constexpr double kOver = 0.005;                                 // from the centre of mass to the middle of the feet, m
 constexpr int kShifts = 20;
@@ -49,7 +50,7 @@ class Adopter {
       fail("it has a fixed base",
            "only robots that stand on feet can be adopted; complete others by hand, with a YAML file that has the key "
            "`model`, motors and a reference");
-    if (const Vector3d& down = model_.gravity(); !(down.z() <= -0.9 * down.norm()))
+    if (const Vector3d& down = model_.gravity(); !(down.z() <= -kDownward * down.norm()))
       fail("its gravity points along (" + format(down.x()) + ", " + format(down.y()) + ", " + format(down.z()) +
                "), but the ground is level where z is up",
            "turn it so that z is up");
@@ -328,7 +329,7 @@ class Adopter {
     for (const double least : {1.0, 0.5})  // legs without a roll of the ankle stand where they are alone, to all digits
       for (const Bend bend : {Bend::None, Bend::IntoRanges, Bend::Knees})
         for (double share = kHighest; share > kLowest && (least == 1 || may_be_nearer); share -= kStep) {
-          if (work_ > kMostWork * (1 + static_cast<int>(bend)) / kBends) break;  // each has its share of it
+          if (work_ > kMostWork * (1 + static_cast<int>(bend)) / kBends) break;  // bends that come later have more left
           Reference r = makePosture(ws_, share, least);
           if (bend == Bend::IntoRanges) preferRanges(r);
           if (bend == Bend::Knees)

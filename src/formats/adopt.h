@@ -28,7 +28,7 @@ struct Adoption {
 /// - serial joints: those from base to foot, if they are six of one coordinate each. Dead points of their linkages that they can
 ///   reach from the posture are told, and that one lies between it and the neutral configuration.
 /// \param model  value of the key `model`: the path of the robot, as the file will name it
-/// \throws InputError when the robot has no free base, gravity that is not along -z, no loop that closes or no such foot
+/// \throws InputError when the robot has no free base, gravity more than 26 degrees beside -z, no loop that closes or no such foot
 Adoption adoptRobot(const LoadedRobot& robot, const std::string& model);
 
 }  // namespace bielle

@@ -191,14 +191,14 @@ std::vector<FoundFoot> findLegEnds(const Model& model, const Workspace& ws, cons
   for (const FoundFoot& foot : feet) {
     const Inertia& link = model.bodies()[static_cast<size_t>(foot.body)].inertia;
     const double away = link.com.norm();
-    if (foot.is_named || !foot.X_BF.p.isZero(0) || !(away > kLeast)) return {};
+    if (foot.is_named || !foot.X_BF.p.isZero(0) || !(away > kLeast) || !(link.mass > 0)) return {};
     const Vector3d along = link.com / away;
     const double across = link.I_com.trace() / 2;  // of a rod of length 2 l, m (2 l)^2 / 12, however the axes are given
     FoundFoot end = foot;
     end.X_BF.p = (away + std::sqrt(3 * across / link.mass)) * along;
     end.X_WF = {Matrix3d::Identity(), ws.X_WB[static_cast<size_t>(foot.body)].act(end.X_BF.p)};
     end.X_BF.R = ws.X_WB[static_cast<size_t>(foot.body)].R.transpose();
-    if (end.X_WF.p.z() > foot.X_WF.p.z() - kLeast) return {};
+    if (!(end.X_WF.p.z() <= foot.X_WF.p.z() - kLeast)) return {};
     end.frame.clear();
     ends.push_back(end);
   }

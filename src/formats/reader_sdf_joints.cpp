@@ -14,8 +14,8 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 std::string describeSdf(const sdf::Joint& joint) { return "joint '" + joint.Name() + "'"; }
 
-// The rotation to an axis from that of the coordinate axes which it is but for rounding, and which it becomes: else none. Rows across
-// the plane of a linkage are zero so, not a millionth of the others.
+// If an axis is a coordinate axis but for rounding, makes it that one and returns the rotation from it to what was given; else the
+// identity. Rows across the plane of a linkage are then zero, not a millionth of the others.
 Matrix3d turnToAxis(Vector3d& axis) {
   constexpr double kNearly = 1e-3;
   Eigen::Index k = 0;

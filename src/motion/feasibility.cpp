@@ -1,11 +1,13 @@
 #include "motion/feasibility.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
@@ -15,6 +17,7 @@
 #include "formats/robot_text.h"
 #include "math/constants.h"
 #include "math/so3.h"
+#include "model/number_text.h"
 #include "model/rounded_text.h"
 #include "motion/applied_options.h"
 #include "motion/com_reach.h"

@@ -110,8 +110,8 @@ class FeetPlacer {
   };
 
   // With the base as little raised or lowered as can be; the first whose transmission is easy enough, else the first. Heights at
-  // which legs reach are an interval: behind its ends none is tried.
-  // \param sure  where the first start does not lead to a posture, the others do not, either
+  // which legs reach are an interval: beyond its ends none is tried.
+  // \param sure  that no other start leads to a posture where the first does not
   // \param ways  of the base, up and down, over the height of the centre of mass: the longest that failed before, and the longest
   // that is tried
   std::optional<VectorXd> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,

@@ -111,7 +111,7 @@ std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd
     bounds.back().scale[0] = 1;
   }
   if (!margins.empty())
-    requireOption(false, "dead_point_margins", "there is no linkage of '" + margins.begin()->first + "'",
+    requireOption(false, "dead_point_margin", "there is no linkage of '" + margins.begin()->first + "'",
                   "see `bielle info`");
   return bounds;
 }
@@ -125,11 +125,12 @@ void append(const std::vector<PathConstraint>& bounds, std::vector<PathConstrain
 Limits::Limits(const Model& model, const LimitOptions& options, const VectorXd& q0)
     : efforts_(VectorXd::Constant(model.nu(), kNone)) {
   if (!options.enforced) return;
-  const auto requireShare = [](double margin) {
-    requireOption(margin >= 0 && margin < 1, "dead_point_margin", "it is outside 0 .. 1", "give a share, e.g. 0.15");
+  const auto requireShare = [](double margin, const std::string& name) {
+    requireOption(margin >= 0 && margin < 1, name, "it is outside 0 .. 1", "give a share, e.g. 0.15");
   };
-  requireShare(options.dead_point_margin);
-  for (const auto& [linkage, margin] : options.dead_point_margins) requireShare(margin);
+  requireShare(options.dead_point_margin, "dead_point_margin");
+  for (const auto& [linkage, margin] : options.dead_point_margins)
+    requireShare(margin, "dead_point_margin of '" + linkage + "'");
   efforts_ = getEffortLimits(model, options);
   states_ = listRanges(model, q0);
   append(listVelocities(model, options), states_);

@@ -166,8 +166,9 @@ std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const Moti
   if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
   bool larger = false;
   for (const auto& [linkage, needed] : findMargins(solved, record)) {
-    const auto given = limits.dead_point_margins.find(linkage);
-    if (needed <= (given == limits.dead_point_margins.end() ? limits.dead_point_margin : given->second)) continue;
+    const auto own = limits.dead_point_margins.find(linkage);
+    const double given = own == limits.dead_point_margins.end() ? 0 : own->second;
+    if (needed <= std::max(limits.dead_point_margin, given)) continue;
     limits.dead_point_margins[linkage] = needed;
     larger = true;
   }

@@ -122,38 +122,21 @@ ShootingTrajectory holdPosture(const RobotProblem& problem, ShootingTrajectory t
   return trajectory;
 }
 
-// A first attempt that ends as soon as it has gone astray: far from a solution, no step is acceptable without much regularization,
-// as where a linkage is about to snap. Dozens of iterations lead out of there, if any do.
-Solution attemptFirst(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
-                      const StartingPoint& start) {
-  constexpr double kMuch = 1e3, kFar = 0.03;  // regularization; violation
-  bool astray = false;
-  FddpObserver watching = observer;
-  watching.callback = [&](const FddpIteration& line, const ShootingTrajectory& nodes) {
-    if (observer.callback && observer.callback(line, nodes) == FddpAction::Stop) return FddpAction::Stop;
-    astray = line.regularization >= kMuch && line.violation > kFar;
-    return astray ? FddpAction::Stop : FddpAction::Continue;
-  };
-  Solution result = attempt(motion, options, watching, start);
-  if (astray) result.summary.termination = FddpTermination::Infeasible;
-  return result;
-}
-
 // The motion as it is.
 Solution solveAlone(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                     StartingPoint start) {
-  const bool is_first = options.initial_regularization < kCautious;
-  const auto run = is_first ? attemptFirst : attempt;
-  Solution result = run(motion, options, observer, start);
+  Solution result = attempt(motion, options, observer, start);
   if (result.summary.termination == FddpTermination::Failed && result.summary.iterations == 0) {
     start = {holdPosture(*motion.problem, std::move(start.trajectory)), {}};
-    result = run(motion, options, observer, start);
+    result = attempt(motion, options, observer, start);
   }
-  if (!is_first || result.summary.termination != FddpTermination::Infeasible) return result;
-  FddpOptions cautious = options;
-  cautious.initial_regularization = kCautious;
-  start.multipliers = {};
-  return join(std::move(result), attempt(motion, cautious, observer, start));
+  if (result.summary.termination == FddpTermination::Infeasible && options.initial_regularization < kCautious) {
+    FddpOptions cautious = options;
+    cautious.initial_regularization = kCautious;
+    start.multipliers = {};
+    result = join(std::move(result), attempt(motion, cautious, observer, start));
+  }
+  return result;
 }
 
 FddpOptions dampGuess(FddpOptions options) {
@@ -239,7 +222,7 @@ class RequestSolver {
       improve(*apart, {apart->guess}, from_guess, "with linkages farther from dead points", solution, record);
     const auto getMargins = [](const Motion& motion) { return motion.problem_options.limits.dead_point_margins; };
     const bool in_vain = apart_ && getMargins(solution.motion) == getMargins(motion_);
-    for (int i = 0; i < kMostMargins && options_.keep_apart && !in_vain; ++i) {
+    for (int i = apart_ ? 1 : 0; i < kMostMargins && options_.keep_apart && !in_vain; ++i) {
       const auto apart = keepFromDeadPoints(solution.motion, record);
       if (!apart || !keepApart(*apart, again, solution, record)) break;
     }
@@ -417,7 +400,6 @@ class RequestSolver {
 FddpOptions makeMotionSolverOptions() {
   FddpOptions out;
   out.acceptable_decrease = 1e-4;
-  out.short_step = 0.125;  // far from a solution dozens of short steps could follow each other
   return out;
 }
 

@@ -18,7 +18,6 @@ constexpr double kMuch = 0.1;    // regularization up to which full steps are tr
 constexpr double kBetter = 0.5;  // ratio to which each should reduce the errors of models
 constexpr double kShortest = 0.4;       // alpha of a step in segments after a full one that went too far
 constexpr int kShorter = 5;             // steps tried in segments after a full one
-constexpr double kLargestGap = 0.1;     // that these may leave, unless it was larger
 constexpr int kSettling = 30;           // steps that settle() takes, at most
 constexpr double kSettlingFactor = 10;  // of the regularization, between these steps
 
@@ -157,13 +156,14 @@ FddpSolve::End FddpSolve::updateMultipliers() {
 }
 
 // Leaves the accepted trial in accepted_, or renewed_ set. Where constraints and gaps are small, full steps that violate rows are
-// cheaper by holding these rows or by more regularization than a shorter one.
+// cheaper by holding these rows or by more regularization than a shorter one. Far from there, steps that follow a shortened one are
+// rolled out in one piece: in segments some motions end where no step is acceptable.
 FddpSolve::End FddpSolve::searchLine() {
   const int segments = getNumSegments();
   const bool near = line_.violation < kClose && line_.gap <= kClose;
   const bool settles = near && calcForeseen() <= kClose * std::abs(line_.cost);
   renewed_ = false;
-  if (segments > 1 && first_step_ == 1) {
+  if (segments > 1 && first_step_ == 1 && (near || last_step_ == 1)) {
     if (tryFullStep(segments)) return {};
     if (settles && tryShorterStep(segments)) return {};
     if (near && hasViolatedFreeRows()) {
@@ -171,7 +171,7 @@ FddpSolve::End FddpSolve::searchLine() {
       if (accepted_ || renewed_ || regularization_ < kMuch) return {};
     }
   }
-  if (mustClose() || !tryShorterSteps(segments)) searchInOnePiece(startSearch());
+  if (!near || mustClose() || !tryShorterSteps(segments)) searchInOnePiece(startSearch());
   return {};
 }
 
@@ -195,17 +195,12 @@ bool FddpSolve::tryShorterStep(int segments) {
 }
 
 // Steps in segments, each half as long as the last one, from the full one on that has been rejected. They are far cheaper than
-// those in one piece, but leave gaps. Where these grow, segments begin in states that no motion reaches, as beyond dead points,
-// and some solves end there: then a step in one piece, which only closes gaps.
+// those in one piece, but leave gaps, by which they may be rejected.
 bool FddpSolve::tryShorterSteps(int segments) {
   const RolloutInput input = startSearch();
-  const double largest = std::max(line_.gap, kLargestGap);
   double alpha = first_step_ < 1 ? first_step_ : 0.5;
-  for (int i = 0; i < kShorter && segments > 1 && !isInterrupted(); ++i, alpha *= 0.5) {
-    Trial& trial = rollOut(input, alpha, segments);
-    if (trial.gap_max <= largest && accept(trial)) return true;
-  }
-  accepted_ = nullptr;
+  for (int i = 0; i < kShorter && segments > 1 && !isInterrupted(); ++i, alpha *= 0.5)
+    if (accept(rollOut(input, alpha, segments))) return true;
   return false;
 }
 

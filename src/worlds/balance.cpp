@@ -44,16 +44,17 @@ void Balance::update(double plan_time, const std::vector<PredictedFoothold>& for
   speed_ = velocity.norm();
   const double g = model.gravity().norm(), kinetic = calcKineticEnergy(model, ws_);
   excess_ = std::numeric_limits<double>::infinity();
-  bool is_at_rest = kinetic == 0, is_sinking = false;
+  bool is_at_rest = kinetic == 0;
+  is_sinking_ = false;
   if (g > 0 && !support_.empty()) {
     const double height = std::max(0.0, up_.dot(com) - ground_);
     tau_ = std::sqrt(height / g);
     excess_ = calcExcess(across_ * (com + tau_ * velocity));
     is_at_rest = kinetic <= kRest * model.mass() * g * height;
-    is_sinking = -tau_ * up_.dot(velocity) > kSinking * height;
+    is_sinking_ = -tau_ * up_.dot(velocity) > kSinking * height;
   }
   is_calm_ = (touches_ && is_at_rest) || (excess_ <= 0 && !is_turned_over_);
-  if (is_pushed || (touches_ && (!is_calm_ || is_sinking))) disturbed_ = world_.time();
+  if (is_pushed || (touches_ && (!is_calm_ || is_sinking_))) disturbed_ = world_.time();
 }
 
 bool Balance::stands() const {
@@ -65,6 +66,7 @@ std::string Balance::describe() const {
   const std::string moves = "its centre of mass moves at " + formatNumber(speed_, "%.2f m/s");
   if (!touches_) return "no sole touches the ground, " + moves;
   if (is_turned_over_) return "a sole that carries it is turned over an edge, " + moves;
+  if (is_sinking_) return "its legs give way, " + moves;
   if (!(excess_ > 0)) return "its capture point is over its soles again, " + moves;
   return "its capture point is " + formatNumber(excess_, "%.3f m") + " beyond its soles, " + moves;
 }

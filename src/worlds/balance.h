@@ -63,7 +63,7 @@ class Balance {
          speed_ = 0;  // s; of the capture point beyond the support, m; of the centre of mass, m/s
   std::optional<double>
       disturbed_;  // the last instant at which it was pushed, sank, or was neither at rest nor over its support, s
-  bool touches_ = true, is_turned_over_ = false, is_flight_planned_ = false, is_calm_ = true;
+  bool touches_ = true, is_turned_over_ = false, is_flight_planned_ = false, is_calm_ = true, is_sinking_ = false;
 };
 
 }  // namespace bielle::worlds

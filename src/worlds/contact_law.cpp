@@ -254,7 +254,7 @@ void settle<double>(const GroundsOf<double>& grounds, const SE3& X_WF, ContactAr
     const Eigen::Vector2d there =
         is_home ? Eigen::Vector2d(home.head<2>()) : Eigen::Vector2d(back * (support - centre));
     ContactPoint& point = points[area.first + i];
-    const bool is_added = area.places[i].takes_corner && !area.places[i].is_corner;
+    const bool is_added = !is_home && area.places[i].takes_corner && !area.places[i].is_corner;
     const Vector3d p = area.X_BF.act(Vector3d(there.x(), there.y(), is_added ? 0 : home.z()));
     const Vector3d shift = R * (area.X_BF.R.transpose() * (p - point.p));
     point.p = p;

@@ -59,8 +59,9 @@ bool MujocoGround::update(mjModel& mj, const mjData& data) {
   return true;
 }
 
-void MujocoGround::tilt(mjModel& mj, bool is_back) const {
-  const double half = is_back ? -kTilt / 2 : kTilt / 2;
+void MujocoGround::tilt(mjModel& mj) {
+  is_back_ = !is_back_;
+  const double half = is_back_ ? -kTilt / 2 : kTilt / 2;
   for (size_t i = 0; i < shown_.size(); ++i) {
     const Eigen::Quaterniond q = shown_[i]->attitude * Eigen::Quaterniond(1, half, half, 0);
     Eigen::Map<Eigen::Vector4d>(mj.geom_quat + 4 * geoms_[i]) << q.w(), q.x(), q.y(), q.z();

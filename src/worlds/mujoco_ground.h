@@ -24,9 +24,10 @@ class MujocoGround {
   /// Moves boxes under the soles as they stand in `data`. To be called whenever these may have moved by kReach.
   /// \returns false if there are too many boxes under the soles
   bool update(mjModel& mj, const mjData& data);
-  /// Before every step: this way, then that way, by less than can be measured. MuJoCo 2.2.2 takes the normal of two boxes whose
-  /// edges are parallel to within 1e-13 rad from rounding, and throws the one off the other.
-  void tilt(mjModel& mj, bool is_back) const;
+  /// Tilts the boxes that are shown by 1e-9 rad, to the other side at every call. To be called before every step: MuJoCo
+  /// 2.2.2 takes the normal of two boxes whose edges are parallel to within 1e-13 rad from rounding, and throws the one off
+  /// the other.
+  void tilt(mjModel& mj);
 
   static constexpr double kReach = 0.02;  ///< m
 
@@ -43,6 +44,7 @@ class MujocoGround {
   void show(mjModel& mj, int geom, const Box& box) const;
 
   Model model_;
+  bool is_back_ = false;  // the side of the last tilt
   double height_;
   std::vector<Box> boxes_;
   std::vector<int> geoms_;         // of the boxes that MuJoCo has

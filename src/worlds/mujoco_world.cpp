@@ -114,7 +114,7 @@ bool MujocoWorld::step(double duration) {
   for (; taken < steps && !(taken > 0 && isInterrupted()); ++taken) {
     if (std::fmod(taken, box_steps) == 0 && !boxes_.update(*mujoco_.get(), *data_))
       message_ = "there are too many boxes under the soles";
-    boxes_.tilt(*mujoco_.get(), std::fmod(taken, 2) == 1);
+    boxes_.tilt(*mujoco_.get());
     if (!message_.empty() || !takeStep()) break;
     book(h);
     noteStep(h);

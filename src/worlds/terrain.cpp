@@ -231,7 +231,8 @@ static void giveCorners(const void* top, const Clipped& part, const Terrain::Cor
     const auto isHere = [&](const Eigen::Vector2d& at) { return (at - part[i]).squaredNorm() < kInside * kInside; };
     bool is_held = std::any_of(corners.begin(), corners.end(), isHere);
     for (Place& place : places) {
-      if (!place.is_corner || !isHere(place.support)) continue;
+      if (!(place.is_corner || place.takes_corner) || !isHere(place.support))
+        continue;  // tops are visited cell by cell
       if (isFree(place) && place.distance > 4 * kInside * kInside) continue;
       place.top = nullptr;
       is_held = true;

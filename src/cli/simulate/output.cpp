@@ -331,7 +331,7 @@ void tell(const std::vector<std::string>& warnings) {
 
 void noteOpenLoops(const std::string& world, const Execution& execution, std::vector<std::string>& warnings) {
   constexpr double kOpen = 1e-3;  // m
-  if (!(execution.largest_gap > kOpen)) return;
+  if (execution.largest_gap <= kOpen) return;
   warnings.push_back("world " + world + ": closures opened by up to " + formatNumber(execution.largest_gap, "%.2g") +
                      " m: its loops are too soft for this motion; world bielle closes them to rounding");
   tell({warnings.back()});

@@ -12,7 +12,7 @@ Json listPushes(const std::vector<Push>& pushes);
 Json listIntegration(const Integration& integration);
 /// To the user, on standard error.
 void tell(const std::vector<std::string>& warnings);
-/// Adds and tells that closures of a world did not hold, if it is so.
+/// Warns, on standard error and in `warnings`, if closures of a world opened by more than 1 mm.
 void noteOpenLoops(const std::string& world, const Execution& execution, std::vector<std::string>& warnings);
 
 /// What is told besides what happened: who asked for what.
