@@ -27,7 +27,6 @@ from problem import Problem
 
 LONGEST = 20     # s of processor time, of a run on one thread, unless told otherwise
 ITERATIONS = 300
-MARGIN = "dead-point-margin"  # and "dead-point-margin of LINKAGE": a run begins with those of the archive
 
 # Options of `bielle solve`. All but the first change one thing.
 VARIANTS = {
@@ -123,20 +122,14 @@ def run(bielle, entry, solved, start, output, options, longest):
     command = [bielle, "solve", entry["motion"], "--robot", summary["robot_file"], "--warm-start", start, "-o", output,
                "--threads", "1", "--max-iterations", ITERATIONS, "--quiet", "--no-check", "--no-report", *options]
     for name, value in summary["options"].items():
-        if not name.startswith(MARGIN):
+        if not name.startswith("dead-point-margin"):
             command += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
-    if f"--{MARGIN}" not in options:
-        for name, value in summary["options"].items():
-            if name == MARGIN:
-                command += [f"--{MARGIN}", value]
-            elif name.startswith(MARGIN):
-                command += [f"--{MARGIN}-of", f"{name.removeprefix(f'{MARGIN} of ')}={value}"]
     status, seconds = run_or_end(command, longest)
     if status == -signal.SIGXCPU:
         return {**NONE, "end": "too late"}
     result = json.loads((output / "summary.json").read_text(encoding="utf-8"))
     def list_others(options):
-        return {name: value for name, value in options.items() if not name.startswith(MARGIN)}
+        return {name: value for name, value in options.items() if not name.startswith("dead-point-margin")}
     if list_others(result["options"]) != list_others(summary["options"]):
         return {**NONE, "end": "other stages"}  # the solver made them shorter: another problem
     return {"converged": result["converged"], "cost": result["cost"],

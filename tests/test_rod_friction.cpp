@@ -7,6 +7,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/model/builder.h"
+#include "bielle/motion/motion.h"
 #include "bielle/worlds/batch.h"
 #include "check_derivative.h"
 #include "dynamics/rod_friction.h"
