@@ -539,6 +539,7 @@ TEST_CASE("feet whose frames face backward get frames that face forward, so that
   const RobotDirectory directory;
   const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(urdf + "</robot>", "")), "../robot.urdf");
   CAPTURE(adoption.yaml);
+  CHECK(adoption.yaml.find("add a link without mass under each foot, z up and x forward") != std::string::npos);
   const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
   const AssemblyResult posture = assembleReference(model, "half_sitting");
   REQUIRE(posture.status == NumericalStatus::Ok);
