@@ -1,6 +1,7 @@
 #!/bin/bash
 # check_includes.sh [--all]: compiles sources without precompiled headers, each by itself, so that a file that forgets an include
-# is noticed. Without --all it takes every twelfth file, other ones for each state of the tree.
+# is noticed. Without --all it takes those that the last 40 commits touched, and of the others every twelfth, other ones for each
+# state of the tree.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 cd "$bielle_root"
@@ -10,8 +11,10 @@ cmake -S . -B build/includes -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS
   -DCMAKE_UNITY_BUILD=OFF >/dev/null
 # Headers that are generated come first.
 if ninja -C build/includes -t query bielle_messages >/dev/null 2>&1; then ninja -C build/includes bielle_messages >/dev/null; fi
+git log -40 --name-only --format= -- '*.cpp' >build/includes/touched
 ninja -C build/includes -t targets all | awk -F: '/\.cpp\.o:/ {print $1}' | sort |
-  awk -v turn="$turn" -v turns="$turns" 'NR % turns == turn' >build/includes/objects
+  awk -v turn="$turn" -v turns="$turns" 'NR == FNR {touched[$0]; next} {file = $0; sub(/CMakeFiles\/[^\/]*\.dir\//, "", file);
+    sub(/\.o$/, "", file)} FNR % turns == turn || file in touched' build/includes/touched - >build/includes/objects
 echo "includes: $(wc -l <build/includes/objects) files by themselves"
 python3 - <<'PROGRAM'
 import json, os, subprocess, sys
