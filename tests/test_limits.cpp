@@ -214,6 +214,18 @@ TEST_CASE(
   const Solution grown = solve(makeMotion(model, request, given));
   REQUIRE(grown.converged());
   CHECK(getLimits(grown).dead_point_margins == getLimits(apart).dead_point_margins);
+  // Who stops the second solve is asked no more.
+  int solves = 0;
+  bool stopped = false;
+  SolveObserver observer;
+  observer.motion.callback = [&](const FddpIteration& line, const ShootingTrajectory&) {
+    CHECK(!stopped);
+    solves += line.iteration == 1;
+    stopped = solves == 2;
+    return stopped ? FddpAction::Stop : FddpAction::Continue;
+  };
+  CHECK(solve(makeMotion(model, request), {}, observer).summary.termination == FddpTermination::Interrupted);
+  CHECK(stopped);
   // Who asks for less than the default gets it.
   ProblemOptions nearer;
   nearer.limits.dead_point_margin = 0.14;

@@ -190,7 +190,14 @@ void refuseLongStages(const MotionRecord& record, Solution& solution) {
 class RequestSolver {
  public:
   RequestSolver(const Motion& motion, const SolveOptions& options, const SolveObserver& observer)
-      : motion_(motion), options_(options), observer_(observer) {}
+      : motion_(motion), options_(options), observer_(observer) {
+    // Who stops one solve stops those after it.
+    observer_.motion.callback = [this, &observer](const FddpIteration& line, const ShootingTrajectory& nodes) {
+      const auto& callback = observer.motion.callback;
+      stopped_ = stopped_ || (callback && callback(line, nodes) == FddpAction::Stop);
+      return stopped_ ? FddpAction::Stop : FddpAction::Continue;
+    };
+  }
 
   Solution solve() {
     tellDeadPoints();
@@ -235,13 +242,12 @@ class RequestSolver {
   // Looks at dead points as soon as the course of the motion is clear: a motion that is solved again needs no end.
   Solution solveApart(const FddpOptions& solver, const FddpOptions& again, StartingPoint start) {
     constexpr double kClear = 0.01;  // violation, gaps, and change of the cost by a full step, relative to it
-    const auto& callback = observer_.motion.callback;
     double last_cost = std::numeric_limits<double>::infinity(), last_step = 0;
     bool looks =
         options_.keep_apart && !motion_.cycle && motion_.problem_options.objective.objective != Objective::PeakTorque;
     FddpObserver observer = observer_.motion;
     observer.callback = [&](const FddpIteration& line, const ShootingTrajectory& nodes) {
-      if (callback && callback(line, nodes) == FddpAction::Stop) return FddpAction::Stop;
+      if (observer_.motion.callback(line, nodes) == FddpAction::Stop) return FddpAction::Stop;
       const double change = line.cost - std::exchange(last_cost, line.cost);
       const bool rests = last_step == 1 && std::abs(change) <= kClear * std::abs(line.cost);
       last_step = line.step;
@@ -392,7 +398,8 @@ class RequestSolver {
   Motion motion_;
   std::optional<RefinedMotion> apart_;  // what solveApart() has tried
   const SolveOptions& options_;
-  const SolveObserver& observer_;
+  SolveObserver observer_;
+  bool stopped_ = false;
 };
 
 }  // namespace
