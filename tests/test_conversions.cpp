@@ -372,7 +372,7 @@ TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and te
     CHECK(closure.terms.size() == 2);
   }
   CHECK_THAT(getError([] { formatUrdf(loadRobot("cleobot").model); }),
-             Catch::Contains("URDF does not have such joints") && Catch::Contains("--to bielle"));
+             Catch::Contains("URDF has no such joints") && Catch::Contains("--to bielle"));
 }
 
 TEST_CASE("polynomials of couplers: exact in YAML, refused or told where a format cannot say them") {

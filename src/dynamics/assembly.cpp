@@ -131,7 +131,7 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
   const VectorXd weights = problem.weights.size() ? problem.weights : VectorXd::Ones(model.nv());
   conditions.update(result.q);
   double error = (conditions.h - offset).norm();
-  std::vector<double> errors;
+  std::vector<double> errors;  // only with patience
   for (int i = 0; i < options.max_iterations; ++i, ++result.iterations) {
     const VectorXd wish = model.difference(result.q, problem.q_ref);
     const double damping = std::min(0.1, error);
@@ -156,9 +156,9 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
     }
     result.q = q_new;
     error = (conditions.h - offset).norm();
+    if (options.patience == 0) continue;
     errors.push_back(error);
-    if (options.patience > 0 && i >= options.patience && error > 1e-6 &&
-        error > 0.7 * errors[static_cast<size_t>(i - options.patience)])
+    if (i >= options.patience && error > 1e-6 && error > 0.7 * errors[static_cast<size_t>(i - options.patience)])
       return false;
   }
   return conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;

@@ -12,7 +12,6 @@
 #include "math/decompositions.h"
 #include "math/direction.h"
 #include "math/largest.h"
-#include "math/so3.h"
 
 namespace bielle {
 namespace {
@@ -155,15 +154,13 @@ void FollowedLinkage::alignFrames(const VectorXd& q) {
     if (!is_hinge && closure.kind != ClosureKind::Ball3D) continue;
     const Matrix3d R_W1 = ws_.X_WB[closure.body1].R * closure.X_B1.R;
     const Vector3d normal = R_W1.transpose() * getDirection(loop.axes[0].place);
-    Eigen::Index k = 0;
-    normal.cwiseAbs().maxCoeff(&k);
-    const Vector3d sine = Vector3d::Unit(k).cross(normal) * std::copysign(1.0, normal[k]);
-    if (sine.isZero(0) || sine.norm() > kMostAngleRounding) continue;
-    const Matrix3d turn = exp3(Vector3d(std::asin(sine.norm()) * sine.normalized()));
-    closure.X_B1.R = closure.X_B1.R * turn;
+    const NearestAxis across = findNearestAxis(normal);
+    if (across.angle == 0 || across.angle > kMostAngleRounding) continue;
+    closure.X_B1.R = closure.X_B1.R * across.turn;
     if (!is_hinge) continue;
-    closure.X_B2.R = closure.X_B2.R * turn;
-    closure.axis = Vector3d::Unit(k) * std::copysign(1.0, closure.axis[k]);  // along the normal, to the last digits
+    closure.X_B2.R = closure.X_B2.R * across.turn;
+    closure.axis =
+        across.axis * std::copysign(1.0, across.axis.dot(closure.axis));  // along the normal, to the last digits
   }
   model_ = ModelBuilder::restore(std::move(parts));
   set_ = makeConstraintSet(model_);

@@ -5,7 +5,7 @@
 #include "bielle/model/error.h"
 #include "formats/reader_loops.h"
 #include "formats/reader_sdf.h"
-#include "math/so3.h"
+#include "math/direction.h"
 
 namespace bielle {
 namespace {
@@ -17,13 +17,11 @@ std::string describeSdf(const sdf::Joint& joint) { return "joint '" + joint.Name
 // If an axis is a coordinate axis but for rounding, makes it that one and returns the rotation from it to what was given; else the
 // identity. Rows across the plane of a linkage are then zero, not a millionth of the others.
 Matrix3d turnToAxis(Vector3d& axis) {
-  constexpr double kNearly = 1e-3;
-  Eigen::Index k = 0;
-  axis.cwiseAbs().maxCoeff(&k);
-  const Vector3d nearest = Vector3d::Unit(k) * std::copysign(1.0, axis[k]), sine = nearest.cross(axis.normalized());
-  if (sine.isZero(0) || sine.norm() > kNearly) return Matrix3d::Identity();
-  axis = nearest;
-  return exp3(Vector3d(std::asin(sine.norm()) * sine.normalized()));
+  constexpr double kNearly = 1e-3;  // rad
+  const NearestAxis nearest = findNearestAxis(axis);
+  if (nearest.angle == 0 || nearest.angle > kNearly) return Matrix3d::Identity();
+  axis = nearest.axis;
+  return nearest.turn;
 }
 
 }  // namespace

@@ -41,7 +41,7 @@ class UrdfWriter {
       if (!for_drake && (kind == JointKind::Spherical || kind == JointKind::Universal))
         throw InputError(
             model_.name(), std::string(getName(kind)) + " joint '" + model_.joints()[i].name + "'",
-            "URDF does not have such joints",
+            "URDF has no such joints",
             "write another format: a URDF with a YAML file (--to bielle), MJCF (--to mjcf), SDF or Drake's");
     }
     for (const Closure& c : model_.closures()) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/so3.h"
+
 namespace bielle {
 
 Matrix3d calcRotationOfZ(const Vector3d& direction) {
@@ -20,6 +22,15 @@ Matrix3d calcRotationOfZ(const Vector3d& direction) {
     q.vec() = normal * (1 / s);
   }
   return q.toRotationMatrix();
+}
+
+NearestAxis findNearestAxis(const Vector3d& direction) {
+  Eigen::Index k = 0;
+  direction.cwiseAbs().maxCoeff(&k);
+  const Vector3d axis = Vector3d::Unit(k) * std::copysign(1.0, direction[k]), normal = axis.cross(direction);
+  const double angle = std::atan2(normal.norm(), axis.dot(direction));
+  if (normal.isZero(0)) return {axis, 0, Matrix3d::Identity()};
+  return {axis, angle, exp3(Vector3d(angle * normal.normalized()))};
 }
 
 Matrix3d makeRotation(const Vector3d& rpy) {

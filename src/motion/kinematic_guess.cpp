@@ -119,9 +119,9 @@ class FeetPlacer {
                                     const std::array<double, 2>& ways, double easy) {
     const double step = ways[1] / 4;
     std::optional<VectorXd> first;
-    int at = 0, highest = -4, lowest = 4;  // steps downwards: of the first, and of those that are left
+    int at = 0, first_left = -4, last_left = 4;  // steps downwards: of `first`, and of those that may reach
     for (int i = 0; i <= 4; i = i > 0 ? -i : 1 - i) {
-      if (i < highest || i > lowest || (ways[0] > 0 && std::abs(i) * step < ways[0] + 1e-9)) continue;
+      if (i < first_left || i > last_left || (ways[0] > 0 && std::abs(i) * step < ways[0] + 1e-9)) continue;
       VectorXd base = planned.q.head<7>();
       base[2] -= i * step * height_;
       bool reaches = false;
@@ -132,12 +132,12 @@ class FeetPlacer {
         if (posture && !first) {
           first = std::move(posture->q);
           at = i;
-          if (i > 0) highest = i;
-          if (i < 0) lowest = i;
+          if (i > 0) first_left = i;
+          if (i < 0) last_left = i;
         }
         if (!reaches && sure) break;
       }
-      if (first && !reaches) (i < at ? highest : lowest) = i;
+      if (first && !reaches) (i < at ? first_left : last_left) = i;
     }
     return first;
   }

@@ -227,8 +227,8 @@ class RequestSolver {
     if (refined) improve(refined->motion, refined->start, again, "with stages half as long", solution, record);
     if (const auto apart = avoidDeadPoints(refined ? refined->motion : solution.motion, record))
       improve(*apart, {apart->guess}, from_guess, "with linkages farther from dead points", solution, record);
-    const auto getMargins = [](const Motion& motion) { return motion.problem_options.limits.dead_point_margins; };
-    const bool in_vain = apart_ && getMargins(solution.motion) == getMargins(motion_);
+    const bool in_vain = apart_ && solution.motion.problem_options.limits.dead_point_margins ==
+                                       motion_.problem_options.limits.dead_point_margins;
     for (int i = apart_ ? 1 : 0; i < kMostMargins && options_.keep_apart && !in_vain; ++i) {
       const auto apart = keepFromDeadPoints(solution.motion, record);
       if (!apart || !keepApart(*apart, again, solution, record)) break;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "dynamics/ground_step.h"
 
@@ -60,8 +61,7 @@ bool MujocoGround::update(mjModel& mj, const mjData& data) {
 }
 
 void MujocoGround::tilt(mjModel& mj) {
-  is_back_ = !is_back_;
-  const double half = is_back_ ? -kTilt / 2 : kTilt / 2;
+  const double half = std::exchange(is_back_, !is_back_) ? -kTilt / 2 : kTilt / 2;
   for (size_t i = 0; i < shown_.size(); ++i) {
     const Eigen::Quaterniond q = shown_[i]->attitude * Eigen::Quaterniond(1, half, half, 0);
     Eigen::Map<Eigen::Vector4d>(mj.geom_quat + 4 * geoms_[i]) << q.w(), q.x(), q.y(), q.z();

@@ -28,6 +28,7 @@ class MujocoGround {
   /// 2.2.2 takes the normal of two boxes whose edges are parallel to within 1e-13 rad from rounding, and throws the one off
   /// the other.
   void tilt(mjModel& mj);
+  void startTilts() { is_back_ = false; }  ///< so that what is simulated again is the same to the last bit
 
   static constexpr double kReach = 0.02;  ///< m
 
@@ -44,7 +45,7 @@ class MujocoGround {
   void show(mjModel& mj, int geom, const Box& box) const;
 
   Model model_;
-  bool is_back_ = false;  // the side of the last tilt
+  bool is_back_ = false;  // the side of the next tilt
   double height_;
   std::vector<Box> boxes_;
   std::vector<int> geoms_;         // of the boxes that MuJoCo has

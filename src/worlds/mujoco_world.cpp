@@ -95,6 +95,7 @@ void MujocoWorld::setPointSprings() {
 }
 
 void MujocoWorld::start() {
+  boxes_.startTilts();
   mj_resetData(mujoco_.get(), data_.get());
   mujoco_.setState(q_, v_, *data_);
   mj_kinematics(mujoco_.get(), data_.get());

@@ -38,7 +38,7 @@ class Terrain {
     const void* top = nullptr;  ///< whose edge bears it
     double distance = 0;        ///< squared, m^2
     bool is_corner = false;     ///< of the sole: before others, it takes a corner of what lies on the step
-    bool takes_corner = false;  ///< whether it has
+    bool takes_corner = false;  ///< set by findSupports(): it lies on such a corner
   };
   using Corners = std::array<Eigen::Vector2d, 4>;
   /// Moves places of a sole that overhang a step onto its edge, to the corners of what lies on the step first. The ground is at a

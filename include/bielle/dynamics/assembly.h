@@ -43,8 +43,8 @@ struct AssemblyOptions {
   double tolerance = 1e-12;  ///< on every closure and target, m and rad
   double step_limit = 0.2;   ///< largest change of a coordinate per step, m or rad
   int max_iterations = 200;  ///< per continuation step
-  /// Iterations in which the norm of the conditions has to fall by three tenths, while it is above 1e-6; 0: it need not. A target out of
-  /// reach is told sooner; one that is only reached past a worse posture is given up.
+  /// Iterations in which the norm of the conditions has to fall by three tenths, while it is above 1e-6; 0: no such limit. With
+  /// one, targets out of reach are refused sooner, and so are those that are only reached past worse postures.
   int patience = 0;
   int continuation_steps = 20;
   /// Singular values of H below this, relative to the largest, count as zero. It is above the square root of rounding,
@@ -75,8 +75,8 @@ AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const As
 AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions& options = {});
 
 /// The assembly problem of a reference of the robot's file: preferred joint values, feet flat at their places, height.
-/// A free base that is not given is over the middle of the feet, upright as on unbent legs (by right angles, if given ones allow), and
-/// faces as they do, so that the posture does not depend on where the robot stands. A foot without a yaw is free to turn about the
+/// A free base that is not given is over the middle of the feet, with the attitude in which its soles on unbent legs lie flat (rounded
+/// to right angles where the given joint angles allow it), and faces as they do, so that the posture does not depend on where the robot stands. A foot without a yaw is free to turn about the
 /// vertical where an angle but 0 of a joint of its leg about the vertical is given; else it faces as the base does, where
 /// that is given, or else as the robot has to turn for its feet to lie as near as possible to their places (two: across or
 /// along the line between them; more: a fit in the plane, in the least-squares sense; a single foot faces x).

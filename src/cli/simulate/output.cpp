@@ -333,7 +333,8 @@ void noteOpenLoops(const std::string& world, const Execution& execution, std::ve
   constexpr double kOpen = 1e-3;  // m
   if (execution.largest_gap <= kOpen) return;
   warnings.push_back("world " + world + ": closures opened by up to " + formatNumber(execution.largest_gap, "%.2g") +
-                     " m: its loops are too soft for this motion; world bielle closes them to rounding");
+                     " m: its loops are too soft for this motion" +
+                     (world == "bielle" ? "" : "; world bielle closes them to rounding"));
   tell({warnings.back()});
 }
 
