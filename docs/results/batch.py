@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Writes docs/results/batch.md: the speed of many worlds at once, by bielle-batch-speed beside the command.
+"""Writes docs/results/batch.md and docs/images/batch.svg: the speed of many worlds at once, by bielle-batch-speed beside the
+command.
 
     docs/results/batch.py [--bielle build/bin/bielle] [--rounds 9] [--quick]
 
 Processor time, each kind of world in turn: other programs on the machine lengthen all alike, more or less.
 """
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -15,13 +17,18 @@ import common
 
 REGISTERS = {8: "AVX-512, eight numbers", 4: "AVX2, four numbers", 2: "SSE2, two numbers"}
 TITLES = {"many": "many at once", "single": "one after the other", "mujoco": "MuJoCo 2.2.2, `mj_step` alone"}
+IMAGE = common.SOURCE / "docs/images/batch.svg"
+ROBOTS = {"Bipetto": ["--robot", common.SOURCE / "robots/bipetto"], "Cleobot": ["--robot", common.SOURCE / "robots/cleobot"],
+          "four-bar knees, Digit's ankles": ["--robot", common.SOURCE / "suite/digit_ankles"],
+          "16 four-bars in a chain": ["--four-bars", 16]}  # fmt: skip
+STEPS = (2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2)  # s
+PRECISE = 1e-3  # rad or m
 GOALS = {(8, 1e-3): 8, (8, 2.5e-4): 12, (4, 1e-3): 4, (4, 2.5e-4): 6}
 
 
 def measure(program, *options):
     run = subprocess.run([program, *map(str, options)], capture_output=True, text=True, check=True)
-    if run.stderr:
-        print(run.stderr, file=sys.stderr, end="")
+    print(run.stderr, file=sys.stderr, end="")
     return json.loads(run.stdout)
 
 
@@ -71,6 +78,83 @@ machine that does nothing else.""")
                 for name, report in (("stand", stands), ("fall", falls)) for row in report["threads"]])
 
 
+def find_best(runs, world):
+    """The fastest run of a world, by the beginning of its name, whose error is small enough; None if there is none."""
+    precise = [run for run in runs if run["world"].startswith(world) and (run["error"] or math.inf) <= PRECISE]
+    return max(precise, key=lambda run: run["rate"], default=None)
+
+
+def describe_best(run):
+    if run is None:
+        return "none"
+    integrator = run["world"].partition(", ")[2]
+    return f"{run['rate']:.0f} ({', '.join([integrator] * bool(integrator) + [show_step(run)])})"
+
+
+def show_step(run):
+    return f"{1e3 * run['time step [s]']:g} ms"
+
+
+def draw(reports):
+    import matplotlib
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "batch", "svg.fonttype": "none", "font.size": 9})
+    from matplotlib import pyplot
+    figure, axes = pyplot.subplots(1, len(reports), figsize=(3 * len(reports), 3), sharey=True)
+    for ax, (name, runs) in zip(axes, reports.items()):
+        for world in dict.fromkeys(run["world"] for run in runs):
+            line = [run for run in runs if run["world"] == world and run["rate"] > 0 and (run["error"] or math.inf) < 1]
+            ax.loglog([run["rate"] for run in line], [run["error"] for run in line], "o-", ms=3, lw=1.2,
+                      label=world.replace("many", "many at once").replace("mujoco", "MuJoCo"))
+        ax.axhline(PRECISE, color="k", lw=0.6, ls=":")
+        ax.set_title(name, fontsize=9)
+        ax.set_xlabel("robot-seconds per second")
+        ax.grid(True, lw=0.3)
+    axes[0].set_ylabel("largest error of a joint [rad]")
+    axes[0].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(IMAGE, metadata={"Date": None})
+    pyplot.close(figure)
+
+
+def add_precision(page, program, quick):
+    robots = {"2 four-bars": ["--four-bars", 2]} if quick else ROBOTS
+    options = ["--worlds", 2 if quick else 16, "--seconds", 0.1 if quick else 1]
+    options += [word for step in (STEPS[2:4] if quick else STEPS) for word in ("--time-step", step)]
+    reports = {}
+    for name, robot in robots.items():
+        print(f"precision of {name}", file=sys.stderr, flush=True)
+        reports[name] = measure(program, "--precision", *robot, *options)["runs"]
+    page.heading("Precision")
+    page.add(f"""Springs of 100 N m/rad and dampers of 2 N m s/rad at the motors hold a posture, without control, so that steps may
+be as long as one likes, while the first body is pushed for 50 ms, differently in each world. An error is the largest difference of
+any joint within a second from the motion by steps of 1/32 ms of the same program. *Best*: robot-seconds per second of processor time
+of the setting that is fastest within {PRECISE:g} rad. MuJoCo's closures and contacts are as stiff as the exported file has them, or
+its step allows. The goal is 8 times MuJoCo's best for Bipetto, and at 1 ms 6 times MuJoCo's steps for the others.""")
+    rows = []
+    for name, runs in reports.items():
+        own, other = find_best(runs, "many"), find_best(runs, "mujoco")
+        at = {run["world"]: run for run in runs if run["time step [s]"] == 1e-3}
+        rows.append([name, f"{at['many']['rate'] / at['mujoco, Euler']['rate']:.1f}", describe_best(own), describe_best(other),
+                     f"{own['rate'] / other['rate']:.0f}" if own and other else "–", f"{runs[0]['moves']:.3f}",
+                     f"{at['mujoco, RK4']['apart']:.1e}"])
+    page.table(["robot", "steps at 1 ms over MuJoCo's (Euler)", "best of many at once", "MuJoCo's best", "ratio of the best",
+                "joints move by [rad]", "converged motions of both apart [rad]"], rows)
+    if not quick:
+        draw(reports)
+        page.lines += ["", "![error over robot-seconds per second](../images/batch.svg)"]
+    for name, runs in reports.items():
+        worlds = list(dict.fromkeys(run["world"] for run in runs))
+        page.add(f"{name[0].upper() + name[1:]}: errors [rad] and the largest opening of a closure [m] by time step.")
+        page.table(["step", *(world.replace("many", "many at once").replace("mujoco", "MuJoCo") for world in worlds)],
+                   [[show_step(row), *(show_error(run) for run in runs if run["time step [s]"] == row["time step [s]"])]
+                    for row in runs if row["world"] == worlds[0]])
+
+
+def show_error(run):
+    return "breaks off" if run["error"] is None or run["error"] > 1 else f"{run['error']:.1e}, {run['gap [m]']:.1e}"
+
+
 def describe_goals(report):
     parts = []
     for step in dict.fromkeys(row["time step [s]"] for row in report["runs"]):
@@ -112,6 +196,7 @@ worlds differ. A round of Newton's method is one for all robots of a register, p
 slide, joints run into stops, and steps are halved, at other times in every world: a register goes as slowly as its slowest robot.
 MuJoCo's steps are never halved.""")
     add_table(page, falls)
+    add_precision(page, program, arguments.quick)
     add_threads(page, stands, falls)
     if overhead := measure_overhead(command, 8 if arguments.quick else 256):
         add_overhead(page, overhead)

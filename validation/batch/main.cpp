@@ -10,9 +10,11 @@
 
 #include "bench/batch_speed.h"
 #include "bielle/dynamics/assembly.h"
+#include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/robot_loader.h"
 #include "bielle/worlds/batch.h"
 #include "math/lane_registers.h"
+#include "precision.h"
 #include "worlds/mujoco_model.h"
 
 namespace {
@@ -25,9 +27,9 @@ constexpr double kTick = BatchTask::kTick;
 struct Arguments {
   std::string robot = "bipetto";
   std::vector<double> time_steps = {1e-3, 2.5e-4};
-  int worlds = 32, rounds = 5;
+  int worlds = 32, rounds = 5, four_bars = 0;
   double seconds = 0.2;
-  bool falls = false;
+  bool falls = false, precision = false;
 };
 
 struct Speed {
@@ -113,19 +115,50 @@ double measureMemory(const Model& model) {
   return (readMemory() - before) / kMany;
 }
 
+Model loadModel(const Arguments& arguments) {
+  if (arguments.four_bars == 0) return loadRobot(arguments.robot).model;
+  FourBarChainOptions options;
+  options.count = arguments.four_bars;
+  return makeFourBarChain(options).model;
+}
+
+void printPrecision(const Model& model, const Arguments& arguments) {
+  PrecisionOptions options;
+  options.time_steps = arguments.time_steps;
+  options.seconds = arguments.seconds;
+  options.worlds = arguments.worlds;
+  nlohmann::ordered_json out = {{"register", kRegister}, {"seconds", options.seconds}, {"push [N]", options.push}};
+  for (const Precision& row : measurePrecision(model, options))
+    out["runs"].push_back({{"world", row.world},
+                           {"time step [s]", row.time_step},
+                           {"error", row.error},
+                           {"gap [m]", row.gap},
+                           {"moves", row.moves},
+                           {"apart", row.apart},
+                           {"rate", row.rate}});
+  std::cout << out.dump(2) << "\n";
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Steps per second of processor time: many worlds at once, one after the other, and MuJoCo, in turn.");
   app.add_option("--robot", arguments.robot);
+  app.add_option("--four-bars", arguments.four_bars, "instead of a robot: links of a chain that hangs in the world")
+      ->check(CLI::PositiveNumber);
   app.add_option("--time-step", arguments.time_steps, "s");
   app.add_option("--worlds", arguments.worlds)->check(CLI::PositiveNumber);
   app.add_option("--rounds", arguments.rounds, "runs of each, in turn")->check(CLI::PositiveNumber);
   app.add_option("--seconds", arguments.seconds, "simulated, of a run")->check(CLI::PositiveNumber);
   app.add_flag("--falls", arguments.falls, "limp robots that are dropped");
+  app.add_flag("--precision", arguments.precision, "errors by time step, of a second of a robot that is pushed");
   CLI11_PARSE(app, argc, argv);
-  const Model model = loadRobot(arguments.robot).model;
+  const Model model = loadModel(arguments);
+  if (arguments.precision) {
+    printPrecision(model, arguments);
+    return 0;
+  }
   const BatchTask task(model, arguments.falls);
   using Run = std::function<Speed(double)>;
   const std::map<std::string, Run> runs = {{"many", [&](double h) { return runBatch(task, arguments, h); }},
