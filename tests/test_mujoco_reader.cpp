@@ -76,6 +76,52 @@ TEST_CASE("MuJoCo has the masses of meshes that the reader has, by both of its w
   }
 }
 
+TEST_CASE("it is told where MuJoCo 2 gives meshes another mass than its successors") {
+  const RobotDirectory directory;
+  directory.write("angle.obj", kAngle);
+  directory.write("tetrahedron.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  directory.write("box.obj", R"(v 0 0 0
+v 1 0 0
+v 1 2 0
+v 0 2 0
+v 0 0 3
+v 1 0 3
+v 1 2 3
+v 0 2 3
+f 1 3 2
+f 1 4 3
+f 5 6 7
+f 5 7 8
+f 1 2 6
+f 1 6 5
+f 2 3 7
+f 2 7 6
+f 3 4 8
+f 3 8 7
+f 4 1 5
+f 4 5 8
+)");
+  const std::string exact = "exactmeshinertia=\"true\"";
+  for (const auto& [mesh, compiler, geom, share] : {std::tuple("tetrahedron", "", "", 1.394),
+                                                    {"box", "", "", 1.0},
+                                                    {"angle", "", "", 0.0},
+                                                    {"tetrahedron", exact.c_str(), "", 1.0},
+                                                    {"tetrahedron", "", "mass=\"2\"", 1.0}}) {
+    CAPTURE(mesh, compiler, geom);
+    const std::string path = directory.write(
+        "robot.xml", std::string("<mujoco><compiler ") + compiler + "/><asset><mesh file=\"" + mesh +
+                         ".obj\"/></asset><worldbody><body name=\"a\"><joint/><geom type=\"mesh\" mesh=\"" + mesh +
+                         "\" euler=\"10 20 30\" " + geom + "/></body></worldbody></mujoco>");
+    const LoadedRobot ours = loadRobot(path);
+    const double relative = loadMujoco(path)->body_mass[1] / ours.model.bodies()[1].inertia.mass;
+    if (share > 0) CHECK(relative == Approx(share).epsilon(1e-3));
+    const bool is_told = std::any_of(ours.warnings.begin(), ours.warnings.end(), [](const std::string& warning) {
+      return warning.find("MuJoCo 2 takes the volume of a box") != std::string::npos;
+    });
+    CHECK(is_told == (std::abs(relative - 1) > 0.01));
+  }
+}
+
 TEST_CASE("a free base of several joints stands where MuJoCo puts it") {
   const RobotDirectory directory;
   const std::string slides =

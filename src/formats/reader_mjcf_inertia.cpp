@@ -63,6 +63,13 @@ bool isOwnFrame(const std::vector<SE3>& frames, const Inertia& inertia) {
   return inertia.com.isZero(kZero) && I.isDiagonal(kZero) && I(0, 0) >= I(1, 1) && I(1, 1) >= I(2, 2);
 }
 
+// Of the box that has these moments per mass: MuJoCo 2 weighs meshes by it.
+double calcBoxVolume(const Matrix3d& I) {
+  const Vector3d moments = Eigen::SelfAdjointEigenSolver<Matrix3d>(I).eigenvalues();
+  const Vector3d squares = 6 * (Vector3d::Constant(moments.sum()) - 2 * moments);
+  return std::sqrt(squares.cwiseMax(0).prod());
+}
+
 }  // namespace
 
 Inertia MjcfReader::readInertia(const std::vector<Child>& children, MjcfBody& soft) {
@@ -160,7 +167,12 @@ Inertia MjcfReader::readMeshSolid(MjcfElement& e, const std::string& mesh) const
     e.fail("the mass of the body comes from the mesh '" + mesh + "', but " + visual.mesh +
                " is missing, damaged, of another kind, or encloses nothing",
            remedy);
-  return {solid->mass, solid->com, solid->I_com / solid->mass};
+  const Inertia out{solid->mass, solid->com, solid->I_com / solid->mass};
+  if (kind == "legacy" && !e.find("mass") && std::abs(calcBoxVolume(out.I_com) - out.mass) > 0.01 * out.mass)
+    e.note(
+        "its mass is that of its volume, as in MuJoCo 3; MuJoCo 2 takes the volume of a box with the same moments of "
+        "inertia. Give the body an <inertial>, which all read alike");
+  return out;
 }
 
 Inertia MjcfReader::readSolid(const Child& child, std::vector<SE3>& frames) {
