@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <sdf/sdf.hh>
+#include <set>
+#include <string>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -81,8 +83,18 @@ TEST_CASE("SDF: bodies, joints and loops stand where they are, and what is lost 
       return std::any_of(text.warnings.begin(), text.warnings.end(),
                          [&](const std::string& w) { return w.find(lost) != std::string::npos; });
     };
-    for (const Closure& closure : model.closures())
-      CHECK(tells("closure '" + closure.name + "': it is left out") == (closure.kind == ClosureKind::Coupler));
+    bool has_loops = false;
+    for (const Closure& closure : model.closures()) {
+      const bool is_coupler = closure.kind == ClosureKind::Coupler;
+      CHECK(tells("closure '" + closure.name + "': it is left out") == is_coupler);
+      has_loops |= !is_coupler;
+    }
+    CHECK(tells("they close loops; Gazebo with DART") == has_loops);
+    // Engines that keep the first joint of a body alone keep the tree.
+    std::set<std::string> held;
+    const size_t closures_begin = text.xml.rfind("</link>");
+    for (size_t at = 0; (at = text.xml.find("<child>", at + 1)) != std::string::npos;)
+      CHECK(held.insert(text.xml.substr(at, text.xml.find('<', at + 1) - at)).second == (at < closures_begin));
     for (const ContactFrame& contact : model.contacts()) CHECK(tells("contact '" + contact.name + "'"));
     for (const Reference& reference : model.references()) CHECK(tells("reference '" + reference.name + "'"));
     // A wrong pose must show.

@@ -229,6 +229,7 @@ class SdfWriter {
                        : closure.kind == ClosureKind::Slider ? "prismatic"
                                                              : "continuous";
     XMLElement& e = addElement(robot, "joint", {{"name", name}, {"type", type}});
+    loops_ += (loops_.empty() ? "'" : ", '") + name + "'";
     writePose(X, 0, e);
     addText(e, "parent", getLink(parent));
     addText(e, "child", getLink(child));
@@ -239,6 +240,9 @@ class SdfWriter {
   void warn(const std::string& element, const std::string& problem) { warnings_.add(element, problem); }
 
   void listOmissions() {
+    if (!loops_.empty())
+      warn("joints " + loops_,
+           "they close loops; Gazebo with DART, its default engine since Ignition, leaves them out");
     if (!shifted_.empty()) warn("joints " + shifted_, "their coordinates are measured from these values, rad or m");
     for (const Visual& visual : model_.visuals())
       if (visual.body == 0) {
@@ -255,6 +259,7 @@ class SdfWriter {
   const VectorXd q_ref_;
   std::set<std::string> taken_;  // names of joints
   std::string shifted_;          // joints with their coordinates at q_ref
+  std::string loops_;            // joints that are closures
   FormatWarnings warnings_{model_};
 };
 

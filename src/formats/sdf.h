@@ -3,8 +3,9 @@
 ///
 /// Bodies keep their names and frames and stand at q_ref, where coordinates of joints are zero in SDF, so that limits and
 /// rests of springs move by q_ref. A loop closes by a second joint of a body, named after the closure: a weld is `fixed`, a ball
-/// `ball`, a hinge `revolute`. SDF makes such a joint where the bodies stand, therefore q_ref should be closed. A body on a
-/// free-flyer over the ground has no joint.
+/// `ball`, a hinge `revolute`. SDF makes such a joint where the bodies stand, therefore q_ref should be closed. These joints come
+/// last, because engines that leave out the second joint of a body then keep the tree. A body on a free-flyer over the ground has
+/// no joint.
 #include <string>
 #include <vector>
 
