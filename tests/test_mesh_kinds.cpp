@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <sstream>
 
 #include "formats/mesh.h"
@@ -130,14 +131,77 @@ TEST_CASE("meshes that are cut off, empty or of no known kind give nothing") {
   files.write("empty.ply", "");
   files.write("header.ply", kPly);
   files.write("wedge.text", "no mesh at all\n");
+  // Valid, but assimp takes the camera for a vertex.
+  std::string camera = ply;
+  camera.insert(camera.find("element vertex"), "element camera 1\nproperty float focus\n");
+  camera.insert(camera.find("end_header\n") + 11, "7\n");
+  files.write("camera.ply", camera);
   files.write("-option.ply", ply);
   CHECK(readTriangles("cut.ply", files.path()).cols() == 0);  // assimp never ends on it
-  for (const std::string name : {"empty.ply", "header.ply", "wedge.text", "missing.ply"}) {
+  for (const std::string name : {"empty.ply", "header.ply", "camera.ply", "wedge.text", "missing.ply"}) {
     CAPTURE(name);
     CHECK(readTriangles(name, files.path()).cols() == 0);
     CHECK_FALSE(fitMesh(name, files.path(), Vector3d::Ones()));
   }
   CHECK(readTriangles("-option.ply", files.path()).cols() == 24);
+}
+
+namespace {
+
+// A triangle with the corners (0, 0, 0), (0.1, 0, 0), (0, 0.2, 0) as glTF: floats, or whole numbers of 16 bits in units of 0.1 mm.
+// Text, or binary with a chunk of JSON and one of numbers.
+std::string writeGltf(bool is_quantized, const std::string& required, bool is_binary) {
+  const std::array<float, 9> floats = {0, 0, 0, 0.1F, 0, 0, 0, 0.2F, 0};
+  const std::array<std::int16_t, 12> shorts = {0, 0, 0, 0, 1000, 0, 0, 0, 0, 2000, 0, 0};
+  const std::string base64 = is_quantized ? "AAAAAAAAAADoAwAAAAAAAAAA0AcAAAAA"
+                                          : "AAAAAAAAAAAAAAAAzczMPQAAAAAAAAAAAAAAAM3MTD4AAAAA",
+                    bytes = is_quantized ? std::string(reinterpret_cast<const char*>(shorts.data()), sizeof shorts)
+                                         : std::string(reinterpret_cast<const char*>(floats.data()), sizeof floats),
+                    size = std::to_string(bytes.size());
+  std::string json =
+      R"({"asset": {"version": "2.0"}, )" +
+      (required.empty()
+           ? ""
+           : R"("extensionsUsed": [")" + required + R"("], "extensionsRequired": [")" + required + "\"], ") +
+      R"("buffers": [{"byteLength": )" + size +
+      (is_binary ? "" : R"(, "uri": "data:application/octet-stream;base64,)" + base64 + "\"") +
+      R"(}], "bufferViews": [{"buffer": 0, "byteLength": )" + size + (is_quantized ? R"(, "byteStride": 8)" : "") +
+      R"(}], "accessors": [{"bufferView": 0, "count": 3, "type": "VEC3", )" +
+      (is_quantized ? R"("componentType": 5122, "min": [0, 0, 0], "max": [1000, 2000, 0])"
+                    : R"("componentType": 5126, "min": [0, 0, 0], "max": [0.1, 0.2, 0])") +
+      R"(}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "nodes": [{"mesh": 0)" +
+      (is_quantized ? R"(, "scale": [0.0001, 0.0001, 0.0001])" : "") + R"(}], "scenes": [{"nodes": [0]}], "scene": 0})";
+  if (!is_binary) return json;
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const auto number = [](size_t n) {
+    const auto word = static_cast<std::uint32_t>(n);
+    return std::string(reinterpret_cast<const char*>(&word), sizeof word);
+  };
+  return "glTF" + number(2) + number(28 + json.size() + bytes.size()) + number(json.size()) + "JSON" + json +
+         number(bytes.size()) + std::string("BIN\0", 4) + bytes;
+}
+
+}  // namespace
+
+TEST_CASE("a glTF whose numbers need an extension gives nothing rather than a part that has collapsed") {
+  const RobotDirectory files;
+  const std::string quantization = "KHR_mesh_quantization";
+  files.write("part.gltf", writeGltf(false, "", false));
+  files.write("part.glb", writeGltf(false, "", true));
+  files.write("shiny.gltf", writeGltf(false, "KHR_materials_unlit", false));
+  files.write("small.gltf", writeGltf(true, quantization, false));
+  files.write("small.glb", writeGltf(true, quantization, true));
+  for (const std::string name : {"part.gltf", "part.glb", "shiny.gltf"}) {
+    CAPTURE(name);
+    const Eigen::Matrix3Xd corners = readTriangles(name, files.path());
+    REQUIRE(corners.cols() == 3);
+    CHECK((corners.rowwise().maxCoeff() - Vector3d(0.1, 0.2, 0)).norm() < 1e-7);
+  }
+  for (const std::string name : {"small.gltf", "small.glb"}) {
+    CAPTURE(name);
+    CHECK(readTriangles(name, files.path()).cols() == 0);
+    CHECK_FALSE(fitMesh(name, files.path(), Vector3d::Ones()));
+  }
 }
 
 namespace {

@@ -168,15 +168,18 @@ TEST_CASE(
   const std::string binary = makeBinaryStl(corners);
   std::vector<Vector3d> infinite = corners;
   infinite[4].x() = std::numeric_limits<double>::infinity();
-  for (const auto& [mesh, content] : {std::pair<std::string, std::string>("d.stl", binary.substr(0, 100)),
-                                      {"d.stl", ""},
-                                      {"d.stl", makeBinaryStl(infinite)},
-                                      {"d.stl", "vertex 1 2"},
-                                      {"d.obj", "v 1 2 x"},
-                                      {"d.dae", binary},
-                                      {"d.dae", makeCollada(corners).substr(0, 900)},
-                                      {"d.dae", makeCollada(corners, "<node id='m'><instance_node url='#m'/></node>")},
-                                      {"d.ply", binary}}) {
+  for (const auto& [mesh, content] :
+       {std::pair<std::string, std::string>("d.stl", binary.substr(0, 100)),
+        {"d.stl", ""},
+        {"d.stl", makeBinaryStl(infinite)},
+        {"d.stl", "vertex 1 2"},
+        {"d.obj", "v 1 2 x"},
+        {"d.dae", binary},
+        {"d.dae", makeCollada(corners).substr(0, 900)},
+        {"d.dae", makeCollada(corners, "<node id='m'><instance_node url='#m'/></node>")},
+        {"d.dae", makeCollada(corners, "<node><skew>45 0 1 0 1 0 0</skew></node>")},
+        {"d.dae", makeCollada(corners, "<node><lookat>1 0 0 0 0 0 0 1 0</lookat></node>")},
+        {"d.ply", binary}}) {
     CAPTURE(mesh, content);
     const LoadedRobot robot = load(mesh, content);
     CHECK(robot.model.shapes().empty());

@@ -64,6 +64,8 @@ class ColladaReader {
         addGeometry(require(e, "url"), X);
       else if (tag == "matrix" || tag == "translate" || tag == "rotate" || tag == "scale")
         transform(tag, getNumbers(e), X);
+      else if (tag == "lookat" || tag == "skew")
+        fail();  // better no shape than one in another place
     }
   }
 

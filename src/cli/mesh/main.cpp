@@ -1,5 +1,5 @@
 // bielle-mesh FILE: writes the triangles of a mesh of any kind that assimp reads to the standard output, as binary STL in the
-// coordinates and units of the file. Exit status: 0, or 2 with a message if it cannot be read.
+// coordinates and units of the file. Exit status: 0, or 2 with a message if it cannot be read or requires an extension of glTF.
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
@@ -7,8 +7,12 @@
 #include <assimp/Importer.hpp>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -54,6 +58,49 @@ std::uint32_t appendNode(const aiScene& scene, const aiNode& node, const aiMatri
   return count;
 }
 
+// The JSON of a glTF: the file, or the first chunk of a binary one after a header of 12 bytes, its size and its kind.
+std::string readGltfText(const std::string& path) {
+  constexpr size_t kChunk = 20;
+  std::ifstream in(path, std::ios::binary);
+  std::string start(kChunk, '\0');
+  in.read(start.data(), kChunk);
+  if (in && start.compare(0, 4, "glTF") == 0) {
+    std::uint32_t size = 0;
+    std::memcpy(&size, start.data() + 12, sizeof size);
+    if (size > std::filesystem::file_size(path)) return {};
+    std::string text(size, '\0');
+    return in.read(text.data(), size) ? text : std::string();
+  }
+  if (std::filesystem::path(path).extension() != ".gltf") return {};
+  in.clear(), in.seekg(0);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// An extension without which the file cannot be understood, unless it concerns materials or lights; empty if there is none. assimp
+// (5.2.5) ignores that files require extensions, and takes the whole numbers of KHR_mesh_quantization for floats.
+std::string findRequiredExtension(const std::string& path) {
+  const nlohmann::json gltf = nlohmann::json::parse(readGltfText(path), nullptr, false);
+  if (!gltf.is_object() || !gltf.contains("extensionsRequired") || !gltf["extensionsRequired"].is_array()) return {};
+  for (const nlohmann::json& extension : gltf["extensionsRequired"]) {
+    const std::string name = extension.is_string() ? extension.get<std::string>() : "?";
+    bool is_drawn = false;
+    for (const char* drawn : {"KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_"})
+      is_drawn |= name.rfind(drawn, 0) == 0;
+    if (!is_drawn) return name;
+  }
+  return {};
+}
+
+// Whether a PLY begins with other elements than vertices, which it may. assimp (5.2.5) takes the first ones for vertices.
+bool beginsWithOthers(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string line;
+  if (!std::getline(in, line) || line.rfind("ply", 0) != 0) return false;
+  while (std::getline(in, line) && line.rfind("end_header", 0) != 0)
+    if (line.rfind("element ", 0) == 0) return line.rfind("element vertex ", 0) != 0;
+  return false;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -61,6 +108,10 @@ int main(int argc, char** argv) {
     std::cerr << "usage: bielle-mesh FILE    (its triangles as binary STL to the standard output)\n";
     return kBadInput;
   }
+  if (const std::string extension = findRequiredExtension(argv[1]); !extension.empty())
+    return fail(std::string(argv[1]) + " requires the extension " + extension + ", which is not supported");
+  if (beginsWithOthers(argv[1]))
+    return fail(std::string(argv[1]) + " has other elements before its vertices, which is not supported");
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);  // as in ROS
