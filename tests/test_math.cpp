@@ -9,6 +9,7 @@
 #include "math/constants.h"
 #include "math/direction.h"
 #include "math/linear_program.h"
+#include "math/settled.h"
 #include "math/small_dense.h"
 #include "math/so3.h"
 #include "model/joint.h"
@@ -87,6 +88,39 @@ TEST_CASE("z turns to a direction by the smallest rotation, where that is nearly
   check(Vector3d::UnitZ());
   check(-Vector3d::UnitZ());
   CHECK(calcRotationOfZ({0, 0, -3}) == Vector3d(1, -1, -1).asDiagonal().toDenseMatrix());
+}
+
+TEST_CASE("what is settled is near what was given, and stays to the bit through angles, quaternions and other frames") {
+  const auto isSame = [](const Matrix3d& a, const Matrix3d& b) { return (a.array() == b.array()).all(); };
+  const auto check = [&](const Matrix3d& given) {
+    const Matrix3d R = settleRotation(given), T = exp3(random(3, 1));
+    CHECK((R - given).cwiseAbs().maxCoeff() < kSettled);
+    CHECK(isSame(settleRotation(makeRotation(calcRollPitchYaw(R))), R));
+    CHECK(isSame(settleRotation(Eigen::Quaterniond(R).normalized().toRotationMatrix()), R));
+    CHECK(isSame(settleRotation(R * T * T.transpose()), R));
+    CHECK(!isSame(settleRotation(R * exp3(Vector3d(0, 0, 1e-13))), R));
+  };
+  for (int i = 0; i < 300; ++i) check(exp3(random(3, 2)));
+  for (double off = 1e-2; off > 1e-16;
+       off /= 10)  // near where roll and yaw turn about one axis, and where quaternions change sign
+    for (const double angle : {kPi / 2, kPi, kPi / 4, 0.0})
+      for (int axis = 0; axis < 3; ++axis) check(exp3(Vector3d::Unit(axis) * (angle + off)));
+  const Matrix3d right = makeRotation({kPi / 2, -kPi / 2, kPi});
+  CHECK(isSame(settleRotation(right), right.array().round()));
+  CHECK(settleRotation(makeRotation({kPi / 2, 0, 0}) * makeRotation({0, 0, 0.3}))
+            .row(1)
+            .head<2>()
+            .isZero(0));  // a plane stays
+  for (int i = 0; i < 300; ++i) {
+    const Vector3d v = i % 2 ? Vector3d(random(3, 1)) : Vector3d(1, 1 + 1e-15 * i, -1), d = settleDirection(v),
+                   p = settlePoint(v, v.norm() + 3);
+    CHECK((d - v.normalized()).norm() < 1e-14);
+    CHECK(d.norm() == Approx(1).epsilon(1e-15));
+    CHECK(settleDirection((3 * d).normalized()) == d);
+    CHECK((p - v).cwiseAbs().maxCoeff() < 1e-13);
+    CHECK(settlePoint((p + Vector3d(0.3, 3, -0.7)) - Vector3d(0.3, 3, -0.7), p.norm() + 3) == p);
+  }
+  CHECK(settlePoint({0.1 + 0.2, 0, -1e-17}, 0.3) == Vector3d(0.3, 0, 0));
 }
 
 TEST_CASE("every joint kind: integrate, difference, their Jacobians and the motion subspace are consistent") {
@@ -255,7 +289,7 @@ TEST_CASE("roll, pitch and yaw make the rotation that they come from, at right a
         for (const double yaw : {0.0, 1.2, -0.5 * kPi, 3.0}) {
           CAPTURE(off, roll, pitch, yaw);
           const Matrix3d R = makeRotation({roll, pitch, yaw});
-          CHECK((makeRotation(calcRollPitchYaw(R)) - R).norm() < 2e-12);
+          CHECK((makeRotation(calcRollPitchYaw(R)) - R).norm() < 3e-15);
           if (off == 0.5 && std::abs(pitch) < 0.5 * kPi && roll != kPi)
             CHECK((calcRollPitchYaw(R) - Vector3d(roll, pitch, yaw)).norm() < 1e-14);
         }

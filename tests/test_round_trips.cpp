@@ -1,13 +1,11 @@
 // Robots out into every format that is also read, and in again, with the same loops and numbers. Random mechanisms,
 // and plane four-bars and parallelograms of hinges anywhere in space, whose rows are redundant.
 #include <catch2/catch.hpp>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
 #include <map>
 #include <optional>
-#include <regex>
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
@@ -21,6 +19,7 @@
 #include "formats/mjcf.h"
 #include "formats/sdf.h"
 #include "formats/usd.h"
+#include "math/settled.h"
 #include "math/so3.h"
 #include "mechanisms.h"
 #include "model/number_text.h"
@@ -90,14 +89,6 @@ double calcGap(const Model& model, ConstVectorRef q) {
   return calcLargestGap(ws, makeConstraintSet(model));
 }
 
-// The numbers of a text in their order, as they are written.
-std::vector<std::string> readNumbers(const std::string& text) {
-  static const std::regex number(R"(rpy="[^"]*"|axis xyz="[^"]*"|-?\d+\.?\d*(e[-+]?\d+)?)");
-  std::vector<std::string> out;
-  for (std::sregex_iterator it(text.begin(), text.end(), number), end; it != end; ++it) out.push_back(it->str());
-  return out;
-}
-
 // Lengths, masses and limits of two models: a writer of fewer digits rounds once and never again, so that texts do not tell.
 void checkLengths(const Model& a, const Model& b) {
   for (int i = 1; i < a.numBodies(); ++i) {
@@ -108,7 +99,7 @@ void checkLengths(const Model& a, const Model& b) {
     const Joint& other = b.joints()[static_cast<size_t>(j)];
     const Inertia &own = a.bodies()[static_cast<size_t>(i)].inertia, &back = b.bodies()[static_cast<size_t>(j)].inertia;
     CHECK(other.X_PJ.p == joint.X_PJ.p);
-    CHECK((other.X_PJ.R - joint.X_PJ.R).cwiseAbs().maxCoeff() < 1e-15);
+    CHECK((other.X_PJ.R - joint.X_PJ.R).cwiseAbs().maxCoeff() < kSettled);
     CHECK(back.mass == own.mass);
     CHECK(back.com == own.com);
     for (int r = 0; r < 3; ++r)  // one half, which may differ from the other by rounding
@@ -118,27 +109,6 @@ void checkLengths(const Model& a, const Model& b) {
   for (size_t c = 0; c < a.closures().size(); ++c) {
     const Closure &own = a.closures()[c], &back = b.closures()[c];
     CHECK((back.X_B1.p == own.X_B1.p && back.X_B2.p == own.X_B2.p && back.offset == own.offset));
-  }
-}
-
-// Of rotations and of axes, which readers make of unit length, up to rounding.
-void checkNumbers(const std::vector<std::string>& a, const std::vector<std::string>& b) {
-  REQUIRE(a.size() == b.size());
-  for (size_t k = 0; k < a.size(); ++k) {
-    if (a[k] == b[k]) continue;
-    CAPTURE(a[k], b[k]);
-    REQUIRE((a[k].rfind("rpy", 0) == 0 || a[k].rfind("axis", 0) == 0));
-    std::vector<double> x, y;
-    const auto read = [](std::string text, std::vector<double>& values) {
-      for (char& c : text)
-        if (!std::isdigit(static_cast<unsigned char>(c)) && c != '.' && c != '-' && c != 'e') c = ' ';
-      std::istringstream words(text);
-      for (std::string word; words >> word;)
-        if (const std::optional<double> value = parseNumber(word)) values.push_back(*value);
-    };
-    read(a[k], x), read(b[k], y);
-    REQUIRE((x.size() == 3 && y.size() == 3));
-    for (size_t i = 0; i < 3; ++i) CHECK(std::abs(std::remainder(x[i] - y[i], 2 * M_PI)) < 1e-14);
   }
 }
 
@@ -165,9 +135,6 @@ TEST_CASE(
     REQUIRE(model.nq() == mechanism.model.nq());
     CHECK(calcGap(model, mechanism.q_closed) < 1e-11);
     checkLengths(mechanism.model, model);
-    const RobotText again = formatRobot(model);
-    checkNumbers(readNumbers(text.urdf), readNumbers(again.urdf));
-    CHECK(readNumbers(text.yaml) == readNumbers(again.yaml));
     const Mobility mobility = calcMobility(model, mechanism.q_closed);
     redundant += mobility.rank < mobility.rows;
     if (i % 10 == 0) CHECK(findClosedConfiguration(model).status == NumericalStatus::Ok);
@@ -320,16 +287,6 @@ Model readBack(const Format& format, const std::string& text) {
   return loadRobot(directory.write(format.file, text)).model;
 }
 
-// Without moments of inertia, whose axes nothing determines where two of them are nearly equal.
-std::string leaveOutMoments(const std::string& text) {
-  static const std::regex moments("<inertial|physics:diagonalInertia|physics:principalAxes");
-  std::istringstream lines(text);
-  std::string out;
-  for (std::string line; std::getline(lines, line);)
-    if (!std::regex_search(line, moments)) out += line + "\n";
-  return out;
-}
-
 // The first line of two texts that differs.
 std::string findDifference(const std::string& a, const std::string& b) {
   std::istringstream one(a), other(b);
@@ -339,22 +296,13 @@ std::string findDifference(const std::string& a, const std::string& b) {
   return std::getline(other, y) ? "the end and\n" + y : "";
 }
 
-// The first number that differs by more than its last digits, if the texts are the same but for numbers.
-std::string compareNumbers(const std::string& a, const std::string& b) {
-  static const std::regex number("-?\\d+(\\.\\d+)?(e[-+]?\\d+)?");
-  if (std::regex_replace(a, number, "#") != std::regex_replace(b, number, "#")) return findDifference(a, b);
-  for (std::sregex_iterator x(a.begin(), a.end(), number), y(b.begin(), b.end(), number), end; x != end; ++x, ++y) {
-    const double one = *parseNumber(x->str()), other = *parseNumber(y->str());
-    if (!(std::abs(one - other) < 1e-13 * std::max(1.0, std::abs(one)))) return x->str() + " and " + y->str();
-  }
-  return "";
-}
-
 }  // namespace
 
-TEST_CASE("what is read and written, and then read and written again, is the same but for last digits in every format",
+// The second file, since formats that have no name for a frame of a loop, or other joints, are written with those that their readers
+// make; from then on nothing changes. A format that loses nothing of these robots has the same bytes from the first file on.
+TEST_CASE("what is read and written, and then read and written again, is the same to the byte in every format",
           "[sweep]") {
-  const int count = std::getenv("BIELLE_SWEEP") ? 300 : 30;
+  const int count = std::getenv("BIELLE_SWEEP") ? 1000 : 30;
   std::vector<Model> models;
   for (const char* robot : {"bipetto", "cleobot", "belt_biped", "rsu_biped", "fivebar", "delta", "spring_leg"})
     models.push_back(loadOwn(robot).model);
@@ -374,8 +322,8 @@ TEST_CASE("what is read and written, and then read and written again, is the sam
       }
       ++written;
       const std::string second = format.write(readBack(format, first));
-      const std::string third = format.write(readBack(format, second));
-      CHECK(compareNumbers(leaveOutMoments(second), leaveOutMoments(third)) == "");
+      CHECK(findDifference(second, format.write(readBack(format, second))) == "");
+      if (format.name == std::string("bielle")) CHECK(findDifference(first, second) == "");
     }
     CAPTURE(format.name);
     CHECK(written > static_cast<int>(models.size()) / 3);

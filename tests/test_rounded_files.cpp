@@ -15,6 +15,7 @@
 #include "formats/decimals.h"
 #include "get_error.h"
 #include "math/constants.h"
+#include "math/settled.h"
 #include "model/number_text.h"
 #include "robot_directory.h"
 #include "rounded_families.h"
@@ -176,7 +177,7 @@ TEST_CASE(
     for (int i = 1; i < robot.model.numBodies(); ++i) {
       const SE3 &X = robot.model.joints()[i].X_PJ, &X_read = read.model.joints()[i].X_PJ;
       CHECK((X.p - X_read.p).norm() == 0);
-      CHECK((X.R - X_read.R).norm() < 1e-15);
+      CHECK((X.R - X_read.R).norm() < kSettled);
     }
     checkTurns(read.model);
   }
@@ -207,7 +208,7 @@ TEST_CASE("frames of pins that rounding turns out of the plane have no rows of n
     writeRobot(model, again.path() + "/written");
     const Closure read = loadRobot(again.path() + "/written").model.closures()[0];
     CHECK((read.axis - pin.axis).norm() == 0);
-    CHECK((read.X_B1.R - pin.X_B1.R).norm() < 1e-15);
+    CHECK((read.X_B1.R - pin.X_B1.R).norm() < kSettled);
   }
 }
 

@@ -10,8 +10,10 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
+#include "formats/exact_moments.h"
 #include "formats/mjcf_bodies.h"
 #include "formats/reader_mjcf.h"
+#include "math/settled.h"
 
 namespace bielle {
 namespace {
@@ -36,7 +38,9 @@ class MjcfWriter {
     writeTendons(addElement(root, "tendon"));
     writeClosures(addElement(root, "equality"));
     writeMotors(addElement(root, "actuator"));
-    writeMotorData(addElement(root, "custom"));
+    XMLElement& custom = addElement(root, "custom");
+    writeMotorData(custom);
+    writeInertias(custom);
     writeKeyframes(addElement(root, "keyframe"));
     for (const char* section : {"tendon", "equality", "actuator", "custom", "keyframe"})
       if (XMLElement* e = root.FirstChildElement(section); e->NoChildren()) root.DeleteChild(e);
@@ -113,8 +117,10 @@ class MjcfWriter {
       if (closure.kind == ClosureKind::Ball3D) {
         tie("connect", "", closure.X_B1.p);
       } else if (closure.kind == ClosureKind::Hinge5D) {
-        tie("connect", ".1", closure.X_B1.act(options_.hinge_lever * closure.axis));
-        tie("connect", ".2", closure.X_B1.act(-options_.hinge_lever * closure.axis));
+        constexpr int kBits = 44;  // of axes that two points make
+        const Vector3d lever = options_.hinge_lever * settleDirection(closure.X_B1.R * closure.axis, kBits);
+        tie("connect", ".1", closure.X_B1.p + lever);
+        tie("connect", ".2", closure.X_B1.p - lever);
       } else {
         tie("weld", "", closure.X_B2.p);
       }
@@ -233,6 +239,14 @@ class MjcfWriter {
       if (map != "{}")
         addElement(section, "text", {{"name", kMjcfMotorData + motor.name}, {"data", map.substr(1, map.size() - 2)}});
     }
+  }
+
+  // Principal axes are found anew from what a reader makes of them, and are anything where two moments are nearly equal.
+  void writeInertias(XMLElement& section) const {
+    for (int i = 1; i < model_.numBodies(); ++i)
+      if (const Matrix3d& I = model_.bodies()[i].inertia.I_com; !I.isDiagonal(0))
+        addElement(section, "numeric",
+                   {{"name", kMjcfInertia + model_.bodies()[i].name}, {"data", formatMjcf(listMoments(I))}});
   }
 
   // Where hinges in place of a ball come near to locking in a reference.

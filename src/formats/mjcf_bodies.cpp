@@ -6,6 +6,7 @@
 
 #include "formats/robot_text.h"
 #include "math/decompositions.h"
+#include "math/settled.h"
 #include "math/so3.h"
 #include "model/joint.h"
 
@@ -59,7 +60,7 @@ constexpr double kLeastInertia = 1e-14;
 
 XMLElement& addPlaced(XMLElement& parent, const char* tag, const SE3& X, XmlAttributes attributes) {
   XMLElement& element = addElement(parent, tag, attributes);
-  const Eigen::Quaterniond q(X.R);
+  const Eigen::Quaterniond q(settleRotation(X.R));
   setAttributes(element, {{"pos", formatMjcf(X.p)}, {"quat", formatMjcf(Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()))}});
   return element;
 }
@@ -80,7 +81,8 @@ class BodyWriter {
  private:
   void writeBody(int i, XMLElement& parent) {
     const Joint& joint = model_.joints()[i];
-    const SE3 X_PB = joint.X_PJ * calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq));
+    SE3 X_PB = joint.X_PJ * calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq));
+    if (X_PB.p != joint.X_PJ.p && !isMjcfFree(joint)) X_PB.p = settlePoint(X_PB.p, X_PB.p.norm() + joint.X_PJ.p.norm());
     XMLElement& body = addPlaced(parent, "body", X_PB, {{"name", model_.bodies()[i].name}});
     writeInertia(i, body);
     writeJoint(joint, body);
@@ -172,7 +174,8 @@ class BodyWriter {
         writeRotation(joint, 0, body);
         break;
       case JointKind::Universal:
-        writeAxis(joint, 0, "hinge", ".angle1", makeAxisRotation(joint.axis2, -q[1]) * joint.axis, body);
+        writeAxis(joint, 0, "hinge", ".angle1",
+                  q[1] == 0 ? joint.axis : settleDirection(makeAxisRotation(joint.axis2, -q[1]) * joint.axis), body);
         writeAxis(joint, 1, "hinge", ".angle2", joint.axis2, body);
         break;
       case JointKind::Planar: {
@@ -190,7 +193,8 @@ class BodyWriter {
 
   void writeFreeFlyer(const Joint& joint, XMLElement& body) {
     if (isMjcfFree(joint)) return writeBall(joint, 0, "free", body);
-    const Matrix3d axes = calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq)).R.transpose();
+    const Matrix3d axes =
+        settleRotation(calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq)).R).transpose();
     for (int k = 0; k < 3; ++k)
       writeAxis(joint, k, "slide", std::string(".") + static_cast<char>('x' + k), axes.col(k), body);
     writeRotation(joint, 3, body);

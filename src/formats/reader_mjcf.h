@@ -15,6 +15,8 @@ namespace bielle {
 
 /// Before the name of a motor: the name of a text of <custom> that says of it what our YAML file would.
 inline const std::string kMjcfMotorData = "bielle:motor:";
+/// Before the name of a body: the name of six numbers of <custom>, its moments of inertia with all their digits.
+inline const std::string kMjcfInertia = "bielle:inertia:";
 
 /// Attributes of geoms that are read at several places.
 inline constexpr const char* kGeomAttributes[] = {"mass",        "density", "mesh",     "contype",
@@ -211,6 +213,7 @@ class MjcfReader {
   void listNamed();
   void readActuator(const XMLElement& element);
   void readCustom(const XMLElement& element);
+  void readExactInertia(const XMLElement& element, const std::string& body);
 
   MjcfSettings settings_;
   UrdfFile tree_;

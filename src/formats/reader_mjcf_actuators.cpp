@@ -98,6 +98,8 @@ void MjcfReader::readCustom(const XMLElement& element) {
   const std::string& path = settings_.files.getPath(element);
   const std::string name = getAttribute(&element, "name"),
                     joint = name.substr(std::min(name.size(), kMjcfMotorData.size()));
+  if (getTag(element) == "numeric" && name.rfind(kMjcfInertia, 0) == 0)
+    return readExactInertia(element, name.substr(kMjcfInertia.size()));
   const auto motor =
       std::find_if(yaml_.motors.begin(), yaml_.motors.end(), [&joint](const MotorSpec& m) { return m.joint == joint; });
   if (getTag(element) != "text" || name != kMjcfMotorData + joint || motor == yaml_.motors.end())

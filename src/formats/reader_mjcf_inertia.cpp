@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "bielle/model/error.h"
+#include "formats/exact_moments.h"
 #include "formats/mesh.h"
 #include "formats/mesh_inertia.h"
 #include "formats/reader_mjcf.h"
@@ -118,6 +119,18 @@ Inertia MjcfReader::readGivenInertia(MjcfElement& e) const {
     I << full[0], full[3], full[4], full[3], full[1], full[5], full[4], full[5], full[2];
   }
   return Inertia{mass, Vector3d::Zero(), I}.transformed(X_BI);
+}
+
+// What <inertial> says by principal axes, to rounding; another one was changed since by hand.
+void MjcfReader::readExactInertia(const XMLElement& element, const std::string& body) {
+  MjcfElement e(element, "", settings_);
+  const std::vector<double> data = e.getNumbers("data", 6, 6);
+  const auto place = places_.find(body);
+  if (data.empty() || place == places_.end()) return e.leaveOut("left out: there is no such body, or no data");
+  Inertia& inertia = tree_.links.at(place->second.link).inertia;
+  const Matrix3d& R = place->second.X_LB.R;
+  if (!takeExactMoments(R * makeMoments(data) * R.transpose(), inertia.I_com))
+    e.note("left out: the body has other moments of inertia");
 }
 
 // What <compiler> asks for: a mean moment where no body can have those given, and least values.

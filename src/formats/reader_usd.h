@@ -14,6 +14,9 @@
 
 namespace bielle {
 
+/// Of a body: six numbers, its moments of inertia with all their digits, beside its principal axes.
+inline const std::string kUsdInertia = "bielle:inertia";
+
 /// What a body gets its mass from where it does not say it: a shape with collisions.
 struct UsdSolid {
   const UsdPrim* prim = nullptr;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "formats/exact_moments.h"
 #include "formats/mesh_inertia.h"
 #include "formats/reader_usd.h"
 #include "math/constants.h"
@@ -71,6 +72,11 @@ Inertia UsdReader::readInertia(const UsdBody& body) {
       note(prim.line, "body", "it has neither mass nor shapes, and is without mass here; PhysX gives such a body 1 kg");
   }
   if (!moments.isZero(0)) out.I_com = R * moments.asDiagonal() * R.transpose();
+  if (prim.find(kUsdInertia) &&
+      !takeExactMoments(
+          kilogram_ * meter_ * meter_ * makeMoments(getUsdNumbers(path_, prim, kUsdInertia, std::vector<double>(6))),
+          out.I_com))
+    note(prim.line, kUsdInertia, "left out: the body has other moments of inertia");
   if (has_com) out.com = calcUsdScale(body.M).cwiseProduct(Vector3d(com[0], com[1], com[2]));
   return out;
 }
@@ -171,7 +177,10 @@ void UsdReader::readShape(const UsdPrim& prim, const UsdTransform& M, const UsdT
   SE3 X_GV;
   const std::optional<SE3> X_WG = findUsdPlace(M);
   if (!X_WG) note(prim.line, std::string(prim.type), "it is left out: its transform mirrors, shears or flattens it");
-  std::optional<Visual> visual = X_WG ? readGeometry(prim, calcUsdScale(M), X_GV) : std::nullopt;
+  // Its own scale, where nothing above it scales: that of the matrix is rounded.
+  Vector3d scale = calcUsdScale(M);
+  if (const Vector3d own = getUsdVector(path_, prim, "xformOp:scale", scale); own.isApprox(scale, 1e-14)) scale = own;
+  std::optional<Visual> visual = X_WG ? readGeometry(prim, scale, X_GV) : std::nullopt;
   UsdSolid solid;
   solid.prim = &prim;
   solid.density = findDensity(prim);

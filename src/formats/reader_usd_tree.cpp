@@ -248,6 +248,13 @@ void UsdReader::addStart() {
       note(joint.prim->line, "joint", "its bodies stand outside its range");
       continue;
     }
+    // What the file says of it, too, where these are not other digits: the places have it rounded.
+    constexpr double kSame = 1e-9;
+    if (!joint.coordinate.empty()) {
+      const double given = getCoordinateUnit(joint) *
+                           getNumber(*joint.prim, "state:" + joint.coordinate + ":physics:position", HUGE_VAL, true);
+      if (std::abs(given - q) < kSame) q = given;
+    }
     q = std::clamp(q, joint.lower, joint.upper);
     if (!joint.coordinate.empty()) reference.joints[joint.name] = {q};
     has_moved = has_moved || std::abs(q) > 1e-6;

@@ -8,6 +8,7 @@
 #include "formats/robot_text.h"
 #include "formats/xml_document.h"
 #include "math/direction.h"
+#include "math/settled.h"
 #include "math/so3.h"
 #include "model/joint.h"
 #include "model/number_text.h"
@@ -16,7 +17,9 @@ namespace bielle {
 namespace {
 
 // x y z roll pitch yaw, R = Rz(yaw) Ry(pitch) Rx(roll)
-std::string formatPose(const SE3& X) { return formatExact(X.p) + " " + formatExact(calcRollPitchYaw(X.R)); }
+std::string formatPose(const SE3& X) {
+  return formatExact(X.p) + " " + formatExact(calcRollPitchYaw(settleRotation(X.R)));
+}
 
 class SdfWriter {
  public:
@@ -165,7 +168,7 @@ class SdfWriter {
     const double q = q_ref_[joint.idx_q + k], lower = model_.lowerLimits()[dof] - q,
                  upper = model_.upperLimits()[dof] - q;
     const double effort = motor < 0 ? HUGE_VAL : model_.motors()[motor].effort_limit;
-    addText(e, "xyz", formatExact(axis));
+    addText(e, "xyz", formatExact(settleDirection(axis)));  // which its reader makes of unit length
     if (q != 0) shifted_ += (shifted_.empty() ? "'" : ", '") + joint.name + "' " + formatNumber(q);
     constexpr double kFar = 1e16;  // none, in SDF
     XMLElement& limit = addElement(e, "limit");
@@ -233,7 +236,7 @@ class SdfWriter {
     writePose(X, 0, e);
     addText(e, "parent", getLink(parent));
     addText(e, "child", getLink(child));
-    if (hasAxis(closure.kind)) addText(addElement(e, "axis"), "xyz", formatExact(closure.axis));
+    if (hasAxis(closure.kind)) addText(addElement(e, "axis"), "xyz", formatExact(settleDirection(closure.axis)));
     if (closure.kp != 0 || closure.kd != 0) warn(element, "its gains kp and kd are left out");
   }
 

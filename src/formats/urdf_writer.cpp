@@ -8,6 +8,7 @@
 #include "bielle/model/error.h"
 #include "formats/robot_text.h"
 #include "math/direction.h"
+#include "math/settled.h"
 #include "model/number_text.h"
 
 namespace bielle {
@@ -22,7 +23,7 @@ constexpr double kNone = 1e16;
 
 void addOrigin(XMLElement& e, const SE3& X) {
   XMLElement& origin = addElement(e, "origin", {{"xyz", formatExact(X.p)}});
-  if (!X.R.isIdentity(1e-15)) setAttributes(origin, {{"rpy", formatExact(calcRollPitchYaw(X.R))}});
+  if (!X.R.isIdentity(1e-15)) setAttributes(origin, {{"rpy", formatExact(calcRollPitchYaw(settleRotation(X.R)))}});
 }
 
 class UrdfWriter {

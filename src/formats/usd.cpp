@@ -6,7 +6,9 @@
 #include <set>
 
 #include "bielle/model/error.h"
+#include "formats/exact_moments.h"
 #include "formats/format_warnings.h"
+#include "formats/reader_usd.h"
 #include "formats/usd_lines.h"
 #include "math/constants.h"
 #include "math/decompositions.h"
@@ -21,6 +23,24 @@ namespace {
 constexpr double kLeastUsdMass = 1e-10, kLeastUsdMoment = 1e-13;
 
 // What ties two bodies in the file, by their paths; none is the world.
+std::string formatList(const VectorXd& values) {
+  std::vector<std::string> items;
+  for (const double value : values) items.push_back(formatExact(value));
+  return listItems(items);
+}
+
+// A number in another unit that is read as this one to the bit, if there is one: of those next to `guess`.
+template <typename Read>
+double invert(double value, double guess, const Read& read) {
+  for (const double near : {guess, std::nextafter(guess, HUGE_VAL), std::nextafter(guess, -HUGE_VAL)})
+    if (read(near) == value) return near;
+  return guess;
+}
+
+double toUnit(double value, double unit) {
+  return invert(value, value / unit, [unit](double x) { return x * unit; });
+}
+
 const char* getTieType(ClosureKind kind) {
   switch (kind) {
     case ClosureKind::Ball3D:
@@ -128,7 +148,7 @@ class UsdWriter {
   }
 
   void writeBody(int i, const std::string& shown, const SE3& X_WB) {
-    places_[static_cast<size_t>(i)] = X_WB;
+    places_[static_cast<size_t>(i)] = {settleRotation(X_WB.R), X_WB.p};  // as it is written
     const std::string name = names_.add(shown);
     paths_[static_cast<size_t>(i)] = "/" + root_ + "/" + name;
     out_.open("Xform", name, shown, {"PhysicsRigidBodyAPI", "PhysicsMassAPI"});
@@ -168,6 +188,9 @@ class UsdWriter {
     out_.set("point3f physics:centerOfMass", formatTuple(inertia.com));
     out_.set("float3 physics:diagonalInertia", formatTuple(moments.cwiseMax(0)));
     out_.set("quatf physics:principalAxes", formatQuaternion(R));
+    // Principal axes are found anew from what a reader makes of them, and are anything where two moments are nearly equal.
+    if (!inertia.I_com.isDiagonal(0))
+      out_.set("custom double[] " + kUsdInertia, "[" + formatList(listMoments(inertia.I_com)) + "]");
   }
 
   void writeVisual(const Visual& visual, const std::string& name) {
@@ -273,8 +296,8 @@ class UsdWriter {
     const auto addLimit = [&properties](const std::string& property, double value) {
       if (std::isfinite(value)) properties.push_back({"float " + property, formatExact(value)});
     };
-    addLimit("physics:lowerLimit", model_.lowerLimits()[dof] / unit);
-    addLimit("physics:upperLimit", model_.upperLimits()[dof] / unit);
+    addLimit("physics:lowerLimit", toUnit(model_.lowerLimits()[dof], unit));
+    addLimit("physics:upperLimit", toUnit(model_.upperLimits()[dof], unit));
     if (motor >= 0) {
       const std::string drive = turns ? "angular" : "linear", prefix = "drive:" + drive + ":physics:";
       schemas.push_back("PhysicsDriveAPI:" + drive);
@@ -284,9 +307,14 @@ class UsdWriter {
       properties.push_back({"float " + prefix + "damping", "0"});
     }
     addArmature(dof, schemas, properties);
+    // Where it stands: places of bodies alone give it back rounded.
+    const std::string state = turns ? "angular" : "linear";
+    schemas.push_back("PhysicsJointStateAPI:" + state);
+    properties.push_back(
+        {"float state:" + state + ":physics:position", formatExact(toUnit(q_ref_[joint.idx_q + k], unit))});
     if (const double velocity = model_.velocityLimits()[dof]; std::isfinite(velocity)) {
-      if (schemas.empty() || schemas.back() != "PhysxJointAPI") schemas.push_back("PhysxJointAPI");
-      properties.push_back({"float physxJoint:maxJointVelocity", formatExact(velocity / unit)});
+      if (!contains(schemas, "PhysxJointAPI")) schemas.push_back("PhysxJointAPI");
+      properties.push_back({"float physxJoint:maxJointVelocity", formatExact(toUnit(velocity, unit))});
     }
     for (const WholeJointForce& whole : joinJointForces(model_))
       if (whole.force.dof == dof) addForce(joint, whole, unit, schemas, properties);
@@ -305,7 +333,9 @@ class UsdWriter {
       warn("joint '" + joint.name + "'", "its spring is left out: a drive with a stiffness would be read as a servo");
     if (force.damping == 0 && force.friction == 0) return;
     schemas.push_back("NewtonJointAPI");
-    if (force.damping != 0) properties.push_back({"float newton:damping", formatExact(force.damping * unit)});
+    if (force.damping != 0)
+      properties.push_back({"float newton:damping", formatExact(invert(force.damping, force.damping * unit,
+                                                                       [unit](double x) { return x / unit; }))});
     if (force.friction != 0) properties.push_back({"float newton:friction", formatExact(force.friction)});
     warn("joint '" + joint.name + "'",
          "its damping and friction are Newton's (newton:damping); PhysX does not read them");
@@ -345,7 +375,7 @@ class UsdWriter {
     const Joint &follower = model_.joints()[own.joint], &leader = model_.joints()[other.joint];
     const bool turn = follower.kind != JointKind::Prismatic && leader.kind != JointKind::Prismatic;
     const double ratio = -other.coefficient / own.coefficient,
-                 offset = closure.offset / own.coefficient / (follower.kind == JointKind::Prismatic ? 1 : kDegree);
+                 offset = toUnit(closure.offset / own.coefficient, follower.kind == JointKind::Prismatic ? 1 : kDegree);
     const std::string path = "</" + root_ + "/" + joints_ + "/" + joint_prims_.at(leader.name) + ">";
     schemas.push_back("NewtonMimicAPI");
     properties.push_back({"rel newton:mimicJoint", path});

@@ -8,6 +8,7 @@
 #include "formats/robot_text.h"
 #include "formats/usda.h"
 #include "math/direction.h"
+#include "math/settled.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 
@@ -16,7 +17,7 @@ namespace bielle {
 inline std::string formatTuple(const Vector3d& v) { return "(" + formatExact(v, ", ") + ")"; }
 
 inline std::string formatQuaternion(const Matrix3d& R) {
-  Eigen::Quaterniond q(R);
+  Eigen::Quaterniond q(settleRotation(R));
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   return "(" + formatExact(q.w()) + ", " + formatExact(Vector3d(q.vec()), ", ") + ")";
 }
@@ -27,16 +28,19 @@ inline std::string listQuoted(const std::vector<std::string>& items) {
   return "[" + listItems(quoted) + "]";
 }
 
-// The axis of a joint as one of x, y and z of a frame that is turned by R.
+// The axis of a joint as one of x, y and z, the nearest one, of a frame that is turned by R.
 struct UsdAxis {
   char token = 'Z';
   Matrix3d R = Matrix3d::Identity();
 };
 
 inline UsdAxis makeUsdAxis(const Vector3d& axis) {
-  for (int i = 0; i < 3; ++i)
-    if (axis == Vector3d::Unit(i)) return {static_cast<char>('X' + i), Matrix3d::Identity()};
-  return {'Z', calcRotationOfZ(axis)};
+  const NearestAxis nearest = findNearestAxis(axis);
+  Eigen::Index i = 0;
+  nearest.axis.cwiseAbs().maxCoeff(&i);
+  Matrix3d flip = Matrix3d::Identity();  // by half a turn, where it points the other way
+  if (nearest.axis[i] < 0) flip(i, i) = flip((i + 1) % 3, (i + 1) % 3) = -1;
+  return {static_cast<char>('X' + i), settleRotation(nearest.turn * flip)};
 }
 
 // Names of the prims in one place.

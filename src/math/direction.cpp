@@ -25,8 +25,10 @@ Matrix3d calcRotationOfZ(const Vector3d& direction) {
 }
 
 NearestAxis findNearestAxis(const Vector3d& direction) {
+  constexpr double kTie = 1e-6;  // the first of those that are equally near but for rounding
+  const Vector3d size = direction.cwiseAbs();
   Eigen::Index k = 0;
-  direction.cwiseAbs().maxCoeff(&k);
+  while (size[k] < (1 - kTie) * size.maxCoeff()) ++k;
   const Vector3d axis = Vector3d::Unit(k) * std::copysign(1.0, direction[k]), normal = axis.cross(direction);
   const double angle = std::atan2(normal.norm(), axis.dot(direction));
   if (normal.isZero(0)) return {axis, 0, Matrix3d::Identity()};
@@ -40,7 +42,7 @@ Matrix3d makeRotation(const Vector3d& rpy) {
 }
 
 Vector3d calcRollPitchYaw(const Matrix3d& R) {
-  constexpr double kLocked = 1e-12;
+  constexpr double kLocked = 1e-15;
   const double level = std::hypot(R(0, 0), R(1, 0)), pitch = std::atan2(-R(2, 0), level);
   if (level < kLocked) return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0};
   const double roll = std::atan2(R(2, 1), R(2, 2));

@@ -9,7 +9,7 @@ namespace bielle {
 /// third of a minute to compile.
 Matrix3d calcRotationOfZ(const Vector3d& direction);
 
-/// The coordinate axis nearest to a direction, and the smallest rotation that takes it there.
+/// The coordinate axis nearest to a direction, the first of those as near to a millionth, and the smallest rotation that takes it there.
 struct NearestAxis {
   Vector3d axis;  ///< with its sign
   double angle;   ///< rad, at most acos(1 / sqrt(3))
@@ -19,7 +19,7 @@ NearestAxis findNearestAxis(const Vector3d& direction);
 
 /// Rz(yaw) Ry(pitch) Rx(roll). \param rpy  roll, pitch and yaw, rad
 Matrix3d makeRotation(const Vector3d& rpy);
-/// Its inverse, pitch within -pi/2 .. pi/2. Where that is a right angle to 1e-12 rad, roll and yaw turn about one axis, and yaw is 0;
+/// Its inverse, pitch within -pi/2 .. pi/2. Where that is a right angle to 1e-15 rad, roll and yaw turn about one axis, and yaw is 0;
 /// near it they are known less and less, but what they make of R is not: each is that which fits the other.
 Vector3d calcRollPitchYaw(const Matrix3d& R);
 
