@@ -144,6 +144,20 @@ TEST_CASE("simulate: a cycle is repeated, at its speed, and stands") {
   }
 }
 
+TEST_CASE("simulate: down stairs under predictive control, feet pass the edges of the treads above") {
+  const Scratch scratch;
+  const std::string plan = (scratch.path / "down").string(), output = (scratch.path / "walked").string();
+  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "stairs", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--height",
+                      "-0.06", "--stairs", "3", "-o", plan, "--quiet", "--no-report", "--no-check"})
+              .status == 0);
+  const CommandResult result = runCommand({BIELLE_COMMAND, "simulate", plan, "-o", output, "--summary-only"});
+  CAPTURE(result.out, result.err);
+  CHECK(result.status == 0);
+  const nlohmann::json summary = parseSummary(output);
+  CHECK(summary["largest_tilt"].get<double>() < 0.01);
+  CHECK(summary["largest_slip"].get<double>() < 2e-3);
+}
+
 TEST_CASE("simulate: predictive control is the default, and gains where it cannot carry a motion out") {
   const Scratch scratch;
   const std::string output = (scratch.path / "out").string(), full = (scratch.path / "full").string();

@@ -346,11 +346,11 @@ SECTIONS = [
 or the seconds until the robot falls; how far the trunk leaves its plan, the largest slip of a sole since its
 touchdown, and the largest opening of a closure. Bielle's world closes loops exactly; in MuJoCo's they are soft."""),
     ("Torques alone, gains and predictive control", "worlds", lambda: """Two robots, eleven motions, three worlds:
-seconds until a robot falls by the torques of its plan alone (`open`), by gains and by predictive control (`mpc`). Going down,
-heels may come down on the edge of the step above, because a swinging foot under predictive control knows where it may land,
-not what it passes: Bipetto's turned by up to 0.5 rad in Bielle's world and 0.36 in MuJoCo's, Cleobot's by 0.24 in Bielle's, and
-their verdicts say so. Earlier, Bipetto fell going down (2.25 s in Bielle's world, 3.15 in MuJoCo's) and Cleobot going back (1.08
-and 1.10 s) under gains, and Cleobot going down in MuJoCo's world under predictive control (1.47 s)."""),
+seconds until a robot falls by the torques of its plan alone (`open`), by gains and by predictive control (`mpc`). Under
+predictive control a swinging foot keeps to its path wherever there are steps, up to where it lands; before, heels came down on
+the edge of the step above: Bipetto's turned by up to 0.5 rad, Cleobot's by 0.24. Earlier, Bipetto fell going down (2.25 s in
+Bielle's world, 3.15 in MuJoCo's) and Cleobot going back (1.08 and 1.10 s) under gains, and Cleobot going down in MuJoCo's world
+under predictive control (1.47 s)."""),
     ("Real sensors", "sensors", lambda: """`--sensors real`, seed 1, gains; outcomes as above. Errors are
 those of the estimated trunk, root mean squares; drift is that over the ground at the end."""),
     ("Errors of the robot", "errors", lambda: """Bipetto's walk at 0.4 m/s in Bielle's world: how many of five runs

@@ -77,7 +77,8 @@ Vector6d makeVector(double x, double z, double rotation) {
 void addSwingCosts(const Scene& scene, const GaitNode& node, Side side, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
   const SwingNode& swing = node.swings[static_cast<int>(side)];
-  const bool free = isFree(scene), leaves = swing.progress < o.swing.leave;
+  // Among steps the path is the way past their edges: only where it ends is free.
+  const bool free = isFree(scene) && scene.task.ground.steps.empty(), leaves = swing.progress < o.swing.leave;
   const double turning = o.swing_velocity_weight * scene.size.length * scene.size.length;
   addSwing(scene.model, getContact(scene, side), swing.X_WF,
            makeVector(free ? o.foothold_weight : o.swing_weight, o.swing_weight, o.swing_rotation_weight), stage);
