@@ -22,7 +22,6 @@ namespace {
 // Of bodies without any: UsdPhysics takes 0 for "not given". kg, kg m^2
 constexpr double kLeastUsdMass = 1e-10, kLeastUsdMoment = 1e-13;
 
-// What ties two bodies in the file, by their paths; none is the world.
 std::string formatList(const VectorXd& values) {
   std::vector<std::string> items;
   for (const double value : values) items.push_back(formatExact(value));
@@ -58,6 +57,7 @@ const char* getTieType(ClosureKind kind) {
   return "PhysicsFixedJoint";
 }
 
+// What ties two bodies in the file, by their paths; none is the world.
 struct UsdTie {
   std::string name, type;
   std::string path0, path1;
