@@ -4,9 +4,8 @@
 #
 # Guessed: density times volume, which a closed convex mesh leaves no doubt about; only what is concave differs, as its manual says.
 # Seen with MuJoCo 2.2.2 (Debian 12, libmujoco2.2.2 2.2.2-3) and 3.14.0 (npm, @mujoco/mujoco), on closed meshes of density 1000:
-# - a box, turned or not, weighs what it should in both;
-# - in 2.2.2 a prism with 48 sides weighs 0.95 times its mass, whatever its height, an icosahedron 0.90 and a tetrahedron 1.39 times. Its
-#   moments are as much too large, and its centre is right;
+# - a box weighs what it should in both;
+# - in 2.2.2 a prism with 48 sides weighs 0.95 times its mass, an icosahedron 0.90 and a tetrahedron 1.39 times;
 # - a U of three boards weighs 3.1 times its mass; with `exactmeshinertia` it and the tetrahedron weigh what they should;
 # - in 3.14.0 the convex ones have their masses; so has the U with `inertia="exact"`, else 3.3 times;
 # - with `mass` at the geom both have this mass, and the moments of the convex ones agree.
