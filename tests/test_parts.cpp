@@ -523,6 +523,8 @@ TEST_CASE("parts: errors give the file, the line, the name and what to do") {
            "on: swing_upper_left", std::string("on: ") + name,
            {"the part wants a joint here, and '" + std::string(name) + "' is"});
   refuse(kRobotOfRods, "density: {value", "dens: {value", {"nothing gives it a value", "density"});
+  for (const char* whole : {"play: {knee: 0.01}", "rod_friction: {rod: 0.1}", "rounding: 1e-4"})
+    refuse(kSlider, "tree:", std::string(whole) + "\ntree:", {"it belongs to a whole robot", "beside `model: "});
   refuse(kRobotOfRods, "length: span/2", "length: spam/2", {"'spam' is unknown; known are", "line"});
   refuse(kRobotOfRods, "length: span/2", "length: span/", {"is not an expression", "key 'length'"});
   refuse(kRobotOfRods, "length: span/2", "length: -span", {"the rod has no length", "make it longer"});

@@ -50,7 +50,12 @@ FOLLOWED = [  # command, what it refuses, the remedy, and what follows it: {} is
     (SIMULATE.format("walk"), "--jitter 0.01", r"at most (--delay)", "--jitter 0.01 {} 0.01"),
     (SIMULATE.format("walk"), "--push t=1", r"e\.g\. (--push \S+)", "{}"),
     (SIMULATE.format("walk"), "--terrain tiles", r"e\.g\. (--terrain \S+)", "{}"),
+    (SIMULATE.format("walk"), "--terrain ramp=nan", r"e\.g\. (--terrain \S+)", "{}"),
+    (SIMULATE.format("walk"), "--seed -1", r"a whole number from (\d)", "--seed {}"),
     (SIMULATE.format("walk"), "--payload 1 --payload-at trunk", r"e\.g\. (--payload-at \S+)", "--payload 1 {}"),
+]
+DOUBTED = [  # likewise, what is a warning, and is none then
+    (SOLVE.format("walk"), "--power-limit motor_knee_left=1e-9", "may have too little power", r"(--power-limit [^\s)]+)", "{}"),
 ]
 # Options of other programs in texts of ours.
 FOREIGN = {"--check", "--print", "--expand-auto-inertials", "--dropdtd", "--noent", "--build", "--parallel", "--target",
@@ -71,6 +76,17 @@ def test_following():
         assert second.returncode == 0, f"{command + refused}: {remedy[0]!r} leads to\n{second.stderr}"
         assert "no posture was found" not in second.stdout, f"{command + refused}: {remedy[0]!r} leads to\n{second.stdout}"
     assert not os.path.exists("nowhere"), "a dry run wrote something"
+
+
+def test_doubts():
+    for command, doubtful, doubt, told, followed in DOUBTED:
+        first = run(command + doubtful)
+        text = first.stdout + first.stderr
+        remedy = re.search(told, text)
+        assert first.returncode == 0 and doubt in text and remedy, f"{command + doubtful}: no {told} in\n{text}"
+        second = run(command + followed.format(remedy[1]))
+        text = second.stdout + second.stderr
+        assert second.returncode == 0 and doubt not in text, f"{command + doubtful}: {remedy[0]!r} leads to\n{text}"
 
 
 def test_layers():
@@ -105,5 +121,6 @@ def test_options():
 
 
 test_following()
+test_doubts()
 test_layers()
 test_options()

@@ -133,6 +133,8 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
   double error = (conditions.h - offset).norm();
   std::vector<double> errors;  // only with patience
   for (int i = 0; i < options.max_iterations; ++i, ++result.iterations) {
+    const bool met = conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;
+    if (met && options.step == AssemblyStep::Shortest) return true;  // nothing else is wished
     const VectorXd wish = model.difference(result.q, problem.q_ref);
     const double damping = std::min(0.1, error);
     // A preference far from the feasible set (e.g. an overstretched leg) can make the iterates cycle: it fades.
@@ -144,7 +146,6 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
             : calcStep(conditions.H, conditions.h - offset, wish, wish_gain, weights, shrink, options.rank_tolerance);
     const double largest = calcLargest(step);
     if (!std::isfinite(largest)) return false;
-    const bool met = conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;
     if (met && largest < 1e-9) return true;
     if (largest > options.step_limit) step *= options.step_limit / largest;
     // Halve while the conditions get much worse; slightly worse is allowed, as the preference bends the path.

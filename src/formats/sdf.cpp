@@ -61,8 +61,19 @@ class SdfWriter {
     pose.SetText(formatPose(X).c_str());
   }
 
+  // libsdformat refuses a link without mass, as crosses of two joints are.
+  Inertia makeInertia(int i) {
+    constexpr double kLeastMass = 2e-6, kLeastMoment = 1e-12;  // kg, kg m^2, as in URDFs
+    Inertia inertia = model_.bodies()[i].inertia;
+    if (inertia.mass > 0) return inertia;
+    inertia.mass = kLeastMass;
+    if (inertia.I_com.isZero(0)) inertia.I_com = kLeastMoment * Matrix3d::Identity();
+    warn("link '" + getLink(i) + "'", "it has no mass, which SDF requires to be positive; 2e-06 kg is written");
+    return inertia;
+  }
+
   void writeLink(int i, XMLElement& robot) {
-    const Inertia& inertia = model_.bodies()[i].inertia;
+    const Inertia inertia = makeInertia(i);
     XMLElement& link = addElement(robot, "link", {{"name", getLink(i)}});
     writePose(calcPlacement(i), model_.joints()[i].parent, link);
     const Matrix3d& I = inertia.I_com;
@@ -77,8 +88,6 @@ class SdfWriter {
                                       {"iyz", I(1, 2)},
                                       {"izz", I(2, 2)}})
       addText(moments, name, formatExact(value));
-    if (!(inertia.mass > 0))
-      warn("link '" + model_.bodies()[i].name + "'", "it has no mass, which SDF requires to be positive");
     int count = 0;
     for (const Visual* visual : visuals_[i]) writeVisual(*visual, ++count, link);
     count = 0;

@@ -49,6 +49,10 @@ VectorXd getVelocityLimits(const Model& model, const LimitOptions& options) {
   return limits;
 }
 
+VectorXd getPowerLimits(const Model& model, const LimitOptions& options) {
+  return replaceByName(model, VectorXd::Constant(model.nu(), kNone), options.powers, "power");
+}
+
 namespace {
 
 std::vector<PathConstraint> listRanges(const Model& model, const VectorXd& q0) {
@@ -82,7 +86,7 @@ std::vector<PathConstraint> listVelocities(const Model& model, const LimitOption
 }
 
 std::vector<PathConstraint> listPowers(const Model& model, const LimitOptions& options) {
-  const VectorXd limits = replaceByName(model, VectorXd::Constant(model.nu(), kNone), options.powers, "power");
+  const VectorXd limits = getPowerLimits(model, options);
   std::vector<PathConstraint> bounds;
   for (int m = 0; m < model.nu(); ++m)
     if (std::isfinite(limits[m]))

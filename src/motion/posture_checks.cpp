@@ -138,7 +138,8 @@ void PostureChecks::checkStart() {
 }
 
 void PostureChecks::doubt() {
-  std::vector<Need> efforts(static_cast<size_t>(model_.nu())), speeds(static_cast<size_t>(model_.nv()));
+  std::vector<Need> efforts(static_cast<size_t>(model_.nu())), powers(efforts),
+      speeds(static_cast<size_t>(model_.nv()));
   const VectorXd velocity_limits = motion_.problem_options.limits.enforced
                                        ? getVelocityLimits(model_, motion_.problem_options.limits)
                                        : VectorXd::Constant(model_.nv(), std::numeric_limits<double>::infinity());
@@ -156,6 +157,7 @@ void PostureChecks::doubt() {
     if (moment.middle && !held_) needEfforts(moment, q, efforts);
     if (before && moment.time - before->time < kApart) continue;
     if (before) needSpeeds(*before, moment, velocity_limits, speeds);
+    if (before && moment.middle && !held_) needPowers(*before, moment, powers);
     before = &moment;
   }
   if (reach.needed > 0)
@@ -169,6 +171,7 @@ void PostureChecks::doubt() {
           "request a slower motion or shorter steps, or give `friction` if the ground has more");
   tellEfforts(efforts);
   tellSpeeds(speeds);
+  tellPowers(powers);
 }
 
 // Of a level foot that stands alone; doubtSlopes() sees the others.
@@ -218,6 +221,26 @@ void PostureChecks::needSpeeds(const Moment& before, const Moment& after, const 
   }
 }
 
+// A motor of limited power that moves from one posture to the next at its mean speed can hold the second with so much torque alone.
+void PostureChecks::needPowers(const Moment& before, const Moment& after, std::vector<Need>& powers) {
+  constexpr double kLeast = 1e-3;  // N m or N: linear programs want limits that are not next to nothing
+  const LimitOptions& options = motion_.problem_options.limits;
+  if (!options.enforced || options.powers.empty()) return;
+  const VectorXd q = getPosture(after.node), most = getPowerLimits(model_, options),
+                 v = model_.difference(getPosture(before.node), q) / (after.time - before.time);
+  VectorXd limits = getLimits(after.node), speeds(model_.nu());
+  for (int m = 0; m < model_.nu(); ++m) {
+    speeds[m] = std::abs(v[model_.motors()[static_cast<size_t>(m)].dof]);
+    if (std::isfinite(most[m]) && speeds[m] > 0) limits[m] = std::min(limits[m], std::max(most[m] / speeds[m], kLeast));
+  }
+  const HoldingShare share = calcShare(after, q, calcCom(model_, ws_), limits);
+  if (!share.isTooMuch()) return;
+  for (int m = 0; m < model_.nu(); ++m) {
+    const Need need{std::abs(share.u[m]) * speeds[m], most[m], after};
+    if (need.share() > std::max(1.0, powers[static_cast<size_t>(m)].share())) powers[static_cast<size_t>(m)] = need;
+  }
+}
+
 void PostureChecks::tellEfforts(const std::vector<Need>& efforts) const {
   for (size_t m = 0; m < efforts.size(); ++m)
     if (efforts[m].needed > 0) {
@@ -239,6 +262,18 @@ void PostureChecks::tellSpeeds(const std::vector<Need>& speeds) const {
                 speeds[k].moment.describe() + ", it needs " + formatNumber(speeds[k].needed, "%.3g") + unit +
                 ", its limit is " + formatNumber(speeds[k].allowed, "%.3g") + unit,
             "request a slower or shorter motion, longer phases, or a larger limit");
+    }
+}
+
+void PostureChecks::tellPowers(const std::vector<Need>& powers) const {
+  for (size_t m = 0; m < powers.size(); ++m)
+    if (powers[m].needed > 0) {
+      const std::string& name = model_.motors()[m].name;
+      tell_(quote("motor", name) + " may have too little power: at its mean speed to the posture planned " +
+                powers[m].moment.describe() + ", this needs " + formatNumber(powers[m].needed, "%.3g") +
+                " W, its limit is " + formatNumber(powers[m].allowed, "%.3g") + " W",
+            "give a larger limit (--power-limit " + name + "=" + formatNumber(1.05 * powers[m].needed, "%.3g") +
+                "), or request a slower or shorter motion");
     }
 }
 

@@ -26,7 +26,7 @@ class PostureChecks {
 
   // That motors hold the posture in which the motion starts. \throws InputError naming them where they are far too weak
   void checkStart();
-  // Tells of motors that are too weak or too slow for the guess, of feet that would slip, and of legs that do not reach.
+  // Tells of motors that are too weak or too slow for the guess, or have too little power, of feet that would slip, and of legs that do not reach.
   void doubt();
 
  private:
@@ -65,8 +65,10 @@ class PostureChecks {
   bool needReach(const Moment& moment, Need& reach, std::string& foot);
   void needEfforts(const Moment& moment, const VectorXd& q, std::vector<Need>& efforts);
   void needSpeeds(const Moment& before, const Moment& after, const VectorXd& limits, std::vector<Need>& speeds) const;
+  void needPowers(const Moment& before, const Moment& after, std::vector<Need>& powers);
   void tellEfforts(const std::vector<Need>& efforts) const;
   void tellSpeeds(const std::vector<Need>& speeds) const;
+  void tellPowers(const std::vector<Need>& powers) const;
 
   const Motion& motion_;
   const RobotProblem& problem_;

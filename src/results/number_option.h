@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <string>
 
 #include "model/number_text.h"
@@ -34,6 +35,18 @@ inline CLI::Validator isWithin(double lower, double upper) {
   const std::string low = formatNumber(lower), high = formatNumber(upper);
   return makeNumberCheck([=](double value) { return value >= lower && value <= upper; },
                          "a number from " + low + " to " + high, "FLOAT in [" + low + " - " + high + "]");
+}
+inline CLI::Validator isCount() {
+  return CLI::Validator(
+      [](std::string& text) {
+        unsigned value = 0;
+        const bool is_good =
+            text.find_first_not_of("0123456789") == std::string::npos && CLI::detail::lexical_cast(text, value);
+        return is_good ? std::string()
+                       : "'" + text + "' is not a whole number from 0 to " +
+                             std::to_string(std::numeric_limits<unsigned>::max());
+      },
+      "");
 }
 
 // Every option of a command and of its subcommands that is a number without bounds of its own is finite.

@@ -51,7 +51,7 @@ class OptionFlags : public OptionFields {
       added->check(CLI::Range(static_cast<int>(option.bounds.lower), static_cast<int>(option.bounds.upper)));
   }
   void add(const Option& option, unsigned* member) {
-    app_.add_option(makeFlag(option.name), *member, option.help)->capture_default_str();
+    app_.add_option(makeFlag(option.name), *member, option.help)->capture_default_str()->check(isCount());
   }
   void add(const Option& option, std::string* member) {
     CLI::Option* added = app_.add_option(makeFlag(option.name), *member, option.help);

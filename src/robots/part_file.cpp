@@ -81,6 +81,11 @@ MountKind readMountKind(const YamlEntry& entry) {
 }
 
 void readDocument(const YamlEntry& root, PartFile& part) {
+  for (const auto& [name, entry] : root.getMap())
+    if (name == "play" || name == "rod_friction" || name == "rounding")
+      entry.fail("it belongs to a whole robot, not to parts, whose joints and closures others name",
+                 "move it to a file of its own, beside `model: " + fs::path(part.path).filename().string() +
+                     "`, which is this robot with it");
   part.fields = root.getFields(kPartKeys);
   const YamlFields& fields = part.fields;
   if (const YamlEntry* help = find(fields, "help")) part.help = help->getText();

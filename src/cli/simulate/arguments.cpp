@@ -212,7 +212,9 @@ WorldGround makeGround(const SimulateArguments& arguments, const Ground& planned
     ground = carryGround({}, place.X_WP);
   } else {
     const auto [name, value] = parseSetting("--terrain", arguments.terrain, "tiles=0.01");
-    if (!std::isfinite(value)) throw InputError("", "terrain '" + name + "'", "it is not finite", "e.g. tiles=0.01");
+    if (!std::isfinite(value))
+      throw InputError("", "--terrain " + arguments.terrain, "it is not finite",
+                       "give a number, e.g. --terrain " + name + "=0.01");
     if (name == "ramp") {
       RampOptions ramp;
       ramp.slope = value;

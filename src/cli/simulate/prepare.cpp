@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "bielle/model/error.h"
@@ -119,9 +120,20 @@ std::vector<std::string> listOddGround(const Plan& plan, const Ground& ground, c
   const bool is_reached = std::any_of(phases.begin(), phases.end(), [&](const ContactPhase& phase) {
     return reachesBoxes(model, ground, phase.contacts, place.X_WP, start);
   });
+  constexpr double kAhead = 0.01;  // m
+  const auto calcFarthest = [&](const ContactPhase& phase) {
+    double farthest = -std::numeric_limits<double>::infinity();
+    for (const ContactTarget& foot : phase.contacts)
+      farthest = std::max(farthest, place.X_WP.inverse().act(foot.X_WT.p).x());
+    return farthest;
+  };
+  const bool walks_ahead = std::any_of(phases.begin(), phases.end(), [&](const ContactPhase& phase) {
+    return calcFarthest(phase) > calcFarthest(phases.front()) + kAhead;
+  });
   if (start > 0 && !is_reached)
     odd.push_back("--terrain begins " + formatNumber(start) +
-                  " m ahead of where the robot stands, and no planned foothold is on it: let it walk farther");
+                  " m ahead of where the robot stands, and no planned foothold is on it: " +
+                  (walks_ahead ? "let it walk farther" : "give a motion that walks ahead"));
   return odd;
 }
 
