@@ -235,6 +235,10 @@ class Problem:
         for index, ks in self.group("state_cost").items():
             entry = self.data["state_costs"][index]
             d = np.concatenate([m.subtract(trajectory["q"][ks], np.array(entry["q"])), trajectory["v"][ks] - entry["v"]], 1)
+            if "axes" in entry:  # of a free base
+                nv = d.shape[1] // 2
+                for first in (0, 3, nv, nv + 3):
+                    d[:, first:first + 3] = d[:, first:first + 3] @ np.transpose(entry["axes"])
             cost[ks] += 0.5 * entry["weight"] * (d**2 @ entry["weights"])
         for index, ks in self.group("control_cost").items():
             entry = self.data["control_costs"][index]

@@ -4,13 +4,14 @@
 
 #include "bielle/motion/motion.h"
 #include "discretizations.h"
+#include "math/so3.h"
 #include "mechanisms.h"
 
 namespace bielle::testing {
 
 inline StateCost makeRandomStateCost(std::mt19937& rng, const Model& model, const VectorXd& q) {
   return {0.7, model.integrate(q, randomVector(rng, model.nv(), 0.6)), randomVector(rng, model.nv()),
-          randomVector(rng, 2 * model.nv()).cwiseAbs()};
+          randomVector(rng, 2 * model.nv()).cwiseAbs(), exp3(Vector3d(0.4, -0.7, 0.5))};
 }
 
 // A stage with a cost of every sort that looks at q, v, u and the forces; the barrier is crossed by some rows only.

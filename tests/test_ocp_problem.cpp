@@ -49,9 +49,13 @@ VectorXd calcWeightedResiduals(ProblemProbe& problem, int node, const VectorXd& 
   updateVelocities(model, ws, x.tail(model.nv()));
   updateMassMatrix(model, ws);
   std::vector<double> rows;
-  const VectorXd dq = model.difference(spec.state.q_ref, x.head(model.nq()));
-  for (int i = 0; i < model.nv(); ++i) rows.push_back(dq[i]);
-  for (int i = 0; i < model.nv(); ++i) rows.push_back(x[model.nq() + i] - spec.state.v_ref[i]);
+  VectorXd dq = model.difference(spec.state.q_ref, x.head(model.nq())),
+           dv = x.segment(model.nq(), model.nv()) - spec.state.v_ref;
+  if (model.hasFreeFlyer())
+    for (VectorXd* d : {&dq, &dv})
+      for (const int i : {0, 3}) d->segment<3>(i) = (spec.state.axes * d->segment<3>(i)).eval();
+  for (const VectorXd* d : {&dq, &dv})
+    for (int i = 0; i < model.nv(); ++i) rows.push_back((*d)[i]);
   for (int i = 0; running && i < model.nu(); ++i) rows.push_back(u[i] - spec.control.reference[i]);
   for (const Cost& cost : spec.costs) {
     VectorXd r(cost.residual->size());

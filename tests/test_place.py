@@ -319,12 +319,13 @@ def make_base(directory, rpy, at):
 
 
 def check_bases(where, motion, arguments):
-    """Nothing depends on how the axes of the base are called, nor on which way they face, and hardly anything on where its frame is
-    and how it is inclined: trunks are kept from turning about the axis nearest to the vertical by a weight of its own."""
+    """Nothing depends on how the axes of the base are called and which way they face, no plan on how they are inclined, and hardly
+    anything else on that and on where its frame is."""
     quarter, results = math.pi / 2, []
     here, beside, above = (0, 0, 0), (0.3, 0.5, -0.2), (0, 0, 0.575)  # the last one is on the ground
-    exact, moved, inclined = (1e-6, 1e-5), (0.01, 2), (0.06, 2.5)  # rad, N m
-    for i, (rpy, at, (off, torque)) in enumerate([
+    # rad, N m: planned, and carried out under predictive control
+    exact, inclined, moved = ((1e-6, 1e-5),) * 2, ((1e-6, 1e-5), (0.01, 2)), ((0.01, 2),) * 2
+    for i, (rpy, at, bounds) in enumerate([
             ((0, 0, 0), here, exact), ((0, 0, quarter), here, exact), ((quarter, 0, 0), here, exact), ((0, quarter, 0), here, exact),
             ((math.pi, 0, 0), here, exact), ((-quarter, 0, quarter), beside, moved), ((0, 0, 0), above, moved),
             ((0, 0, 0.65), here, exact), ((quarter, 0.65, 0), here, exact), ((0.21, 0, 0), here, inclined),
@@ -335,7 +336,7 @@ def check_bases(where, motion, arguments):
         run("simulate", result, "--duration", 0.8, "--threads", 1, "--no-report", "-o", f"{result}-done", status=(0, 3))
         results.append((read(result), read(f"{result}-done")))
         assert all(goal["met"] for goal in results[-1][0][0]["goals"]), results[-1][0][0]["goals"]
-        for (_, at_home), (_, there) in zip(results[0], results[-1]):
+        for (_, at_home), (_, there), (off, torque) in zip(results[0], results[-1], bounds):
             joints, torques = np.abs(at_home["q"][:, 7:] - there["q"][:, 7:]).max(), np.abs(at_home["u"] - there["u"]).max()
             print(f"{motion}, base turned by {rpy}, at {at}: joints {joints:.1e}, torques {torques:.1e}")
             assert joints < off and torques < torque, (joints, torques)

@@ -53,8 +53,9 @@ StateCost makeEndCost(const Model& model, const VectorXd& q, const VectorXd& joi
     weights.head<6>() << o.end_place, o.end_place, o.end_posture, o.end_posture, o.end_posture, o.end_place;
     weights.segment<6>(nv).setConstant(o.end_velocity);
   }
-  scaleStateWeights(model, calcRobotSize(model, makeStandingRobot(model, q)), weights);
-  return {1, q, VectorXd::Zero(nv), weights};
+  const RobotSize size = calcRobotSize(model, makeStandingRobot(model, q));
+  scaleStateWeights(model, size, weights);
+  return {1, q, VectorXd::Zero(nv), weights, calcWeightAxes(size)};
 }
 
 std::vector<StageSpec> listStages(const RobotProblem& problem) {

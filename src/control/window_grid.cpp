@@ -55,7 +55,7 @@ bool areAlike(const Terms& a, const Terms& b) {
 
 // But for the attitude and its rate, about whichever axis of the base: the robot turns while it walks.
 bool areAlike(const Model& model, const StateCost& a, const StateCost& b) {
-  if (a.weight != b.weight || !areSame(a.weights, b.weights)) return false;
+  if (a.weight != b.weight || !areSame(a.weights, b.weights) || a.axes != b.axes) return false;
   if (a.weight == 0 || !model.hasFreeFlyer()) return areSame(a.q_ref, b.q_ref) && areSame(a.v_ref, b.v_ref);
   const int joints = model.nq() - 7, others = model.nv() - 6;
   return areSame(a.q_ref.head<3>(), b.q_ref.head<3>()) && areSame(a.q_ref.tail(joints), b.q_ref.tail(joints)) &&

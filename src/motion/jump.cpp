@@ -72,7 +72,8 @@ StageSpec makeStage(const JumpScene& scene, const std::vector<ContactTarget>& co
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
   setClosureGains({o.contact_kp, o.contact_kd}, stage.constraints);
-  stage.state = {o.state_weight, scene.standing.q, VectorXd::Zero(model.nv()), scene.state_weights};
+  stage.state = {o.state_weight, scene.standing.q, VectorXd::Zero(model.nv()), scene.state_weights,
+                 calcWeightAxes(scene.size)};
   stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model, scene.size)};
   return stage;
 }

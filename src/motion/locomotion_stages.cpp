@@ -23,7 +23,8 @@ StageSpec makeRegularizedStage(const Scene& scene, const GaitNode& node) {
   const Model& model = scene.model;
   StageSpec stage;
   stage.dt = scene.options.timing.time_step;
-  stage.state = {scene.options.state_weight, scene.stance.q, VectorXd::Zero(model.nv()), scene.state_weights};
+  stage.state = {scene.options.state_weight, scene.stance.q, VectorXd::Zero(model.nv()), scene.state_weights,
+                 calcWeightAxes(scene.size)};
   stage.state.q_ref.segment<4>(3) = makeHeading(scene, node);
   if (model.hasFreeFlyer()) stage.state.v_ref.segment<3>(3) = node.heading_rate * scene.size.upright.col(2);
   stage.control = {scene.options.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model, scene.size)};

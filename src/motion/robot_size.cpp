@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/direction.h"
 #include "math/upright.h"
 #include "motion/motor_scale.h"
 
@@ -20,7 +21,9 @@ RobotSize calcSize(const Model& model, ConstVectorRef q, double height) {
   RobotSize size;
   if (!model.hasFreeFlyer()) return size;
   const Eigen::Quaterniond base(q[6], q[3], q[4], q[5]);
-  size.upright = findUprightAxes(base.toRotationMatrix().row(2));
+  const Vector3d up = base.toRotationMatrix().row(2);
+  const Matrix3d right = findUprightAxes(up);
+  size.upright = right * calcRotationOfZ(right.transpose() * up);
   if (hasSprings(model)) return size;
   const double gravity = model.gravity().norm();
   if (!(height > 0 && gravity > 0 && model.mass() > 0)) return size;
@@ -66,9 +69,9 @@ VectorXd makeControlWeights(const Model& model, const RobotSize& size) {
 
 void scaleStateWeights(const Model& model, const RobotSize& size, VectorXd& weights) {
   const int nv = model.nv();
-  if (model.hasFreeFlyer())
+  if (const Matrix3d right = findUprightAxes(size.upright.col(2)); model.hasFreeFlyer())
     for (int part : {0, 3, nv, nv + 3})
-      weights.segment<3>(part) = Vector3d(size.upright.cwiseAbs() * weights.segment<3>(part));
+      weights.segment<3>(part) = Vector3d(right.cwiseAbs() * weights.segment<3>(part));
   for (const Joint& joint : model.joints()) {
     const int linear = joint.kind == JointKind::FreeFlyer   ? 3
                        : joint.kind == JointKind::Planar    ? 2
@@ -78,6 +81,10 @@ void scaleStateWeights(const Model& model, const RobotSize& size, VectorXd& weig
       for (int i = 0; i < linear; ++i) part[i] /= size.length * size.length;
   }
   weights.tail(nv) *= size.time * size.time;
+}
+
+Matrix3d calcWeightAxes(const RobotSize& size) {
+  return findUprightAxes(size.upright.col(2)) * size.upright.transpose();
 }
 
 }  // namespace bielle

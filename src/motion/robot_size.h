@@ -13,7 +13,8 @@ namespace bielle {
 /// L, T and M G L relative to the reference robot.
 struct RobotSize {
   double length = 1, time = 1, torque = 1;
-  Matrix3d upright = Matrix3d::Identity();  ///< findUprightAxes() of the base where it stands
+  /// Of the base where it stands: R A is upright, by right angles and the smallest rotation beside them.
+  Matrix3d upright = Matrix3d::Identity();
 
   double velocity() const { return length / time; }
   double force() const { return torque / length; }
@@ -38,7 +39,11 @@ void scaleWeights(const RobotSize& size, LocomotionOptions& options);
 VectorXd makeControlWeights(const Model& model, const RobotSize& size = {});
 
 /// Scales the weights of a state cost, of the tangents of q and v, 2 nv. Those of a free base are given for one that stands with x
-/// ahead and z up, and go to the axes of the robot's that are so, or nearest to it.
+/// ahead and z up, and go to calcWeightAxes().
 void scaleStateWeights(const Model& model, const RobotSize& size, VectorXd& weights);
+
+/// StateCost::axes of these weights: those of the base that are nearest to x ahead and z up, made upright. The identity for a base that
+/// is so but for right angles.
+Matrix3d calcWeightAxes(const RobotSize& size);
 
 }  // namespace bielle

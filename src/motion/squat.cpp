@@ -39,7 +39,7 @@ StageSpec makeStage(const Model& model, const RobotSize& size, const SquatOption
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
   setClosureGains({o.closure_kp, o.closure_kd}, stage.constraints);
-  stage.state = {o.state_weight, q0, VectorXd::Zero(model.nv()), makeStateWeights(model)};
+  stage.state = {o.state_weight, q0, VectorXd::Zero(model.nv()), makeStateWeights(model), calcWeightAxes(size)};
   if (model.hasFreeFlyer()) stage.state.weights.segment<2>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, stage.state.weights);
   scaleStateWeights(model, size, stage.state.weights);

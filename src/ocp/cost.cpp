@@ -81,4 +81,9 @@ void Activation::calcDerivatives(ConstVectorRef r, VectorRef gradient, VectorRef
   }
 }
 
+Matrix3d StateCost::calcCoupling(Eigen::Index first) const {
+  const Matrix3d own = weights.segment<3>(first).asDiagonal();
+  return axes.transpose() * own * axes - own;
+}
+
 }  // namespace bielle

@@ -89,11 +89,16 @@ class ProblemWriter {
                                               {"reference", listVector(spec.control.reference)},
                                               {"weights", listVector(spec.control.weights)}});
     }
-    if (spec.state.weight != 0)
-      json["state_cost"] = states_.add({{"weight", spec.state.weight},
-                                        {"q", listVector(spec.state.q_ref)},
-                                        {"v", listVector(spec.state.v_ref)},
-                                        {"weights", listVector(spec.state.weights)}});
+    if (spec.state.weight != 0) {
+      const StateCost& cost = spec.state;
+      Json state = {{"weight", cost.weight},
+                    {"q", listVector(cost.q_ref)},
+                    {"v", listVector(cost.v_ref)},
+                    {"weights", listVector(cost.weights)}};
+      if (motion_.problem->model().hasFreeFlyer())
+        for (int row = 0; row < 3; ++row) state["axes"].push_back(listVector(cost.axes.row(row)));
+      json["state_cost"] = states_.add(state);
+    }
     json["costs"] = json["constraints"] = Json::array();
     for (const Cost& cost : spec.costs) json["costs"].push_back(costs_.add(describeCost(cost)));
     for (const PathConstraint& constraint : spec.path_constraints)

@@ -194,6 +194,13 @@ struct StateCost {
   double weight = 0;
   VectorXd q_ref, v_ref;  ///< nq, nv
   VectorXd weights;       ///< 2 nv
+  /// Rows: the directions in a free base along which its place, its rotation and their rates are weighted, orthonormal. With those that
+  /// are upright where the robot stands, the cost does not depend on how the frame of the base is turned.
+  Matrix3d axes = Matrix3d::Identity();
+
+  /// What weights along `axes` add to those of the base's own, 3 x 3: A^T diag(w) A - diag(w), zero where they are the same.
+  /// \param first  of three entries of `weights`: 0, 3, nv, nv + 3
+  Matrix3d calcCoupling(Eigen::Index first) const;
 };
 
 /// 1/2 weight sum_i w_i (u_i - u_ref_i)^2.

@@ -128,9 +128,14 @@ NumericalStatus FullTranscription::updateImpactStep(int node, FullEvaluation& at
 double FullTranscription::calcStateCost(const StateCost& state, const FullEvaluation& at, VectorXd& difference) const {
   const int nv = model_.nv();
   model_.difference(state.q_ref, at.ws.q, difference);
-  return 0.5 * state.weight *
-         (difference.cwiseAbs2().dot(state.weights.head(nv)) +
-          (at.ws.v - state.v_ref).cwiseAbs2().dot(state.weights.tail(nv)));
+  double sum = difference.cwiseAbs2().dot(state.weights.head(nv)) +
+               (at.ws.v - state.v_ref).cwiseAbs2().dot(state.weights.tail(nv));
+  if (model_.hasFreeFlyer())
+    for (const int i : {0, 3}) {
+      const Vector3d d = difference.segment<3>(i), e = at.ws.v.segment<3>(i) - state.v_ref.segment<3>(i);
+      sum += d.dot(state.calcCoupling(i) * d) + e.dot(state.calcCoupling(nv + i) * e);
+    }
+  return 0.5 * state.weight * sum;
 }
 
 void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) const {
@@ -301,6 +306,12 @@ void FullTranscription::addStateCost(int node, const FullEvaluation& at, VectorX
   auto lxx = all.bottomRightCorner(2 * nv, 2 * nv);
   lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(at.ws.v - state.v_ref);
   lxx.diagonal().tail(nv) += w * state.weights.tail(nv);
+  if (model_.hasFreeFlyer())
+    for (const int i : {0, 3}) {
+      const Matrix3d C = w * state.calcCoupling(nv + i);
+      lx.segment<3>(nv + i) += C * (at.ws.v.segment<3>(i) - state.v_ref.segment<3>(i));
+      lxx.block<3, 3>(nv + i, nv + i) += C;
+    }
   for (const Joint& joint : model_.joints()) {
     const int i = joint.idx_v, n = joint.nv;
     if (n == 0) continue;
@@ -308,7 +319,9 @@ void FullTranscription::addStateCost(int node, const FullEvaluation& at, VectorX
     const JointVector d = difference.segment(i, n);
     JointMatrix J(n, n);
     calcJointDifferenceJacobian(joint, d, J);
-    const JointMatrix WJ = weights.asDiagonal() * J;
+    JointMatrix WJ = weights.asDiagonal() * J;
+    if (i == 0 && model_.hasFreeFlyer())
+      for (const int k : {0, 3}) WJ.middleRows<3>(k) += w * state.calcCoupling(k) * J.middleRows<3>(k);
     lx.segment(i, n).noalias() += WJ.transpose() * d;
     lxx.block(i, i, n, n).noalias() += J.transpose() * WJ;
   }

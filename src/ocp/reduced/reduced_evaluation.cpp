@@ -26,7 +26,7 @@ Matrix3d makeTurn(const Closure& contact) {
 }
 
 bool isSame(const StateCost& a, const StateCost& b) {
-  return a.weight == b.weight && a.q_ref == b.q_ref && a.v_ref == b.v_ref && a.weights == b.weights;
+  return a.weight == b.weight && a.q_ref == b.q_ref && a.v_ref == b.v_ref && a.weights == b.weights && a.axes == b.axes;
 }
 
 }  // namespace

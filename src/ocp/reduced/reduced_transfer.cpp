@@ -1,5 +1,6 @@
 // Copies data between the nodes and the kernel's lanes.
 #include <algorithm>
+#include <array>
 
 #include "ocp/reduced/reduced_kernel.h"
 
@@ -203,7 +204,7 @@ bool ReducedKernel::loadStateCosts(const int* indices, const StageSpec* const* s
   if (!some) return false;
   if (wanted == loaded_costs_) return true;
   loaded_costs_ = wanted;
-  const auto load = [&](const auto& get, VectorX<Lanes>& out) {
+  const auto load = [&](const auto& get, auto& out) {
     gatherLanes(kLane, out.size(), out.data(), [&](int l) { return get(costs[l] ? *costs[l] : *some).data(); });
   };
   load([](const StateCost& cost) -> const VectorXd& { return cost.q_ref; }, state_cost_.q_ref);
@@ -212,6 +213,15 @@ bool ReducedKernel::loadStateCosts(const int* indices, const StageSpec* const* s
   Lanes weight;
   for (int l = 0; l < kLane; ++l) weight.set(l, costs[l] ? costs[l]->weight : 0);
   state_cost_.weights *= weight;
+  if (!model_.hasFreeFlyer()) return true;
+  for (int k = 0; k < 4; ++k) {
+    std::array<Matrix3d, kLane> own;
+    for (int l = 0; l < kLane; ++l)
+      own[l] = (costs[l] ? *costs[l] : *some).calcCoupling(3 * (k % 2) + k / 2 * model_.nv());
+    Matrix3<Lanes>& coupling = state_cost_.couplings[k];
+    gatherLanes(kLane, coupling.size(), coupling.data(), [&](int l) { return own[l].data(); });
+    coupling *= weight;
+  }
   return true;
 }
 

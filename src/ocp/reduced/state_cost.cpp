@@ -6,7 +6,7 @@ namespace bielle {
 namespace {
 
 // Number of stored Hessian entries of a reduced joint.
-int countFree(const Joint& joint) { return joint.nv * (joint.nv + 1); }
+int countFree(const Joint& joint) { return 2 * joint.nv * joint.nv; }
 int countCluster(const ReducedCluster& loop) { return 3 * loop.size * loop.size; }
 
 // out += scale times the lower triangle of a matrix (n x n).
@@ -38,7 +38,7 @@ void addStateCostModel(const Model& model, const Reduction& reduction, const Sta
     const Joint& joint = model.joints()[reduction.free_joints[i]];
     const int o = reduction.free_offsets[i], n = joint.nv;
     addLower(hessian, n, scale, lxx.block(o, o, n, n));
-    for (int c = 0; c < n; ++c) lxx(nr + o + c, nr + o + c) += scale * hessian[n * n + c];
+    addLower(hessian + n * n, n, scale, lxx.block(nr + o, nr + o, n, n));
     hessian += countFree(joint);
   }
   for (const ReducedCluster& loop : reduction.clusters) {
@@ -54,6 +54,7 @@ ReducedStateCost::ReducedStateCost(const Model& model, const Reduction& reductio
     : model_(model), reduction_(reduction), derivatives_(model, reduction) {
   q_ref.setZero(model.nq());
   weights.setZero(2 * model.nv());
+  for (Matrix3<Lanes>& coupling : couplings) coupling.setZero();
   for (VectorX<Lanes>* x : {&v_ref, &difference, &gradient_q_, &gradient_v_}) x->setZero(model.nv());
   for (const ReducedCluster& loop : reduction.clusters) {
     const int n = loop.model.nv(), r = loop.size;
@@ -76,6 +77,11 @@ Lanes ReducedStateCost::update(const VectorX<Lanes>& q, const VectorX<Lanes>& v)
     of_q += weights[k] * d * d;
     of_v += weights[nv + k] * e * e;
   }
+  for (int k = 0; model_.hasFreeFlyer() && k < 2; ++k) {
+    const Vector3<Lanes> d = difference.segment<3>(3 * k), e = v.segment<3>(3 * k) - v_ref.segment<3>(3 * k);
+    of_q += d.dot(couplings[k] * d);
+    of_v += e.dot(couplings[2 + k] * e);
+  }
   return 0.5 * (of_q + of_v);
 }
 
@@ -85,6 +91,11 @@ const StateCostModelOf<Lanes>& ReducedStateCost::differentiate(const VectorX<Lan
   for (int k = 0; k < nv; ++k) {
     gradient_q_[k] = weights[k] * difference[k];
     gradient_v_[k] = weights[nv + k] * (v[k] - v_ref[k]);
+  }
+  for (int k = 0; model_.hasFreeFlyer() && k < 2; ++k) {
+    const Vector3<Lanes> d = difference.segment<3>(3 * k), e = v.segment<3>(3 * k) - v_ref.segment<3>(3 * k);
+    gradient_q_.segment<3>(3 * k) += couplings[k] * d;
+    gradient_v_.segment<3>(3 * k) += couplings[2 + k] * e;
   }
   Lanes* hessian = derivatives_.hessian.data();
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
@@ -104,7 +115,8 @@ ReducedStateCost::JointMatrix ReducedStateCost::differentiateJoint(const Joint& 
   const int k = joint.idx_v, n = joint.nv;
   JointMatrix J(n, n);
   calcJointDifferenceJacobian(joint, difference.segment(k, n), J);
-  const JointMatrix WJ = weights.segment(k, n).asDiagonal() * J;
+  JointMatrix WJ = weights.segment(k, n).asDiagonal() * J;
+  for (int i = 0; isBase(joint) && i < 2; ++i) WJ.middleRows<3>(3 * i) += couplings[i] * J.middleRows<3>(3 * i);
   Eigen::Matrix<Lanes, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> gradient =
       J.transpose().lazyProduct(gradient_q_.segment(k, n));
   gradient_q_.segment(k, n) = gradient;
@@ -113,12 +125,13 @@ ReducedStateCost::JointMatrix ReducedStateCost::differentiateJoint(const Joint& 
 
 void ReducedStateCost::differentiateFree(const Joint& joint, int offset, Lanes* hessian) {
   const int k = joint.idx_v, n = joint.nv;
-  Eigen::Map<MatrixX<Lanes>> yy(hessian, n, n);
+  Eigen::Map<MatrixX<Lanes>> yy(hessian, n, n), vv(hessian + n * n, n, n);
   if (isCurved(joint))
     yy = differentiateJoint(joint);
   else
     yy = weights.segment(k, n).asDiagonal();
-  for (int c = 0; c < n; ++c) hessian[n * n + c] = weights[model_.nv() + k + c];
+  vv = weights.segment(model_.nv() + k, n).asDiagonal();
+  for (int i = 0; isBase(joint) && i < 2; ++i) vv.block<3, 3>(3 * i, 3 * i) += couplings[2 + i];
   derivatives_.gradient.segment(offset, n) = gradient_q_.segment(k, n);
   derivatives_.gradient.segment(reduction_.size + offset, n) = gradient_v_.segment(k, n);
 }

@@ -1,12 +1,14 @@
 #pragma once
 // A state cost in the coordinates of reduced_kernel.h.
 //
-// With d = q (-) q_ref, J_d its Jacobian by q, e = v - v_ref, and the weights W_q and W_v (diagonal),
+// With d = q (-) q_ref, J_d its Jacobian by q, e = v - v_ref, and the weights W_q and W_v (diagonal but for blocks of a free base),
 //     l = 1/2 (d.W_q d + e.W_v e)
 // By Gauss-Newton, with Q = J_d^T W_q J_d, a reduced joint (reduction.h) with bases N and Z of Eq. (a) (outside all
 // clusters N = 1, Z = 0) contributes
 //     l_y  = N^T J_d^T W_q d + Z^T W_v e,     l_v  = N^T W_v e
 //     l_yy = N^T Q N + Z^T W_v Z,             l_vy = N^T W_v Z,         l_vv = N^T W_v N                            (h)
+#include <array>
+
 #include "dynamics/reduced_tree.h"
 #include "ocp/transcription.h"
 
@@ -30,7 +32,9 @@ class ReducedStateCost {
   ReducedStateCost(const Model& model, const Reduction& reduction);
 
   VectorX<Lanes> q_ref, v_ref, weights;  // nq, nv, 2 nv: W_q, W_v
-  VectorX<Lanes> difference;             // nv, d
+  // What the axes of StateCost add to those of a free base: of its place and rotation, and of their rates.
+  std::array<Matrix3<Lanes>, 4> couplings;
+  VectorX<Lanes> difference;  // nv, d
 
   // Computes the value at (q, v), and d.
   Lanes update(const VectorX<Lanes>& q, const VectorX<Lanes>& v);
@@ -39,6 +43,7 @@ class ReducedStateCost {
 
  private:
   using JointMatrix = Eigen::Matrix<Lanes, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
+  bool isBase(const Joint& joint) const { return joint.idx_v == 0 && model_.hasFreeFlyer(); }
   JointMatrix differentiateJoint(const Joint& joint);
   void differentiateFree(const Joint& joint, int offset, Lanes* hessian);
   struct Cluster {
