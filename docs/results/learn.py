@@ -261,7 +261,17 @@ def tell_learning(name, run):
     first, last = run["curve"][0], run["curve"][-1]
     return f"""On the {name}: {run['iterations']} iterations in {run['minutes']:g} min of processor time. Of the same
 {2 * run['settings']['pairs']} walks {first[2]:.0%} stood in the beginning and {last[2]:.0%} in the last measurement, with
-mean rewards of {first[1]:.3f} and {last[1]:.3f}."""
+mean rewards of {first[1]:.3f} and {last[1]:.3f}.{tell_rest(run["curve"])}"""
+
+
+def tell_rest(curve):
+    """What becomes of the reward after the first ten minutes, if there are many more."""
+    rewards = [row[1] for row in curve if row[0] >= 10]
+    if len(rewards) < 100:
+        return ""
+    third = len(rewards) // 3
+    return f""" After ten minutes it varied between {min(rewards):.3f} and {max(rewards):.3f}; means of the first and the last third of
+that time are {sum(rewards[:third]) / third:.3f} and {sum(rewards[-third:]) / third:.3f}."""
 
 
 def write_page(data, quick):
