@@ -323,6 +323,24 @@ TEST_CASE(
       CHECK_FALSE(result.ends[0].reason.empty());
     }
   }
+  // Only what is near the start can be evaluated, and the slope leads far beyond it.
+  for (const SearchAlgorithm algorithm : {SearchAlgorithm::Slsqp, SearchAlgorithm::Mma}) {
+    CAPTURE(getName(algorithm));
+    SearchProblem narrow;
+    narrow.lower = Eigen::Vector2d(0, 0), narrow.upper = Eigen::Vector2d(1, 1),
+    narrow.start = Eigen::Vector2d(0.8, 0.8);
+    narrow.sloped = [](const VectorXd& x, const SearchStage&) {
+      SlopedValue out;
+      out.value = x.minCoeff() < 0.6 ? 1e3 : x.sum();
+      if (out.value < 1e3) out.terms = {{VectorXd::Constant(1, out.value), MatrixXd::Constant(1, 2, 1)}};
+      return out;
+    };
+    const SearchResult result = minimizeByStages(narrow, {{algorithm, 60, 1e-3}}, 1);
+    CHECK(result.value < 1.25);
+    CHECK(result.evaluations <= 60);
+    REQUIRE(result.ends.size() == 1);
+    CHECK(result.ends[0].evaluations == result.evaluations);
+  }
   SearchProblem bowl;
   bowl.lower = VectorXd::Constant(1, -1), bowl.upper = VectorXd::Constant(1, 1),
   bowl.start = VectorXd::Constant(1, 0.7);

@@ -238,7 +238,7 @@ TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
 }
 
 TEST_CASE("Mutated files of USD are models or clear errors") {
-  tryMutatedFiles(1400, "robot.usda", [](const Model& model, const VectorXd& q) { return formatUsd(model, q).usda; });
+  tryMutatedFiles(8000, "robot.usda", [](const Model& model, const VectorXd& q) { return formatUsd(model, q).usda; });
 }
 
 TEST_CASE("Mutated robots of parts are models or clear errors") {

@@ -24,6 +24,14 @@ class EpigraphProblem {
   }
 
   bool feasible() const { return feasible_; }
+  // From the best point to the last design, if that could not be evaluated: the largest share of the bounds.
+  double calcBlockedStep() const {
+    if (!here_.terms.empty()) return 0;
+    const std::vector<double> best = getShares(search_.problem, search_.best.x);
+    double step = 0;
+    for (Eigen::Index i = 0; i < n_; ++i) step = std::max(step, std::abs(shares_[i] - best[i]));
+    return step;
+  }
   Eigen::Index size() const { return n_ + bounds_; }
   Eigen::Index constraints() const { return constraints_; }
 
@@ -119,14 +127,14 @@ class EpigraphProblem {
   SlopedValue here_;
 };
 
-}  // namespace
-
-void runSlopedStage(Search& search) {
+// Searches within `reach` of the best point, a share of the bounds. Returns how far away a design was that could not be evaluated and
+// that the algorithm has not come back from; 0 if there is none.
+double searchWithin(Search& search, double reach) {
   const VectorXd start = search.best.x;
   EpigraphProblem problem(search, start);
   if (!problem.feasible()) {
     search.best.ends.push_back({search.stage->algorithm, 1, "it starts where nothing can be differentiated"});
-    return;
+    return 0;
   }
   std::vector<double> z = problem.makeStart();
   const bool slsqp = search.stage->algorithm == SearchAlgorithm::Slsqp;
@@ -136,10 +144,36 @@ void runSlopedStage(Search& search) {
     optimizer.add_inequality_mconstraint(EpigraphProblem::calcConstraints, &problem,
                                          std::vector<double>(problem.constraints(), kConstraintTolerance));
   std::vector<double> lower(z.size(), 0), upper(z.size(), 1);
+  for (Eigen::Index i = 0; i < start.size(); ++i) {
+    lower[i] = std::max(0.0, z[i] - reach);
+    upper[i] = std::min(1.0, z[i] + reach);
+  }
   for (Eigen::Index t = start.size(); t < problem.size(); ++t) upper[t] = 2 * z[t];
   optimizer.set_lower_bounds(lower);
   optimizer.set_upper_bounds(upper);
   runOptimizer(search, optimizer, z);
+  return problem.calcBlockedStep();
+}
+
+}  // namespace
+
+// Slopes say nothing of designs that cannot be evaluated: after a step to one, NLopt's SLSQP may ask for it until it has no evaluations
+// left. It then begins again from the best point, and goes half as far.
+void runSlopedStage(Search& search) {
+  const SearchStage* const stage = search.stage;
+  SearchStage rest = *stage;
+  search.stage = &rest;
+  const int before = search.best.evaluations;
+  double reach = 1;
+  while (true) {
+    reach = 0.5 * searchWithin(search, reach);
+    const int taken = search.best.evaluations - before;
+    search.best.ends.back().evaluations = taken;
+    rest.evaluations = stage->evaluations - taken;
+    if (reach <= stage->tolerance || rest.evaluations <= 0) break;
+    search.best.ends.pop_back();
+  }
+  search.stage = stage;
 }
 
 }  // namespace bielle
