@@ -331,12 +331,14 @@ TEST_CASE(
     narrow.start = Eigen::Vector2d(0.8, 0.8);
     narrow.sloped = [](const VectorXd& x, const SearchStage&) {
       SlopedValue out;
-      out.value = x.minCoeff() < 0.6 ? 1e3 : x.sum();
-      if (out.value < 1e3) out.terms = {{VectorXd::Constant(1, out.value), MatrixXd::Constant(1, 2, 1)}};
+      out.value = x.minCoeff() < 0.6 ? 2 : x.maxCoeff();
+      if (out.value == 2) return out;
+      out.terms = {{x, MatrixXd::Identity(2, 2)}};
+      out.limits = {VectorXd::Constant(1, x.sum() - 10), MatrixXd::Constant(1, 2, 1)};  // far away
       return out;
     };
     const SearchResult result = minimizeByStages(narrow, {{algorithm, 60, 1e-3}}, 1);
-    CHECK(result.value < 1.25);
+    CHECK(result.value < 0.61);
     CHECK(result.evaluations <= 60);
     REQUIRE(result.ends.size() == 1);
     CHECK(result.ends[0].evaluations == result.evaluations);
