@@ -270,8 +270,8 @@ def tell_rest(curve):
     if len(rewards) < 100:
         return ""
     third = len(rewards) // 3
-    return f""" After ten minutes it varied between {min(rewards):.3f} and {max(rewards):.3f}; means of the first and the last third of
-that time are {sum(rewards[:third]) / third:.3f} and {sum(rewards[-third:]) / third:.3f}."""
+    return f""" After ten minutes the mean reward varied between {min(rewards):.3f} and {max(rewards):.3f}; its means over the
+first and the last third of that time are {sum(rewards[:third]) / third:.3f} and {sum(rewards[-third:]) / third:.3f}."""
 
 
 def write_page(data, quick):
@@ -288,7 +288,8 @@ processor time.""")
         page.add(tell_learning(name, run))
     short = [name for name, run in own["learning"].items() if run["minutes"] < 119]
     if short:
-        page.add(f"""Cut short, since other programs had the machine: {" and ".join(short)}. The same command goes on from there.""")
+        page.add(f"""Other programs had the machine, so that learning was cut short on the {" and the ".join(short)}; the same command
+goes on from there.""")
     page.lines += ["", "![mean rewards and shares that stand, by processor time](../images/learn.svg)"]
     page.heading("Carried out under the conditions of learning")
     armature = own["learning"]["serial model"]["settings"].get("armature", "")

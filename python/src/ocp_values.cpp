@@ -76,7 +76,8 @@ void bindCosts(py::module_& module) {
       .field("q_ref", &StateCost::q_ref, "(nq,)")
       .field("v_ref", &StateCost::v_ref, "(nv,)")
       .field("weights", &StateCost::weights, "(2 nv,)")
-      .field("axes", &StateCost::axes, "(3, 3), rows: directions in a free base that its rotation is weighted along");
+      .field("axes", &StateCost::axes,
+             "(3, 3), rows: directions in a free base along which its place and rotation are weighted");
   Value<ControlCost>(module, "ControlCost", "1/2 weight sum w_i (u_i - reference_i)^2.")
       .field("weight", &ControlCost::weight, "0: none")
       .field("reference", &ControlCost::reference, "(nu,)")

@@ -14,7 +14,8 @@ VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
 
 /// Velocity limits by coordinate (nv), likewise.
 VectorXd getVelocityLimits(const Model& model, const LimitOptions& options);
-// Of motors, W; infinite where there is none.
+
+/// Power limits by motor (nu), W, likewise; infinite where there is none.
 VectorXd getPowerLimits(const Model& model, const LimitOptions& options);
 
 /// The limits of a model, as its file and the options give them.

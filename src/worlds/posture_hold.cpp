@@ -4,11 +4,6 @@
 #include "bielle/motion/motion.h"
 
 namespace bielle::worlds {
-namespace {
-
-constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad
-
-}  // namespace
 
 PostureHold::PostureHold(const Model& model) : model_(model), q_(makeStandingPosture(model)) {
   std::vector<int> feet;

@@ -7,6 +7,8 @@ namespace bielle::worlds {
 // Keeps the standing posture by springs and dampers on the motors about the torques that hold it there.
 class PostureHold {
  public:
+  static constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad
+
   // \param model  outlives it, has feet
   explicit PostureHold(const Model& model);
   const VectorXd& posture() const { return q_; }

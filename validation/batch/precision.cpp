@@ -17,8 +17,9 @@
 namespace bielle {
 namespace {
 
+using worlds::PostureHold;
+
 constexpr double kSample = 0.01, kPushed = 0.05;  // s
-constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad
 
 // Joints at each sample, a column per world and sample; and the time that the steps took.
 struct Motion {
@@ -35,10 +36,10 @@ Model makeSprung(const Model& model, ConstVectorRef posture, ConstVectorRef torq
     force.joint = motor.joint;
     force.idx_q = model.joints()[motor.joint].idx_q;
     force.dof = motor.dof;
-    force.stiffness = kStiffness;
+    force.stiffness = PostureHold::kStiffness;
     force.rest = posture[force.idx_q];
     force.preload = torques[m];
-    force.damping = kDamping;
+    force.damping = PostureHold::kDamping;
     parts.joint_forces.push_back(force);
   }
   return ModelBuilder::restore(std::move(parts));
@@ -46,7 +47,7 @@ Model makeSprung(const Model& model, ConstVectorRef posture, ConstVectorRef torq
 
 class Task {
  public:
-  Task(const Model& model, const PrecisionOptions& options) : Task(model, options, worlds::PostureHold(model)) {}
+  Task(const Model& model, const PrecisionOptions& options) : Task(model, options, PostureHold(model)) {}
   const Model& model() const { return model_; }
   const VectorXd& posture() const { return posture_; }
   int numSamples() const { return static_cast<int>(std::lround(options_.seconds / kSample)); }
@@ -63,7 +64,7 @@ class Task {
   }
 
  private:
-  Task(const Model& model, const PrecisionOptions& options, const worlds::PostureHold& hold)
+  Task(const Model& model, const PrecisionOptions& options, const PostureHold& hold)
       : options_(options),
         posture_(hold.posture()),
         model_(makeSprung(model, posture_, hold.calcTorques(posture_, VectorXd::Zero(model.nv())))) {

@@ -1,5 +1,6 @@
 // bielle-mesh FILE: writes the triangles of a mesh of any kind that assimp reads to the standard output, as binary STL in the
-// coordinates and units of the file. Exit status: 0, or 2 with a message if it cannot be read or requires an extension of glTF.
+// coordinates and units of the file. Exit status: 0, or 2 with a message if it cannot be read, or assimp would read
+// it as another mesh.
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
