@@ -89,7 +89,7 @@ inline double calcLargestGap(const ShootingProblem& problem, const ShootingTraje
     VectorXd dx(problem.tangentSize(k + 1));
     const DifferenceTask task{k + 1, next.get(), &node->x_next, &dx};
     problem.difference(&task, 1, problem.makeScratch().get());
-    gap = std::max(gap, dx.lpNorm<Eigen::Infinity>());
+    gap = std::max(gap, dx.norm());
   }
   return gap;
 }

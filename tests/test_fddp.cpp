@@ -59,6 +59,28 @@ TEST_CASE("a body turns on SO(3), from a guess that jumps about") {
   checkOptimal(problem, solveInPlace(problem, t, makeTightOptions()), t);
 }
 
+TEST_CASE("multiple shooting brings an unstable plant to rest from a guess from which rollouts in one piece do not") {
+  auto problem = makeCartPole();
+  problem.stages = 200;
+  problem.start << 0, 0.4, 0, 0;
+  problem.goal.setZero();  // its pole is upright, and stays there, but for what the guess says
+  FddpSummary summaries[2];
+  for (const bool multiple : {false, true}) {
+    ShootingTrajectory t = makeGuess(problem);
+    std::mt19937 rng(7);  // other guesses are solved by both, and a few by the other way alone
+    std::normal_distribution<double> normal;
+    for (VectorXd& x : t.xs) x = VectorXd::NullaryExpr(4, [&](Eigen::Index) { return 2 * normal(rng); });
+    for (VectorXd& u : t.us) u.setConstant(10 * normal(rng));
+    FddpOptions options;
+    options.multiple_shooting = multiple;
+    summaries[multiple] = solveInPlace(problem, t, options);
+  }
+  CHECK(summaries[true].termination == FddpTermination::Converged);
+  CHECK(summaries[true].cost == Approx(0.223682).epsilon(1e-5));  // that of the guess that stays upright
+  CHECK(summaries[true].iterations < 30);
+  CHECK(summaries[false].cost > 1.01 * summaries[true].cost);
+}
+
 TEST_CASE("the gaps contract by 1 - alpha, and the log tells so") {
   auto problem = makeCartPole();
   ShootingTrajectory t = makeLine(problem);

@@ -1,5 +1,6 @@
 #include "motion/attempts.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "motion/applied_options.h"
@@ -10,7 +11,9 @@
 namespace bielle {
 namespace {
 
-constexpr double kCautious = 1e-2;  // regularization of a second attempt
+// A first attempt is given up after as many iterations if constraints are violated or gaps open by more than this.
+constexpr int kPatience = 80;
+constexpr double kFar = 0.03;
 
 // Whether a problem has these rows of constraints at its nodes.
 bool haveRows(const ShootingProblem& problem, const Multipliers& multipliers) {
@@ -95,7 +98,8 @@ namespace {
 
 // The better of two attempts, with what both took.
 Solution join(Solution first, Solution second) {
-  const bool both = second.summary.termination == FddpTermination::Infeasible;
+  const bool both = first.summary.termination == FddpTermination::Infeasible &&
+                    second.summary.termination == FddpTermination::Infeasible;
   const bool is_first = both && first.summary.violation < second.summary.violation;
   Solution &better = is_first ? first : second, &other = is_first ? second : first;
   std::vector<FddpIteration> log = first.summary.log;
@@ -120,16 +124,25 @@ ShootingTrajectory holdPosture(const RobotProblem& problem, ShootingTrajectory t
 
 Solution solveAlone(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                     StartingPoint start) {
-  Solution result = attempt(motion, options, observer, start);
+  bool lost = false;
+  FddpObserver patient = observer;
+  patient.callback = [&](const FddpIteration& line, const ShootingTrajectory& nodes) {
+    if (observer.callback && observer.callback(line, nodes) == FddpAction::Stop) return FddpAction::Stop;
+    lost = line.iteration >= kPatience && std::max(line.violation, line.gap) > kFar;
+    return lost ? FddpAction::Stop : FddpAction::Continue;
+  };
+  Solution result = attempt(motion, options, options.multiple_shooting ? patient : observer, start);
   if (result.summary.termination == FddpTermination::Failed && result.summary.iterations == 0) {
     start = {holdPosture(*motion.problem, std::move(start.trajectory)), {}};
     result = attempt(motion, options, observer, start);
   }
-  if (result.summary.termination == FddpTermination::Infeasible && options.initial_regularization < kCautious) {
-    FddpOptions cautious = options;
-    cautious.initial_regularization = kCautious;
+  lost = lost && result.summary.termination == FddpTermination::Interrupted;
+  if (options.multiple_shooting && (lost || result.summary.termination == FddpTermination::Infeasible)) {
+    FddpOptions single = options;
+    single.multiple_shooting = false;
+    single.max_iterations = std::max(1, options.max_iterations - result.summary.iterations);
     start.multipliers = {};
-    result = join(std::move(result), attempt(motion, cautious, observer, start));
+    result = join(std::move(result), attempt(motion, single, observer, start));
   }
   return result;
 }

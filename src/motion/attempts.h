@@ -8,7 +8,8 @@ namespace bielle {
 Solution attempt(const Motion& motion, const FddpOptions& solver, const FddpObserver& observer,
                  const StartingPoint& start);
 
-// One, and another one if that cannot begin, from the posture at the start, or ends as infeasible, from a larger regularization.
+// One, and another one if that cannot begin, from the posture at the start, or, without multiple shooting, if it ends as infeasible
+// or has come nowhere after 80 iterations.
 Solution solveAlone(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                     StartingPoint start);
 

@@ -251,8 +251,9 @@ void describe(OptionFields& f, ConstraintOptions& o) {
 
 void describe(OptionFields& f, FddpOptions& o) {
   f.integer("max_iterations", o.max_iterations, {1, kMostIterations}, "largest number of iterations");
+  f.flag("multiple_shooting", o.multiple_shooting, "false: far from the optimum, rollouts in one piece");
   f.number("gradient_tolerance", o.gradient_tolerance, "1", kNotNegative, "(cost per unit of control)^2");
-  f.number("gap_tolerance", o.gap_tolerance, "1", kNotNegative, "largest entry of the gaps");
+  f.number("gap_tolerance", o.gap_tolerance, "1", kNotNegative, "largest norm of a gap");
   f.number("cost_tolerance", o.cost_tolerance, "1", kNotNegative,
            "relative change of the cost by a full step; 0: never");
   f.number(

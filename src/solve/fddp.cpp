@@ -41,7 +41,7 @@ FddpResult solve(const ShootingProblem& problem, ShootingTrajectory guess, const
 }
 
 FddpSummary FddpSolve::run() {
-  start();
+  start(multiple_shooting_ ? problem_.numStages() : options_.rollout_segments);
   finish(iterate());
   const AugmentedLagrangian& lagrangian = memory_.lagrangian;
   if (summary_.termination == FddpTermination::MaxIterations && lagrangian.violation() > options_.constraints.tolerance)
@@ -156,14 +156,14 @@ FddpSolve::End FddpSolve::updateMultipliers() {
 }
 
 // Leaves the accepted trial in accepted_, or renewed_ set. Where constraints and gaps are small, full steps that violate rows are
-// cheaper by holding these rows or by more regularization than a shorter one. Far from there, steps that follow a shortened one are
-// rolled out in one piece: in segments some motions end where no step is acceptable.
+// cheaper by holding these rows or by more regularization than a shorter one. Without multiple shooting, steps far from there that
+// follow a shortened one are rolled out in one piece.
 FddpSolve::End FddpSolve::searchLine() {
-  const int segments = getNumSegments();
+  const int segments = multiple_shooting_ && line_.gap > kClose ? N_ : getNumSegments();
   const bool near = line_.violation < kClose && line_.gap <= kClose;
   const bool settles = near && calcForeseen() <= kClose * std::abs(line_.cost);
   renewed_ = false;
-  if (segments > 1 && first_step_ == 1 && (near || last_step_ == 1)) {
+  if (segments > 1 && first_step_ == 1 && (near || multiple_shooting_ || last_step_ == 1)) {
     if (tryFullStep(segments)) return {};
     if (settles && tryShorterStep(segments)) return {};
     if (near && hasViolatedFreeRows()) {
@@ -171,7 +171,8 @@ FddpSolve::End FddpSolve::searchLine() {
       if (accepted_ || renewed_ || regularization_ < kMuch) return {};
     }
   }
-  if (!near || mustClose() || !tryShorterSteps(segments)) searchInOnePiece(startSearch());
+  const bool cuts = (near || multiple_shooting_) && !mustClose();
+  if (!cuts || !tryShorterSteps(segments)) searchInOnePiece(startSearch());
   return {};
 }
 

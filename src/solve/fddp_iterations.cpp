@@ -17,12 +17,13 @@ constexpr const char* kStalled = "the cost no longer decreases";
 
 }  // namespace
 
-void FddpMemory::resize(const ShootingProblem& problem, const IterationOptions& options, int threads) {
+void FddpMemory::resize(const ShootingProblem& problem, const IterationOptions& options, int most_segments,
+                        int threads) {
   const int num_trials = std::min(problem.batchSize(), options.num_step_lengths);
   evaluations.resize(problem, num_trials > 1 ? 2 * num_trials : 0, threads);
   lagrangian.resize(problem, options.constraints);
   backward.resize(problem);
-  rollout.resize(problem, options.rollout_segments, num_trials);
+  rollout.resize(problem, most_segments, num_trials);
   bounds.resize(problem.hasControlBounds() ? problem.numStages() : 0);
   for (size_t k = 0; k < bounds.size(); ++k) {
     const int stage = static_cast<int>(k), nu = problem.controlSize(stage);
@@ -36,9 +37,9 @@ void FddpMemory::resize(const ShootingProblem& problem, const IterationOptions& 
   open.assign(problem.numStages(), false);
 }
 
-void FddpIterations::start() {
+void FddpIterations::start(int most_segments) {
   begin();
-  memory_.resize(problem_, options_, threads_);
+  memory_.resize(problem_, options_, most_segments, threads_);
   for (size_t k = 0; k < memory_.bounds.size(); ++k) {
     trajectory_.us[k] = trajectory_.us[k].cwiseMax(memory_.bounds[k].lower).cwiseMin(memory_.bounds[k].upper);
   }
@@ -139,10 +140,10 @@ void FddpIterations::updateGaps() {
   gap_sum_ = 0;
   for (int k = 0; k <= N_; ++k) {
     if (models[k].gap.size() == 0) continue;
-    const double largest = models[k].gap.lpNorm<Eigen::Infinity>();
+    const double largest = models[k].gap.norm();
     line_.gap = std::max(line_.gap, largest);
     memory_.open[k] = largest > options_.gap_tolerance;
-    if (memory_.open[k]) gap_sum_ += models[k].gap.lpNorm<1>();
+    if (memory_.open[k]) gap_sum_ += largest;
   }
 }
 

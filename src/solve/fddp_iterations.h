@@ -23,7 +23,7 @@ struct FddpMemory {
   std::vector<IntegrateTask> integrations;
   Team team;
 
-  void resize(const ShootingProblem& problem, const IterationOptions& options, int threads);
+  void resize(const ShootingProblem& problem, const IterationOptions& options, int most_segments, int threads);
 };
 
 /// The numbers of the current iterate and of the step searched from it.
@@ -50,7 +50,7 @@ class FddpIterations {
   };
 
   // The parts of an iteration, in their order.
-  void start();
+  void start(int most_segments);  // of rollouts
   // Then, for all nodes but the first: evaluations, multipliers, models and sweep. What follows it begins with resume().
   void prepare();
   void resume();

@@ -26,7 +26,7 @@ class RecedingStep : private FddpIterations {
   ~RecedingStep() { last_ = std::move(summary_); }
 
   void prepare(double regularization) {
-    start();
+    start(options_.rollout_segments);
     regularization_ = std::max(regularization_, regularization);
     FddpIterations::prepare();
   }
@@ -39,7 +39,7 @@ class RecedingStep : private FddpIterations {
     if (prepared)
       resume();
     else
-      start();
+      start(options_.rollout_segments);
     regularization_ = std::max(regularization_, regularization);
     finish(iterate());
     regularization = rejected_ > 0 ? regularization_ : regularization / options_.regularization_decrease;

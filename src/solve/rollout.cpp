@@ -289,8 +289,8 @@ void Rollout::updateGaps(const RolloutInput& input, int num_tracks, Trial& trial
       addJointGap(input, rest, tracks_[s], tracks_[s + 1], trial);
       ++s;
     } else if (rest > 0) {
-      trial.gap_sum += rest * gap.lpNorm<1>();
-      trial.gap_max = std::max(trial.gap_max, rest * gap.lpNorm<Eigen::Infinity>());
+      trial.gap_sum += rest * gap.norm();
+      trial.gap_max = std::max(trial.gap_max, rest * gap.norm());
     }
   }
   trial.ok = std::isfinite(trial.merit) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
@@ -304,8 +304,8 @@ void Rollout::addJointGap(const RolloutInput& input, double rest, const Track& b
   const LqSweep::Node& value = input.sweep.nodes()[after.begin];
   auto gap = joint_gap_.head(after.start.size()), slope = joint_slope_.head(after.start.size());
   gap = before.arrival - after.start;
-  trial.gap_sum += gap.lpNorm<1>();
-  trial.gap_max = std::max(trial.gap_max, gap.lpNorm<Eigen::Infinity>());
+  trial.gap_sum += gap.norm();
+  trial.gap_max = std::max(trial.gap_max, gap.norm());
   gap -= rest * input.models[before.end - 1].gap;
   slope = value.Vx;
   slope.noalias() += value.Vxx * after.start;

@@ -62,7 +62,7 @@ struct Multipliers {
 struct IterationOptions {
   /// Converged if Eq. (6) is below this, in (units of cost per unit of control)^2, and the gaps are closed.
   double gradient_tolerance = 1e-9;
-  /// The gaps are closed if every entry is below this, in units of the tangent space.
+  /// The gaps are closed if the norm of each is below this, in units of the tangent space.
   double gap_tolerance = 1e-10;
   /// Also converged if a full step at the smallest regularization changes J by less than this times |J|; 0: never. It
   /// also converges if no such step decreases J and (1) predicts less than the rounding of all nodes, N 1e-14 |J|.
@@ -81,7 +81,8 @@ struct IterationOptions {
   double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must actually fall, in (0, 1)
 
   ConstraintOptions constraints;
-  /// Largest number of segments that a rollout is cut into, to run at the same time; none is shorter than 6 stages. Results
+  /// Largest number of segments that a rollout is cut into near the optimum, to run at the same time; none is shorter than 6
+  /// stages. Results
   /// depend on it, within the tolerances, so it is independent of the number of threads.
   int rollout_segments = 16;
   int threads = 0;  ///< 0: all; at most 1024. Results are bitwise independent of it.
@@ -89,6 +90,9 @@ struct IterationOptions {
 
 struct FddpOptions : IterationOptions {
   int max_iterations = 300;  ///< at most 1000000; the last one closes the gaps
+  /// Whether steps are tried in segments first however far the iterate is, and in those of a single stage while gaps are large
+  /// (multiple shooting). Otherwise they are rolled out in one piece there, which is slower, and from some guesses gets farther.
+  bool multiple_shooting = true;
   /// Share of J; 0: never. If J has stayed within it for 20 iterations and violations below 0.03, constraints are closed
   /// where the trajectory is, and it ends as Converged and `acceptable`: within the constraints, but not stationary.
   double acceptable_decrease = 0;
@@ -99,7 +103,7 @@ struct FddpIteration {
   int iteration = 0;
   double cost = 0;            ///< J before the step, without what Eq. (10) adds
   double violation = 0;       ///< largest of the constraints before the step
-  double gap = 0;             ///< max_k |gap_k|_inf before the step
+  double gap = 0;             ///< max_k |gap_k| before the step
   double gradient = 0;        ///< Eq. (6)
   double step = 0;            ///< alpha; 0: none was taken, the iterate is the result
   double regularization = 0;  ///< mu_u of the sweep
@@ -123,7 +127,7 @@ struct FddpSummary {
   std::string message;
   bool acceptable = false;  ///< Converged by acceptable_decrease: the gradient has not vanished
   double cost = 0;          ///< J of the returned trajectory
-  double gap = 0;           ///< max_k |gap_k|_inf of the returned trajectory (after a last step alpha < 1: by Eq. 3)
+  double gap = 0;           ///< max_k |gap_k| of the returned trajectory (after a last step alpha < 1: by Eq. 3)
   int iterations = 0;
   // Of constraints, at the returned trajectory if it ended as Converged, RegularizationMax or Infeasible, else before the last step.
   double violation = 0;        ///< the largest, in the units of c
