@@ -1,11 +1,9 @@
 // Many worlds at once: the single world as an oracle, one step at a time, and independence to the last bit.
 #include <catch2/catch.hpp>
-#include <cstring>
 #include <limits>
 #include <random>
 
-#include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/constrained.h"
+#include "batch_starts.h"
 #include "bielle/model/builder.h"
 #include "bielle/worlds/batch.h"
 #include "count_allocations.h"
@@ -16,44 +14,10 @@ namespace bielle::worlds {
 namespace {
 
 using bielle::testing::getBipetto;
-
-struct Start {
-  MatrixXd q, v, u, push;  // a column per world
-};
-
-// Near the ground, turned and moving in all coordinates, with random torques and pushes.
-Start makeStarts(const Model& model, int count, unsigned seed) {
-  const PostureHold posture(model);
-  const ConstraintSet closures = makeConstraintSet(model);
-  Workspace ws(model);
-  std::mt19937 generator(seed);
-  std::uniform_real_distribution<double> any(-1, 1);
-  const auto draw = [&] { return any(generator); };
-  Start out{posture.posture().replicate(1, count), MatrixXd(model.nv(), count), MatrixXd(model.nu(), count),
-            MatrixXd::Zero(3, count)};
-  for (int i = 0; i < count; ++i) {
-    VectorXd turn = VectorXd::Zero(model.nv());
-    turn.head<6>() << 0, 0, 2e-3 * draw(), 0.02 * draw(), 0.02 * draw(), 3 * draw();
-    out.q.col(i) = model.integrate(out.q.col(i), turn);
-    VectorXd v(model.nv());
-    for (double& x : v) x = draw();
-    out.v.col(i) = projectVelocity(model, ws, closures, out.q.col(i), v);
-    for (double& x : out.u.col(i)) x = 10 * draw();
-    if (i % 3 == 0) out.push.col(i) << 20 * draw(), 20 * draw(), 0;
-  }
-  return out;
-}
-
-WorldBatchOptions makeOptions(double time_step, int threads = 1) {
-  WorldBatchOptions options;
-  options.world.world.time_step = time_step;
-  options.threads = threads;
-  return options;
-}
-
-bool isEqual(const VectorXd& a, const VectorXd& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), sizeof(double) * static_cast<size_t>(a.size())) == 0;
-}
+using bielle::testing::isEqual;
+using bielle::testing::makeBatchOptions;
+using bielle::testing::makeStarts;
+using Start = bielle::testing::BatchStart;
 
 // Largest difference of two steps from those of single worlds: of coordinates and velocities, and 1e-3 of that of wrenches, relative.
 double compareStep(const Model& model, const WorldBatchOptions& options, const BielleWorldOptions& single, int count) {
@@ -119,7 +83,7 @@ std::unique_ptr<World> makeAlone(const Model& model, const WorldParameters& para
     parts.motors[m].armature = parts.armature[model.motors()[m].dof] = parameters.armatures(m, i);
     parts.motors[m].effort_limit = parameters.effort_limits(m, i);
   }
-  BielleWorldOptions options = makeOptions(time_step).world;
+  BielleWorldOptions options = makeBatchOptions(time_step).world;
   options.world.ground.friction = parameters.friction[i];
   return makeBielleWorld(ModelBuilder::restore(std::move(parts)), options);
 }
@@ -128,7 +92,7 @@ std::unique_ptr<World> makeAlone(const Model& model, const WorldParameters& para
 MatrixXd calcDifference(const Model& model, const Start& starts, const WorldParameters& parameters,
                         const WorldParameters& alone, double time_step, double duration) {
   const auto count = static_cast<int>(starts.q.cols());
-  WorldBatch batch(model, count, makeOptions(time_step));
+  WorldBatch batch(model, count, makeBatchOptions(time_step));
   batch.set(parameters);
   batch.reset(starts.q, starts.v);
   CHECK(batch.step(starts.u, starts.push, duration));
@@ -148,7 +112,7 @@ MatrixXd calcDifference(const Model& model, const Start& starts, const WorldPara
 
 TEST_CASE("batch: a step is that of a single world") {
   for (double h : {2.5e-4, 1e-3}) {
-    const WorldBatchOptions options = makeOptions(h);
+    const WorldBatchOptions options = makeBatchOptions(h);
     CHECK(compareStep(getBipetto(), options, options.world, 100) < 1e-11);
     BielleWorldOptions other = options.world;
     other.world.ground.friction = 0.7007;
@@ -157,7 +121,7 @@ TEST_CASE("batch: a step is that of a single world") {
 }
 
 TEST_CASE("batch: a step on a ground of steps, and of a robot with springs between points, is that of a single world") {
-  WorldBatchOptions options = makeOptions(1e-3);
+  WorldBatchOptions options = makeBatchOptions(1e-3);
   GroundStep step;
   step.top = {0.02, 0.05, 1e-3};
   step.length = step.width = 0.15;
@@ -188,8 +152,8 @@ TEST_CASE("batch: what becomes of a world does not depend on the others, to the 
   std::vector<int> all(kCount), reversed;
   for (int i = 0; i < kCount; ++i) all[static_cast<size_t>(i)] = i;
   reversed.assign(all.rbegin(), all.rend());
-  WorldBatch together(model, kCount, makeOptions(2e-3)), threads(model, kCount, makeOptions(2e-3, 2)),
-      backward(model, kCount, makeOptions(2e-3));
+  WorldBatch together(model, kCount, makeBatchOptions(2e-3)), threads(model, kCount, makeBatchOptions(2e-3, 2)),
+      backward(model, kCount, makeBatchOptions(2e-3));
   run(together, all);
   run(threads, all);
   run(backward, reversed);
@@ -197,7 +161,7 @@ TEST_CASE("batch: what becomes of a world does not depend on the others, to the 
   for (int i = 0; i < kCount; ++i) {
     CAPTURE(i, together.message(i));
     const VectorXd q = together.configurations().col(i), v = together.velocities().col(i);
-    WorldBatch alone(model, 1, makeOptions(2e-3));
+    WorldBatch alone(model, 1, makeBatchOptions(2e-3));
     run(alone, {i});
     const auto check = [&](const WorldBatch& batch, int at) {
       CHECK(isEqual(batch.configurations().col(at), q));
@@ -273,7 +237,7 @@ TEST_CASE("batch: parameters are kept over resets, told, and none of the neighbo
     batch.reset(starts.q, starts.v);
     for (int k = 0; k < 4; ++k) batch.step(starts.u, starts.push, 2e-3);
   };
-  WorldBatch batch(model, kCount, makeOptions(1e-3)), plain(model, kCount, makeOptions(1e-3));
+  WorldBatch batch(model, kCount, makeBatchOptions(1e-3)), plain(model, kCount, makeBatchOptions(1e-3));
   run(plain);
   batch.reset(starts.q, starts.v);
   for (int k = 0; k < 2; ++k) CHECK(batch.step(starts.u, starts.push, 2e-3));
@@ -285,7 +249,7 @@ TEST_CASE("batch: parameters are kept over resets, told, and none of the neighbo
   run(batch);
   CHECK(batch.velocities() == v);
   for (int i = 0; i < kCount; ++i) {
-    WorldBatch alone(model, 1, makeOptions(1e-3));
+    WorldBatch alone(model, 1, makeBatchOptions(1e-3));
     WorldParameters own{parameters.mass_factors.col(i),
                         parameters.armatures.col(i),
                         parameters.effort_limits.col(i),
@@ -309,7 +273,7 @@ TEST_CASE("batch: delayed torques act later, in each world by its own delay") {
   WorldParameters parameters;
   parameters.delays.resize(kCount);
   parameters.delays << 0, 1e-3, 2e-3, 3e-3, 7e-3;
-  WorldBatch batch(model, kCount, makeOptions(1e-3));
+  WorldBatch batch(model, kCount, makeBatchOptions(1e-3));
   batch.set(parameters);
   const auto getTorques = [&](int tick, int i) { return VectorXd(starts.u.col(i) / (1 + std::max(0, tick))); };
   for (int k = 0; k < 2; ++k) {  // nothing of the first time is left in the second one
@@ -320,7 +284,7 @@ TEST_CASE("batch: delayed torques act later, in each world by its own delay") {
       REQUIRE(batch.step(u, starts.push, 2e-3));
     }
   }
-  const auto world = makeBielleWorld(model, makeOptions(1e-3).world);
+  const auto world = makeBielleWorld(model, makeBatchOptions(1e-3).world);
   for (int i = 0; i < kCount; ++i) {
     const int delay = static_cast<int>(std::lround(1e3 * parameters.delays[i]));
     world->reset(starts.q.col(i), starts.v.col(i));
@@ -341,7 +305,7 @@ TEST_CASE("batch: delayed torques act later, in each world by its own delay") {
 TEST_CASE("batch: worlds are reset alone, and begin as the others did") {
   const Model& model = getBipetto();
   const Start starts = makeStarts(model, 10, 3);
-  WorldBatch batch(model, 10, makeOptions(1e-3));
+  WorldBatch batch(model, 10, makeBatchOptions(1e-3));
   CHECK(batch.message(9) == "it has not been reset");
   CHECK_FALSE(batch.step(starts.u, starts.push, 1e-3));
   batch.reset(starts.q, starts.v);
@@ -356,7 +320,7 @@ TEST_CASE("batch: worlds are reset alone, and begin as the others did") {
   CHECK(batch.step(starts.u, starts.push, 2e-3));
   for (int i : {1, 8}) CHECK(isEqual(batch.configurations().col(i), after.col(i)));
   // Those that were not reset go on as if nothing had been.
-  WorldBatch other(model, 10, makeOptions(1e-3));
+  WorldBatch other(model, 10, makeBatchOptions(1e-3));
   other.reset(starts.q, starts.v);
   other.step(starts.u, starts.push, 2e-3);
   other.step(starts.u, starts.push, 2e-3);
@@ -366,7 +330,7 @@ TEST_CASE("batch: worlds are reset alone, and begin as the others did") {
 TEST_CASE("batch: nothing is allocated once worlds step and are reset, on flat ground or on steps") {
   const Model& model = getBipetto();
   const Start starts = makeStarts(model, 19, 3);
-  WorldBatchOptions options = makeOptions(1e-3, 2);
+  WorldBatchOptions options = makeBatchOptions(1e-3, 2);
   std::vector<char> where(19, 0);
   where[3] = where[17] = 1;
   for (const bool has_steps : {false, true}) {
@@ -400,7 +364,7 @@ TEST_CASE("batch: what it cannot take is refused, and nothing is stepped") {
   const Model& model = getBipetto();
   const Start starts = makeStarts(model, 3, 3);
   CHECK_THROWS_WITH(WorldBatch(model, 0), Catch::Contains("count is 0"));
-  WorldBatch batch(model, 3, makeOptions(1e-3));
+  WorldBatch batch(model, 3, makeBatchOptions(1e-3));
   batch.reset(starts.q, starts.v);
   CHECK_THROWS_WITH(batch.reset(starts.q.leftCols(2), starts.v), Catch::Contains(" x 2; give "));
   CHECK_THROWS_WITH(batch.reset(starts.q, starts.v, {1, 0}), Catch::Contains("where has 2 entries; give 3"));

@@ -81,6 +81,11 @@ class WorldParameters(NamedTuple):
     effort_limits: Array  #: (nu,), N m or N
     friction: Array  #: of the ground
     delays: Array  #: from step() until its torques act, s
+    torque_constants: Array  #: of windings (nu,), N m/A; 0: none
+    resistances: Array  #: (nu,), ohm
+    voltages: Array  #: of the supply (nu,), V
+    currents: Array  #: most of each motor (nu,), A
+    rod_changes: Array  #: by how much the rods that closures end are longer (closures,), m
 
 
 class Books(NamedTuple):

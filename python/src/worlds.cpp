@@ -86,7 +86,9 @@ class HeldWorlds {
 
   // Of all worlds (fields without an axis of them) or of each.
   void set(const py::object& mass_factors, const py::object& armatures, const py::object& effort_limits,
-           const py::object& friction, const py::object& delays, const py::object& grounds) {
+           const py::object& friction, const py::object& delays, const py::object& grounds,
+           const py::object& torque_constants, const py::object& resistances, const py::object& voltages,
+           const py::object& currents, const py::object& rod_changes) {
     if (!batch_)
       throw py::value_error(
           "set: expected worlds of Bielle's own engine at fixed steps, made with `count` (1 for one) and without play");
@@ -101,6 +103,11 @@ class HeldWorlds {
     read(mass_factors, model_->numBodies(), "mass_factors", parameters.mass_factors);
     read(armatures, model_->nu(), "armatures", parameters.armatures);
     read(effort_limits, model_->nu(), "effort_limits", parameters.effort_limits);
+    read(torque_constants, model_->nu(), "torque_constants", parameters.torque_constants);
+    read(resistances, model_->nu(), "resistances", parameters.resistances);
+    read(voltages, model_->nu(), "voltages", parameters.voltages);
+    read(currents, model_->nu(), "currents", parameters.currents);
+    read(rod_changes, numClosures(), "rod_changes", parameters.rod_changes);
     readEach(friction, "friction", parameters.friction);
     readEach(delays, "delays", parameters.delays);
     if (!grounds.is_none()) parameters.grounds = readGrounds(grounds);
@@ -113,10 +120,13 @@ class HeldWorlds {
           "parameters: expected worlds of Bielle's own engine at fixed steps, made with `count` and without play");
     const BusyGuard guard(is_busy_, "world");
     const worlds::WorldParameters& now = batch_->parameters();
+    const Shape motors = {model_->nu()};
     return makeNamed("WorldParameters",
-                     {makeRows(now.mass_factors, {model_->numBodies()}), makeRows(now.armatures, {model_->nu()}),
-                      makeRows(now.effort_limits, {model_->nu()}), makeRows(now.friction.transpose(), {}),
-                      makeRows(now.delays.transpose(), {})});
+                     {makeRows(now.mass_factors, {model_->numBodies()}), makeRows(now.armatures, motors),
+                      makeRows(now.effort_limits, motors), makeRows(now.friction.transpose(), {}),
+                      makeRows(now.delays.transpose(), {}), makeRows(now.torque_constants, motors),
+                      makeRows(now.resistances, motors), makeRows(now.voltages, motors),
+                      makeRows(now.currents, motors), makeRows(now.rod_changes, {numClosures()})});
   }
 
   // Of a single world.
@@ -261,6 +271,7 @@ class HeldWorlds {
     if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) < 0) throw py::error_already_set();
   }
 
+  Eigen::Index numClosures() const { return static_cast<Eigen::Index>(model_->closures().size()); }
   size_t numWorlds() const { return batch_ ? static_cast<size_t>(batch_->count()) : worlds_.size(); }
 
   // One column per world.
@@ -447,15 +458,23 @@ void bindWorlds(py::module_& module) {
       .def(
           "set", &HeldWorlds::set, py::arg("mass_factors") = py::none(), py::arg("armatures") = py::none(),
           py::arg("effort_limits") = py::none(), py::arg("friction") = py::none(), py::arg("delays") = py::none(),
-          py::arg("grounds") = py::none(),
+          py::arg("grounds") = py::none(), py::arg("torque_constants") = py::none(),
+          py::arg("resistances") = py::none(), py::arg("voltages") = py::none(), py::arg("currents") = py::none(),
+          py::arg("rod_changes") = py::none(),
           "Sets parameters by which worlds differ from the model, from now on and over reset(), of worlds made with "
           "`count` and without play; each for all alike, or with a leading axis of worlds.\n\n"
           "mass_factors: (bodies,), mass and inertia over those of the model, the world first; armatures: (nu,), of "
           "the motors, kg m^2 or kg; effort_limits: (nu,), N m or N; friction: of the ground; delays: from step() "
           "until "
           "its torques act, to the nearest whole time step, s; grounds: a Ground for all or a list of them, either all "
-          "with steps or none, as the world was made; reset worlds whose ground changes. Raises ValueError, and "
-          "nothing changes.")
+          "with steps or none, as the world was made; reset worlds whose ground changes.\n\n"
+          "torque_constants: (nu,), of windings, N m/A, 0: none; resistances: (nu,), ohm; voltages: (nu,), of the "
+          "supply, V; currents: (nu,), A: within its effort limit a motor gives efficiency * ratio * torque_constant * "
+          "current at most, and, the faster it turns, what the voltage leaves (MotorDrive); rod_changes: (closures,), "
+          "by how much the rod that a closure ends, or that is a distance, is longer than in the model, m, 0 where "
+          "there is none: its loops must have no redundant rows. Worlds whose rods change are not ok until they are "
+          "reset, which closes their loops from the state given, and shifts the robot so that its lowest foot is as "
+          "high. Raises ValueError, and nothing changes.")
       .def_property_readonly("parameters", &HeldWorlds::parameters, "WorldParameters, of worlds made with `count`")
       .def_property_readonly("books", &HeldWorlds::books,
                              "energies now, and work and losses since reset, of a single world (Books), J")

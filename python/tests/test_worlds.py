@@ -247,6 +247,33 @@ def test_parameters_of_worlds(model):
             other.set(friction=1)
 
 
+def test_windings_and_rods_of_worlds(model):
+    """A motor at rest gives e n k U / R, one of a strong supply what its current allows; rods change what a posture is closed at."""
+    world = bielle.World(model, count=3)
+    sensors, q, v = bielle.Sensors(world, noise=0.0), model.standing(), np.zeros(model.nv)
+    with pytest.raises(ValueError, match="give torque_constants"):
+        world.set(voltages=24 * np.ones(model.nu))
+    world.set(torque_constants=0.1 * np.ones(model.nu), resistances=0.5 * np.ones(model.nu),
+              voltages=np.array([[np.inf], [5.0], [1000.0]]) * np.ones(model.nu), currents=np.array([[np.inf], [np.inf], [30.0]]) * np.ones(model.nu))
+    world.reset(q, v)
+    sensors.reset(0)
+    world.step(np.full(model.nu, 4.0), 1e-3)
+    torques, drives = sensors.read().motor_torques, [motor.drive for motor in model.motors]
+    gears = np.array([drive.efficiency * drive.ratio * 0.1 for drive in drives])
+    assert (torques[0] == 4).all() and torques[1] == pytest.approx(gears * 5 / 0.5) and torques[2] == pytest.approx(gears * 30)
+
+    rods = np.zeros((3, len(model.closures)))
+    rods[1] = 1e-3
+    before = world.reset(q, v)
+    world.set(rod_changes=rods)
+    assert list(world.step(np.zeros(model.nu), 1e-3).ok) == [True, False, True] and "rods" in world.message[1]
+    after = world.reset(q, v)
+    assert after.ok.all() and np.array_equal(after.q[::2], before.q[::2]) and 1e-3 < np.abs(after.q[1] - before.q[1]).max() < 0.1
+    assert np.array_equal(world.parameters.rod_changes, rods) and (world.parameters.voltages[1] == 5).all()
+    with pytest.raises(ValueError, match="rod_changes: expected shape"):
+        world.set(rod_changes=[1e-3])
+
+
 def test_steps_that_cannot_be_met_are_told(model):
     world = bielle.World(model, time_step=0.001)
     world.reset(model.standing(), np.zeros(model.nv))

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/closure_change.h"
 #include "dynamics/closure_rows.h"
 #include "math/constants.h"
 #include "math/lanes.h"
@@ -21,8 +22,13 @@ SE3Of<T> getFrame1(const WorkspaceOf<T>& ws, const Closure& c) {
 }
 
 template <typename T>
-SE3Of<T> calcRelativePlacement(const WorkspaceOf<T>& ws, const Closure& c) {
-  return getFrame1(ws, c).inverseTimes(ws.X_WB[c.body2] * c.X_B2);
+SE3Of<T> calcRelativePlacement(const WorkspaceOf<T>& ws, const Closure& c, const ClosureChangeOf<T>* change = nullptr) {
+  SE3Of<T> X_W1 = getFrame1(ws, c), X_W2 = ws.X_WB[c.body2] * c.X_B2;
+  if (change) {
+    X_W1.p += X_W1.R * change->shift1;
+    X_W2.p += X_W2.R * change->shift2;
+  }
+  return X_W1.inverseTimes(X_W2);
 }
 
 // theta / sin(theta) of the angle between the hinge axes, whose sine is positive.
@@ -142,6 +148,11 @@ Vector6d expandRows(const Closure& c, ConstVectorRef lambda) {
 
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& c) {
+  return calcClosureResidual<T>(ws, c, nullptr);
+}
+
+template <typename T>
+VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& c, const ClosureChangeOf<T>* change) {
   requireStage(ws, WorkspaceStage::Placement, "calcClosureResidual", "updatePlacements or updatePositions");
   if (c.kind == ClosureKind::Coupler) {
     VectorUpTo6<T> row =
@@ -149,7 +160,11 @@ VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& c) {
     row[0] = c.offset - row[0];
     return row;
   }
-  return calcClosureResidual(c, calcRelativePlacement(ws, c));
+  const SE3Of<T> X = calcRelativePlacement(ws, c, change);
+  if (!change || c.kind != ClosureKind::Distance) return calcClosureResidual(c, X);
+  VectorUpTo6<T> row(1);
+  row[0] = (X.p.dot(X.p) - change->square) * (0.5 / change->length);
+  return row;
 }
 
 template <typename T>
@@ -240,6 +255,11 @@ RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& c) {
 
 template <typename T>
 VectorUpTo6<T> calcClosureAcceleration(const WorkspaceOf<T>& ws, const Closure& c) {
+  return calcClosureAcceleration<T>(ws, c, nullptr);
+}
+
+template <typename T>
+VectorUpTo6<T> calcClosureAcceleration(const WorkspaceOf<T>& ws, const Closure& c, const ClosureChangeOf<T>* change) {
   if (c.kind == ClosureKind::Coupler)
     return sumTerms<T>(c, [&](const CouplerTerm& term) {
       const T &q = ws.q[term.idx_q], &v = ws.v[term.dof], &a = ws.a[term.dof];
@@ -247,7 +267,7 @@ VectorUpTo6<T> calcClosureAcceleration(const WorkspaceOf<T>& ws, const Closure& 
                                : term.calcDerivative(1, q) * a + term.calcDerivative(2, q) * v * v);
     });
   VectorUpTo6<T> rows(getRows(c.kind));
-  ClosureRows<T>(ws, c).writeAcceleration(rows.data());
+  ClosureRows<T>(ws, c, change).writeAcceleration(rows.data());
   return rows;
 }
 
@@ -260,9 +280,15 @@ RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& c) {
 
 template <typename T>
 void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& c, typename ArgumentsOf<T>::Matrix J) {
+  calcClosureJacobian<T>(ws, c, nullptr, J);
+}
+
+template <typename T>
+void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& c, const ClosureChangeOf<T>* change,
+                         typename ArgumentsOf<T>::Matrix J) {
   if (c.kind == ClosureKind::Coupler)
     return writeTerms(c, J, [&](const CouplerTerm& term) { return term.calcDerivative(1, ws.q[term.idx_q]); });
-  const ClosureRows<T> rows(ws, c);
+  const ClosureRows<T> rows(ws, c, change);
   for (size_t i = 0; i < c.dofs.size(); ++i) rows.write(c.signs[i], ws.J.col(c.dofs[i]), &J(0, c.dofs[i]));
 }
 
@@ -373,5 +399,15 @@ template VectorUpTo6<double> calcClosureAcceleration(const Workspace&, const Clo
 template VectorUpTo6<Lanes> calcClosureAcceleration(const WorkspaceOf<Lanes>&, const Closure&);
 template void calcClosureJacobian(const Workspace&, const Closure&, MatrixRef);
 template void calcClosureJacobian(const WorkspaceOf<Lanes>&, const Closure&, ArgumentsOf<Lanes>::Matrix);
+
+template VectorUpTo6<double> calcClosureResidual(const Workspace&, const Closure&, const ClosureChangeOf<double>*);
+template VectorUpTo6<Lanes> calcClosureResidual(const WorkspaceOf<Lanes>&, const Closure&,
+                                                const ClosureChangeOf<Lanes>*);
+template VectorUpTo6<double> calcClosureAcceleration(const Workspace&, const Closure&, const ClosureChangeOf<double>*);
+template VectorUpTo6<Lanes> calcClosureAcceleration(const WorkspaceOf<Lanes>&, const Closure&,
+                                                    const ClosureChangeOf<Lanes>*);
+template void calcClosureJacobian(const Workspace&, const Closure&, const ClosureChangeOf<double>*, MatrixRef);
+template void calcClosureJacobian(const WorkspaceOf<Lanes>&, const Closure&, const ClosureChangeOf<Lanes>*,
+                                  ArgumentsOf<Lanes>::Matrix);
 
 }  // namespace bielle

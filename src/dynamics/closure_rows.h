@@ -1,6 +1,7 @@
 #pragma once
 /// \file The rows of a closure in full vectors, and how they change as it moves: Eqs. (1) to (4), (8) and (9) of closure.h.
 #include "bielle/dynamics/closure.h"
+#include "dynamics/closure_change.h"
 #include "model/joint.h"
 
 namespace bielle {
@@ -13,11 +14,14 @@ inline Eigen::Matrix<double, 3, 2> getAxisNormals(const Closure& c) { return mak
 template <typename T>
 class ClosureRows {
  public:
-  ClosureRows(const WorkspaceOf<T>& ws, const Closure& c) : ws_(ws), c_(c), X_W1_(ws.X_WB[c.body1] * c.X_B1) {
+  /// \param change  of the closure, or null
+  ClosureRows(const WorkspaceOf<T>& ws, const Closure& c, const ClosureChangeOf<T>* change = nullptr)
+      : ws_(ws), c_(c), X_W1_(ws.X_WB[c.body1] * c.X_B1) {
+    if (change) X_W1_.p += X_W1_.R * change->shift1;
     if (hasAxis(c.kind)) normals_ = getAxisNormals(c);
     if (c.kind != ClosureKind::Distance) return;
     p_ = X_W1_.inverseTimes(ws.X_WB[c.body2] * c.X_B2).p;
-    per_length_ = 1 / c.length;
+    per_length_ = change ? T(1 / change->length) : T(1 / c.length);
   }
 
   /// out = s times the rows of `full`.
@@ -103,7 +107,7 @@ class ClosureRows {
   SE3Of<T> X_W1_;
   Eigen::Matrix<double, 3, 2> normals_;
   Vector3<T> p_;  // of a distance, Eq. (8)
-  double per_length_ = 0;
+  T per_length_ = 0;
 };
 
 }  // namespace bielle

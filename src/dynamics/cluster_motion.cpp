@@ -174,16 +174,21 @@ void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<
 
 template <typename T>
 void calcClusterDrift(const ClusterViewOf<T>& view, const ReducedCluster& cluster, const ClusterBasisOf<T>& basis,
-                      typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift) {
-  for (size_t c = 0; c < view.closures.size(); ++c)
+                      typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift,
+                      const std::vector<ClosureChangeOf<T>>& changes) {
+  for (size_t c = 0; c < view.closures.size(); ++c) {
+    const ClosureChangeOf<T>* change =
+        changes.empty() ? nullptr : &changes[static_cast<size_t>(cluster.closure_indices[c])];
     rows.segment(cluster.closures.offsets[c], getRows(view.closures[c].kind)) =
-        calcClosureAcceleration(view.ws, view.closures[c]);
+        calcClosureAcceleration(view.ws, view.closures[c], change);
+  }
   for (size_t i = 0; i < basis.rows.size(); ++i) drift[i] = getEntry(rows.data(), basis.rows[i]);
 }
 
 template struct ClusterMotionOf<double>;
 template void calcClusterDrift(const ClusterViewOf<double>&, const ReducedCluster&, const ClusterBasisOf<double>&,
-                               ArgumentsOf<double>::Vector, ArgumentsOf<double>::Vector);
+                               ArgumentsOf<double>::Vector, ArgumentsOf<double>::Vector,
+                               const std::vector<ClosureChangeOf<double>>&);
 template void updateTwists(const ClusterViewOf<double>&, const ClusterBasisOf<double>&, ClusterMotionOf<double>&);
 template void updateVelocityLift(const ClusterViewOf<double>&, ClusterMotionOf<double>&);
 template void updateAccelerationLift(const ClusterViewOf<double>&, ClusterMotionOf<double>&);
@@ -191,7 +196,8 @@ template void calcGeometricStiffness(const ClusterViewOf<double>&, const Cluster
                                      ArgumentsOf<double>::ConstVector, ArgumentsOf<double>::Matrix);
 template struct ClusterMotionOf<Lanes>;
 template void calcClusterDrift(const ClusterViewOf<Lanes>&, const ReducedCluster&, const ClusterBasisOf<Lanes>&,
-                               ArgumentsOf<Lanes>::Vector, ArgumentsOf<Lanes>::Vector);
+                               ArgumentsOf<Lanes>::Vector, ArgumentsOf<Lanes>::Vector,
+                               const std::vector<ClosureChangeOf<Lanes>>&);
 template void updateTwists(const ClusterViewOf<Lanes>&, const ClusterBasisOf<Lanes>&, ClusterMotionOf<Lanes>&);
 template void updateVelocityLift(const ClusterViewOf<Lanes>&, ClusterMotionOf<Lanes>&);
 template void updateAccelerationLift(const ClusterViewOf<Lanes>&, ClusterMotionOf<Lanes>&);

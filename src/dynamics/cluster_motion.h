@@ -13,6 +13,7 @@
 /// on a closure through the frame that it moves: the derivatives of closure.h, Eqs. (1) to (3), along a coordinate are
 /// those of its columns with J_k, dV_k, .. replaced by the difference of (3) between body 1 and body 2. So the effort
 /// is linear in the number of dofs, not quadratic.
+#include "dynamics/closure_change.h"
 #include "dynamics/reduction.h"
 
 namespace bielle {
@@ -64,8 +65,10 @@ template <typename T>
 void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
                             typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out);
 /// Drift of the independent closure rows (rank) for the accelerations held by the view.
+/// \param changes  of the whole model's closures (closure_change.h), or empty
 template <typename T>
 void calcClusterDrift(const ClusterViewOf<T>& view, const ReducedCluster& cluster, const ClusterBasisOf<T>& basis,
-                      typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift);
+                      typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift,
+                      const std::vector<ClosureChangeOf<T>>& changes = {});
 
 }  // namespace bielle

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/closure_change.h"
 #include "dynamics/idle_spins.h"
 #include "math/small_dense.h"
 #include "model/joint.h"
@@ -73,11 +74,18 @@ void applyPseudoInverse(const ReducedCluster& cluster, const ClusterBasisOf<T>& 
 
 namespace {
 
+// Of a closure of the cluster, or null.
+template <typename T>
+const ClosureChangeOf<T>* getChange(const ReducedCluster& cluster, const ClusterScratchOf<T>& scratch, size_t closure) {
+  if (!scratch.changes || scratch.changes->empty()) return nullptr;
+  return &(*scratch.changes)[static_cast<size_t>(cluster.closure_indices[closure])];
+}
+
 template <typename T>
 void updateJacobian(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
   const ConstraintSet& set = cluster.closures;
   for (size_t c = 0; c < set.closures.size(); ++c)
-    calcClosureJacobian<T>(scratch.ws, set.closures[c],
+    calcClosureJacobian<T>(scratch.ws, set.closures[c], getChange(cluster, scratch, c),
                            scratch.J_all.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
   if constexpr (std::is_same_v<T, double>)
     if (cluster.holds_spins) updateSpinRows(cluster, scratch.J_all);
@@ -91,7 +99,8 @@ T updateResidual(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
   T largest = 0, sum = 0;
   for (size_t c = 0; c < set.closures.size(); ++c) {
     const int row = set.offsets[c], rows = getRows(set.closures[c].kind);
-    scratch.residual.segment(row, rows) = calcClosureResidual(scratch.ws, set.closures[c]);
+    scratch.residual.segment(row, rows) =
+        calcClosureResidual(scratch.ws, set.closures[c], getChange(cluster, scratch, c));
     for (int r = row; r < row + rows; ++r) {
       const T size = abs(scratch.residual[r]);
       largest = select(size > largest, size, largest);

@@ -122,12 +122,16 @@ template <typename T>
 void applyPseudoInverse(const ReducedCluster& cluster, const ClusterBasisOf<T>& basis, double s,
                         typename ArgumentsOf<T>::Matrix X, typename ArgumentsOf<T>::Matrix out);
 
+template <typename T>
+struct ClosureChangeOf;  // closure_change.h
+
 /// Scratch memory for updating and closing a cluster, one per thread.
 template <typename T>
 struct ClusterScratchOf {
   explicit ClusterScratchOf(const ReducedCluster& cluster);
   using Index = typename LogicOf<T>::Index;
-  WorkspaceOf<T> ws;  ///< of the cluster's model
+  WorkspaceOf<T> ws;                                         ///< of the cluster's model
+  const std::vector<ClosureChangeOf<T>>* changes = nullptr;  ///< of the whole model's closures; null or empty: none
   VectorX<T> residual, correction;
   MatrixX<T> J_all, J, JW;   // all rows; independent ones at the iterate; J W^{-1} at the start
   MatrixX<T> newton, fresh;  // factors of Newton's matrix; of a new one

@@ -6,6 +6,7 @@
 
 #include "bielle/model/builder.h"
 #include "bielle/model/wear.h"
+#include "model/rod_end.h"
 
 namespace bielle {
 namespace {
@@ -125,34 +126,19 @@ class PlayBuilder {
     names_.push_back(play.name);
   }
 
-  // Whether nothing else hangs on a body, nor stands on it.
-  bool isRod(int body, const Closure& own) const {
-    const auto hangs = [body](const Joint& joint) { return joint.parent == body; };
-    const auto ties = [&](const Closure& c) { return &c != &own && (c.body1 == body || c.body2 == body); };
-    const auto stands = [body](const ContactFrame& contact) { return contact.body == body; };
-    return body > 0 && std::none_of(model_.joints().begin(), model_.joints().end(), hangs) &&
-           std::none_of(model_.closures().begin(), model_.closures().end(), ties) &&
-           std::none_of(model_.contacts().begin(), model_.contacts().end(), stands);
-  }
-
-  // The line of a rod runs from its joint to the joint at its other end, where the cut is or the other half begins.
   void placeEnd(const Closure& closure, double size) {
-    const bool is_tie = closure.kind == ClosureKind::Weld6D || closure.kind == ClosureKind::Hinge5D ||
-                        closure.kind == ClosureKind::Ball3D;
-    const bool first = is_tie && isRod(closure.body1, closure), second = is_tie && isRod(closure.body2, closure);
-    if (!first && !second)
+    const std::optional<RodEnd> found = findRodEnd(model_, closure);
+    if (!found)
       refuse(closure.name, "it does not close the end of a rod", "name a rod with a body of its own, or a joint");
-    const SE3 &X_BC = first ? closure.X_B1 : closure.X_B2, &X_OC = first ? closure.X_B2 : closure.X_B1;
-    const bool is_half = first && second && closure.kind == ClosureKind::Weld6D;
-    const Vector3d far = is_half ? (X_BC * X_OC.inverse()).p : X_BC.p;
-    if (!(far.norm() > 1e-9)) refuse(closure.name, "its rod has no length", "cut the loop at the rod's other end");
+    if (!(found->far.norm() > 1e-9))
+      refuse(closure.name, "its rod has no length", "cut the loop at the rod's other end");
     End end;
-    end.body = first ? closure.body1 : closure.body2;
+    end.body = found->is_first ? closure.body1 : closure.body2;
     end.size = size;
     end.joint.name = getPlayName(closure.name);
     end.joint.kind = JointKind::Prismatic;
-    end.joint.axis = far.normalized();
-    end.joint.X_PJ.p = X_BC.p;
+    end.joint.axis = found->far.normalized();
+    end.joint.X_PJ.p = (found->is_first ? closure.X_B1 : closure.X_B2).p;
     Inertia& rod = inertias_[static_cast<size_t>(end.body)];
     end.inertia = scale(rod, kShare).transformed(end.joint.X_PJ.inverse());
     rod = scale(rod, 1 - kShare);

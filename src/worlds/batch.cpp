@@ -4,12 +4,15 @@
 #include <atomic>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <stdexcept>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
 #include "solve/team.h"
+#include "worlds/batch_parameters.h"
+#include "worlds/contact_law.h"
 #include "worlds/leapfrog.h"
 #include "worlds/left_out.h"
 #include "worlds/torque_pipe.h"
@@ -20,26 +23,6 @@ namespace {
 using Steps = LeapfrogOf<Lanes>;
 using MatrixView = Eigen::Ref<const MatrixXd>;
 
-void requireShape(const MatrixView& x, Eigen::Index rows, Eigen::Index columns, const char* name) {
-  if (x.rows() == rows && x.cols() == columns) return;
-  throw std::invalid_argument("worlds: " + std::string(name) + " is " + std::to_string(x.rows()) + " x " +
-                              std::to_string(x.cols()) + "; give " + std::to_string(rows) + " x " +
-                              std::to_string(columns) + ", a column per world");
-}
-
-// Takes over parameters of a name that are given. \param is_possible  tells whether a number may be one
-template <typename M, typename IsPossible>
-void takeParameters(const M& given, const char* name, const char* wanted, const IsPossible& is_possible, M& out) {
-  if (given.size() == 0) return;
-  for (Eigen::Index i = 0; i < given.size(); ++i)
-    if (!is_possible(given.data()[i])) {
-      const Eigen::Index size = M::ColsAtCompileTime == 1 ? 1 : given.rows();
-      throw std::invalid_argument("worlds: " + std::string(name) + " of world " + std::to_string(i / size) + " has a " +
-                                  std::to_string(given.data()[i]) + "; give numbers that are " + wanted);
-    }
-  out = given;
-}
-
 // Of a thread: allocated once, since worlds step in loops.
 struct Worker {
   Worker(const Model& model, const BielleWorldOptions& options)
@@ -48,12 +31,14 @@ struct Worker {
         q(model.nq()),
         v(model.nv()),
         efforts(model.nu()),
-        wrenches(6 * static_cast<Eigen::Index>(model.contacts().size())) {}
+        wrenches(6 * static_cast<Eigen::Index>(model.contacts().size())),
+        closures(model.closures().size()) {}
 
   Steps steps;
   std::vector<Motor> motors;
   VectorX<Lanes> q, v, efforts, wrenches;
   Steps::Courses courses;
+  std::vector<ClosureChangeOf<Lanes>> closures;
 };
 
 }  // namespace
@@ -99,6 +84,8 @@ struct WorldBatch::Data {
   void command(Worker& worker, int lane, int world, ConstVectorRef u);
   void takeSteps(Worker& worker, size_t group, const MatrixView& u, const MatrixView& push, double duration);
   void mark(const std::vector<char>& where);
+  void start(const MatrixView& q, const MatrixView& v);
+  bool shiftToHeight(const MatrixView& q);
   void setGrounds(const std::vector<std::shared_ptr<const Ground>>& grounds);
 
   Model model;
@@ -109,6 +96,7 @@ struct WorldBatch::Data {
   Team team;
   std::vector<Steps::State> groups;  // of kLane worlds
   WorldParameters parameters;
+  std::optional<Rods> rods;
   std::vector<std::shared_ptr<const Terrain>> terrains;  // of parameters.grounds
   std::vector<TorquePipe> pipes;                         // empty where no torques are delayed
   MatrixXd q, v, torques, wrenches;
@@ -132,15 +120,8 @@ WorldBatch::Data::Data(const Model& model, int count, const WorldBatchOptions& a
     workers.push_back(std::make_unique<Worker>(model, options));
   groups.assign(size, workers.front()->steps.copyState());
   q = model.makeNeutral().replicate(1, count);
-  parameters.mass_factors.setOnes(model.numBodies(), count);
-  parameters.armatures.resize(model.nu(), count);
-  parameters.effort_limits.resize(model.nu(), count);
-  for (int m = 0; m < model.nu(); ++m) {
-    parameters.armatures.row(m).setConstant(model.armature()[model.motors()[m].dof]);
-    parameters.effort_limits.row(m).setConstant(model.motors()[m].effort_limit);
-  }
-  parameters.friction.setConstant(count, options.world.ground.friction);
-  parameters.delays.setZero(count);
+  parameters = makeParameters(model, count, options.world.ground.friction);
+  rods.emplace(model, workers.front()->steps.tree().reduction());
   v.setZero(model.nv(), count);
   torques.setZero(model.nu(), count);
   wrenches.setZero(6 * static_cast<Eigen::Index>(model.contacts().size()), count);
@@ -167,7 +148,7 @@ void WorldBatch::Data::read(Worker& worker, size_t group, const LaneMask& which)
 void WorldBatch::Data::command(Worker& worker, int lane, int world, ConstVectorRef u) {
   for (int m = 0; m < model.nu(); ++m) {
     Motor& motor = worker.motors[m];
-    motor.effort_limit = parameters.effort_limits(m, world);
+    updateMotor(parameters, m, world, motor);
     torques(m, world) = motor.clampEffort(u[m], v(motor.dof, world));
     worker.efforts[m].set(lane, torques(m, world));
   }
@@ -251,27 +232,59 @@ void WorldBatch::reset(const MatrixView& q, const MatrixView& v, const std::vect
     if (d.marks[i] && !(q.col(i).allFinite() && v.col(i).allFinite()))
       throw std::invalid_argument("worlds: the state of world " + std::to_string(i) +
                                   " has a number that is not finite; give a closed configuration and a velocity");
-  d.visit([&](Worker& worker, size_t group) {
-    const LaneMask which = d.choose(group, d.marks);
+  d.start(q, v);
+  if (d.shiftToHeight(q)) d.start(d.q, v);
+}
+
+// Worlds that are marked. Each reads its own columns before it writes them, so that q0 may be q.
+void WorldBatch::Data::start(const MatrixView& q0, const MatrixView& v0) {
+  visit([&](Worker& worker, size_t group) {
+    const LaneMask which = choose(group, marks);
     if (!any(which)) return;
-    d.pack(q, group, worker.q);
-    d.pack(v, group, worker.v);
+    pack(q0, group, worker.q);
+    pack(v0, group, worker.v);
     const LaneMask done = worker.steps.start(worker.q, worker.v, which);
     for (int l = 0; l < kLane; ++l) {
       if (!which[l]) continue;
-      const int world = d.getFirst(group) + l;
-      d.times[world] = d.shortest_steps[world] = d.longest_steps[world] = 0;
-      d.torques.col(world).setZero();
-      if (!d.pipes.empty()) d.pipes[world].clear();
-      d.is_ok[world] = done[l];
-      d.messages[world] = done[l] ? "" : worker.steps.tree().failure(l);
+      const int world = getFirst(group) + l;
+      times[world] = shortest_steps[world] = longest_steps[world] = 0;
+      torques.col(world).setZero();
+      if (!pipes.empty()) pipes[world].clear();
+      is_ok[world] = done[l];
+      messages[world] = done[l] ? "" : worker.steps.tree().failure(l);
     }
-    d.read(worker, group, done);
+    read(worker, group, done);
   });
+}
+
+// Where the loops of a world were closed for its own rods, its feet are no longer where they were given. \returns whether any q has
+// changed; marked are those then
+bool WorldBatch::Data::shiftToHeight(const MatrixView& given) {
+  if (!model.hasFreeFlyer() || model.contacts().empty()) return false;
+  bool shifts = false;
+  for (int i = 0; i < count; ++i) {
+    const bool may_shift = marks[i] && is_ok[i] && !parameters.rod_changes.col(i).isZero(0);
+    const double shift =
+        may_shift ? calcLeastHeight(model, ws, given.col(i)) - calcLeastHeight(model, ws, q.col(i)) : 0;
+    q(2, i) += shift;
+    marks[i] = shift != 0;
+    shifts = shifts || marks[i];
+  }
+  return shifts;
 }
 
 // Worlds whose parameters stay are not touched.
 void WorldBatch::Data::vary(Worker& worker, size_t group, const WorldParameters& before) {
+  LaneMask rebuilt = makeMask<Lanes>(false);
+  for (int l = 0; l < kLane && getFirst(group) + l < count; ++l) {
+    const int world = getFirst(group) + l;
+    if (parameters.rod_changes.col(world) == before.rod_changes.col(world)) continue;
+    rebuilt.set(l, true);
+    rods->write(parameters.rod_changes.col(world), l, worker.closures);
+    is_ok[world] = false;
+    messages[world] = "its rods have other lengths than when it was reset; reset it";
+  }
+  if (any(rebuilt)) worker.steps.setClosures(worker.closures, rebuilt);
   LaneMask which = makeMask<Lanes>(false);
   for (int l = 0; l < kLane && getFirst(group) + l < count; ++l) {
     const int world = getFirst(group) + l;
@@ -313,22 +326,8 @@ void WorldBatch::Data::setGrounds(const std::vector<std::shared_ptr<const Ground
 void WorldBatch::set(const WorldParameters& parameters) {
   Data& d = *data_;
   WorldParameters all = d.parameters;
-  const auto check = [&](const MatrixView& given, Eigen::Index rows, const char* name) {
-    if (given.size() > 0) requireShape(given, rows, d.count, name);
-  };
-  check(parameters.mass_factors, d.model.numBodies(), "mass_factors");
-  check(parameters.armatures, d.model.nu(), "armatures");
-  check(parameters.effort_limits, d.model.nu(), "effort_limits");
-  check(parameters.friction.transpose(), 1, "friction");
-  check(parameters.delays.transpose(), 1, "delays");
-  const auto isPositive = [](double x) { return x > 0 && std::isfinite(x); };
-  const auto isNotNegative = [](double x) { return x >= 0 && std::isfinite(x); };
-  takeParameters(parameters.mass_factors, "mass_factors", "positive", isPositive, all.mass_factors);
-  takeParameters(parameters.armatures, "armatures", "not negative", isNotNegative, all.armatures);
-  takeParameters(
-      parameters.effort_limits, "effort_limits", "positive", [](double x) { return x > 0; }, all.effort_limits);
-  takeParameters(parameters.friction, "friction", "not negative", isNotNegative, all.friction);
-  takeParameters(parameters.delays, "delays", "not negative", isNotNegative, all.delays);
+  takeParameters(d.model, parameters, all);
+  d.rods->check(all.rod_changes);
   d.setGrounds(parameters.grounds);
   if (!parameters.grounds.empty()) all.grounds = parameters.grounds;
   std::swap(d.parameters, all);

@@ -75,6 +75,7 @@ ClosedTreeOf<T>::ClosedTreeOf(const Model& model, ConstVectorRef q, const std::v
     for (size_t k = 0; k < cluster.dofs.size(); ++k)
       places_[cluster.dofs[k]] = {static_cast<int>(clusters_.size()), static_cast<int>(k)};
     clusters_.emplace_back(cluster);
+    clusters_.back().scratch.changes = &state_.changes;
     lifts_.push_back({&clusters_.back().motion, nullptr});
     state_.clusters.emplace_back(cluster);
     state_.drifts.push_back(Vector::Zero(cluster.rank));
@@ -101,7 +102,8 @@ MaskOf<T> ClosedTreeOf<T>::set(const Vector& q, const Vector& v, const Mask& whi
   w_next_ = state_.w;
   for (size_t i = 0; i < clusters_.size(); ++i) {
     Cluster& c = clusters_[i];
-    const Mask regular = renew(i, which);
+    Mask regular = renew(i, which);
+    if (!state_.changes.empty()) regular = closeChanged(i, regular);
     describe(i, done && !regular);
     done = done && regular;
     if (!any(done)) return done;
@@ -139,6 +141,50 @@ MaskOf<T> ClosedTreeOf<T>::renew(size_t cluster, const Mask& which) {
   takeNext(which, cluster);
   assignLanes(which, Vector::Zero(c.cluster.rank), state_.drifts[cluster]);  // of another state
   return regular;
+}
+
+template <typename T>
+void ClosedTreeOf<T>::setClosures(const std::vector<ClosureChangeOf<T>>& changes, const Mask& which) {
+  std::vector<ClosureChangeOf<T>>& own = state_.changes;
+  if (own.empty())
+    for (const Closure& closure : model_.closures()) {
+      own.emplace_back();
+      own.back().length = closure.length;
+      own.back().square = closure.length * closure.length;
+    }
+  for (size_t c = 0; c < own.size(); ++c) {
+    for (auto shift : {&ClosureChangeOf<T>::shift1, &ClosureChangeOf<T>::shift2})
+      assignLanes(which, changes[c].*shift, own[c].*shift);
+    assignLanes(which, changes[c].length, own[c].length);
+    assignLanes(which, changes[c].square, own[c].square);
+  }
+}
+
+// Whether a cluster has closures other than those of the model.
+template <typename T>
+MaskOf<T> ClosedTreeOf<T>::findChanged(size_t cluster) const {
+  Mask out = makeMask<T>(false);
+  for (int c : clusters_[cluster].cluster.closure_indices) {
+    const ClosureChangeOf<T>& change = state_.changes[c];
+    const T amount = change.shift1.squaredNorm() + change.shift2.squaredNorm(), length = model_.closures()[c].length;
+    out = out || amount > T(0) || change.length < length || change.length > length;
+  }
+  return out;
+}
+
+// Closes a cluster whose closures are not those of the model, from where it is.
+template <typename T>
+MaskOf<T> ClosedTreeOf<T>::closeChanged(size_t cluster, const Mask& which) {
+  Cluster& c = clusters_[cluster];
+  const Mask changed = which && findChanged(cluster);
+  if (!any(changed)) return which;
+  c.d.setZero();
+  const Mask closed = closeCluster<T>(c.cluster, c.scratch, state_.clusters[cluster].basis, c.d, Vector(), c.next);
+  takeNext(changed && closed, cluster);
+  q_next_ = state_.q;
+  scatterConfiguration<T>(model_, c.cluster, state_.clusters[cluster].basis.q, q_next_);
+  assignLanes(changed && closed, q_next_, state_.q);
+  return which && (closed || !changed);
 }
 
 template <typename T>
@@ -308,7 +354,7 @@ void ClosedTreeOf<T>::updateLoads(const Vector& tau, const Vector& dw, const Mas
   for (size_t i = 0; i < clusters_.size(); ++i) {
     Cluster& c = clusters_[i];
     const ClusterBasisOf<T>& basis = state_.clusters[i].basis;
-    calcClusterDrift<T>(getPlacedView(c.cluster, ws_), c.cluster, basis, c.rows, c.drift);
+    calcClusterDrift<T>(getPlacedView(c.cluster, ws_), c.cluster, basis, c.rows, c.drift, state_.changes);
     applyPseudoInverse<T>(c.cluster, basis, -1, c.drift, c.a_d);  // leaves the solution in c.drift
     assignLanes(which, c.drift, state_.drifts[i]);
     for (size_t k = 0; k < c.cluster.dofs.size(); ++k) a_d_[c.cluster.dofs[k]] = c.a_d[k];

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "bielle/dynamics/workspace.h"
+#include "dynamics/closure_change.h"
 #include "dynamics/reduced_tree.h"
 #include "dynamics/reduction.h"
 #include "math/lane_masks.h"
@@ -35,6 +36,7 @@ class ClosedTreeOf {
     std::vector<ClusterStateOf<T>> clusters;  ///< at q
     std::vector<Vector> drifts;               ///< rank: (J W^{-1} J^T)^{-1} times the drift of the closures
     Vector mass_factors, armature;            ///< numBodies, empty where all are 1; nv
+    std::vector<ClosureChangeOf<T>> changes;  ///< of the closures; empty where all are those of the model
   };
 
   /// \param q  closed configuration at which ranks are determined   \param tips  bodies
@@ -44,12 +46,15 @@ class ClosedTreeOf {
   ClosedTreeOf(const ClosedTreeOf&) = delete;
   ClosedTreeOf& operator=(const ClosedTreeOf&) = delete;
 
-  /// Sets closed configurations of the robots of the mask, and the velocities nearest to v that keep them closed.
-  /// \returns false where the linkages are singular; failure() then names a closure, also below
+  /// Sets closed configurations of the robots of the mask, and the velocities nearest to v that keep them closed. Loops with
+  /// closures of their own are closed from there, by Eq. (2) of reduction.h.
+  /// \returns false where that fails or linkages are singular; failure() then names a closure, also below
   Mask set(const Vector& q, const Vector& v, const Mask& which);
   /// Masses and inertias of bodies are those of the model times factors (numBodies), rotors have an armature (nv), from now on. W of
   /// reduction.h stays that of the model.
   void setInertias(const Vector& mass_factors, const Vector& armature, const Mask& which);
+  /// Robots of the mask have these closures (of the model, all) from their next set() on.
+  void setClosures(const std::vector<ClosureChangeOf<T>>& changes, const Mask& which);
   /// Robots of the mask move with the present velocity for a duration h, not zero: where a loop does not close, by two halves, which
   /// are divided again up to kMostHalvings times. Those that do not are somewhere on the way: restore() them.
   Mask drift(const T& h, const Mask& which, int halvings = kMostHalvings);
@@ -81,6 +86,7 @@ class ClosedTreeOf {
   T calcPotential() const;  ///< of gravity and springs of the model, J
   T calcEnergy();           ///< that and the kinetic one, J
 
+  const Reduction& reduction() const { return reduction_; }
   int size() const { return reduction_.size; }
   const MatrixX<T>& massMatrix() const { return M_; }
   const Vector& loads() const { return loads_; }
@@ -124,6 +130,8 @@ class ClosedTreeOf {
   };
   Mask driftAtOnce(const T& h, const Mask& which, bool is_last);
   Mask renew(size_t cluster, const Mask& which);
+  Mask findChanged(size_t cluster) const;
+  Mask closeChanged(size_t cluster, const Mask& which);
   void updateTree(const Mask& which);
   void addReduced(const Vector& dw, Vector& v) const;
   void takeNext(const Mask& which, size_t cluster);

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "bielle/dynamics/kinematics.h"
 
 namespace bielle::worlds {
 namespace {
@@ -216,6 +219,16 @@ ContactPoint takeLane(const ContactPointOf<Lanes>& point, int lane) {
     out.from[i] = point.from[i][lane];
   }
   return out;
+}
+
+double calcLeastHeight(const Model& model, Workspace& ws, ConstVectorRef q) {
+  updatePlacements<double>(model, ws, q);
+  double least = std::numeric_limits<double>::infinity();
+  for (const ContactFrame& contact : model.contacts())
+    for (double x : {-contact.half_length, contact.half_length})
+      for (double y : {-contact.half_width, contact.half_width})
+        least = std::min(least, ws.X_WB[contact.body].act(contact.X_BF.act(Vector3d(x, y, 0))).z());
+  return least;
 }
 
 std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<ContactPoint>& points) {

@@ -42,6 +42,7 @@
 #include <array>
 #include <vector>
 
+#include "bielle/dynamics/workspace.h"
 #include "bielle/worlds/bielle_world.h"
 #include "math/lane_masks.h"
 #include "worlds/terrain.h"
@@ -82,6 +83,9 @@ struct ContactArea {
 /// grid between them has its share of the same.
 std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& ground,
                                             const ContactOptions& options = {});
+
+/// Height of the lowest corner of all soles at q, m (world).
+double calcLeastHeight(const Model& model, Workspace& ws, ConstVectorRef q);
 
 /// Of those points. Contacts of a single point have none.
 std::vector<ContactArea> makeContactAreas(const Model& model, const std::vector<ContactPoint>& points);

@@ -66,6 +66,10 @@ class LeapfrogOf {
   Mask start(const Vector& q, const Vector& v, const Mask& which);
   /// Robots of the mask have masses, rotors (ClosedTreeOf::setInertias()) and a friction of the ground of their own, from now on.
   void vary(const Vector& mass_factors, const Vector& armature, const T& friction, const Mask& which);
+  /// ClosedTreeOf::setClosures()
+  void setClosures(const std::vector<ClosureChangeOf<T>>& changes, const Mask& which) {
+    tree_.setClosures(changes, which);
+  }
   /// Torques of the motors (nu), and a force at the centre of mass of the pushed body, N (world).
   void command(const Vector& u, const Vector3<T>& push);
   /// Robots of the mask take `steps` of their courses, of length h, or shorter ones. Their first and last drifts are half as long.

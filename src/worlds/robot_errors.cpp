@@ -1,31 +1,14 @@
 #include "worlds/robot_errors.h"
 
-#include <algorithm>
-#include <limits>
 #include <optional>
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/builder.h"
 #include "control/passive_joints.h"
+#include "worlds/contact_law.h"
 
 namespace bielle::worlds {
-namespace {
-
-// Of the corners of all soles, m (world).
-double calcLeastHeight(const Model& model, ConstVectorRef q) {
-  Workspace ws(model);
-  updatePlacements<double>(model, ws, q);
-  double least = std::numeric_limits<double>::infinity();
-  for (const ContactFrame& contact : model.contacts())
-    for (double x : {-contact.half_length, contact.half_length})
-      for (double y : {-contact.half_width, contact.half_width})
-        least = std::min(least, ws.X_WB[contact.body].act(contact.X_BF.act(Vector3d(x, y, 0))).z());
-  return least;
-}
-
-}  // namespace
 
 Model makeMachine(const Model& model, const RobotErrors& errors) {
   if (!(errors.mass >= 0 && errors.mass < 1))
@@ -60,8 +43,10 @@ VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRe
   for (int m = 0; m < machine.nu(); ++m) motors[m] = q[machine.joints()[machine.motors()[m].joint].idx_q];
   if (joints && joints->update(motors, out) != NumericalStatus::Ok)
     throw InputError(machine.name(), "closures", "they cannot close at the motors' positions", "allow smaller errors");
-  if (machine.hasFreeFlyer() && !machine.contacts().empty())
-    out[2] += calcLeastHeight(model, q) - calcLeastHeight(machine, out);
+  if (machine.hasFreeFlyer() && !machine.contacts().empty()) {
+    Workspace planned(model), built(machine);
+    out[2] += calcLeastHeight(model, planned, q) - calcLeastHeight(machine, built, out);
+  }
   return out;
 }
 

@@ -23,6 +23,14 @@ struct WorldParameters {
   /// count, on which they stand, maybe the same one for several; either all have steps or none, as WorldOptions::ground. Worlds
   /// whose ground changes are to be reset. Their friction is not read.
   std::vector<std::shared_ptr<const Ground>> grounds{};
+  /// Windings, nu x count, as in MotorDrive: torque constants k_t, N m/A, 0 where there is none; resistances R, ohm; voltages U of the
+  /// supply, V, and currents i, A, both positive, maybe infinite. A motor gives what Motor::clampEffort() says within its effort
+  /// limit and e n k_t i, with ratio n and efficiency e of the model; without a winding, R = 0 and U and i are infinite.
+  MatrixXd torque_constants{}, resistances{}, voltages{}, currents{};
+  /// closures x count: by how much longer than in the model the rod is that a closure ends, or is as a `distance`, m; 0 where a closure
+  /// ends none. It grows along the line between its two joints, its mass and inertia stay. Loops must have no redundant rows, which
+  /// another length would lock. Worlds whose rods change are not ok() until they are reset.
+  MatrixXd rod_changes{};
 };
 
 /// What springs hold, J.
@@ -45,7 +53,9 @@ class WorldBatch {
   WorldBatch& operator=(WorldBatch&&) noexcept;
 
   /// Sets closed configurations q (nq x count) and velocities v (nv x count) that keep them closed, of all worlds or of those that
-  /// `where` (count) marks; their time starts from zero.
+  /// `where` (count) marks; their time starts from zero. Where a world has other rods than the model, its loops are closed from
+  /// there, light links moving rather than heavy ones, and a free robot is shifted so that its lowest corner of a sole is as high as
+  /// it was; a q that its own loops close stays.
   /// \throws std::invalid_argument for a wrong shape, or a number of theirs that is not finite; nothing has changed then
   void reset(const Eigen::Ref<const MatrixXd>& q, const Eigen::Ref<const MatrixXd>& v,
              const std::vector<char>& where = {});
