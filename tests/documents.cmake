@@ -46,7 +46,14 @@ if(BIELLE_BUILD_VALIDATION)
   if(TARGET bielle-batch-speed)
     add_test(NAME results_batch COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/batch.py --quick
       --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
-    set_tests_properties(results_batch PROPERTIES LABELS system)
+    add_test(NAME results_batch_ends COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/batch_ends.py --quick
+      --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
+    set_tests_properties(results_batch results_batch_ends PROPERTIES LABELS system)
+    if(TARGET bielle_engines)
+      add_test(NAME results_batch_builds COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/batch_builds.py --quick
+        --bielle ${PROJECT_BINARY_DIR}/bin/bielle --avx2 $<TARGET_FILE:bielle-batch-speed> --older ${PROJECT_BINARY_DIR}/python)
+      set_tests_properties(results_batch_builds PROPERTIES LABELS system)
+    endif()
   endif()
   # The figure of the jump with and without springs, by coarser stages and without the second solve of each.
   add_test(NAME springs_figure COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/examples/springs/jump.py

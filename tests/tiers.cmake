@@ -30,7 +30,8 @@ set(bielle_long_tests
   12_controller 13_beam springs_figure documents_new_motion python_notebooks
   # A few rows of each page of results.
   results_architectures results_checks results_dataset results_execution results_formulations results_loops results_motions
-  results_objectives results_scaling results_speed results_suite results_synthesis results_turn results_batch results_learn
+  results_objectives results_scaling results_speed results_suite results_synthesis results_turn results_batch results_batch_builds
+  results_batch_ends results_learn
   # What is given away: packages, libraries for every machine, the pages of Doxygen.
   install package portable doxygen)
 

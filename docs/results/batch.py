@@ -9,6 +9,7 @@ Processor time, each kind of world in turn: other programs on the machine length
 import json
 import math
 import os
+import pathlib
 import shutil
 import subprocess
 import sys
@@ -16,7 +17,8 @@ import sys
 import common
 
 REGISTERS = {8: "AVX-512, eight numbers", 4: "AVX2, four numbers", 2: "SSE2, two numbers"}
-TITLES = {"many": "many at once", "single": "one after the other", "mujoco": "MuJoCo 2.2.2, `mj_step` alone"}
+TITLES = {"many": "many at once", "single": "one after the other", "mujoco": "MuJoCo 2.2.2, `mj_step` alone",
+          "mujoco3": "MuJoCo {}, WebAssembly"}
 IMAGE = common.SOURCE / "docs/images/batch.svg"
 ROBOTS = {"Bipetto": ["--robot", common.SOURCE / "robots/bipetto"], "Cleobot": ["--robot", common.SOURCE / "robots/cleobot"],
           "four-bar knees, Digit's ankles": ["--robot", common.SOURCE / "suite/digit_ankles"],
@@ -32,13 +34,21 @@ def measure(program, *options):
     return json.loads(run.stdout)
 
 
+def find_newest():
+    """The version of npm's MuJoCo, or None."""
+    package = pathlib.Path(os.environ.get("BIELLE_NODE_MODULES", "/"), "@mujoco/mujoco/package.json")
+    return json.loads(package.read_text(encoding="utf-8"))["version"] if package.exists() and shutil.which("node") else None
+
+
 def add_table(page, report):
     rows = []
     for step in dict.fromkeys(row["time step [s]"] for row in report["runs"]):
         runs = {row["world"]: row for row in report["runs"] if row["time step [s]"] == step}
         for name, title in TITLES.items():
+            if name not in runs:
+                continue
             row = runs[name]
-            rows.append([f"{1e3 * step:g}", title,
+            rows.append([f"{1e3 * step:g}", title.format(find_newest()),
                          f"{row['median']:,.0f} ({row['least']:,.0f} to {row['most']:,.0f})",
                          f"{row['median'] / runs['single']['median']:.2f}",
                          f"{row['median'] / runs['mujoco']['median']:.2f}",
@@ -184,6 +194,7 @@ def main():
     page.add(f"""Steps per second of processor time on one thread, all in turn, medians; `validation/batch` measures them. The
 library is compiled for this processor, with registers of {REGISTERS[stands['register']]}. The load average was {load:.1f}. Torques change every millisecond.
 MuJoCo runs the file that `bielle convert --to mjcf` writes, with closures and contacts as soft as its time step allows.""")
+    page.add("[Other builds and engines](batch_builds.md) and [where pushed walks end](batch_ends.md) have pages of their own.")
     if load > 1.5:  # it counts itself
         page.add("Other programs ran beside it: these numbers are those of a busy machine, and spread.")
     page.heading("Bipetto stands")

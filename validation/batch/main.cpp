@@ -1,5 +1,5 @@
 // bielle-batch-speed: steps per second of processor time of a robot that stands, or lies fallen: many worlds at once, one after the
-// other, and MuJoCo on the file that we export, in turn.
+// other, and MuJoCo on the file that we export, in turn: the one that is linked and, where $BIELLE_NODE_MODULES has it, npm's.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
@@ -13,6 +13,8 @@
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/robot_loader.h"
 #include "bielle/worlds/batch.h"
+#include "formats/mjcf.h"
+#include "loops/process_world.h"
 #include "math/lane_registers.h"
 #include "precision.h"
 #include "worlds/mujoco_model.h"
@@ -98,6 +100,43 @@ Speed runMujoco(const Model& model, const BatchTask& task, const Arguments& argu
   return out;
 }
 
+// The newest one, by npm, with the same coordinates.
+Speed runMujoco3(const Model& model, const BatchTask& task, const Arguments& arguments, double h) {
+  MjcfOptions options;
+  options.time_step = h;
+  const VectorXd closed = findClosedConfiguration(model).q;
+  const MujocoModel mujoco(model, closed, options);
+  const auto data = mujoco.makeData();
+  loops::Mujoco3 newest(formatMjcf(model, closed, options).xml, loops::Mujoco3Integrator::Euler);
+  Eigen::Map<VectorXd> qpos(data->qpos, mujoco.get()->nq), qvel(data->qvel, mujoco.get()->nv);
+  const int ticks = static_cast<int>(arguments.seconds / kTick), n = std::max(1, arguments.worlds / 16);
+  const int steps = static_cast<int>(std::round(kTick / h));
+  Speed out{0, 0, 1, 0};
+  double spent = 0;
+  for (int i = 0; i < n; ++i) {
+    VectorXd q = task.makeConfiguration(), v = task.makeVelocity(i), forces = VectorXd::Zero(qvel.size());
+    mujoco.setState(q, v, *data);
+    newest.start(qpos, qvel);
+    for (int t = 0; t < ticks; ++t) {
+      const VectorXd u = task.calcTorques(q, v);
+      for (int m = 0; m < model.nu(); ++m) {
+        const Motor& motor = model.motors()[m];
+        forces[mujoco.getDof(motor.joint)] = motor.clampEffort(u[m], v[motor.dof]);
+      }
+      newest.apply(forces, mujoco.getBody(1), Vector3d(task.calcPush(t, i), 0, 0));
+      newest.step(h, steps);
+      qpos = newest.qpos();
+      qvel = newest.qvel();
+      mujoco.getState(*data, q, v);
+    }
+    spent += newest.cpu();
+    out.gap = std::max(out.gap, calcLargestGap(model, q));
+    out.least_height = std::min(out.least_height, q[2]);
+  }
+  out.rate = static_cast<double>(steps) * ticks * n / spent;
+  return out;
+}
+
 // Resident memory of the program, kB.
 double readMemory() {
   std::ifstream file("/proc/self/status");
@@ -161,9 +200,10 @@ int main(int argc, char** argv) {
   }
   const BatchTask task(model, arguments.falls);
   using Run = std::function<Speed(double)>;
-  const std::map<std::string, Run> runs = {{"many", [&](double h) { return runBatch(task, arguments, h); }},
-                                           {"single", [&](double h) { return runSingle(model, task, arguments, h); }},
-                                           {"mujoco", [&](double h) { return runMujoco(model, task, arguments, h); }}};
+  std::map<std::string, Run> runs = {{"many", [&](double h) { return runBatch(task, arguments, h); }},
+                                     {"single", [&](double h) { return runSingle(model, task, arguments, h); }},
+                                     {"mujoco", [&](double h) { return runMujoco(model, task, arguments, h); }}};
+  if (loops::hasMujoco3()) runs["mujoco3"] = [&](double h) { return runMujoco3(model, task, arguments, h); };
   nlohmann::ordered_json out = {{"register", kRegister}, {"memory [kB]", measureMemory(model)}};
   for (const double h : arguments.time_steps) {
     std::map<std::string, std::vector<Speed>> speeds;

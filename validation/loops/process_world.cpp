@@ -220,6 +220,7 @@ try {
       cpu = 0;
     } else if (request.forces) {
       data.qfrc_applied.set(request.forces);
+      if (request.push) data.xfrc_applied.set(request.push, 6 * request.body);
     } else {
       model.opt.timestep = request.step;
       const before = getTime();
@@ -236,6 +237,11 @@ try {
   fs.writeSync(1, JSON.stringify({error: String(error)}) + '\n');
 }
 )";
+
+// Functions are compiled when they are first called, by the better compiler at once.
+std::vector<std::string> listMujoco3Command() {
+  return {"node", "--no-liftoff", "--input-type=module", "-e", kMujoco3, "--", getNodeModules()};
+}
 
 }  // namespace
 
@@ -254,6 +260,36 @@ bool hasMujoco3() {
   return isOnPath("node") && std::filesystem::exists(std::string(getNodeModules()) + "/@mujoco/mujoco/mujoco.js");
 }
 
+struct Mujoco3::Talk {
+  Program program{listMujoco3Command()};
+
+  void ask(const json& request, Mujoco3& out) {
+    const json answer = program.ask(request);
+    if (answer.contains("error"))
+      throw InputError("", "MuJoCo 3", answer["error"].get<std::string>(), "see its manual");
+    const auto q = answer["q"].get<std::vector<double>>(), v = answer["v"].get<std::vector<double>>();
+    out.qpos_ = Eigen::Map<const VectorXd>(q.data(), static_cast<Eigen::Index>(q.size()));
+    out.qvel_ = Eigen::Map<const VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
+    out.cpu_ = answer["cpu"];
+  }
+};
+
+Mujoco3::Mujoco3(const std::string& xml, Mujoco3Integrator integrator) : talk_(std::make_unique<Talk>()) {
+  talk_->program.tell({{"xml", xml}, {"integrator", static_cast<int>(integrator)}});
+}
+Mujoco3::~Mujoco3() = default;
+void Mujoco3::start(const VectorXd& qpos, const VectorXd& qvel) {
+  talk_->ask(
+      {{"q", std::vector<double>(qpos.begin(), qpos.end())}, {"v", std::vector<double>(qvel.begin(), qvel.end())}},
+      *this);
+}
+void Mujoco3::apply(const VectorXd& forces, int body, const Vector3d& push) {
+  talk_->ask(
+      {{"forces", std::vector<double>(forces.begin(), forces.end())}, {"body", body}, {"push", listVector(push)}},
+      *this);
+}
+void Mujoco3::step(double h, int count) { talk_->ask({{"step", h}, {"count", count}}, *this); }
+
 std::unique_ptr<ProcessWorld> makeMujoco3World(const Model& model, double time_step, Mujoco3Integrator integrator) {
   checkParts(model);
   const AssemblyResult closed = findClosedConfiguration(model);
@@ -264,11 +300,8 @@ std::unique_ptr<ProcessWorld> makeMujoco3World(const Model& model, double time_s
   std::vector<int> order;
   for (const int body : listMjcfBodies(model))
     for (int k = 0; k < model.joints()[body].nv; ++k) order.push_back(model.joints()[body].idx_v + k);
-  // Functions are compiled when they are first called, by the better compiler at once.
-  const std::vector<std::string> command = {"node",   "--no-liftoff", "--input-type=module", "-e",
-                                            kMujoco3, "--",           getNodeModules()};
   return std::make_unique<LineWorld>(
-      model, time_step, command,
+      model, time_step, listMujoco3Command(),
       json{{"xml", formatMjcf(model, closed.q, options).xml}, {"integrator", static_cast<int>(integrator)}}, order);
 }
 

@@ -23,8 +23,29 @@ std::unique_ptr<ProcessWorld> makeOdeWorld(const Model& model, double time_step)
 
 // Today's MuJoCo: npm's @mujoco/mujoco, WebAssembly in node, from the directory $BIELLE_NODE_MODULES.
 bool hasMujoco3();
-enum class Mujoco3Integrator { RungeKutta = 1, Discrete = 4 };
+enum class Mujoco3Integrator { Euler = 0, RungeKutta = 1, Discrete = 4 };
 // Closures are as stiff as the steps allow.
 std::unique_ptr<ProcessWorld> makeMujoco3World(const Model& model, double time_step, Mujoco3Integrator integrator);
+
+// The same program on any file, in coordinates of its own. Functions throw an InputError with what it complains of.
+class Mujoco3 {
+ public:
+  Mujoco3(const std::string& xml, Mujoco3Integrator integrator);
+  ~Mujoco3();
+
+  void start(const VectorXd& qpos, const VectorXd& qvel);
+  // Generalized forces, and one at the centre of mass of a body, N (world), from now on.
+  void apply(const VectorXd& forces, int body, const Vector3d& push);
+  void step(double h, int count);
+  const VectorXd& qpos() const { return qpos_; }
+  const VectorXd& qvel() const { return qvel_; }
+  double cpu() const { return cpu_; }  // of the steps since start(), s
+
+ private:
+  struct Talk;
+  std::unique_ptr<Talk> talk_;
+  VectorXd qpos_, qvel_;
+  double cpu_ = 0;
+};
 
 }  // namespace bielle::loops
