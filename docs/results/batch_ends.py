@@ -115,27 +115,28 @@ def main():
     arguments = parser.parse_args()
     runner = common.Runner(arguments.bielle)
     runs = read_runs(arguments.campaign or [run_campaign(runner, arguments.quick)])
-    pairs = [run for run in runs.values() if all(world in run for world in WORLDS)]
+    common_pushes = [push for push, run in runs.items() if all(world in run for world in WORLDS)]
+    pairs = [runs[push] for push in common_pushes]
     alone = [run["bielle"] for run in runs.values() if "bielle" in run]
     if not pairs:
         sys.exit("no push was carried out in both worlds")
+    count = lambda name: len({word for push in common_pushes for word in push.split(",") if word.startswith(name + "=")})
     falls = [[run[world]["outcome"] != "stood" for world in WORLDS] for run in pairs]
     only = [falls.count([True, False]), falls.count([False, True])]
     page = common.Page(__file__, "Where pushed walks end", common.describe_run(arguments.commit))
     page.add(f"""Bipetto walks four steps at 0.4 m/s under the gains of its plan at 1 ms, and its trunk is pushed for 0.1 s: at 10
 instants, from 20 directions, by 0.5 to 3 N s, 1,000 pushes. Bielle's worlds stand in the lanes of [one batch](batch.md), where
 {len(alone)} were carried out: {sum(run['outcome'] != 'stood' for run in alone)} fell. MuJoCo's world on the file that we export
-carried out {len(pairs)} of them, evenly spread unless that is all; what follows is of these in both worlds. Contacts and closures
-differ, and falls are chaotic: what can agree is how the ends are distributed. Both worlds get the same pushes, so that
-the samples are no independent ones, and probabilities are too large rather than too small.""")
+carried out {len(pairs)} of them, at {count("t")} of the instants and from {count("direction")} of the directions; what follows is of
+these in both worlds. Contacts and closures differ, and falls are chaotic: what can agree is how the ends are distributed. Both worlds
+get the same pushes, so that the samples are no independent ones, and probabilities are too large rather than too small.""")
     page.heading("Falls")
     page.add(f"""{sum(f[0] for f in falls)} walks of {len(pairs)} fall in Bielle's world and {sum(f[1] for f in falls)} in MuJoCo's:
 {falls.count([True, True])} in both, {only[0]} in Bielle's alone and {only[1]} in MuJoCo's alone. Were either way as probable, a split
 at least as uneven would have the probability {find_chance(*only):.2g} (McNemar's exact test).""")
     groups = {}
-    for push, run in runs.items():
-        if run in pairs:
-            groups.setdefault(float(push.rpartition("=")[2]), []).append(run)
+    for push, run in zip(common_pushes, pairs):
+        groups.setdefault(float(push.rpartition("=")[2]), []).append(run)
     page.table(["impulse [N s]", "pushes", *(f"fall in {TITLES[world]} world" for world in WORLDS)],
                [[f"{impulse:g}", str(len(group)), *(str(sum(run[world]["outcome"] != "stood" for run in group)) for world in WORLDS)]
                 for impulse, group in sorted(groups.items())])
