@@ -1,10 +1,14 @@
-// Lengths and offsets from logs: numbers of the geometry, derivatives of what is left of a log, and the files of logs. Oracles:
-// configurations closed by another way (LinkageMap), central differences, and models measured again.
+// Lengths, offsets and play from logs: numbers of the geometry, derivatives of what is left of a log, sides of play, and
+// files of logs. Oracles: configurations closed by another way (LinkageMap), central differences, models measured again,
+// forces of closures.
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/closing.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
 #include "bielle/model/names.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "check_derivative.h"
@@ -12,6 +16,7 @@
 #include "get_error.h"
 #include "identify/log.h"
 #include "identify/log_fit.h"
+#include "identify/play_sides.h"
 #include "model/listing.h"
 #include "own_robots.h"
 #include "results/npz.h"
@@ -177,6 +182,150 @@ TEST_CASE("identify: nothing is left of exact readings, and derivatives are thos
                       return VectorXd(VectorXd::Constant(1, 0.5 * there.squaredNorm()));
                     }));
   }
+}
+
+TEST_CASE("identify: play adds to readings and rods by its sides, and derivatives are those of differences") {
+  constexpr double kGear = 4e-3, kRod = 6e-4;  // more than drawn
+  constexpr Eigen::Index kRows = 16;
+  for (const Named& named : kTrials) {
+    const Trial trial(loadOwn(named.robot).model, named.joint);
+    CAPTURE(named.robot);
+    std::vector<GeometryNumber> numbers = choose(trial, named);
+    std::vector<LinkagePlay> plays =
+        listLinkagePlays(trial.model, *trial.cluster, trial.sensors,
+                         {{trial.model.motors()[static_cast<size_t>(trial.motors.front())].name, 1e-3}});
+    const auto n = static_cast<Eigen::Index>(numbers.size()), count = static_cast<Eigen::Index>(trial.sensors.size()),
+               P = static_cast<Eigen::Index>(plays.size());
+    CHECK(plays.front().size == 1e-3);
+    CHECK(P == static_cast<Eigen::Index>(trial.motors.size() + trial.cluster->closures.closures.size()));
+    VectorXd x(n + count + P);
+    x.head(n + count) = makeErrors(numbers, trial.sensors);
+    std::mt19937 rng(4);
+    MatrixXd sides(kRows, P);
+    for (double& side : sides.reshaped()) side = rng() % 2 ? 1 : -1;
+    std::vector<GeometryNumber> all = numbers;
+    for (const LinkagePlay& play : plays)
+      if (play.sensor < 0) all.push_back(play.rod);
+    const auto rods = static_cast<Eigen::Index>(all.size()) - n;
+    REQUIRE((rods > 0 && rods < P));
+    x.tail(P).head(P - rods).setConstant(kGear);
+    x.tail(rods).setConstant(kRod);
+    // Each row as if all had its sides.
+    MatrixXd readings(kRows, count);
+    for (Eigen::Index k = 0; k < kRows; ++k) {
+      VectorXd changes(n + rods + count);
+      changes << x.head(n), sides.row(k).tail(rods).transpose() * kRod / 2, x.segment(n, count);
+      readings.row(k) = trial.measure(all, changes, kRows).row(k);
+      for (Eigen::Index p = 0; p < P - rods; ++p)
+        readings(k, plays[static_cast<size_t>(p)].sensor) +=
+            sides(k, p) * (plays[static_cast<size_t>(p)].size + kGear) / 2;
+    }
+    sides(3, P - 1) = 0;
+    LogFit fit(trial.cluster, numbers, trial.sensors, readings, trial.q_cluster);
+    fit.addPlays(plays, sides);
+    REQUIRE(fit.follow(std::atomic<bool>(false)));
+    CHECK(fit.numRows() == kRows - 1);
+    CHECK_FALSE(contains(fit.usedRows(), 3));
+    CHECK(fit.followedRows().size() == kRows);
+    VectorXd r, without = x;
+    MatrixXd J;
+    without.tail(P).setZero();
+    REQUIRE(fit.evaluate(without, r, nullptr));
+    CHECK(r.cwiseAbs().maxCoeff() > 1e-4);
+    REQUIRE(fit.evaluate(x, r, &J));
+    CHECK(r.cwiseAbs().maxCoeff() < 1e-9);
+    checkDerivative(J, differentiate(x, 1e-4, [&](const VectorXd& at) {
+                      VectorXd there;
+                      REQUIRE(fit.evaluate(at, there, nullptr));
+                      return there;
+                    }));
+    // At one side in all rows, it is a part of the offset or the length.
+    LogFit still(trial.cluster, numbers, trial.sensors, readings, trial.q_cluster);
+    still.addPlays(plays, MatrixXd::Ones(kRows, P));
+    REQUIRE(still.follow(std::atomic<bool>(false)));
+    REQUIRE(still.evaluate(x, r, &J));
+    for (Eigen::Index p = 0; p < P - rods; ++p)
+      CHECK((J.col(n + count + p) - J.col(n + plays[static_cast<size_t>(p)].sensor) / 2).norm() < 1e-12 * J.norm());
+  }
+}
+
+TEST_CASE("identify: the load of a rod's play is the force of its closure along the rod") {
+  for (const char* name : {"fourbar", "rsu_biped"}) {
+    Model model = loadOwn(name).model;
+    const Trial trial(model, name == std::string("fourbar") ? "rocker_joint" : "ankley_left");
+    CAPTURE(name);
+    const std::vector<LinkagePlay> plays = listLinkagePlays(model, *trial.cluster, trial.sensors, {});
+    MeasuredLinkage linkage{trial.cluster, trial.sensors, trial.q_cluster, {}};
+    // At rest, and let go under these torques.
+    LoadedState state{trial.q, VectorXd::Zero(model.nv()), {}, VectorXd(model.nu()), VectorXd::Zero(model.nu()), {}};
+    for (Eigen::Index m = 0; m < model.nu(); ++m) state.u[m] = 1.5 - 0.7 * static_cast<double>(m);
+    Workspace ws(model);
+    ConstrainedWorkspace cws;
+    const ConstraintSet closures = makeConstraintSet(model);
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, closures, state.q, state.v, calcMotorForces(model, state.u)) ==
+            NumericalStatus::Ok);
+    state.a = cws.a;
+    const PlayLoads loads =
+        calcPlayLoads(model, linkage, plays, {{state}, {0}, {}}, VectorXd::Constant(model.nu(), 1e-2));
+    for (size_t p = 0; p < plays.size(); ++p) {
+      const LinkagePlay& play = plays[p];
+      const double load = loads.values(0, static_cast<Eigen::Index>(p));
+      CAPTURE(play.name, load);
+      CHECK(loads.least(0, static_cast<Eigen::Index>(p)) > 9e-3);
+      if (play.sensor >= 0) {
+        const Motor& motor = model.motors()[static_cast<size_t>(model.findMotor(play.name))];
+        CHECK(load == Approx(state.u[model.findMotor(play.name)] - motor.armature * state.a[motor.dof]).epsilon(1e-9));
+        continue;
+      }
+      constexpr double kStep = 1e-6;
+      const auto calcResiduals = [&](double s) {
+        const Model longer = changeGeometry(model, trial.cluster.get(), {play.rod}, VectorXd::Constant(1, s));
+        Workspace there(longer);
+        updatePositions(longer, there, state.q);
+        VectorXd h = VectorXd::Zero(closures.rows);
+        for (size_t c = 0; c < longer.closures().size(); ++c)
+          h.segment(closures.offsets[c], getRows(longer.closures()[c].kind)) =
+              calcClosureResidual(there, longer.closures()[c]);
+        return h;
+      };
+      // Residuals fall by J dq (notation.h), so that work is lambda times what they grow by.
+      const VectorXd slope = (calcResiduals(kStep) - calcResiduals(-kStep)) / (2 * kStep);
+      CHECK(slope.norm() == Approx(1).epsilon(0.5));
+      CHECK(std::abs(load) > 0.1);
+      CHECK(load == Approx(-slope.dot(cws.lambda)).epsilon(1e-6));
+      // The play of a world is that of the length.
+      ModelParts parts = takeParts(model);
+      for (Motor& motor : parts.motors) motor.armature = parts.armature[motor.dof] = 1e-3;
+      const Model with = addPlay(ModelBuilder::restore(parts), {{play.name, 1e-2}});
+      constexpr double kLonger = 2e-3;
+      const AssemblyResult longer = closeConfiguration(
+          changeGeometry(model, trial.cluster.get(), {play.rod}, VectorXd::Constant(1, kLonger)), state.q);
+      REQUIRE(longer.status == NumericalStatus::Ok);
+      VectorXd q = with.makeNeutral();
+      for (size_t i = 1; i < model.joints().size(); ++i) {
+        const Joint &joint = model.joints()[i], &same = with.joints()[static_cast<size_t>(with.findJoint(joint.name))];
+        q.segment(same.idx_q, same.nq) = longer.q.segment(joint.idx_q, joint.nq);
+      }
+      Workspace there(with);
+      updatePositions(with, there, q);
+      CHECK(calcLargestGap(there, makeConstraintSet(with)) > 0.5 * kLonger);
+      q[with.joints()[static_cast<size_t>(with.findJoint(getPlayName(play.name)))].idx_q] = kLonger;
+      updatePositions(with, there, q);
+      CHECK(calcLargestGap(there, makeConstraintSet(with)) < 1e-9);
+    }
+  }
+}
+
+TEST_CASE("identify: sides are those of loads that are clear before and after") {
+  PlayLoads loads{MatrixXd(6, 1), MatrixXd::Constant(6, 1, 0.5)};
+  loads.values << 1, 2, 0.4, -1, -3, -2;
+  const VectorXd time = VectorXd::LinSpaced(13, 0, 6);
+  const MatrixXd sides = findSides(time, {1, 2, 3, 4, 5, 5.6}, loads, 1.1);
+  VectorXd expected = VectorXd::Zero(13);
+  expected[3] = expected[4] = 1;           // 1.5 and 2, but not at the first one and before
+  expected.segment(9, 3).setConstant(-1);  // 4.5, 5, 5.5
+  CHECK(sides == expected);
+  CHECK(findSides(time, {1, 2, 3, 4, 5, 5.6}, loads, 0.9).cwiseAbs().sum() == 1);  // 5.5
 }
 
 TEST_CASE("identify: angles do not tell the size of a linkage") {

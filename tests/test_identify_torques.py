@@ -1,4 +1,5 @@
-"""test_identify_torques.py BIELLE SOURCE: masses, armature and friction found again from torques, by `bielle identify --dynamics`.
+"""test_identify_torques.py BIELLE SOURCE: masses, armature and friction found again from torques, by `bielle identify --dynamics`, and
+play, of which they tell at which stop it is, by `--play`.
 
 Torques of a four-bar come from a closed form, Lagrange's equation of its one freedom, read with noise, and from MuJoCo. Masses are
 wrong by a tenth, friction by a fifth.
@@ -27,6 +28,7 @@ DRAWN = {"crank.mass": 0.3, "coupler.mass": 0.7, "rocker.mass": 0.6, "crank_join
          "crank_joint.friction": 0.2}
 TRUTH = {"crank.mass": 0.33, "coupler.mass": 0.63, "rocker.mass": 0.66, "crank_joint.armature": 2.4e-3, "crank_joint.damping": 0.06,
          "crank_joint.friction": 0.16}
+OFFSET, GEAR = math.radians(0.5), 4e-3
 ALL = [word for name in ("masses", "armatures", "frictions") for word in ("--dynamics", name)]
 
 
@@ -74,8 +76,8 @@ def swing(time):
             sum(-a * w * w * np.sin(w * time + p) for a, w, p in parts))
 
 
-def calc_torque(time, numbers):
-    angle, speed, acceleration = swing(time)
+def calc_torque(time, numbers, motion=swing):
+    angle, speed, acceleration = motion(time)
     inertia = lambda a: calc_inertia(a, numbers)
     return (inertia(angle) * acceleration + 0.5 * differentiate(inertia, angle) * speed**2
             + differentiate(lambda a: calc_potential(a, numbers), angle) + calc_loss_torque(speed, numbers))
@@ -258,6 +260,111 @@ class IdentifyTorques(unittest.TestCase):
             self.assertLess(abs(one["after"] - true), 4 * one["deviation"], one)
         done = run("identify", "drawn", "--motion", "5", "-o", "none", status=2)
         self.assertIn("--motion: it needs --dynamics and -o, and no LOG", done.stderr)
+
+    def measure_play(self, motion, seed=1, rows=10000):
+        """With play of the gear: the motor is ahead of the crank by half of it to the side of the torque that it passes on."""
+        random = np.random.default_rng(seed)
+        time = np.arange(rows) * 1e-3
+        angle, speed, acceleration = motion(time)
+        torque = calc_torque(time, TRUTH, motion)
+        passed = torque - TRUTH["crank_joint.armature"] * acceleration - calc_loss_torque(speed, TRUTH)
+        _, end = place_fourbar(angle)
+        columns = {"time": time, "crank_joint": angle + OFFSET + GEAR / 2 * np.sign(passed),
+                   "rocker_joint": np.unwrap(np.angle(end - GROUND)) - OFFSET}
+        for name in ("crank_joint", "rocker_joint"):
+            columns[name] = columns[name] + 1e-4 * random.standard_normal(rows)
+        columns["u.crank_joint"] = torque + 0.01 * random.standard_normal(rows)
+        np.savetxt("log.csv", np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="", fmt="%.9f")
+
+    def take_linkage(self, robot, *options, log="log.csv"):
+        shutil.rmtree("found", ignore_errors=True)
+        done = run("identify", robot, log, "-o", "found", *options)
+        linkage, = json.loads(pathlib.Path("found/identified.json").read_text())["linkages"]
+        return linkage, {(one["name"], one["kind"]): one for one in linkage["unknowns"]}, done
+
+    def test_play(self):
+        draw("drawn")
+        squares = []
+        for seed in range(4):
+            self.measure_play(swing, seed)
+            linkage, found, _ = self.take_linkage("drawn", "--play", "crank_joint", "--window", "0.05")
+            for key, truth in ((("crank_joint.play", "play"), GEAR), (("crank_joint", "offset"), OFFSET),
+                               (("rocker_joint", "offset"), -OFFSET), (("coupler", "length"), 0.35)):
+                squares.append(((found[key]["after"] - truth) / found[key]["deviation"])**2)
+            self.assertLess(linkage["noise_over_assumed"], 1.1)
+            self.assertGreater(linkage["unclear"], 500)
+            self.assertGreater(linkage["rows"], 4000)
+        # Of 16 numbers, of which those of a log depend on each other: bounds of chi-square with 4, at 0.1 %.
+        self.assertTrue(0.09 / 4 < np.mean(squares) < 18.5 / 4, squares)
+        # Who passes over it finds other offsets and lengths, or is told.
+        linkage, found, done = self.take_linkage("drawn")
+        self.assertIn("or it has play", done.stderr)
+        self.assertGreater(abs(found["crank_joint", "offset"]["after"] - OFFSET), 1.5 * math.radians(0.02))
+        # Where the load never changes sides, play is a part of the offset.
+        self.measure_play(lambda t: (0.6 + 0.3 * np.sin(1.5 * t), 0.45 * np.cos(1.5 * t), -0.675 * np.sin(1.5 * t)))
+        linkage, found, _ = self.take_linkage("drawn", "--play", "crank_joint", "--free", "none")
+        unseen, = linkage["not_seen"]
+        self.assertEqual(set(unseen), {"crank_joint", "crank_joint.play"})
+        self.assertAlmostEqual(unseen["crank_joint"] / unseen["crank_joint.play"], -0.5, delta=1e-9)
+        self.assertIsNone(found["crank_joint.play", "play"]["after"])
+        self.assertTrue(found["rocker_joint", "offset"]["seen"])
+        self.assertNotIn("play:", pathlib.Path("found/found.yaml").read_text())
+        # Unless the offset is known.
+        _, found, _ = self.take_linkage("drawn", "--play", "crank_joint", "--free", "none", "--no-offset", "crank_joint")
+        self.assertLess(abs(found["crank_joint.play", "play"]["after"] - GEAR - 2 * OFFSET), 1e-4)
+        for options, text in ((("--play", "elbow"), "--play elbow: no linkage has it; there are: crank_joint, coupler"),
+                              (("--play", "crank_joint", "--window", "9"), "in no row it is clear at which of its stops it is")):
+            self.assertIn(text, run("identify", "drawn", "log.csv", "-o", "none", *options, status=2).stderr)
+        text = pathlib.Path("log.csv").read_text().replace("u.crank_joint", "effort")
+        pathlib.Path("without.csv").write_text(text)
+        self.assertIn("without.csv: columns: --play needs those that are missing: u.crank_joint",
+                      run("identify", "drawn", "without.csv", "-o", "none", "--play", "*", status=2).stderr)
+
+    def test_play_in_mujoco(self):
+        """Play of gear and rod, a rod and encoders that are wrong, masses and friction too, read by encoders of 14 bits."""
+        rod = 3e-4
+        draw("drawn")
+        draw("built", TRUTH)
+        urdf = pathlib.Path("built/fourbar.urdf")
+        text = urdf.read_text()
+        self.assertEqual(text.count('"0.175 0 0"'), 2)
+        urdf.write_text(text.replace('"0.175 0 0"', '"0.1755 0 0"'))
+        run("convert", "built", "--play", f"crank_joint={GEAR}", "--play", f"coupler={rod}", "-o", "worn")
+        pathlib.Path("torques.yaml").write_text("torques:\n" + "".join(
+            f"  - {{time: {0.002 * k:.3f}, crank_joint: {1.2 * math.sin(0.004 * k) + 0.6 * math.sin(0.011 * k + 1):.6f}}}\n"
+            for k in range(5000)))
+        done = subprocess.run([BIELLE, "simulate", "worn", "--world", "mujoco", "--duration", "10", "--torques", "torques.yaml",
+                               "--record-period", "0.001", "--no-report", "-o", "real"], capture_output=True, text=True)
+        if "without MuJoCo" in done.stderr:
+            self.skipTest("MuJoCo is not built in")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        real = np.genfromtxt("real/trajectory.csv", delimiter=",", names=True, deletechars="")[:-1]
+        step, random = 2 * math.pi / 2**14, np.random.default_rng(1)
+        columns = {"time": real["time"], "u.crank_joint": real["u.crank_joint"] + 0.01 * random.standard_normal(len(real))}
+        for name, offset in (("crank_joint", OFFSET), ("rocker_joint", -OFFSET)):
+            columns[name] = np.round((real["q." + name] + offset) / step) * step
+        np.savetxt("log.csv", np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="", fmt="%.9f")
+        linkage, found, _ = self.take_linkage("drawn", "--play", "*", "--window", "0.05")
+        self.assertGreater(linkage["rows"], 4000)
+        self.assertLess(abs(found["coupler", "length"]["after"] - 0.351), 5e-5)
+        for name, offset in (("crank_joint", OFFSET), ("rocker_joint", -OFFSET)):
+            self.assertLess(abs(found[name, "offset"]["after"] - offset), math.radians(0.02))
+        # MuJoCo's stops give way, by 1.5 % in the mean.
+        self.assertLess(abs(found["crank_joint.play", "play"]["after"] - GEAR), 0.04 * GEAR)
+        self.assertLess(abs(found["coupler.play", "play"]["after"] - rod), 0.06 * rod)
+        # The robot that is found has it, in the next identification and in worlds.
+        info = run("info", "found").stdout
+        self.assertIn("coupler", info[info.index("play"):])
+        shutil.rmtree("first", ignore_errors=True)
+        os.rename("found", "first")
+        _, again, _ = self.take_linkage("first", "--play", "*", "--window", "0.05")
+        for key in (("crank_joint.play", "play"), ("coupler.play", "play")):
+            self.assertAlmostEqual(again[key]["before"], found[key]["after"], delta=1e-12)
+            self.assertLess(abs(again[key]["after"] - found[key]["after"]), 5 * found[key]["deviation"])
+        # Without play in the model, what is left is many times the noise.
+        blind, _, done = self.take_linkage("drawn")
+        self.assertGreater(blind["misfit_after"], 5 * linkage["misfit_after"])
+        self.assertIn("or it has play", done.stderr)
 
     def test_arm(self):
         """Without loops; while it leans on a stop, its motors do not tell."""

@@ -11,9 +11,11 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/formats/robot_writer.h"
 #include "bielle/model/error.h"
+#include "bielle/model/names.h"
 #include "bielle/results/result.h"
 #include "cli/commands.h"
 #include "cli/identify_motion.h"
+#include "cli/identify_play.h"
 #include "cli/identify_report.h"
 #include "cli/table.h"
 #include "formats/text_file.h"
@@ -30,6 +32,7 @@ namespace {
 constexpr double kQuiet = 0.5;     // s, before progress is told
 constexpr double kSuspicious = 5;  // noise over the one assumed
 constexpr double kBelowZero = 3;   // standard deviations, before it is told
+constexpr double kLongGone = 0.5;  // share of rows in which play is at no stop, before it is told
 
 struct IdentifyArguments {
   RobotArgument robot;
@@ -60,7 +63,8 @@ int list(const Model& model, const std::vector<LinkageTask>& tasks, const std::v
                 {"by --sensor", listItems(task.others)},
                 {"rods", listItems(rods)},
                 {"lengths", listItems(lengths)},
-                {"places .x .y .z", listItems(places)}},
+                {"places .x .y .z", listItems(places)},
+                {"play", listItems(getNames(task.plays))}},
                "    ");
   }
   if (loads.empty()) return kOk;
@@ -132,22 +136,26 @@ EstimateOptions makeOptions(const IdentifyArguments& arguments, const Teller& te
 }
 
 // Of one linkage; empty if the user asked for the end before there was one.
-std::optional<Identified> identify(const IdentifyArguments& arguments, const MotionLog& log, LoggedTask logged) {
+std::optional<Identified> identify(const IdentifyArguments& arguments, const Model& model, const VectorXd& q,
+                                   const MotionLog& whole, const MotionLog& log, LoggedTask logged) {
   const Teller tell("linkage of " + logged.task->name);
   Identified out;
   out.task = logged.task;
   out.geometry = chooseGeometry(*logged.task, arguments.choice.free);
   out.sensors = logged.sensors;
   const auto K = static_cast<int>(logged.readings.rows());
-  LogFit fit(logged.task->cluster, out.geometry, out.sensors, std::move(logged.readings), logged.task->q);
+  LogFit fit(logged.task->cluster, out.geometry, out.sensors, logged.readings, logged.task->q);
+  addPlays(fit, model, q, logged, arguments.choice, arguments.torques.window, whole, log.time);
   if (!fit.follow(isInterrupted())) return {};
-  out.rows = fit.numRows(), out.left_out = K - out.rows;
+  out.plays = fit.plays();
+  const std::vector<Eigen::Index>& followed = fit.followedRows();
+  out.rows = fit.numRows(), out.left_out = K - static_cast<int>(followed.size());
+  out.unclear = static_cast<int>(followed.size()) - out.rows;
   out.time.resize(out.rows);
   for (int k = 0; k < out.rows; ++k) out.time[k] = log.time[fit.usedRows()[static_cast<size_t>(k)]];
-  if (out.rows < 2 || 2 * out.rows < K) {
-    const std::vector<Eigen::Index>& used = fit.usedRows();
+  if (K - out.left_out < 2 || 2 * out.left_out > K) {
     size_t first = 0;
-    while (first < used.size() && used[first] == static_cast<Eigen::Index>(first)) ++first;
+    while (first < followed.size() && followed[first] == static_cast<Eigen::Index>(first)) ++first;
     throw InputError(log.path, log.rows[first],
                      "the linkage of " + out.task->name +
                          " has no configuration near these positions, nor near those of " +
@@ -210,9 +218,14 @@ void warn(const Identified& found, const std::string& log) {
   };
   if (found.left_out > 0)
     tell(std::to_string(found.left_out) + " rows near which it has no configuration are left out");
+  if (found.unclear > kLongGone * (found.rows + found.unclear))
+    tell(std::to_string(found.unclear) + " rows in which it is not clear at which stop play is are left out");
   if (found.estimate.noise > kSuspicious)
     tell("what is left is " + formatNumber(found.estimate.noise, "%.3g") +
          " times the noise that is assumed (--noise): other numbers than the free ones are wrong, or it has play");
+  for (const Unknown& unknown : found.estimate.unknowns)
+    if (unknown.kind == "play" && unknown.is_seen && unknown.after < -kBelowZero * unknown.deviation)
+      tell(unknown.name + " is below zero: torques or positions have other signs than the robot; it has 0");
 }
 
 int run(const IdentifyArguments& arguments) {
@@ -231,13 +244,14 @@ int run(const IdentifyArguments& arguments) {
     throw InputError("", arguments.log.empty() ? "-o" : "LOG", "LOG and --output need each other",
                      "give both, or none");
   std::vector<LinkageTask> tasks;
-  if (!has_dynamics || !robot.model.closures().empty()) tasks = listTasks(robot.model, q, arguments.choice);
+  if (!has_dynamics || !robot.model.closures().empty())
+    tasks = listTasks(robot.model, q, arguments.choice, robot.wear.plays);
   if (arguments.log.empty()) return list(robot.model, tasks, loads);
   std::vector<std::string> inputs = listFiles(robot), wanted;
   inputs.push_back(arguments.log);
   requireApart(arguments.directory, inputs);
   formatRobot(robot.model);  // \throws what its files could not say in the end
-  if (has_dynamics) wanted = listTorqueColumns(robot.model);
+  if (has_dynamics || !arguments.choice.plays.empty()) wanted = listTorqueColumns(robot.model);
   for (const LinkageTask& task : tasks)
     for (const LinkageSensor& sensor : task.sensors) wanted.push_back(sensor.name);
   const MotionLog whole = readLog(arguments.log, wanted), log = thin(whole, arguments.every);
@@ -247,14 +261,17 @@ int run(const IdentifyArguments& arguments) {
   std::vector<Identified> all;
   for (LoggedTask& logged : chosen) {
     if (isInterrupted()) break;
-    if (std::optional<Identified> found = identify(arguments, log, std::move(logged))) all.push_back(std::move(*found));
+    if (std::optional<Identified> found = identify(arguments, robot.model, q, whole, log, std::move(logged)))
+      all.push_back(std::move(*found));
   }
   Model model = robot.model;
+  Wear wear = robot.wear;
   Json linkages = Json::array();
   bool converged = all.size() == chosen.size();
   for (const Identified& found : all) {
     const auto n = static_cast<Eigen::Index>(found.geometry.size());
     model = changeGeometry(model, found.task->cluster.get(), found.geometry, found.estimate.x.head(n));
+    wear = changePlays(std::move(wear), found.plays, found.estimate);
     linkages.push_back(describe(found));
     converged = converged && found.estimate.converged;
   }
@@ -269,7 +286,7 @@ int run(const IdentifyArguments& arguments) {
     return kFailed;
   }
   makeOutputDirectory(arguments.directory);
-  writeRobot(model, arguments.directory, "with what `bielle identify` found", robot.wear);
+  writeRobot(model, arguments.directory, "with what `bielle identify` found", wear);
   Json summary = {{"robot", arguments.robot.name},
                   {"log", arguments.log},
                   {"interrupted", static_cast<bool>(isInterrupted())},
@@ -321,12 +338,14 @@ void addIdentify(CLI::App& command, Action& action) {
           "what is looked for in torques, columns u.MOTOR [N m or N]: masses, coms (centres of mass), armatures, "
           "frictions, or the name of one, as LINK.mass or MOTOR.friction (* stands for any text); the base must not "
           "move; may be repeated");
+  addList("--play", choice.plays,
+          "what may have play: a motor, behind its gear, or a closure, along its rod (* stands for any text); torques, "
+          "columns u.MOTOR [N m or N], tell at which stop it is; may be repeated");
   command
       .add_option("--window", arguments->torques.window,
-                  "of the polynomials that smooth positions for --dynamics, their degree being 4 [s]")
+                  "of the polynomials that smooth positions for --dynamics and --play, their degree being 4 [s]")
       ->capture_default_str()
-      ->check(CLI::Range(1e-4, 10.0))
-      ->needs("--dynamics");
+      ->check(CLI::Range(1e-4, 10.0));
   command
       .add_option(
           "--motion", arguments->motion,
@@ -352,6 +371,8 @@ void addIdentify(CLI::App& command, Action& action) {
       "does "
       "not\n"
       "show: with angles alone, that of all lengths of a linkage by the same factor.\n"
+      "With --play, columns u.MOTOR tell at which of its stops play is, and its size is found as well, where the load "
+      "changes sides.\n"
       "With --dynamics, columns u.MOTOR and, if there are any, v.JOINT tell masses, armatures and friction as well.\n"
       "-o is a robot for every other command. After Ctrl-C it has the best estimate so far.\n"
       "Exit status: 0 done, 1 interrupted or not converged, 2 bad input.\n"
@@ -360,6 +381,7 @@ void addIdentify(CLI::App& command, Action& action) {
       "  bielle identify fourbar log.csv -o found\n"
       "  bielle identify fourbar log.csv --free rods --free crank --no-offset crank_joint -o found\n"
       "  bielle identify fourbar log.csv --dynamics masses --dynamics frictions -o found\n"
+      "  bielle identify fourbar log.csv --play coupler -o found\n"
       "  bielle identify fourbar --dynamics masses --dynamics frictions --motion 10 -o motion\n"
       "  bielle identify bipetto log.npz --joint knee_left --noise '*=5e-5' --noise knee_left=2e-4 -o found");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });

@@ -25,7 +25,8 @@ std::string format(double value, const char* as = "%.6f") {
 std::vector<Row> listRows(const Estimate& estimate) {
   std::vector<Row> rows = {{"", "unit", "before", "after", "change", "+-"}};
   for (const Unknown& unknown : estimate.unknowns) {
-    const bool is_offset = unknown.kind == "offset", is_place = is_offset || unknown.kind == "length";
+    const bool is_offset = unknown.kind == "offset",
+               is_place = is_offset || unknown.kind == "length" || unknown.kind == "play";
     const char *const as = is_place ? "%.6f" : "%.5g", *const change = is_place ? "%+.6f" : "%+.3g";
     Row row = {unknown.name + (is_offset ? ", offset" : ""), unknown.unit, format(unknown.before, as), "not seen"};
     if (unknown.is_seen) {
@@ -134,7 +135,11 @@ std::string formatSection(const std::string& title, const Estimate& estimate, co
 Json describe(const Identified& found) {
   Json columns = Json::array();
   for (const LinkageSensor& sensor : found.sensors) columns.push_back(sensor.name);
-  Json json = {{"linkage", found.task->name}, {"columns", columns}, {"rows", found.rows}, {"left_out", found.left_out}};
+  Json json = {{"linkage", found.task->name},
+               {"columns", columns},
+               {"rows", found.rows},
+               {"left_out", found.left_out},
+               {"unclear", found.unclear}};
   json.update(describe(found.estimate));
   return json;
 }

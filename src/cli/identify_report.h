@@ -13,7 +13,9 @@ struct Identified {
   const LinkageTask* task = nullptr;
   std::vector<GeometryNumber> geometry;
   std::vector<LinkageSensor> sensors;
-  int rows = 0, left_out = 0;
+  std::vector<LinkagePlay> plays;
+  // Rows that are used, that have no configuration, and where play is at no stop that is known.
+  int rows = 0, left_out = 0, unclear = 0;
   VectorXd time;                     // of the rows
   MatrixXd left_before, left_after;  // of the columns, rows x sensors
   Estimate estimate;

@@ -8,6 +8,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "dynamics/linkage_workspace.h"
+#include "identify/play_sides.h"
 #include "model/listing.h"
 #include "model/number_text.h"
 #include "results/setting.h"
@@ -59,7 +60,8 @@ bool matches(const std::vector<std::string>& patterns, const std::string& name) 
                      [&](const std::string& pattern) { return matches(pattern, name); });
 }
 
-std::vector<LinkageTask> listTasks(const Model& model, ConstVectorRef q, const IdentifyChoice& choice) {
+std::vector<LinkageTask> listTasks(const Model& model, ConstVectorRef q, const IdentifyChoice& choice,
+                                   const std::vector<Play>& present) {
   const Reduction reduction = makeReduction(model, q);
   std::vector<LinkageTask> tasks;
   std::vector<std::string> names;
@@ -86,6 +88,7 @@ std::vector<LinkageTask> listTasks(const Model& model, ConstVectorRef q, const I
         if (matches(name, sensor.name)) sensor.noise = value;
     }
     task.geometry = listGeometry(model, *task.cluster, task.q);
+    task.plays = listLinkagePlays(model, *task.cluster, task.sensors, present);
     tasks.push_back(std::move(task));
   }
   if (names.empty())
@@ -105,11 +108,12 @@ std::vector<GeometryNumber> chooseGeometry(const LinkageTask& task, const std::v
 }
 
 void requireKnown(const std::vector<LinkageTask>& tasks, const IdentifyChoice& choice) {
-  std::vector<std::string> sensors, measurable, geometry;
+  std::vector<std::string> sensors, measurable, geometry, plays;
   for (const LinkageTask& task : tasks) {
     for (const LinkageSensor& sensor : task.sensors) sensors.push_back(sensor.name);
     measurable.insert(measurable.end(), task.others.begin(), task.others.end());
     for (const GeometryNumber& number : task.geometry) geometry.push_back(number.name);
+    for (const LinkagePlay& play : task.plays) plays.push_back(play.name);
   }
   const auto require = [](const char* flag, const std::string& pattern, const std::vector<std::string>& names) {
     if (std::none_of(names.begin(), names.end(), [&](const std::string& name) { return matches(pattern, name); }))
@@ -120,6 +124,7 @@ void requireKnown(const std::vector<LinkageTask>& tasks, const IdentifyChoice& c
   for (const std::string& pattern : choice.exact) require("--no-offset", pattern, sensors);
   for (const std::string& setting : choice.noise)
     require("--noise", parseSetting("--noise", setting, kNoiseExample).first, sensors);
+  for (const std::string& pattern : choice.plays) require("--play", pattern, plays);
   geometry.insert(geometry.begin(), {kRods, "none"});
   for (const std::string& pattern : choice.free) require("--free", pattern, geometry);
 }

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "bielle/model/wear.h"
 #include "identify/geometry.h"
 #include "identify/log.h"
 #include "identify/log_fit.h"
@@ -18,6 +19,7 @@ struct LinkageTask {
   std::vector<LinkageSensor> sensors;    // motors, serial joints and what else is measured
   std::vector<std::string> others;       // coordinates that could be measured as well
   std::vector<GeometryNumber> geometry;  // all of it
+  std::vector<LinkagePlay> plays;        // what may have play; sensors are those above
 };
 
 struct IdentifyChoice {
@@ -26,10 +28,12 @@ struct IdentifyChoice {
   std::vector<std::string> free = {"rods"};  // geometry; * stands for any text
   std::vector<std::string> exact;            // sensors without an offset, likewise
   std::vector<std::string> noise;            // NAME=VALUE, likewise
+  std::vector<std::string> plays;            // motors and closures with play, likewise
 };
 
-// \param q  nq, closed   \throws InputError for names that no linkage has
-std::vector<LinkageTask> listTasks(const Model& model, ConstVectorRef q, const IdentifyChoice& choice);
+// \param q  nq, closed   \param present  play of the robot   \throws InputError for names that no linkage has
+std::vector<LinkageTask> listTasks(const Model& model, ConstVectorRef q, const IdentifyChoice& choice,
+                                   const std::vector<Play>& present = {});
 
 // The numbers of a task that are free. \throws InputError for a name that none of the tasks has
 std::vector<GeometryNumber> chooseGeometry(const LinkageTask& task, const std::vector<std::string>& free);

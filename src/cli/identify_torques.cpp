@@ -6,6 +6,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
+#include "cli/smooth_log.h"
 #include "identify/loaded_states.h"
 #include "model/listing.h"
 #include "model/number_text.h"
@@ -15,25 +16,6 @@ namespace bielle::cli {
 namespace {
 
 constexpr int kRounds = 3;  // of weighing
-
-// A position that a log may have: of a joint with one coordinate, or of a universal joint.
-struct Coordinate {
-  std::string name, speed;  // columns
-  int joint = 0, position = 0, dof = 0;
-};
-
-std::vector<Coordinate> listCoordinates(const Model& model) {
-  const std::vector<std::string> positions = makePositionNames(model), speeds = makeVelocityNames(model);
-  std::vector<Coordinate> out;
-  for (int i = 1; i < model.numBodies(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    if (joint.nq != 1 && joint.kind != JointKind::Universal) continue;
-    for (int k = 0; k < joint.nq; ++k)
-      out.push_back({positions[static_cast<size_t>(joint.idx_q + k)],
-                     "v." + speeds[static_cast<size_t>(joint.idx_v + k)], i, joint.idx_q + k, joint.idx_v + k});
-  }
-  return out;
-}
 
 // What is used of the log.
 struct TorqueTask {
@@ -90,86 +72,6 @@ TorqueTask makeTask(const Model& model, ConstVectorRef q, const IdentifyChoice& 
   return task;
 }
 
-// Columns of positions with their derivatives, those of speeds in place of the former's where they are logged.
-class SmoothLog {
- public:
-  SmoothLog(const MotionLog& log, double window) : log_(log), window_(window) {
-    centres_ = listCentres(log.time, window_);
-  }
-  double window() const { return window_; }
-  // Without instants in whose windows a joint is at its limit, where a stop may bear it. \returns their number
-  int leaveOutStops(const Model& model, const std::vector<Coordinate>& coordinates,
-                    const std::map<std::string, double>& offsets) {
-    std::vector<double> times;
-    for (const Coordinate& coordinate : coordinates) {
-      const int column = log_.find(coordinate.name);
-      if (column < 0) continue;
-      const auto offset = offsets.find(coordinate.name);
-      const double zero = offset == offsets.end() ? 0 : offset->second;
-      for (Eigen::Index k = 0; k < log_.time.size(); ++k)
-        if (const double q = log_.values(k, column) - zero;
-            q <= model.lowerLimits()[coordinate.dof] || q >= model.upperLimits()[coordinate.dof])
-          times.push_back(log_.time[k]);
-    }
-    std::sort(times.begin(), times.end());
-    const auto is_at_stop = [&](double centre) {
-      const auto next = std::lower_bound(times.begin(), times.end(), centre - 0.5 * window_);
-      return next != times.end() && *next <= centre + 0.5 * window_;
-    };
-    const size_t before = centres_.size();
-    centres_.erase(std::remove_if(centres_.begin(), centres_.end(), is_at_stop), centres_.end());
-    return static_cast<int>(before - centres_.size());
-  }
-  Eigen::Index size() const { return static_cast<Eigen::Index>(centres_.size()); }
-
-  Smoothed getMotion(const std::string& position, const std::string& speed, double offset) const {
-    Smoothed motion = getColumn(log_.time, log_.find(position), log_.time.size());
-    motion.value.array() -= offset;
-    if (const int column = log_.find(speed); column >= 0) {
-      Smoothed rate = getColumn(log_.time, column, log_.time.size());
-      motion.rate = std::move(rate.value), motion.acceleration = std::move(rate.rate);
-    }
-    return motion;
-  }
-  MatrixXd getTorques(const Model& model) const {
-    MatrixXd torques(size(), model.nu());
-    const Eigen::Index K = log_.time.size();
-    for (int m = 0; m < model.nu(); ++m) {
-      const int column = log_.find("u." + model.motors()[static_cast<size_t>(m)].name);
-      // A torque that is held belongs to the middle of its time.
-      const bool is_held = log_.isHeld(column);
-      const VectorXd held = 0.5 * (log_.time.head(K - 1) + log_.time.tail(K - 1));
-      torques.col(m) = getColumn(is_held ? held : log_.time, column, is_held ? K - 1 : K).value;
-    }
-    return torques;
-  }
-  // Of motors whose positions are logged; empty if there is another one.
-  MatrixXd getSigns(const Model& model, const std::vector<Coordinate>& coordinates) const {
-    MatrixXd speeds(log_.time.size(), model.nu());
-    const std::vector<double> rows(log_.time.begin(), log_.time.end());
-    for (int m = 0; m < model.nu(); ++m) {
-      const Motor& motor = model.motors()[static_cast<size_t>(m)];
-      const auto own = std::find_if(coordinates.begin(), coordinates.end(),
-                                    [&motor](const Coordinate& one) { return one.dof == motor.dof; });
-      const int position = log_.find(own->name), speed = log_.find(own->speed);
-      if (position < 0 && speed < 0) return {};
-      speeds.col(m) = speed >= 0 ? VectorXd(log_.values.col(speed))
-                                 : VectorXd(smooth(log_.time, log_.values.col(position), rows, window_).rate);
-      for (double& value : speeds.col(m)) value = calcFrictionSign(model, motor, value);
-    }
-    return smooth(log_.time, speeds, centres_, window_).value;
-  }
-
- private:
-  Smoothed getColumn(const VectorXd& time, int column, Eigen::Index rows) const {
-    return smooth(time, log_.values.col(column).head(rows), centres_, window_);
-  }
-
-  const MotionLog& log_;
-  double window_;
-  std::vector<double> centres_;
-};
-
 }  // namespace
 
 std::vector<std::string> listTorqueColumns(const Model& model) {
@@ -221,29 +123,14 @@ IdentifiedLoads identifyLoads(const Model& model, ConstVectorRef q, const Identi
   SmoothLog smooth_log(log, torques.window);
   IdentifiedLoads out;
   out.at_stops = smooth_log.leaveOutStops(model, all, offsets);
-  std::map<std::string, std::string> speeds;
-  for (const Coordinate& coordinate : all) speeds[coordinate.name] = coordinate.speed;
-  const auto getMotion = [&](const std::string& name) {
-    const auto offset = offsets.find(name);
-    return smooth_log.getMotion(name, speeds.at(name), offset == offsets.end() ? 0 : offset->second);
-  };
   std::vector<MeasuredLinkage> linkages;
-  for (size_t l = 0; l < task.linkages.size(); ++l) {
-    MeasuredLinkage linkage{task.linkages[l].cluster, task.sensors[l], task.linkages[l].q, {}};
-    const auto count = static_cast<Eigen::Index>(linkage.sensors.size());
-    for (MatrixXd* x : {&linkage.motion.value, &linkage.motion.rate, &linkage.motion.acceleration})
-      x->resize(smooth_log.size(), count);
-    for (Eigen::Index s = 0; s < count; ++s) {
-      const Smoothed motion = getMotion(linkage.sensors[static_cast<size_t>(s)].name);
-      linkage.motion.value.col(s) = motion.value;
-      linkage.motion.rate.col(s) = motion.rate;
-      linkage.motion.acceleration.col(s) = motion.acceleration;
-    }
-    linkages.push_back(std::move(linkage));
-  }
+  for (size_t l = 0; l < task.linkages.size(); ++l)
+    linkages.push_back({task.linkages[l].cluster, task.sensors[l], task.linkages[l].q,
+                        smooth_log.getMotions(all, task.sensors[l], offsets)});
   std::vector<MeasuredCoordinate> coordinates;
   for (const Coordinate& coordinate : task.coordinates)
-    coordinates.push_back({coordinate.position, coordinate.dof, getMotion(coordinate.name)});
+    coordinates.push_back(
+        {coordinate.position, coordinate.dof, smooth_log.getMotion(coordinate.name, coordinate.speed, offsets)});
   LoadedMotion motion = findLoadedStates(model, q, linkages, coordinates, smooth_log.getTorques(model),
                                          smooth_log.getSigns(model, all), isInterrupted());
   out.numbers = chooseLoads(model, torques.dynamics);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "bielle/model/wear.h"
 #include "identify/least_squares.h"
 #include "math/decompositions.h"
 
@@ -92,6 +93,11 @@ EstimateProblem makeProblem(LogFit& fit, const std::vector<bool>& fixed) {
     const LinkageSensor& sensor = fit.sensors()[s];
     problem.unknowns.push_back({sensor.name, "offset", sensor.is_length ? "m" : "rad"});
     scales.push_back(s < fixed.size() && fixed[s] ? 0 : sensor.is_length ? kLengthOffset : kAngleOffset);
+  }
+  for (const LinkagePlay& play : fit.plays()) {
+    const bool is_length = play.sensor < 0 || fit.sensors()[static_cast<size_t>(play.sensor)].is_length;
+    problem.unknowns.push_back({getPlayName(play.name), "play", is_length ? "m" : "rad", play.size});
+    scales.push_back(is_length ? kLengthOffset : kAngleOffset);
   }
   problem.scales = VectorXd::Map(scales.data(), static_cast<Eigen::Index>(scales.size()));
   problem.evaluate = [&fit](const VectorXd& x, VectorXd& r, MatrixXd* J) {

@@ -3,7 +3,7 @@
 /// linkage (log_fit.h), or masses, armatures and friction of a robot (torque_fit.h).
 ///
 /// Each of the unknowns x has a scale d: a tenth of a length, of the linkage's size for a place, 0.1 rad or kLengthOffset for an
-/// offset; those of masses, armatures and friction are in torque_fit.h. More than that is not learnt by a linear estimate. The singular
+/// offset and for play; those of masses, armatures and friction are in torque_fit.h. More than that is not learnt by a linear estimate. The singular
 /// values s of the scaled Jacobian
 ///     J diag(d) = U diag(s) V^T                                                                                      (1)
 /// tell by how much, in scales, each of the combinations v (columns of V) is known: its standard deviation is sigma/s, where
@@ -28,7 +28,7 @@ constexpr double kShareOfLength = 0.1, kAngleOffset = 0.1, kLengthOffset = 0.01;
 /// One number of x.
 struct Unknown {
   std::string name;
-  std::string kind;  ///< "length", "offset", or those of loads.h
+  std::string kind;  ///< "length", "offset", "play", or those of loads.h
   std::string unit;  ///< of the next three
   double before = 0, after = 0;
   double deviation = 0;  ///< standard deviation; infinite if it is not seen
@@ -44,7 +44,7 @@ struct EstimateProblem {
   std::function<long()> countTold;                      ///< numbers that the rows tell at the last evaluation
   std::function<double(const VectorXd& r)> calcMisfit;  ///< what is left, as users read it
 };
-/// Geometry and offsets of a linkage, whose fit has followed the log. \param fixed  offsets that are zero; empty: none
+/// Geometry, offsets and play of a linkage, whose fit has followed the log. \param fixed  offsets that are zero; empty: none
 EstimateProblem makeProblem(LogFit& fit, const std::vector<bool>& fixed);
 EstimateProblem makeProblem(const TorqueFit& fit);
 

@@ -1,7 +1,9 @@
 #include "identify/log_fit.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <utility>
 
 #include "bielle/dynamics/kinematics.h"
 #include "math/decompositions.h"
@@ -50,6 +52,42 @@ LogFit::LogFit(std::shared_ptr<const ReducedCluster> cluster, std::vector<Geomet
   for (const GeometryNumber& number : geometry_) variations_.push_back(makeVariation(cluster_->model, number));
 }
 
+void LogFit::addPlays(std::vector<LinkagePlay> plays, MatrixXd sides) {
+  plays_ = std::move(plays), sides_ = std::move(sides);
+  play_variations_.clear();
+  for (const LinkagePlay& play : plays_) play_variations_.push_back(makeVariation(cluster_->model, play.rod));
+}
+
+std::vector<double> LogFit::listSides(Eigen::Index row) const {
+  std::vector<double> sides;
+  for (size_t p = 0; p < plays_.size(); ++p)
+    if (plays_[p].sensor < 0) sides.push_back(sides_(row, static_cast<Eigen::Index>(p)));
+  return sides;
+}
+
+LogFit::Variants LogFit::makeVariants(const VectorXd& x) const {
+  const auto n = static_cast<Eigen::Index>(geometry_.size()), count = static_cast<Eigen::Index>(sensors_.size());
+  std::vector<GeometryNumber> numbers = geometry_;
+  std::vector<double> sizes;  // of the rods' plays
+  for (size_t p = 0; p < plays_.size(); ++p) {
+    if (plays_[p].sensor >= 0) continue;
+    numbers.push_back(plays_[p].rod);
+    sizes.push_back(plays_[p].size + x[n + count + static_cast<Eigen::Index>(p)]);
+  }
+  VectorXd changes(n + static_cast<Eigen::Index>(sizes.size()));
+  changes.head(n) = x.head(n);
+  Variants variants;
+  for (const Eigen::Index row : used_) {
+    const auto [at, is_new] = variants.try_emplace(listSides(row), *cluster_);
+    if (!is_new) continue;
+    for (size_t i = 0; i < sizes.size(); ++i)
+      changes[n + static_cast<Eigen::Index>(i)] = at->first[i] * sizes[i] / 2;
+    at->second.model = changeGeometry(cluster_->model, nullptr, numbers, changes);
+    at->second.closures = makeConstraintSet(at->second.model);
+  }
+  return variants;
+}
+
 // Eq. (1) from memory.state, whose loops may be open, to a state that is closed; then A, its factors and r are those there.
 bool LogFit::project(const ReducedCluster& cluster, const VectorXd& readings, Memory& m) const {
   double last = INFINITY;
@@ -82,13 +120,15 @@ bool LogFit::follow(const std::atomic<bool>& interrupt) {
   Memory memory(*cluster_, sensors_.size());
   const Eigen::Index K = readings_.rows();
   q_.resize(q_start_.size(), K);
-  used_.clear();
+  used_.clear(), followed_.clear();
   VectorXd q = q_start_;
   for (Eigen::Index k = 0; k < K; ++k) {
     if (interrupt) return false;
     if (!updateClusterState<double>(*cluster_, memory.scratch, q, memory.state)) break;
     if (!project(*cluster_, readings_.row(k).transpose(), memory)) continue;
     q = memory.state.basis.q;
+    followed_.push_back(k);
+    if (!plays_.empty() && (sides_.row(k).array() == 0).any()) continue;
     q_.col(static_cast<Eigen::Index>(used_.size())) = q;
     used_.push_back(k);
   }
@@ -96,36 +136,57 @@ bool LogFit::follow(const std::atomic<bool>& interrupt) {
   return true;
 }
 
+// dq/dl (nv x variations), by Eq. (3).
+void LogFit::updateMoves(const ReducedCluster& cluster, const std::vector<ModelVariation>& variations, Memory& m,
+                         MatrixXd& e) const {
+  const auto n = static_cast<Eigen::Index>(variations.size());
+  e.resize(cluster.model.nv(), n);
+  if (n == 0) return;
+  loadClusterState(cluster, m.state, m.scratch);
+  updateVelocities<double>(cluster.model, m.scratch.ws, VectorXd::Zero(cluster.model.nv()));
+  updateAccelerations<double>(cluster.model, m.scratch.ws, VectorXd::Zero(cluster.model.nv()));
+  MatrixXd dh = MatrixXd::Zero(cluster.rank, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const ModelVariation& change = variations[static_cast<size_t>(i)];
+    updateVariation(cluster.model, m.scratch.ws, change, m.still, m.variation);
+    const VectorXd all = calcResidualVariation(m.scratch.ws, cluster.closures, change, m.variation);
+    for (int p = 0; p < cluster.rank; ++p)  // rows of idle spins, which follow those of closures, do not change
+      if (const auto at = m.state.basis.rows[static_cast<size_t>(p)]; at < all.size()) dh(p, i) = all[at];
+  }
+  applyPseudoInverse(cluster, m.state.basis, 1, dh, e);  // residuals fall by J dq (notation.h)
+}
+
 bool LogFit::evaluateRow(const ReducedCluster& cluster, const VectorXd& x, size_t row, Memory& m, VectorXd& r,
                          MatrixXd* J, int& told) {
   const auto n = static_cast<Eigen::Index>(geometry_.size()), count = static_cast<Eigen::Index>(sensors_.size());
   const auto k = static_cast<Eigen::Index>(row);
   if (!updateClusterState<double>(cluster, m.scratch, q_.col(k), m.state)) return false;
-  const VectorXd readings = readings_.row(used_[row]).transpose() - x.tail(count);
+  VectorXd readings = readings_.row(used_[row]).transpose() - x.segment(n, count);
+  for (size_t p = 0; p < plays_.size(); ++p) {
+    const auto i = static_cast<Eigen::Index>(p);
+    if (plays_[p].sensor >= 0)
+      readings[plays_[p].sensor] -= sides_(used_[row], i) * (plays_[p].size + x[n + count + i]) / 2;
+  }
   if (!project(cluster, readings, m)) return false;
   q_.col(k) = m.state.basis.q;
   r.segment(k * count, count) = m.rest;
   told = static_cast<int>(count - m.factors.rank());
   if (!J) return true;
-  // Eq. (3) before P.
-  MatrixXd D = MatrixXd::Zero(count, n + count);
-  if (n > 0) {
-    loadClusterState(cluster, m.state, m.scratch);
-    updateVelocities<double>(cluster.model, m.scratch.ws, VectorXd::Zero(cluster.model.nv()));
-    updateAccelerations<double>(cluster.model, m.scratch.ws, VectorXd::Zero(cluster.model.nv()));
-    const ClusterBasis& basis = m.state.basis;
-    MatrixXd dh = MatrixXd::Zero(cluster.rank, n), e(cluster.model.nv(), n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const ModelVariation& change = variations_[static_cast<size_t>(i)];
-      updateVariation(cluster.model, m.scratch.ws, change, m.still, m.variation);
-      const VectorXd all = calcResidualVariation(m.scratch.ws, cluster.closures, change, m.variation);
-      for (int p = 0; p < cluster.rank; ++p)  // rows of idle spins, which follow those of closures, do not change
-        if (const auto at = basis.rows[static_cast<size_t>(p)]; at < all.size()) dh(p, i) = all[at];
-    }
-    applyPseudoInverse(cluster, basis, 1, dh, e);  // residuals fall by J dq (notation.h)
-    for (Eigen::Index s = 0; s < count; ++s) D.row(s).head(n) = -e.row(sensors_[static_cast<size_t>(s)].dof);
+  // Eq. (3) before P, then Eq. (4).
+  MatrixXd D = MatrixXd::Zero(count, size()), e;
+  const auto select = [&](Eigen::Index first) {
+    for (Eigen::Index s = 0; s < count; ++s)
+      D.row(s).segment(first, e.cols()) = -e.row(sensors_[static_cast<size_t>(s)].dof);
+  };
+  updateMoves(cluster, variations_, m, e);
+  select(0);
+  if (!plays_.empty()) updateMoves(cluster, play_variations_, m, e), select(n + count);
+  D.middleCols(n, count).diagonal().setConstant(-1);
+  for (size_t p = 0; p < plays_.size(); ++p) {
+    const auto i = static_cast<Eigen::Index>(p);
+    if (plays_[p].sensor >= 0) D.col(n + count + i) = D.col(n + plays_[p].sensor);
+    D.col(n + count + i) *= sides_(used_[row], i) / 2;
   }
-  D.rightCols(count).diagonal().setConstant(-1);
   for (Eigen::Index s = 0; s < count; ++s) D.row(s) /= sensors_[static_cast<size_t>(s)].noise;
   for (Eigen::Index i = 0; i < D.cols(); ++i) {
     const VectorXd column = D.col(i);
@@ -135,11 +196,8 @@ bool LogFit::evaluateRow(const ReducedCluster& cluster, const VectorXd& x, size_
 }
 
 bool LogFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) {
-  const auto n = static_cast<Eigen::Index>(geometry_.size());
   const size_t rows = used_.size(), entries = rows * sensors_.size();
-  ReducedCluster cluster = *cluster_;
-  cluster.model = changeGeometry(cluster_->model, nullptr, geometry_, x.head(n));
-  cluster.closures = makeConstraintSet(cluster.model);
+  const Variants variants = makeVariants(x);
   r.resize(static_cast<Eigen::Index>(entries));
   if (J) J->resize(static_cast<Eigen::Index>(entries), size());
   std::atomic<size_t> next{0};
@@ -147,12 +205,12 @@ bool LogFit::evaluate(const VectorXd& x, VectorXd& r, MatrixXd* J) {
   std::atomic<long> told{0};
   const MatrixXd before = q_;
   team_.run(getDefaultThreads(), [&](int) {
-    Memory memory(cluster, sensors_.size());
+    Memory memory(*cluster_, sensors_.size());
     long own = 0;
     for (size_t begin = 0; (begin = next.fetch_add(kChunk)) < rows && !fails;)
       for (size_t row = begin; row < std::min(begin + kChunk, rows); ++row) {
         int of_row = 0;
-        if (!evaluateRow(cluster, x, row, memory, r, J, of_row)) fails = true;
+        if (!evaluateRow(variants.at(listSides(used_[row])), x, row, memory, r, J, of_row)) fails = true;
         own += of_row;
       }
     told += own;
@@ -178,6 +236,14 @@ int LogFit::calcSeenFreedoms(const VectorXd& q) const {
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(kRank);
   return static_cast<int>(qr.compute(A).rank());
+}
+
+std::pair<MatrixXd, MatrixXd> LogFit::calcPlayMotions(const VectorXd& q) const {
+  Memory memory(*cluster_, sensors_.size());
+  MatrixXd e = MatrixXd::Zero(cluster_->model.nv(), static_cast<Eigen::Index>(plays_.size()));
+  if (!updateClusterState<double>(*cluster_, memory.scratch, q, memory.state)) return {e, {}};
+  updateMoves(*cluster_, play_variations_, memory, e);
+  return {e, memory.state.basis.N};
 }
 
 }  // namespace bielle
