@@ -326,6 +326,7 @@ TEST_CASE("identify: sides are those of loads that are clear before and after") 
   expected.segment(9, 3).setConstant(-1);  // 4.5, 5, 5.5
   CHECK(sides == expected);
   CHECK(findSides(time, {1, 2, 3, 4, 5, 5.6}, loads, 0.9).cwiseAbs().sum() == 1);  // 5.5
+  CHECK(findSides(time, {1, 2, 3, 4, 5, 5.6}, loads, 0.1) == MatrixXd::Ones(13, 1));
 }
 
 TEST_CASE("identify: angles do not tell the size of a linkage") {

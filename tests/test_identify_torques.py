@@ -313,8 +313,11 @@ class IdentifyTorques(unittest.TestCase):
         _, found, _ = self.take_linkage("drawn", "--play", "crank_joint", "--free", "none", "--no-offset", "crank_joint")
         self.assertLess(abs(found["crank_joint.play", "play"]["after"] - GEAR - 2 * OFFSET), 1e-4)
         for options, text in ((("--play", "elbow"), "--play elbow: no linkage has it; there are: crank_joint, coupler"),
-                              (("--play", "crank_joint", "--window", "9"), "in no row it is clear at which of its stops it is")):
+                              (("--play", "crank_joint", "--noise", "0"), "--noise")):
             self.assertIn(text, run("identify", "drawn", "log.csv", "-o", "none", *options, status=2).stderr)
+        # Nor where no load is clear, as here for want of two windows.
+        _, found, _ = self.take_linkage("drawn", "--play", "crank_joint", "--free", "none", "--window", "9")
+        self.assertIsNone(found["crank_joint.play", "play"]["after"])
         text = pathlib.Path("log.csv").read_text().replace("u.crank_joint", "effort")
         pathlib.Path("without.csv").write_text(text)
         self.assertIn("without.csv: columns: --play needs those that are missing: u.crank_joint",
@@ -345,7 +348,7 @@ class IdentifyTorques(unittest.TestCase):
             columns[name] = np.round((real["q." + name] + offset) / step) * step
         np.savetxt("log.csv", np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="", fmt="%.9f")
         linkage, found, _ = self.take_linkage("drawn", "--play", "*", "--window", "0.05")
-        self.assertGreater(linkage["rows"], 4000)
+        self.assertGreater(linkage["rows"], 3000)
         self.assertLess(abs(found["coupler", "length"]["after"] - 0.351), 5e-5)
         for name, offset in (("crank_joint", OFFSET), ("rocker_joint", -OFFSET)):
             self.assertLess(abs(found[name, "offset"]["after"] - offset), math.radians(0.02))

@@ -58,11 +58,11 @@ void addPlays(LogFit& fit, const Model& model, ConstVectorRef q, const LoggedTas
   const PlayLoads loads = calcPlayLoads(model, linkage, plays, motion, smooth_log.getTorqueNoise(model));
   MatrixXd sides = findSides(time, instants, loads, kFarthest * smooth_log.window());
   if (!isInterrupted() && (sides.array() != 0).rowwise().all().count() < 2) {
-    Eigen::Index p = 0;
-    (sides.array() != 0).colwise().count().minCoeff(&p);
-    throw InputError(log.path, "--play " + plays[static_cast<size_t>(p)].name,
-                     "in no row it is clear at which of its stops it is",
-                     "load it more, hold loads for longer than --window, or leave it out");
+    std::vector<std::string> names;
+    for (const LinkagePlay& play : plays) names.push_back(play.name);
+    throw InputError(log.path, "--play",
+                     "in no row it is clear at which of their stops all of these are: " + listItems(names),
+                     "load them more, hold loads for longer than --window, or name fewer at once");
   }
   fit.addPlays(std::move(plays), std::move(sides));
 }

@@ -107,6 +107,9 @@ MatrixXd findSides(const VectorXd& time, const std::vector<double>& instants, co
     for (Eigen::Index p = 0; p < sides.cols(); ++p)
       if (const int side = find(next, p); side == find(next - 1, p)) sides(k, p) = side;
   }
+  for (auto column : sides.colwise())
+    if (static_cast<double>((column.array() != 0).count()) < kLeastClear * static_cast<double>(time.size()))
+      column.setOnes();
   return sides;
 }
 

@@ -19,7 +19,8 @@
 
 namespace bielle {
 
-inline constexpr double kClearLoad = 0.1;
+inline constexpr double kClearLoad = 0.2;    ///< friction and weights may be wrong by as much
+inline constexpr double kLeastClear = 0.02;  ///< share of rows below which a side is not known at all
 
 /// The motors and rods of a linkage that may have play, with the sizes that they have.
 /// \param model    the whole one   \param sensors  of which those of motors may be behind a gear with play
@@ -37,7 +38,8 @@ struct PlayLoads {
 PlayLoads calcPlayLoads(const Model& model, const MeasuredLinkage& linkage, const std::vector<LinkagePlay>& plays,
                         const LoadedMotion& motion, const VectorXd& noise);
 
-/// Sides at rows of a log: K x plays, 1 or -1 where the loads at the instants before and after agree, else 0.
+/// Sides at rows of a log: K x plays, 1 or -1 where the loads at the instants before and after agree, else 0; where they do in less than
+/// kLeastClear of the rows, 1 in all, with which play is a part of the offset or the length, and neither is seen.
 /// \param time      K, s, not falling   \param instants  s, of the loads, increasing
 /// \param farthest  s: what is between instants that are farther apart is not known
 MatrixXd findSides(const VectorXd& time, const std::vector<double>& instants, const PlayLoads& loads, double farthest);
