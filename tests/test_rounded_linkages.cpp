@@ -1,5 +1,6 @@
 // Linkages that move only because their axes lie as they do: rounded, they are read as what was rounded. The ideal linkages
 // themselves are the oracle.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -57,6 +58,27 @@ RoundingTolerance halfUnit(int decimals) {
 // Whether nothing of it is changed, to the last bit.
 bool isUntouched(const Model& model, const RoundingTolerance& tolerance) {
   return findRoundedLinkages(model, tolerance).model.isCopyOf(model);
+}
+
+// A leg of Klann's kind with a crank of 27 mm in a plane that lies askew, its pivots moved in it (7 x 2), frames turned
+// about their axes (7).
+HingeNet makeKlann(const MatrixXd& moves, const VectorXd& turns) {
+  const double pivots[7][2] = {{0, 0},
+                               {0.020497770619224292, 0.01726503401797012},
+                               {-0.0599, -0.0389},
+                               {-0.045051414609165036, 0.002922289653856637},
+                               {-0.10501553223335772, 0.0049970420612501232},
+                               {-0.0599, 0.0599},
+                               {-0.11745276338773984, 0.070384723479178291}};
+  const int bodies[7][2] = {{0, 1}, {1, 2}, {0, 3}, {3, 2}, {2, 4}, {0, 5}, {5, 4}};
+  const SE3 askew(exp3(Vector3d(0.4, -0.7, 1.1)), Vector3d(0.1, -0.2, 0.3));
+  HingeNet net;
+  net.bodies = 6;
+  for (Eigen::Index i = 0; i < 7; ++i) {
+    const Vector3d place(pivots[i][0] + moves(i, 0), pivots[i][1] + moves(i, 1), 0);
+    net.hinges.push_back({bodies[i][0], bodies[i][1], askew * SE3(exp3(Vector3d(0, 0, turns[i])), place)});
+  }
+  return net;
 }
 
 // Away from dead points angles and ratios are those of the ideal linkage to some units of the last decimal: links are 5 cm to 1 m long, so
@@ -128,6 +150,45 @@ TEST_CASE("many rounded linkages of each family", "[long]") {
 TEST_CASE("what closes in the postures that a linkage was mended by closes in all others, too") {
   // Bricard's of threefold symmetry: with twelve postures within 1.2 rad, others opened by 1e-12 and more.
   checkFamily(Family::Bricard, 15, 5, 9, ClosureKind::Hinge5D);
+}
+
+TEST_CASE("what half a unit on the pivots of a linkage amounts to, mending cannot know") {
+  constexpr double kUnit = 1e-5;
+  constexpr int kTrials = 101;
+  std::mt19937 rng(2);
+  const auto draw = [&rng](Eigen::Index rows, Eigen::Index cols, double size) {
+    std::uniform_real_distribution<double> uniform(-size, size);
+    return MatrixXd(MatrixXd::NullaryExpr(rows, cols, [&](Eigen::Index) { return uniform(rng); }));
+  };
+  const auto calcRatio = [](const Model& model, const VectorXd& q) { return 1 / calcMotion(model, q).ratio[2]; };
+  const auto calcMoved = [&](const MatrixXd& moves) {
+    const Model model = makeModel(makeKlann(moves, VectorXd::Zero(7)), {});
+    return calcRatio(model, model.makeNeutral());
+  };
+  const MatrixXd still = MatrixXd::Zero(7, 2);
+  const double ratio = calcMoved(still);
+  double most = 0;  // by which half a unit on every coordinate can move it
+  for (Eigen::Index i = 0; i < still.size(); ++i) {
+    MatrixXd moves = still;
+    moves.reshaped()[i] = kUnit / 2;
+    most += std::abs(calcMoved(moves) - ratio) / kUnit;
+  }
+  std::vector<double> moved, mended;
+  for (int i = 0; i < kTrials; ++i) {
+    moved.push_back(std::abs(calcMoved(draw(7, 2, kUnit / 2)) - ratio) / kUnit);
+    const RoundedLinkages read = findRoundedLinkages(makeModel(makeKlann(still, draw(7, 1, 3)), 5), halfUnit(5));
+    REQUIRE(read.mended.size() == 1);
+    const AssemblyResult closed = turnTo(read.model, read.model.makeNeutral(), 0);
+    REQUIRE(closed.status == NumericalStatus::Ok);
+    mended.push_back(std::abs(calcRatio(read.model, closed.q) - ratio) / kUnit);
+  }
+  std::sort(moved.begin(), moved.end());
+  std::sort(mended.begin(), mended.end());
+  CAPTURE(ratio, most, moved[kTrials / 2], moved.back(), mended[kTrials / 2], mended.back());
+  CHECK(moved[kTrials / 2] > 50);
+  CHECK(mended[kTrials / 2] < 1.5 * moved[kTrials / 2]);
+  CHECK(mended.back() < most);
+  CHECK(most == Approx(315).epsilon(0.01));
 }
 
 TEST_CASE("what was rounded moves, written as it is, hardly or not at all") {
