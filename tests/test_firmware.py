@@ -1,6 +1,7 @@
 """test_firmware.py BIELLE [all [POSTURES]]: maps of linkages in C are compiled and compared with closed forms and with the mechanism.
 
-With "all", every linkage of the included robots in both precisions at 1e5 postures, and a table of them (docs/firmware.md)."""
+With "all", every linkage of the included robots, of every part of a biped, and an ankle whose rods cross, in both precisions at 1e5
+postures, and a table of them (docs/firmware.md)."""
 import ctypes
 import importlib.machinery
 import math
@@ -549,42 +550,98 @@ class FirmwareTest(unittest.TestCase):
         convert("fourbar", os.path.join(self.place, "no", "such"), "--to", "c", "--postures", "100", status=2)
 
 
+ROBOTS = ("fourbar", "bipetto", "rsu_biped", "kangaroo_leg", "humanoid", "leg_biped", "belt_biped", "differential_ankle", "spring_biped",
+          "spring_leg")
+# Parts whose motors do not determine serial joints through a linkage, and what their maps are refused for.
+NO_MAP = {("knee", "leaf"): "1 motor for a mobility of 2", ("knee", "parallel_spring"): "none has motors",
+          ("hip", "parallel_spring"): "none has motors", ("ankle", "cable_differential"): "3 motors for a mobility of 2"}
+NO_LINKAGE = {("knee", "serial"), ("knee", "passive"), ("ankle", "serial"), ("hip", "serial")}
+# The whole range of a hip on three cranks has postures that are reached from the guess alone.
+RANGES = {("hip", "three_rrs"): [word for side in ("left", "right") for name in ("hipx", "hipy", "hipz")
+                                 for word in ("--range", f"{name}_{side}", "-0.3", "0.3")]}
+CROSSING = """<mujoco model="crossing"><compiler angle="radian" autolimits="true"/><default><geom type="capsule" size="0.006" density="2000"/></default>
+<worldbody><body name="shank" pos="0 0 0.6"><geom fromto="0 0 0 0 0 -0.3"/>
+  <body name="cross" pos="0 0 -0.3"><joint name="pitch" axis="0 1 0" range="-0.8 0.6"/><inertial pos="0 0 0" mass="0.05" diaginertia="1e-5 1e-5 1e-5"/>
+    <body name="foot" pos="0.004 0 -0.015"><joint name="roll" axis="1 0 0" range="-0.35 0.35"/><geom type="box" size="0.1 0.04 0.01" mass="0.6"/>
+      <body name="u1" pos="-0.055 0.03 0.025"><joint name="u1y" axis="0 1 0"/><inertial pos="0 0 0" mass="0.004" diaginertia="2e-7 2e-7 2e-7"/>
+        <body name="rod1"><joint name="u1x" axis="1 0 0"/><geom fromto="0 0 0 0.01 0.004 0.2"/></body></body>
+      <body name="u2" pos="-0.055 -0.032 0.025"><joint name="u2y" axis="0 1 0"/><inertial pos="0 0 0" mass="0.004" diaginertia="2e-7 2e-7 2e-7"/>
+        <body name="rod2"><joint name="u2x" axis="1 0 0"/><geom fromto="0 0 0 0.008 -0.006 0.14"/></body></body></body></body>
+  <body name="m1" pos="-0.002 0.036 -0.088"><joint name="motor1" axis="0 1 0" range="-1.2 1.2"/><geom fromto="0 0 0 -0.04 0 0.002"/></body>
+  <body name="m2" pos="-0.004 -0.04 -0.15"><joint name="motor2" axis="0 1 0" range="-1.2 1.2"/><geom fromto="0 0 0 -0.04 0 0.003"/></body>
+</body></worldbody>
+<equality><connect body1="m1" body2="rod1" anchor="-0.04 0 0.002"/><connect body1="m2" body2="rod2" anchor="-0.04 0 0.003"/></equality>
+<actuator><motor joint="motor1"/><motor joint="motor2"/></actuator></mujoco>
+"""
+
+
+def list_parts(kind):
+    return sorted(name[:-len(".yaml")] for name in os.listdir(os.path.join(SOURCE, "robots/parts", kind)))
+
+
+def generate(place, kind, part):
+    """A biped with one part and serial joints elsewhere."""
+    out = os.path.join(place, kind + "_" + part)
+    sets = [f"{other}={part if other == kind else 'serial'}" for other in ("knee", "ankle", "hip")]
+    run(BIELLE, "generate", "leg_biped", *(word for one in sets for word in ("--set", one)), "-o", out)
+    return out
+
+
+def read_header(text):
+    """Largest error, rad or m; largest entry of the ratio; how the ways are computed."""
+    errors = list(map(float, re.search(r"motors (\S+), joints (\S+) ", text).groups()))
+    ways = []
+    for function in ("joint_to_motor", "motor_to_joint"):
+        how, n, roots, calls = re.search(function + r": (.*); (\d+) mult.* (\d+) roots?, (\d+) trig", text).groups()
+        steps = re.search(r"(\d+) iteration", how)
+        ways.append((steps.group(1) + " steps" if steps else "closed") + f": {n}, {roots}, {calls}")
+    return max(errors), float(re.search(r"Largest entry of R: (\S+);", text).group(1)), ways
+
+
 class AllTest(unittest.TestCase):
+    def check(self, title, robot, place, *options):
+        texts = {}
+        for precision in ("double", "float"):
+            out = os.path.join(place, title.replace(" ", "_"), precision)
+            os.makedirs(os.path.dirname(out), exist_ok=True)
+            convert(robot, out, "--to", "c", "--precision", precision, "--postures", POSTURES, *options)
+            for name in list_names(out):
+                for compiler in COMPILERS:
+                    self.assertIn(": ok", run(build_test(out, name, compiler)).stdout)
+                with open(os.path.join(out, name + ".h")) as file:
+                    texts[name, precision] = file.read()
+        names = sorted({name for name, _ in texts})
+        self.assertTrue(names, title)
+        for name in names:
+            error, ratio, ways = read_header(texts[name, "double"])
+            in_float = read_header(texts[name, "float"])[0]
+            self.assertLess(error, 1e-12, name)
+            instructions = size = "-"
+            if HAS_ARM:
+                here, there, instructions, size = run_on_arm(os.path.join(place, title.replace(" ", "_"), "float"), name, int(POSTURES))
+                self.assertEqual(here, there, name)
+            print(f"| {title}: {name} | {ways[0]} | {ways[1]} | {error:.1e} | {in_float:.1e} | {in_float / (2e-6 * max(1, ratio)):.2f} | "
+                  f"{instructions} | {size} |", flush=True)
+
     def test_all(self):
         print("| linkage | joint to motor | motor to joint | error (double) | error (float) | over goal | instructions | bytes |\n"
               "|---|---|---|---|---|---|---|---|")
         with tempfile.TemporaryDirectory() as place:
-            for robot in ("fourbar", "bipetto", "rsu_biped", "kangaroo_leg", "humanoid", "leg_biped", "belt_biped", "differential_ankle", "spring_biped",
-                          "spring_leg"):
-                texts = {}
-                for precision in ("double", "float"):
-                    out = os.path.join(place, robot, precision)
-                    os.makedirs(os.path.dirname(out), exist_ok=True)
-                    convert(robot, out, "--to", "c", "--precision", precision, "--postures", POSTURES)
-                    for name in list_names(out):
-                        for compiler in COMPILERS:
-                            self.assertIn(": ok", run(build_test(out, name, compiler)).stdout)
-                        with open(os.path.join(out, name + ".h")) as file:
-                            texts[name, precision] = file.read()
-                for name in sorted({name for name, _ in texts}):
-                    errors, ways = {}, []
-                    for precision in ("double", "float"):
-                        text = texts[name, precision]
-                        errors[precision] = list(map(float, re.search(r"motors (\S+), joints (\S+) ", text).groups()))
-                        ratio = float(re.search(r"Largest entry of R: (\S+);", text).group(1))
-                    for function in ("joint_to_motor", "motor_to_joint"):
-                        how, n, roots, calls = re.search(function + r": (.*); (\d+) mult.* (\d+) roots?, (\d+) trig", texts[name, "double"]).groups()
-                        steps = re.search(r"(\d+) iteration", how)
-                        ways.append((steps.group(1) + " steps" if steps else "closed") + f": {n}, {roots}, {calls}")
-                    self.assertLess(max(errors["double"]), 1e-12, name)
-                    float_goal = 2e-6 * max(1, ratio)
-                    instructions = size = "-"
-                    if HAS_ARM:
-                        here, there, instructions, size = run_on_arm(os.path.join(place, robot, "float"), name, int(POSTURES))
-                        self.assertEqual(here, there, name)
-                    worst = {key: max(value) for key, value in errors.items()}
-                    print(f"| {robot}: {name} | {ways[0]} | {ways[1]} | {worst['double']:.1e} | {worst['float']:.1e} | "
-                          f"{worst['float'] / float_goal:.2f} | {instructions} | {size} |", flush=True)
+            for robot in ROBOTS:
+                self.check(robot, robot, place)
+            for kind in ("knee", "ankle", "hip"):
+                for part in list_parts(kind):
+                    if (kind, part) in NO_LINKAGE:
+                        continue
+                    robot = generate(place, kind, part)
+                    if (kind, part) in NO_MAP:
+                        self.assertIn(NO_MAP[kind, part], convert(robot, robot + "_c", "--to", "c", status=2).stderr)
+                        continue
+                    self.check(f"{kind} {part}", robot, place, *RANGES.get((kind, part), ()))
+            for name, text in (("crossing.xml", CROSSING), ("crossing.yaml", "model: crossing.xml\nserial_joints: [pitch, roll]\n")):
+                with open(os.path.join(place, name), "w") as file:
+                    file.write(text)
+            self.check("ankle of crossing rods", os.path.join(place, "crossing.yaml"), place, "--range", "pitch", "-0.55", "0.55", "--range", "roll", "-0.25", "0.25")
 
 
 if __name__ == "__main__":
