@@ -228,12 +228,12 @@ bool ManifoldWorld::evaluate(const VectorXd& x, VectorXd& rate) {
   least_independence_ = std::min(least_independence_, field_.independence());
   std::array<double, kWorks> power{};
   calcForces(tau_, power);
+  if (!rods_.empty()) rods_.move(field_.workspace());
   for (int round = 0;; ++round) {
     tau_all_ = tau_;
-    const double rubbed = rods_.empty() ? 0 : rods_.add(field_.workspace(), tau_all_);
+    const double rubbed = rods_.empty() ? 0 : rods_.add(tau_all_);
     field_.accelerate(tau_all_, rate.head(nv), rate.segment(nv, nv));
-    if (rods_.empty() ||
-        rods_.update(field_.workspace(), rate.segment(nv, nv), tau_all_) <= kSettled * (1 + rods_.largest())) {
+    if (rods_.empty() || rods_.update(rate.segment(nv, nv), tau_all_) <= kSettled * (1 + rods_.largest())) {
       power[kJoints] += rubbed;
       break;
     }

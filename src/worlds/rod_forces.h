@@ -4,10 +4,12 @@
 ///
 /// Friction changes the forces that it depends on, by about its radius over a rod's length: taken in turn, they
 /// converge at that rate.
+#include <utility>
 #include <vector>
 
 #include "bielle/dynamics/workspace.h"
 #include "dynamics/rod_friction.h"
+#include "math/decompositions.h"
 
 namespace bielle::worlds {
 
@@ -17,18 +19,31 @@ class RodForces {
   RodForces(const Model& model, const std::vector<RodFriction>& frictions);
 
   bool empty() const { return bearings_.empty(); }
-  /// Adds the friction under the present forces to tau (nv). Needs positions and velocities. \returns its power, W
-  double add(const Workspace& ws, VectorXd& tau) const;
+  /// Goes to the positions and velocities of a workspace, before everything else.
+  void move(const Workspace& ws);
+  /// Adds the friction under the present forces to tau (nv). \returns its power, W. No allocation.
+  double add(VectorXd& tau) const;
   /// The forces of least norm by which the closures make accelerations a (nv) of tau (nv). \returns by how much they
   /// have changed, N
-  double update(const Workspace& ws, ConstVectorRef a, const VectorXd& tau);
+  double update(ConstVectorRef a, const VectorXd& tau);
   double largest() const { return sizes_.maxCoeff(); }  ///< N
 
  private:
+  // The loops of one cluster that hold bearings.
+  struct Loops {
+    std::vector<int> dofs;
+    std::vector<std::pair<int, int>> closures;                 // of the model, with their first rows
+    std::vector<std::pair<Eigen::Index, int>> bearings;        // with the first rows of their closures
+    MatrixXd J, transposed;                                    // rows x nv; dofs x rows
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;  // of the latter
+    VectorXd load, lambda;
+  };
+
   Model model_;
   std::vector<RodBearing> bearings_;
-  Workspace own_;
-  VectorXd sizes_;
+  std::vector<Loops> loops_;
+  Workspace ws_;
+  VectorXd sizes_, before_;
 };
 
 }  // namespace bielle::worlds
