@@ -159,7 +159,8 @@ def log(place, duration, seed, engine="mujoco"):
     stand.yaml.write_text(re.sub(r"(?ms)^references:.*?(?=^\w|\Z)", "", stand.yaml.read_text()))  # they stand on feet
     model = bielle.load_robot(place + "_stand", base="fixed").model
     motors = list(model.u_names)
-    world = bielle.World(model, engine=engine, ground=bielle.Ground(height=-2.0), play={f"{name}_{side}": size for name, size in PLAYS[engine].items() for side in SIDES})
+    play = {f"{name}_{side}": size for name, size in PLAYS[engine].items() for side in SIDES}
+    world = bielle.World(model, engine=engine, ground=bielle.Ground(height=-2.0), play=play)
     sensors = bielle.Sensors(world, noise=1.0, seed=seed)
     standing = bielle.load_robot(place).model  # its legs' posture
     q = standing.standing()
@@ -335,7 +336,8 @@ def main():
         they are therefore left out in its world, where none is found.""")
     page.heading("The controller")
     page.add(f"""A walk at 0.4 m/s, planned with the robot as drawn and with the robot as found in the same world, encoders set right by what
-        was found, carried out by the robot as built; friction has its full size above {SLOW} rad/s, else it is too steep to plan with. Gains of the solver about the plan, those of at least 36 ms before the end of each
+        was found, carried out by the robot as built; friction has its full size above {SLOW} rad/s, else it is too steep to
+        plan with. Gains of the solver about the plan, those of at least 36 ms before the end of each
         contact phase, and predictive control:""")
     built, drawn, rows = soften(work / "built"), soften(work / "drawn"), []
     for world in worlds:

@@ -45,7 +45,8 @@ def main():
             continue
         done = runner.run("info", file, "--json", allowed=(0, 2))
         if done.returncode == 2:
-            rows.append([f"{repository}: {path}", str(right), "refused: " + re.sub(r"^.*?: error: \S+: ", "", done.stderr.strip().splitlines()[-1])])
+            reason = re.sub(r"^.*?: error: \S+: ", "", done.stderr.strip().splitlines()[-1])
+            rows.append([f"{repository}: {path}", str(right), "refused: " + reason])
             continue
         mobility = json.loads(done.stdout)["mobility"]
         idle = mobility["idle_spins"]
