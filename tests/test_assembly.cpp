@@ -4,6 +4,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/assembly_refinement.h"
 #include "dynamics/target_reach.h"
 #include "math/constants.h"
 #include "math/so3.h"
@@ -59,14 +60,14 @@ TEST_CASE("assembly: whole turns of far angles are left out where nothing counts
   CAPTURE(result.message);
   REQUIRE(result.status == NumericalStatus::Ok);
   CHECK((result.q - near).norm() < 1e-5);
-  Reference reference{"turned", {{"crank_joint", {far[0]}}}, "", 0, {}};
+  Reference reference{"turned", {{"crank_joint", {far[0]}}}, "", 0, {}, {}};
   const VectorXd q = assemble(model, makeReferenceProblem(model, reference)).q;
   CHECK(listReferenceJoints(model, reference, q).front().moved < 1e-5);  // as of other references, which are targets
 }
 
 TEST_CASE("assembly: a given angle out of reach is listed with where it ends, one within reach stays") {
   const Model model = loadOwn("fourbar").model;
-  Reference reference{"bent", {{"crank_joint", {1.047198}}, {"rocker_joint", {0.2}}}, "", 0, {}};
+  Reference reference{"bent", {{"crank_joint", {1.047198}}, {"rocker_joint", {0.2}}}, "", 0, {}, {}};
   const AssemblyResult result = assemble(model, makeReferenceProblem(model, reference));
   REQUIRE(result.status == NumericalStatus::Ok);
   const std::vector<ReferenceJoint> joints = listReferenceJoints(model, reference, result.q);
@@ -163,7 +164,40 @@ TEST_CASE("assembly: the shortest steps close the same robot, and change nothing
   CHECK(assemble(model, problem, options).status == NumericalStatus::NotClosed);
 }
 
-TEST_CASE("assembly: with little patience what is just out of reach is told sooner; what is within reach is found as well") {
+TEST_CASE(
+    "assembly: under a base that is held, legs come to where they do with a target for the base, which does not move") {
+  const Model model = loadOwn("bipetto").model;
+  const VectorXd standing = assembleReference(model, "half_sitting").q;
+  Workspace ws(model);
+  updatePositions(model, ws, standing);
+  AssemblyProblem problem;
+  problem.q_ref = standing;
+  problem.q_ref[2] -= 0.05;
+  for (const ContactFrame& foot : model.contacts())
+    problem.frames.push_back(makeFrameTarget(foot, getPlacement(ws, foot.body, foot.X_BF)));
+  AssemblyOptions options;
+  options.step = AssemblyStep::Shortest;
+  const AssemblyResult held = assembleUnderBase(model, problem, options);
+  REQUIRE(held.status == NumericalStatus::Ok);
+  CHECK(held.q.head<7>() == problem.q_ref.head<7>());
+  const Eigen::Quaterniond attitude(Eigen::Vector4d(problem.q_ref.segment<4>(3)));
+  problem.frames.push_back({"trunk", 1, SE3(), {attitude.toRotationMatrix(), problem.q_ref.head<3>()}});
+  const AssemblyResult placed = assemble(model, problem, options);
+  REQUIRE(placed.status == NumericalStatus::Ok);
+  for (const char* name :
+       {"hipz_left", "hipx_left", "hipy_left", "knee_left", "ankley_left", "anklex_left", "motor_knee_left"}) {
+    CAPTURE(name);  // rods may spin about themselves
+    const int k = model.joints()[model.findJoint(name)].idx_q;
+    CHECK(std::abs(held.q[k] - placed.q[k]) < 1e-10);
+  }
+  CHECK(std::abs(held.iterations - placed.iterations) <= 1);
+  problem.frames.pop_back();
+  problem.q_ref[2] += 0.35;
+  CHECK(assembleUnderBase(model, problem, options).status == NumericalStatus::NotClosed);
+}
+
+TEST_CASE(
+    "assembly: with little patience what is just out of reach is told sooner; what is within reach is found as well") {
   const Model model = loadOwn("bipetto").model;
   const VectorXd standing = assembleReference(model, "half_sitting").q;
   Workspace ws(model);

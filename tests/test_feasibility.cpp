@@ -507,6 +507,18 @@ TEST_CASE("feasibility: feet that planned postures leave off their places are do
                                    Catch::Contains("m (or rad) off its place in '"));
 }
 
+TEST_CASE("feasibility: legs that reach once the pelvis turns raise no doubt") {
+  const LoadedRobot bipetto = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
+  WalkOptions options;
+  for (double speed : {1.0, 1.1}) {
+    CAPTURE(speed);
+    options.speed = speed;
+    CHECK(listDoubts(makeWalk(bipetto.model, options)) == "");
+  }
+  options.speed = 1.5;
+  CHECK_THAT(listDoubts(makeWalk(bipetto.model, options)), Catch::Contains("no posture was found"));
+}
+
 TEST_CASE("feasibility: a robot in other units, and a box too narrow for both feet, are told with their sizes") {
   const Model heavy = changeModel(getRsuBiped(), [](ModelParts& parts) {
     for (Body& body : parts.bodies) body.inertia.mass *= 1000;

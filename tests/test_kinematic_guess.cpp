@@ -89,6 +89,24 @@ TEST_CASE("guess: the base comes down for a long stride, and linkages keep away 
   }
 }
 
+TEST_CASE("guess: feet farther apart than legs reach under the planned base have it turned, and stand flat") {
+  const Stance stance = makeStance();
+  PlannedPosture planned{stance.q, stance.feet};
+  planned.feet[0].p.x() -= 0.175;
+  planned.feet[1].p.x() += 0.311;
+  const VectorXd q = placeFeet(getBipetto(), stance, {planned}).front();
+  CHECK((q.segment<4>(3) - stance.q.segment<4>(3)).norm() > 0.01);
+  CHECK(measureTransmissions(q) > kLeastTransmission);
+  Workspace ws(getBipetto());
+  updatePositions(getBipetto(), ws, q);
+  CHECK(calcLargestGap(ws, makeConstraintSet(getBipetto())) < 1e-10);
+  for (int i = 0; i < 2; ++i) {
+    const ContactFrame& contact = getBipetto().contacts()[stance.contacts[i]];
+    CHECK((getPlacement(ws, contact.body, contact.X_BF).p - planned.feet[i].p).norm() < 1e-10);
+    CHECK((getPlacement(ws, contact.body, contact.X_BF).R - planned.feet[i].R).norm() < 1e-10);
+  }
+}
+
 TEST_CASE("guess: out of reach, legs are as in the stance") {
   const Stance stance = makeStance();
   PlannedPosture planned{stance.q, stance.feet};

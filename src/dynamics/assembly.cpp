@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <tuple>
 #include <utility>
@@ -26,8 +27,9 @@ constexpr int kFullWishIterations = 30;
 // The hard conditions of Eq. (1): residual and Jacobian, with the name of every row's origin.
 class HardConditions {
  public:
-  HardConditions(const Model& model, const AssemblyProblem& problem)
-      : model_(model), problem_(problem), set_(makeConstraintSet(model)), ws_(model) {
+  // \param held  whether the free base stays where it is
+  HardConditions(const Model& model, const AssemblyProblem& problem, bool held = false)
+      : model_(model), problem_(problem), set_(makeConstraintSet(model)), ws_(model), held_(held) {
     rows_ = set_.rows;
     for (const FrameTarget& target : problem.frames) rows_ += static_cast<int>(target.mask.count());
     H.setZero(rows_, model.nv());
@@ -46,6 +48,7 @@ class HardConditions {
     }
     int row = set_.rows;
     for (const FrameTarget& target : problem_.frames) row = updateTarget(target, row);
+    if (held_) H.leftCols<6>().setZero();
   }
 
   // Name and size of the worst violated condition.
@@ -93,8 +96,39 @@ class HardConditions {
   const AssemblyProblem& problem_;
   ConstraintSet set_;
   Workspace ws_;
+  bool held_;
   int rows_ = 0;
 };
+
+// Rows and columns of a matrix that its entries connect, those without entries left out.
+struct MatrixBlock {
+  std::vector<int> rows, columns;
+};
+
+std::vector<MatrixBlock> listBlocks(const MatrixXd& H) {
+  std::vector<int> owners(static_cast<size_t>(H.cols()));  // of columns: each leads to one that stands for its block
+  std::iota(owners.begin(), owners.end(), 0);
+  const auto findOwner = [&](int column) {
+    while (owners[static_cast<size_t>(column)] != column) column = owners[static_cast<size_t>(column)];
+    return column;
+  };
+  std::vector<int> of_rows(static_cast<size_t>(H.rows()), -1);  // a column of the row's block
+  for (int j = 0; j < H.cols(); ++j)
+    for (int i = 0; i < H.rows(); ++i) {
+      if (H(i, j) == 0) continue;
+      int& column = of_rows[static_cast<size_t>(i)];
+      if (column < 0) column = j;
+      owners[static_cast<size_t>(findOwner(j))] = findOwner(column);
+    }
+  std::vector<MatrixBlock> blocks(static_cast<size_t>(H.cols()));
+  for (int i = 0; i < H.rows(); ++i)
+    if (const int column = of_rows[static_cast<size_t>(i)]; column >= 0)
+      blocks[static_cast<size_t>(findOwner(column))].rows.push_back(i);
+  for (int j = 0; j < H.cols(); ++j) blocks[static_cast<size_t>(findOwner(j))].columns.push_back(j);
+  blocks.erase(std::remove_if(blocks.begin(), blocks.end(), [](const MatrixBlock& b) { return b.rows.empty(); }),
+               blocks.end());
+  return blocks;
+}
 
 // Eq. (1). `damping` shrinks the part along weak singular directions, `wish_gain` the second term.
 VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, double wish_gain, const VectorXd& weights,
@@ -112,17 +146,24 @@ VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, do
   return step;
 }
 
-// The first term of Eq. (1) alone.
+// The first term of Eq. (1) alone. The pseudo-inverse of H is made of those of its blocks: the legs under a base that is held.
 VectorXd calcShortestStep(const MatrixXd& H, const VectorXd& h, double damping, double rank_tolerance) {
-  if (h.size() == 0) return VectorXd::Zero(H.cols());
-  if (damping > 0) {
-    MatrixXd gram = H * H.transpose();
-    gram.diagonal().array() += damping * damping;
-    return -H.transpose() * gram.llt().solve(h);
+  VectorXd step = VectorXd::Zero(H.cols());
+  for (const MatrixBlock& block : listBlocks(H)) {
+    const MatrixXd A = H(block.rows, block.columns);
+    const VectorXd b = h(block.rows);
+    if (damping > 0) {
+      MatrixXd gram = A * A.transpose();
+      gram.diagonal().array() += damping * damping;
+      step(block.columns) = -A.transpose() * gram.llt().solve(b);
+    } else {
+      Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
+      factors.setThreshold(rank_tolerance);
+      factors.compute(A);
+      step(block.columns) = -factors.solve(b);
+    }
   }
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
-  factors.setThreshold(rank_tolerance);
-  return -factors.compute(H).solve(h);
+  return step;
 }
 
 // Newton iterations towards h(q) = offset; true when met.
@@ -135,15 +176,14 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
   for (int i = 0; i < options.max_iterations; ++i, ++result.iterations) {
     const bool met = conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;
     if (met && options.step == AssemblyStep::Shortest) return true;  // nothing else is wished
-    const VectorXd wish = model.difference(result.q, problem.q_ref);
     const double damping = std::min(0.1, error);
     // A preference far from the feasible set (e.g. an overstretched leg) can make the iterates cycle: it fades.
     const double wish_gain = std::pow(0.8, std::max(0, i - kFullWishIterations));
     const double shrink = error < 1e-3 ? 0.0 : 0.3 * damping;
-    VectorXd step =
-        options.step == AssemblyStep::Shortest
-            ? calcShortestStep(conditions.H, conditions.h - offset, shrink, options.rank_tolerance)
-            : calcStep(conditions.H, conditions.h - offset, wish, wish_gain, weights, shrink, options.rank_tolerance);
+    VectorXd step = options.step == AssemblyStep::Shortest
+                        ? calcShortestStep(conditions.H, conditions.h - offset, shrink, options.rank_tolerance)
+                        : calcStep(conditions.H, conditions.h - offset, model.difference(result.q, problem.q_ref),
+                                   wish_gain, weights, shrink, options.rank_tolerance);
     const double largest = calcLargest(step);
     if (!std::isfinite(largest)) return false;
     if (met && largest < 1e-9) return true;
@@ -165,12 +205,10 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
   return conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;
 }
 
-}  // namespace
-
-AssemblyResult assemble(const Model& model, const AssemblyProblem& given, const AssemblyOptions& options) {
+AssemblyResult assemble(const Model& model, const AssemblyProblem& given, const AssemblyOptions& options, bool held) {
   AssemblyProblem problem = given;
   problem.q_ref = leaveOutTurns(model, given.q_ref);
-  HardConditions conditions(model, problem);
+  HardConditions conditions(model, problem, held);
   AssemblyResult result;
   result.q = problem.q_ref;
   model.normalize(result.q);
@@ -212,6 +250,16 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& given, const 
     result.message = text.str();
   }
   return result;
+}
+
+}  // namespace
+
+AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options) {
+  return assemble(model, problem, options, false);
+}
+
+AssemblyResult assembleUnderBase(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options) {
+  return assemble(model, problem, options, model.hasFreeFlyer());
 }
 
 AssemblyResult refineAssembly(const Model& model, const AssemblyProblem& problem, ConstVectorRef near) {

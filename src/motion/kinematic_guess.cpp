@@ -7,14 +7,19 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/assembly_refinement.h"
 #include "dynamics/linkage_workspace.h"
 
 namespace bielle {
 namespace {
 
-SE3 getBase(const VectorXd& q) {
-  return {Eigen::Quaterniond(Eigen::Vector4d(q.segment<4>(3))).toRotationMatrix(), q.head<3>()};
-}
+// A posture that was found.
+struct Placement {
+  VectorXd q;
+  double way = 0;                        // of the base, downwards, m
+  std::array<bool, 2> flat{true, true};  // soles parallel to what is planned
+  bool free = false;                     // the base: neither its place nor its rotation is what is planned
+};
 
 class FeetPlacer {
  public:
@@ -29,16 +34,42 @@ class FeetPlacer {
   // None where no posture is found, after dozens of assemblies. Beside a posture that was found, the stance leads to others only
   // where a sole is free to turn: legs with flat soles under a given base have nothing to choose.
   // \param found  whether `before` is one
-  std::optional<VectorXd> place(const PlannedPosture& planned, const VectorXd& before, bool found) {
+  std::optional<Placement> place(const PlannedPosture& planned, const VectorXd& before, bool found) {
     constexpr std::array<bool, 2> kBoth{true, true};
     constexpr double kNear = 0.06;  // of the base, over the height of the centre of mass
     const std::vector<const VectorXd*> starts = {&before, &stance_.q};
-    std::optional<VectorXd> q =
+    std::optional<Placement> q =
         placeNear(planned, kBoth, found ? std::vector{&before} : starts, found, {0, kNear}, kEasyTransmission);
     if (!q && planned.stands != kBoth)
       q = placeNear(planned, planned.stands, starts, found, {0, kNear}, kEasyTransmission);
     if (!q) q = placeNear(planned, planned.stands, starts, found, {kNear, kFar}, kLeastTransmission);
+    for (size_t i = 0; i < starts.size() && !q; ++i) q = placeFreely(planned, *starts[i]);
     return q;
+  }
+
+  // Part of the way from one posture to another, or none.
+  std::optional<Placement> placeBetween(const Placement& from, const Placement& to, double share,
+                                        const PlannedPosture& planned, const VectorXd& before) {
+    if (from.free || to.free) return {};
+    Placement between{{}, from.way + share * (to.way - from.way), {}};
+    for (int i = 0; i < 2; ++i) between.flat[i] = planned.stands[i] || (from.flat[i] && to.flat[i]);
+    VectorXd base = planned.q.head<7>();
+    base[2] -= between.way;
+    std::optional<Posture> posture = assemble(base, planned.feet, between.flat, before);
+    if (!posture) return {};
+    between.q = std::move(posture->q);
+    return between;
+  }
+
+  // With the base where legs have it, near the start: they reach farther where the pelvis turns or leans.
+  std::optional<Placement> placeFreely(const PlannedPosture& planned, const VectorXd& start) {
+    AssemblyProblem problem = makeProblem(planned.feet, planned.stands, start);
+    AssemblyOptions options = options_;
+    options.patience = 0;
+    options.max_iterations = 50;
+    std::optional<Posture> posture = accept(bielle::assemble(model_, problem, options));
+    if (!posture) return {};
+    return Placement{std::move(posture->q), 0, planned.stands, true};
   }
 
   // Whether there is such a posture, as far as that of the stance leads to it.
@@ -114,11 +145,11 @@ class FeetPlacer {
   // \param sure  that no other start leads to a posture where the first does not
   // \param ways  of the base, up and down, over the height of the centre of mass: the longest that failed before, and the longest
   // that is tried
-  std::optional<VectorXd> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
-                                    const std::vector<const VectorXd*>& starts, bool sure,
-                                    const std::array<double, 2>& ways, double easy) {
+  std::optional<Placement> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
+                                     const std::vector<const VectorXd*>& starts, bool sure,
+                                     const std::array<double, 2>& ways, double easy) {
     const double step = ways[1] / 4;
-    std::optional<VectorXd> first;
+    std::optional<Placement> first;
     int at = 0, first_left = -4, last_left = 4;  // steps downwards: of `first`, and of those that may reach
     for (int i = 0; i <= 4; i = i > 0 ? -i : 1 - i) {
       if (i < first_left || i > last_left || (ways[0] > 0 && std::abs(i) * step < ways[0] + 1e-9)) continue;
@@ -127,10 +158,10 @@ class FeetPlacer {
       bool reaches = false;
       for (const VectorXd* start : starts) {
         std::optional<Posture> posture = assemble(base, planned.feet, flat, *start);
-        if (posture && posture->transmission > easy) return std::move(posture->q);
+        if (posture && posture->transmission > easy) return Placement{std::move(posture->q), i * step * height_, flat};
         reaches = reaches || posture;
         if (posture && !first) {
-          first = std::move(posture->q);
+          first = {std::move(posture->q), i * step * height_, flat};
           at = i;
           if (i > 0) first_left = i;
           if (i < 0) last_left = i;
@@ -142,20 +173,28 @@ class FeetPlacer {
     return first;
   }
 
-  // Keeps ranges of joints, and linkages on their side of dead points.
-  // \param flat  soles that are parallel to what is planned
-  std::optional<Posture> assemble(const VectorXd& base, const std::array<SE3, 2>& feet, const std::array<bool, 2>& flat,
-                                  const VectorXd& start) {
+  AssemblyProblem makeProblem(const std::array<SE3, 2>& feet, const std::array<bool, 2>& flat,
+                              const VectorXd& start) const {
     AssemblyProblem problem;
     problem.q_ref = start;
-    problem.q_ref.head<7>() = base;
-    problem.frames.push_back({"base", 1, SE3(), getBase(base)});
     for (int i = 0; i < 2; ++i) {
       problem.frames.push_back(makeFrameTarget(model_.contacts()[stance_.contacts[i]], feet[i]));
       if (!flat[i]) problem.frames.back().mask.tail<3>().setConstant(false);
     }
+    return problem;
+  }
+
+  // Keeps ranges of joints, and linkages on their side of dead points.
+  // \param flat  soles that are parallel to what is planned
+  std::optional<Posture> assemble(const VectorXd& base, const std::array<SE3, 2>& feet, const std::array<bool, 2>& flat,
+                                  const VectorXd& start) {
+    AssemblyProblem problem = makeProblem(feet, flat, start);
+    problem.q_ref.head<7>() = base;
     options_.patience = flat[0] && flat[1] ? 2 : 0;  // soles that are free to turn often pass postures that are worse
-    AssemblyResult result = bielle::assemble(model_, problem, options_);
+    return accept(assembleUnderBase(model_, problem, options_));
+  }
+
+  std::optional<Posture> accept(AssemblyResult result) {
     if (result.status != NumericalStatus::Ok || !keepsRanges(result.q)) return {};
     const double transmission = calcTransmission(result.q);
     if (transmission <= kLeastTransmission) return {};
@@ -191,26 +230,35 @@ class FeetPlacer {
 }  // namespace
 
 std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const std::vector<PlannedPosture>& postures) {
-  constexpr size_t kStride = 8;
+  constexpr size_t kStride = 3, kFarStride = 8;
   FeetPlacer placer(model, stance);
   std::vector<VectorXd> qs;
-  size_t tried = 0;
-  bool found = true;
+  bool found = true;  // the last of them
+  const auto find = [&](size_t k) -> std::optional<Placement> {
+    if (!found && !placer.reaches(postures[k])) return placer.placeFreely(postures[k], stance.q);
+    return placer.place(postures[k], qs.empty() ? stance.q : qs.back(), found);
+  };
+  const auto append = [&](const std::optional<Placement>& placement) {
+    found = placement.has_value();
+    qs.push_back(found ? placement->q : placer.hang(postures[qs.size()]));
+  };
+  std::optional<Placement> last;
   while (qs.size() < postures.size()) {
-    // Beside a posture that is not found others mostly are not, either: one of several is tried, and those between are
-    // like it.
-    if (!found && qs.size() >= tried) {
-      tried = std::min(qs.size() + kStride, postures.size());
-      if (!placer.reaches(postures[tried - 1])) {
-        while (qs.size() < tried) qs.push_back(placer.hang(postures[qs.size()]));
-        continue;
-      }
+    // The way of the base is searched at one of several postures, and lies between those beside it. Beside a posture that is not
+    // found others mostly are not, either.
+    const size_t first = qs.size(), stride = found ? kStride : kFarStride,
+                 at = first == 0 ? 0 : std::min(first + stride, postures.size()) - 1;
+    const std::optional<Placement> next = find(at);
+    while (qs.size() < at) {
+      const size_t k = qs.size();
+      std::optional<Placement> between;
+      const double share = static_cast<double>(k + 1 - first) / static_cast<double>(at + 1 - first);
+      if (last && next) between = placer.placeBetween(*last, *next, share, postures[k], qs.back());
+      if (!between && (found || next)) between = find(k);
+      append(between);
     }
-    const PlannedPosture& planned = postures[qs.size()];
-    std::optional<VectorXd> q;
-    if (found || placer.reaches(planned)) q = placer.place(planned, qs.empty() ? stance.q : qs.back(), found);
-    found = q.has_value();
-    qs.push_back(found ? std::move(*q) : placer.hang(planned));
+    append(next);
+    last = next;
   }
   return qs;
 }

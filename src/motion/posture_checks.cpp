@@ -17,6 +17,10 @@ namespace {
 // straightens its legs first with limits that are 1.4 times too low; with 1.75 and 2.3 times no motion was found.
 constexpr double kTooWeak = 1.5;
 
+// What planned postures need beyond what is allowed before it is doubtful: motions find others. Walks of rsu_biped were found with 0.7
+// of the torques, and with a third to a half of the friction; with 0.11 of the power, but in four times the iterations.
+constexpr double kDoubtfulEffort = 1.25, kDoubtfulPower = 2, kDoubtfulFriction = 2;
+
 // Velocities are those between postures that are so far apart, since the guess goes from one to the next in small jumps, s.
 constexpr double kApart = 0.1;
 
@@ -164,10 +168,12 @@ void PostureChecks::doubt() {
     tell_("no posture was found in which the legs reach: " + foot + " stays " + formatNumber(reach.needed, "%.2g") +
               " m (or rad) off its place " + reach.moment.describe(),
           "request shorter, lower or less turned steps");
+  friction.needed /= kDoubtfulFriction;
   if (friction.needed > friction.allowed)
-    tell_(getContact(friction.moment.phase->contacts[0]).name + " would slip: the weight, as planned " +
-              friction.moment.describe() + ", needs a friction of " + formatAbove(friction.needed, 2) +
-              " at least, the ground has " + formatNumber(friction.allowed),
+    tell_(getContact(friction.moment.phase->contacts[0]).name +
+              " would slip: even with the weight half as far off as planned " + friction.moment.describe() +
+              ", it needs a friction of " + formatAbove(friction.needed, 2) + " at least, the ground has " +
+              formatNumber(friction.allowed),
           "request a slower motion or shorter steps, or give `friction` if the ground has more");
   tellEfforts(efforts);
   tellSpeeds(speeds);
@@ -208,7 +214,7 @@ void PostureChecks::needEfforts(const Moment& moment, const VectorXd& q, std::ve
   if (!share.isTooMuch()) return;
   for (size_t m = 0; m < efforts.size(); ++m) {
     const Need need{std::abs(share.u[static_cast<Eigen::Index>(m)]), limits[static_cast<Eigen::Index>(m)], moment};
-    if (need.share() > std::max(1.0, efforts[m].share())) efforts[m] = need;
+    if (need.share() > std::max(kDoubtfulEffort, efforts[m].share())) efforts[m] = need;
   }
 }
 
@@ -237,7 +243,8 @@ void PostureChecks::needPowers(const Moment& before, const Moment& after, std::v
   if (!share.isTooMuch()) return;
   for (int m = 0; m < model_.nu(); ++m) {
     const Need need{std::abs(share.u[m]) * speeds[m], most[m], after};
-    if (need.share() > std::max(1.0, powers[static_cast<size_t>(m)].share())) powers[static_cast<size_t>(m)] = need;
+    if (need.share() > std::max(kDoubtfulPower, powers[static_cast<size_t>(m)].share()))
+      powers[static_cast<size_t>(m)] = need;
   }
 }
 
