@@ -342,6 +342,38 @@ def check_bases(where, motion, arguments):
             assert joints < off and torques < torque, (joints, torques)
 
 
+def give_posture(robot, start, at):
+    """The reference becomes a posture as a whole: of the joints that it gives, and of a base at a point of the trunk."""
+    x, y, z, w = (start[f"root_joint.q{axis}"] for axis in "xyzw")
+    R = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                  [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                  [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    base = (np.array([start[f"root_joint.{axis}"] for axis in "xyz"]) - R @ np.array(at)).tolist() + [x, y, z, w]
+    with open(f"{robot}/biped.yaml") as file:
+        text = file.read()
+    text, count = re.subn(r"    joints:\n(?: {6}.*\n)+", "".join(
+        ["    joints:\n", f"      root_joint: {base}\n"] + [f"      {name}: {q!r}\n" for name, q in start.items() if name in text]), text)
+    assert count == 1, text
+    write(f"{robot}/biped.yaml", text)
+
+
+def check_origins(where, motion, arguments):
+    """Of one posture, no plan depends on where on the trunk the origin of the base's frame is."""
+    results, start = [], None
+    for i, at in enumerate([(0, 0, 0), (0.03, 0.02, 0.05), (0.3, 0.5, -0.2)]):
+        robot = make_base(f"{where}/origin-{i}", (0, 0, 0), at)
+        if start is None:
+            run("solve", "squat", "--robot", robot, "--max-iterations", 1, "--no-check", "--no-report", "-o", f"{robot}/squat", status=(0, 1))
+            record = read(f"{robot}/squat")[1]
+            start = dict(zip(record["q_names"].tolist(), record["q"][0].tolist()))
+        give_posture(robot, start, at)
+        results.append(read(solve(f"{where}/origin-{i}", robot, motion, arguments)))
+        (home, at_home), (there, moved) = results[0], results[-1]
+        joints, torques = np.abs(at_home["q"][:, 7:] - moved["q"][:, 7:]).max(), np.abs(at_home["u"] - moved["u"]).max()
+        print(f"{motion}, origin of the base at {at}: joints {joints:.1e}, torques {torques:.1e}")
+        assert joints < 2e-6 and torques < 1e-4 and abs(home["cost"] / there["cost"] - 1) < 1e-6, (joints, torques)
+
+
 def check_without_height(where):
     """The legs decide how high the base is, by the angles that are given."""
     robot = make_base(f"{where}/without-height", (0, 0, 0), (0, 0, 0))
@@ -369,7 +401,9 @@ def main():
         for way, make in WAYS.items():
             motion = "walk" if REST else "squat"
             check_motion(where, way, make, motion, MOTIONS[motion], [OTHERS[-1] if REST else PLACE], "--no-check")
-        check_bases(where, *(("turn", REST_OF_MOTIONS["turn"]) if REST else ("squat", MOTIONS["squat"])))
+        motion = ("turn", REST_OF_MOTIONS["turn"]) if REST else ("squat", MOTIONS["squat"])
+        check_bases(where, *motion)
+        check_origins(where, *motion)
         if REST:
             check_motion(where, "feet", make_feet, "walk", MOTIONS["walk"], OTHERS + [PLACE], "--no-check")
             check_yaws(where)
