@@ -294,6 +294,7 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
     CAPTURE(text, result.err);
     CHECK(result.status == 2);
     for (const std::string& word : words) CHECK_THAT(result.err, Contains(word));
+    CHECK_THAT(result.err, !Contains("see --help;"));  // a remedy for another remedy
     CHECK_FALSE(fs::exists(out + "/runs.jsonl"));
     CHECK_FALSE(fs::exists(out + "/motions"));
   }

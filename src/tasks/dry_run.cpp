@@ -54,6 +54,9 @@ std::optional<std::string> findComplaint(std::vector<std::string> command, const
     std::ifstream file(log);
     std::getline(file, complaint);
   }
+  const std::string hint = "; see --help";  // a remedy of its own names the command
+  if (complaint.size() > hint.size() && complaint.compare(complaint.size() - hint.size(), hint.size(), hint) == 0)
+    complaint.resize(complaint.size() - hint.size());
   return complaint.empty() ? "it cannot be checked" : complaint;
 }
 
