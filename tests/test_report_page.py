@@ -212,6 +212,11 @@ class ReportPage(unittest.TestCase):
             for row, value in zip(rows, values):
                 self.assertAlmostEqual(float(row["u." + name]), value, delta=1e-5)
 
+    def test_numbers_of_the_size_of_rounding_are_zero(self):
+        self.browser.open(self.squat / "report.html")
+        for value, text in ((0, "0"), (-6.3e-33, "0"), (7.97e-18, "0"), (2.7e-13, "2.70e-13"), (0.00441, "0.00441"), (float("nan"), "–")):
+            self.assertEqual(self.browser.evaluate(f"formatNumber({value!r})".replace("nan", "NaN")), text)
+
     def test_two_runs(self):
         page = self.root / "both.html"
         run("report", self.squat, self.root / "hostile", "-o", page)

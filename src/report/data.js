@@ -138,8 +138,8 @@ function addElement(parent, tag, className, text) {
 
 function formatNumber(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return '–';
-  if (value === 0) return '0';
   const size = Math.abs(value);
+  if (size < 1e-15) return '0';  // rounding
   return size >= 1e5 || size < 1e-3 ? value.toExponential(Math.max(0, digits - 2)) :
                                       String(Number(value.toPrecision(digits)));
 }
