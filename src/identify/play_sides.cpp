@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
@@ -49,8 +50,10 @@ std::vector<LinkagePlay> listLinkagePlays(const Model& model, const ReducedClust
     const std::optional<RodEnd> end = findRodEnd(model, closure);
     if (!end || !(end->far.norm() > 1e-9)) continue;  // addPlay() says why
     const auto kind = end->is_first ? GeometryMove::Kind::Frame1 : GeometryMove::Kind::Frame2;
-    plays.push_back(
-        {closure.name, getSize(closure.name), -1, {closure.name, 0, true, {{kind, static_cast<int>(c), end->far.normalized()}}}});
+    plays.push_back({closure.name,
+                     getSize(closure.name),
+                     -1,
+                     {closure.name, 0, true, {{kind, static_cast<int>(c), end->far.normalized()}}}});
   }
   return plays;
 }
