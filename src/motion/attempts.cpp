@@ -11,7 +11,9 @@
 namespace bielle {
 namespace {
 
-// A first attempt is given up after as many iterations if constraints are violated or gaps open by more than this.
+constexpr double kCautious = 1e-2;  // regularization of a second attempt
+// A first attempt by multiple shooting is given up after as many iterations if constraints are violated or gaps open by more than
+// this.
 constexpr int kPatience = 80;
 constexpr double kFar = 0.03;
 
@@ -137,12 +139,14 @@ Solution solveAlone(const Motion& motion, const FddpOptions& options, const Fddp
     result = attempt(motion, options, observer, start);
   }
   lost = lost && result.summary.termination == FddpTermination::Interrupted;
-  if (options.multiple_shooting && (lost || result.summary.termination == FddpTermination::Infeasible)) {
-    FddpOptions single = options;
-    single.multiple_shooting = false;
-    single.max_iterations = std::max(1, options.max_iterations - result.summary.iterations);
+  const bool has_other = options.multiple_shooting || options.initial_regularization < kCautious;
+  if (lost || (has_other && result.summary.termination == FddpTermination::Infeasible)) {
+    FddpOptions other = options;
+    other.multiple_shooting = false;
+    other.max_iterations = std::max(1, options.max_iterations - (lost ? result.summary.iterations : 0));
+    if (!options.multiple_shooting) other.initial_regularization = kCautious;
     start.multipliers = {};
-    result = join(std::move(result), attempt(motion, single, observer, start));
+    result = join(std::move(result), attempt(motion, other, observer, start));
   }
   return result;
 }

@@ -8,8 +8,8 @@ namespace bielle {
 Solution attempt(const Motion& motion, const FddpOptions& solver, const FddpObserver& observer,
                  const StartingPoint& start);
 
-// One, and another one if that cannot begin, from the posture at the start, or, without multiple shooting, if it ends as infeasible
-// or has come nowhere after 80 iterations.
+// One, and another one if that cannot begin, from the posture at the start; if it ends as infeasible, from a larger regularization or
+// without multiple shooting; or if that has come nowhere after 80 iterations.
 Solution solveAlone(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                     StartingPoint start);
 

@@ -251,7 +251,7 @@ void describe(OptionFields& f, ConstraintOptions& o) {
 
 void describe(OptionFields& f, FddpOptions& o) {
   f.integer("max_iterations", o.max_iterations, {1, kMostIterations}, "largest number of iterations");
-  f.flag("multiple_shooting", o.multiple_shooting, "false: far from the optimum, rollouts in one piece");
+  f.flag("multiple_shooting", o.multiple_shooting, "rollouts stage by stage while the gaps of the guess are open");
   f.number("gradient_tolerance", o.gradient_tolerance, "1", kNotNegative, "(cost per unit of control)^2");
   f.number("gap_tolerance", o.gap_tolerance, "1", kNotNegative, "largest norm of a gap");
   f.number("cost_tolerance", o.cost_tolerance, "1", kNotNegative,

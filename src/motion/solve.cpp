@@ -88,6 +88,7 @@ class RequestSolver {
     StartingPoint start = options_.start.value_or(StartingPoint{motion_.guess});
     if (from_parts) start.trajectory = startFromParts();
     FddpOptions solver = options_.start || from_parts ? options_.solver : from_guess;
+    solver.multiple_shooting = solver.multiple_shooting || options_.start.has_value();  // its nodes may jump about
     const ObjectiveOptions& objective = motion_.problem_options.objective;
     if (objective.objective != Objective::Effort) {
       if (!objective.scale) {

@@ -18,6 +18,7 @@ constexpr double kMuch = 0.1;    // regularization up to which full steps are tr
 constexpr double kBetter = 0.5;  // ratio to which each should reduce the errors of models
 constexpr double kShortest = 0.4;       // alpha of a step in segments after a full one that went too far
 constexpr int kShorter = 5;             // steps tried in segments after a full one
+constexpr int kShooting = 20;           // iterations of multiple shooting, at most
 constexpr int kSettling = 30;           // steps that settle() takes, at most
 constexpr double kSettlingFactor = 10;  // of the regularization, between these steps
 
@@ -41,7 +42,7 @@ FddpResult solve(const ShootingProblem& problem, ShootingTrajectory guess, const
 }
 
 FddpSummary FddpSolve::run() {
-  start(multiple_shooting_ ? problem_.numStages() : options_.rollout_segments);
+  start(shoots_ ? problem_.numStages() : options_.rollout_segments);
   finish(iterate());
   const AugmentedLagrangian& lagrangian = memory_.lagrangian;
   if (summary_.termination == FddpTermination::MaxIterations && lagrangian.violation() > options_.constraints.tolerance)
@@ -156,14 +157,15 @@ FddpSolve::End FddpSolve::updateMultipliers() {
 }
 
 // Leaves the accepted trial in accepted_, or renewed_ set. Where constraints and gaps are small, full steps that violate rows are
-// cheaper by holding these rows or by more regularization than a shorter one. Without multiple shooting, steps far from there that
-// follow a shortened one are rolled out in one piece.
+// cheaper by holding these rows or by more regularization than a shorter one. Far from there, steps that follow a shortened one are
+// rolled out in one piece, but for multiple shooting: in segments some motions end where no step is acceptable.
 FddpSolve::End FddpSolve::searchLine() {
-  const int segments = multiple_shooting_ && line_.gap > kClose ? N_ : getNumSegments();
+  shoots_ = shoots_ && line_.gap > kClose && line_.iteration <= kShooting;
+  const int segments = shoots_ ? N_ : getNumSegments();
   const bool near = line_.violation < kClose && line_.gap <= kClose;
   const bool settles = near && calcForeseen() <= kClose * std::abs(line_.cost);
   renewed_ = false;
-  if (segments > 1 && first_step_ == 1 && (near || multiple_shooting_ || last_step_ == 1)) {
+  if (segments > 1 && first_step_ == 1 && (near || shoots_ || last_step_ == 1)) {
     if (tryFullStep(segments)) return {};
     if (settles && tryShorterStep(segments)) return {};
     if (near && hasViolatedFreeRows()) {
@@ -171,7 +173,7 @@ FddpSolve::End FddpSolve::searchLine() {
       if (accepted_ || renewed_ || regularization_ < kMuch) return {};
     }
   }
-  const bool cuts = (near || multiple_shooting_) && !mustClose();
+  const bool cuts = (near || shoots_) && !mustClose();
   if (!cuts || !tryShorterSteps(segments)) searchInOnePiece(startSearch());
   return {};
 }

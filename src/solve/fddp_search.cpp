@@ -11,6 +11,7 @@ constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
 // Differences of costs below this share of the cost are rounding: they neither accept nor reject a step.
 constexpr double kCostRounding = 1e-14;
 constexpr double kClosingShare = 0.5;  // of Eq. (4): the most that Eq. (8) may be
+constexpr double kHardly = 1e3;  // times the least regularization, which shortens no step that rounding could hide
 
 }  // namespace
 
@@ -28,7 +29,8 @@ bool FddpIterations::closesTwice(int segments) const {
 
 // Whether a full step can decrease the merit only by less than the rounding errors of all nodes may hide.
 bool FddpIterations::isRounding() const {
-  return regularization_ <= options_.min_regularization && isClosed() && calcForeseen() <= N_ * calcRounding();
+  return regularization_ <= kHardly * options_.min_regularization && isClosed() &&
+         calcForeseen() <= N_ * calcRounding();
 }
 
 // Largest difference of merits that is taken for rounding.

@@ -10,7 +10,7 @@ class FddpSolve : private FddpIterations {
   FddpSolve(const FddpOptions& options, const ShootingProblem& problem, ShootingTrajectory& trajectory,
             const FddpObserver& observer, FddpMemory& memory)
       : FddpIterations(options, options.max_iterations, problem, trajectory, observer, memory),
-        multiple_shooting_(options.multiple_shooting),
+        shoots_(options.multiple_shooting),
         acceptable_decrease_(options.acceptable_decrease) {}
 
   FddpSummary run();
@@ -38,8 +38,8 @@ class FddpSolve : private FddpIterations {
 
   bool renewed_ = false;  // multipliers, by a line search
 
-  const bool multiple_shooting_;
   const double acceptable_decrease_;
+  bool shoots_ = false;            // segments are single stages
   bool closing_ = false;           // the next step must close the gaps, since the constraints are infeasible
   int settling_ = 0;               // steps left in which constraints are closed where the trajectory is
   int next_settling_ = kCreeping;  // iterations before the next such steps

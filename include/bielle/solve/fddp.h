@@ -90,9 +90,9 @@ struct IterationOptions {
 
 struct FddpOptions : IterationOptions {
   int max_iterations = 300;  ///< at most 1000000; the last one closes the gaps
-  /// Whether steps are tried in segments first however far the iterate is, and in those of a single stage while gaps are large
-  /// (multiple shooting). Otherwise they are rolled out in one piece there, which is slower, and from some guesses gets farther.
-  bool multiple_shooting = true;
+  /// Whether steps are rolled out stage by stage (multiple shooting) until the gaps of the guess are closed, for 20 iterations at
+  /// most: for guesses that jump about. Otherwise steps far from the optimum are rolled out in one piece once one was shortened.
+  bool multiple_shooting = false;
   /// Share of J; 0: never. If J has stayed within it for 20 iterations and violations below 0.03, constraints are closed
   /// where the trajectory is, and it ends as Converged and `acceptable`: within the constraints, but not stationary.
   double acceptable_decrease = 0;
