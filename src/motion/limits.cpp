@@ -111,8 +111,7 @@ std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd
     double margin = options.dead_point_margin;
     if (const auto own = margins.extract(linkage.output)) margin = std::max(margin, own.mapped());
     if (margin == 0) continue;
-    bounds.push_back(makeBound("dead points of " + linkage.output, std::atan(margin), std::atan(1 / margin),
-                               makeTransmissionArctan(linkage)));
+    bounds.push_back(makeBound("dead points of " + linkage.output, margin, 1 / margin, makeTransmission(linkage)));
     bounds.back().scale[0] = 1;
   }
   if (!margins.empty())
