@@ -1,6 +1,8 @@
 #pragma once
-// States from which many worlds begin.
+// States from which many worlds begin, and what is left between them and the same robots alone.
+#include <catch2/catch.hpp>
 #include <cstring>
+#include <memory>
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
@@ -42,6 +44,28 @@ inline worlds::WorldBatchOptions makeBatchOptions(double time_step, int threads 
   options.world.world.time_step = time_step;
   options.threads = threads;
   return options;
+}
+
+// Velocities of all worlds after a duration (nv x count), less those of single worlds.
+// \param makeAlone  the single world, or what takes its place, by the number of a world of the batch
+template <class MakeWorld>
+MatrixXd subtractAlone(const Model& model, const worlds::WorldParameters& parameters, const MakeWorld& makeAlone,
+                       const BatchStart& starts, double time_step, double duration) {
+  const auto count = static_cast<int>(starts.q.cols());
+  worlds::WorldBatch batch(model, count, makeBatchOptions(time_step));
+  batch.set(parameters);
+  batch.reset(starts.q, starts.v);
+  CHECK(batch.step(starts.u, starts.push, duration));
+  MatrixXd out = batch.velocities();
+  for (int i = 0; i < count; ++i) {
+    const std::unique_ptr<worlds::World> world = makeAlone(i);
+    world->reset(starts.q.col(i), starts.v.col(i));
+    world->setTorques(starts.u.col(i));
+    world->setPush(starts.push.col(i));
+    REQUIRE(world->advance(duration));
+    out.col(i) -= world->velocity();
+  }
+  return out;
 }
 
 inline bool isEqual(const VectorXd& a, const VectorXd& b) {

@@ -91,21 +91,8 @@ std::unique_ptr<World> makeAlone(const Model& model, const WorldParameters& para
 // Velocities of all worlds less those of the same robots alone, maybe with other parameters, after a duration.
 MatrixXd calcDifference(const Model& model, const Start& starts, const WorldParameters& parameters,
                         const WorldParameters& alone, double time_step, double duration) {
-  const auto count = static_cast<int>(starts.q.cols());
-  WorldBatch batch(model, count, makeBatchOptions(time_step));
-  batch.set(parameters);
-  batch.reset(starts.q, starts.v);
-  CHECK(batch.step(starts.u, starts.push, duration));
-  MatrixXd out = batch.velocities();
-  for (int i = 0; i < count; ++i) {
-    const auto world = makeAlone(model, alone, i, time_step);
-    world->reset(starts.q.col(i), starts.v.col(i));
-    world->setTorques(starts.u.col(i));
-    world->setPush(starts.push.col(i));
-    REQUIRE(world->advance(duration));
-    out.col(i) -= world->velocity();
-  }
-  return out;
+  return bielle::testing::subtractAlone(
+      model, parameters, [&](int i) { return makeAlone(model, alone, i, time_step); }, starts, time_step, duration);
 }
 
 }  // namespace

@@ -32,23 +32,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 using MakeModel = std::function<Model(int world)>;
 
 // Velocities of all worlds less those of robots of models of their own, alone.
-MatrixXd subtractAlone(const Model& model, const WorldParameters& parameters, const MakeModel& makeAlone,
-                       const BatchStart& starts, double time_step, double duration) {
-  const auto count = static_cast<int>(starts.q.cols());
-  WorldBatch batch(model, count, makeBatchOptions(time_step));
-  batch.set(parameters);
-  batch.reset(starts.q, starts.v);
-  CHECK(batch.step(starts.u, starts.push, duration));
-  MatrixXd out = batch.velocities();
-  for (int i = 0; i < count; ++i) {
-    const auto world = makeBielleWorld(makeAlone(i), makeBatchOptions(time_step).world);
-    world->reset(starts.q.col(i), starts.v.col(i));
-    world->setTorques(starts.u.col(i));
-    world->setPush(starts.push.col(i));
-    REQUIRE(world->advance(duration));
-    out.col(i) -= world->velocity();
-  }
-  return out;
+MatrixXd calcDifference(const Model& model, const WorldParameters& parameters, const MakeModel& makeAlone,
+                        const BatchStart& starts, double time_step, double duration) {
+  const auto makeWorld = [&](int i) { return makeBielleWorld(makeAlone(i), makeBatchOptions(time_step).world); };
+  return bielle::testing::subtractAlone(model, parameters, makeWorld, starts, time_step, duration);
 }
 
 // Bipetto with gear motors whose supply bounds the torque of those that turn fast.
@@ -200,7 +187,7 @@ TEST_CASE("batch: windings of a world are those of a changed model") {
   const WorldParameters parameters = makeWindings(model, kCount);
   const auto compare = [&](const WorldParameters& alone) {
     const auto makeAlone = [&](int i) { return rewind(model, alone, i); };
-    return subtractAlone(model, parameters, makeAlone, starts, 1e-3, 2e-3).cwiseAbs().maxCoeff();
+    return calcDifference(model, parameters, makeAlone, starts, 1e-3, 2e-3).cwiseAbs().maxCoeff();
   };
   CHECK(compare(parameters) < 1e-11);
   for (const auto part : {&WorldParameters::torque_constants, &WorldParameters::resistances, &WorldParameters::voltages,
@@ -244,9 +231,9 @@ TEST_CASE("batch: rods of a world are those of a changed model") {
     starts.v.row(0).setConstant(2);
     for (int i = 0; i < kCount; ++i) starts.u.col(i) << 0.02 * (i % 3), -0.05;
     starts = closeStarts(makeAlone, starts);
-    CHECK(subtractAlone(model, parameters, makeAlone, starts, 1e-3, 0.1).cwiseAbs().maxCoeff() < 1e-11);
+    CHECK(calcDifference(model, parameters, makeAlone, starts, 1e-3, 0.1).cwiseAbs().maxCoeff() < 1e-11);
     const auto makeOther = [&](int i) { return makeCrankRocker(ties, 1.001 * parameters.rod_changes(0, i)); };
-    CHECK(subtractAlone(model, parameters, makeOther, starts, 1e-3, 0.1).cwiseAbs().maxCoeff() > 1e-6);
+    CHECK(calcDifference(model, parameters, makeOther, starts, 1e-3, 0.1).cwiseAbs().maxCoeff() > 1e-6);
 
     // To the last bit: worlds of the model as without the others, the others as alone.
     WorldBatch together(model, kCount, makeBatchOptions(1e-3)), plain(model, kCount, makeBatchOptions(1e-3));
@@ -282,8 +269,8 @@ TEST_CASE("batch: rods of a robot are those of a changed model as steps become s
   starts.q.row(2).array() += 1;
   starts = closeStarts(makeAlone, starts);
   const auto extrapolate = [&](const MakeModel& make) {
-    const MatrixXd once = subtractAlone(model, parameters, make, starts, 2.5e-4, 0.01);
-    return ((4 * subtractAlone(model, parameters, make, starts, 1.25e-4, 0.01) - once) / 3).cwiseAbs().maxCoeff();
+    const MatrixXd once = calcDifference(model, parameters, make, starts, 2.5e-4, 0.01);
+    return ((4 * calcDifference(model, parameters, make, starts, 1.25e-4, 0.01) - once) / 3).cwiseAbs().maxCoeff();
   };
   CHECK(extrapolate(makeAlone) < 2e-5);
   CHECK(extrapolate([&](int i) { return lengthenRods(model, 1.1 * parameters.rod_changes.col(i)); }) > 1e-4);

@@ -125,8 +125,8 @@ class HeldWorlds {
                      {makeRows(now.mass_factors, {model_->numBodies()}), makeRows(now.armatures, motors),
                       makeRows(now.effort_limits, motors), makeRows(now.friction.transpose(), {}),
                       makeRows(now.delays.transpose(), {}), makeRows(now.torque_constants, motors),
-                      makeRows(now.resistances, motors), makeRows(now.voltages, motors),
-                      makeRows(now.currents, motors), makeRows(now.rod_changes, {numClosures()})});
+                      makeRows(now.resistances, motors), makeRows(now.voltages, motors), makeRows(now.currents, motors),
+                      makeRows(now.rod_changes, {numClosures()})});
   }
 
   // Of a single world.

@@ -80,8 +80,7 @@ LogFit::Variants LogFit::makeVariants(const VectorXd& x) const {
   for (const Eigen::Index row : used_) {
     const auto [at, is_new] = variants.try_emplace(listSides(row), *cluster_);
     if (!is_new) continue;
-    for (size_t i = 0; i < sizes.size(); ++i)
-      changes[n + static_cast<Eigen::Index>(i)] = at->first[i] * sizes[i] / 2;
+    for (size_t i = 0; i < sizes.size(); ++i) changes[n + static_cast<Eigen::Index>(i)] = at->first[i] * sizes[i] / 2;
     at->second.model = changeGeometry(cluster_->model, nullptr, numbers, changes);
     at->second.closures = makeConstraintSet(at->second.model);
   }

@@ -12,8 +12,7 @@ namespace bielle {
 namespace {
 
 constexpr double kCautious = 1e-2;  // regularization of a second attempt
-// A first attempt by multiple shooting is given up after as many iterations if constraints are violated or gaps open by more than
-// this.
+// A first attempt by multiple shooting is given up if after this many iterations constraints or gaps are open by more than kFar.
 constexpr int kPatience = 80;
 constexpr double kFar = 0.03;
 

@@ -13,14 +13,6 @@
 namespace bielle {
 namespace {
 
-// A posture that was found.
-struct Placement {
-  VectorXd q;
-  double way = 0;                        // of the base, downwards, m
-  std::array<bool, 2> flat{true, true};  // soles parallel to what is planned
-  bool free = false;                     // the base: neither its place nor its rotation is what is planned
-};
-
 class FeetPlacer {
  public:
   FeetPlacer(const Model& model, const Stance& stance)
@@ -34,11 +26,11 @@ class FeetPlacer {
   // None where no posture is found, after dozens of assemblies. Beside a posture that was found, the stance leads to others only
   // where a sole is free to turn: legs with flat soles under a given base have nothing to choose.
   // \param found  whether `before` is one
-  std::optional<Placement> place(const PlannedPosture& planned, const VectorXd& before, bool found) {
+  std::optional<VectorXd> place(const PlannedPosture& planned, const VectorXd& before, bool found) {
     constexpr std::array<bool, 2> kBoth{true, true};
     constexpr double kNear = 0.06;  // of the base, over the height of the centre of mass
     const std::vector<const VectorXd*> starts = {&before, &stance_.q};
-    std::optional<Placement> q =
+    std::optional<VectorXd> q =
         placeNear(planned, kBoth, found ? std::vector{&before} : starts, found, {0, kNear}, kEasyTransmission);
     if (!q && planned.stands != kBoth)
       q = placeNear(planned, planned.stands, starts, found, {0, kNear}, kEasyTransmission);
@@ -47,29 +39,15 @@ class FeetPlacer {
     return q;
   }
 
-  // Part of the way from one posture to another, or none.
-  std::optional<Placement> placeBetween(const Placement& from, const Placement& to, double share,
-                                        const PlannedPosture& planned, const VectorXd& before) {
-    if (from.free || to.free) return {};
-    Placement between{{}, from.way + share * (to.way - from.way), {}};
-    for (int i = 0; i < 2; ++i) between.flat[i] = planned.stands[i] || (from.flat[i] && to.flat[i]);
-    VectorXd base = planned.q.head<7>();
-    base[2] -= between.way;
-    std::optional<Posture> posture = assemble(base, planned.feet, between.flat, before);
-    if (!posture) return {};
-    between.q = std::move(posture->q);
-    return between;
-  }
-
   // With the base where legs have it, near the start: they reach farther where the pelvis turns or leans.
-  std::optional<Placement> placeFreely(const PlannedPosture& planned, const VectorXd& start) {
-    AssemblyProblem problem = makeProblem(planned.feet, planned.stands, start);
+  std::optional<VectorXd> placeFreely(const PlannedPosture& planned, const VectorXd& start) {
     AssemblyOptions options = options_;
     options.patience = 0;
     options.max_iterations = 50;
-    std::optional<Posture> posture = accept(bielle::assemble(model_, problem, options));
+    std::optional<Posture> posture =
+        accept(bielle::assemble(model_, makeProblem(planned.feet, planned.stands, start), options));
     if (!posture) return {};
-    return Placement{std::move(posture->q), 0, planned.stands, true};
+    return std::move(posture->q);
   }
 
   // Whether there is such a posture, as far as that of the stance leads to it.
@@ -145,11 +123,11 @@ class FeetPlacer {
   // \param sure  that no other start leads to a posture where the first does not
   // \param ways  of the base, up and down, over the height of the centre of mass: the longest that failed before, and the longest
   // that is tried
-  std::optional<Placement> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
-                                     const std::vector<const VectorXd*>& starts, bool sure,
-                                     const std::array<double, 2>& ways, double easy) {
+  std::optional<VectorXd> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
+                                    const std::vector<const VectorXd*>& starts, bool sure,
+                                    const std::array<double, 2>& ways, double easy) {
     const double step = ways[1] / 4;
-    std::optional<Placement> first;
+    std::optional<VectorXd> first;
     int at = 0, first_left = -4, last_left = 4;  // steps downwards: of `first`, and of those that may reach
     for (int i = 0; i <= 4; i = i > 0 ? -i : 1 - i) {
       if (i < first_left || i > last_left || (ways[0] > 0 && std::abs(i) * step < ways[0] + 1e-9)) continue;
@@ -158,10 +136,10 @@ class FeetPlacer {
       bool reaches = false;
       for (const VectorXd* start : starts) {
         std::optional<Posture> posture = assemble(base, planned.feet, flat, *start);
-        if (posture && posture->transmission > easy) return Placement{std::move(posture->q), i * step * height_, flat};
+        if (posture && posture->transmission > easy) return std::move(posture->q);
         reaches = reaches || posture;
         if (posture && !first) {
-          first = {std::move(posture->q), i * step * height_, flat};
+          first = std::move(posture->q);
           at = i;
           if (i > 0) first_left = i;
           if (i < 0) last_left = i;
@@ -184,7 +162,6 @@ class FeetPlacer {
     return problem;
   }
 
-  // Keeps ranges of joints, and linkages on their side of dead points.
   // \param flat  soles that are parallel to what is planned
   std::optional<Posture> assemble(const VectorXd& base, const std::array<SE3, 2>& feet, const std::array<bool, 2>& flat,
                                   const VectorXd& start) {
@@ -194,6 +171,7 @@ class FeetPlacer {
     return accept(assembleUnderBase(model_, problem, options_));
   }
 
+  // Keeps ranges of joints, and linkages on their side of dead points.
   std::optional<Posture> accept(AssemblyResult result) {
     if (result.status != NumericalStatus::Ok || !keepsRanges(result.q)) return {};
     const double transmission = calcTransmission(result.q);
@@ -230,35 +208,27 @@ class FeetPlacer {
 }  // namespace
 
 std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const std::vector<PlannedPosture>& postures) {
-  constexpr size_t kStride = 3, kFarStride = 8;
+  constexpr size_t kStride = 8;
   FeetPlacer placer(model, stance);
   std::vector<VectorXd> qs;
-  bool found = true;  // the last of them
-  const auto find = [&](size_t k) -> std::optional<Placement> {
-    if (!found && !placer.reaches(postures[k])) return placer.placeFreely(postures[k], stance.q);
-    return placer.place(postures[k], qs.empty() ? stance.q : qs.back(), found);
-  };
-  const auto append = [&](const std::optional<Placement>& placement) {
-    found = placement.has_value();
-    qs.push_back(found ? placement->q : placer.hang(postures[qs.size()]));
-  };
-  std::optional<Placement> last;
+  size_t tried = 0;
+  bool found = true;
   while (qs.size() < postures.size()) {
-    // The way of the base is searched at one of several postures, and lies between those beside it. Beside a posture that is not
-    // found others mostly are not, either.
-    const size_t first = qs.size(), stride = found ? kStride : kFarStride,
-                 at = first == 0 ? 0 : std::min(first + stride, postures.size()) - 1;
-    const std::optional<Placement> next = find(at);
-    while (qs.size() < at) {
-      const size_t k = qs.size();
-      std::optional<Placement> between;
-      const double share = static_cast<double>(k + 1 - first) / static_cast<double>(at + 1 - first);
-      if (last && next) between = placer.placeBetween(*last, *next, share, postures[k], qs.back());
-      if (!between && (found || next)) between = find(k);
-      append(between);
+    // Beside a posture that is not found others mostly are not, either: one of several is tried, and those between are
+    // like it.
+    if (!found && qs.size() >= tried) {
+      tried = std::min(qs.size() + kStride, postures.size());
+      if (!placer.reaches(postures[tried - 1]) && !placer.placeFreely(postures[tried - 1], stance.q)) {
+        while (qs.size() < tried) qs.push_back(placer.hang(postures[qs.size()]));
+        continue;
+      }
     }
-    append(next);
-    last = next;
+    const PlannedPosture& planned = postures[qs.size()];
+    std::optional<VectorXd> q = found || placer.reaches(planned)
+                                    ? placer.place(planned, qs.empty() ? stance.q : qs.back(), found)
+                                    : placer.placeFreely(planned, stance.q);
+    found = q.has_value();
+    qs.push_back(found ? std::move(*q) : placer.hang(planned));
   }
   return qs;
 }

@@ -18,9 +18,8 @@ struct PlannedPosture {
 /// Closed configurations with the feet of `stance` where they are planned. The base keeps its place and its rotation, but is
 /// raised or lowered as little as legs need. Each posture is found from the one before, or else from the stance, within ranges of
 /// joints, and leaves linkages well before their dead points (transmissions from 0.5 to 2), or at least on their side (by
-/// kLeastTransmission). If that fails, soles in the air may tilt; if that fails too, the base takes the place and rotation that legs give
-/// it, next to the posture before; and else all soles may tilt, or the joints are those of the stance.
-/// Heights of the base are searched at every third posture; between them they are interpolated where postures are found so.
+/// kLeastTransmission). If that fails, soles in the air may tilt; then the base takes the place and rotation that legs give it, next to
+/// the posture before; then all soles may tilt. If that fails too, the joints are those of the stance.
 std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const std::vector<PlannedPosture>& postures);
 inline constexpr double kLeastTransmission = 0.15;
 

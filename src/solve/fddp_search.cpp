@@ -11,7 +11,7 @@ constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
 // Differences of costs below this share of the cost are rounding: they neither accept nor reject a step.
 constexpr double kCostRounding = 1e-14;
 constexpr double kClosingShare = 0.5;  // of Eq. (4): the most that Eq. (8) may be
-constexpr double kHardly = 1e3;  // times the least regularization, which shortens no step that rounding could hide
+constexpr double kHardly = 1e3;        // over the least regularization: up to there a step is as good as undamped
 
 }  // namespace
 
