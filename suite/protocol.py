@@ -41,6 +41,7 @@ IPOPT = {
     "IPOPT, Gauss-Newton": ["--hessian", "gauss-newton"],
     "IPOPT, L-BFGS": ["--hessian", "l-bfgs"],
 }
+KEEP_MARGINS = ["--dead-point-margin", "0.1499999"]  # hardly less than the default: those of linkages then stay as they are
 STARTS = ("optimum", "unperturbed")  # besides numbers of guesses: where the archive ends and where it began
 NONE = {"converged": False, "cost": None, "violation": None, "iterations": None, "seconds": None}
 
@@ -116,21 +117,30 @@ def run_or_end(command, longest):
     return status, seconds
 
 
+def split_margins(options):
+    """Options of a motion, and its margins of single linkages."""
+    prefix = "dead-point-margin of "
+    margins = {name.removeprefix(prefix): value for name, value in options.items() if name.startswith(prefix)}
+    return {name: value for name, value in options.items() if not name.startswith("dead-point-margin")}, margins
+
+
 def run(bielle, entry, solved, start, output, options, longest):
     """What a run leaves of itself: outcome, cost, violation, iterations, seconds."""
     summary = json.loads((solved / "summary.json").read_text(encoding="utf-8"))
     command = [bielle, "solve", entry["motion"], "--robot", summary["robot_file"], "--warm-start", start, "-o", output,
                "--threads", "1", "--max-iterations", ITERATIONS, "--quiet", "--no-check", "--no-report", *options]
-    for name, value in summary["options"].items():
-        if not name.startswith("dead-point-margin"):
-            command += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
+    problem, margins = split_margins(summary["options"])
+    for name, value in problem.items():
+        command += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
+    if "--dead-point-margin" not in options:
+        command += KEEP_MARGINS
+        for name, value in margins.items():
+            command += ["--dead-point-margin-of", f"{name}={value}"]
     status, seconds = run_or_end(command, longest)
     if status == -signal.SIGXCPU:
         return {**NONE, "end": "too late"}
     result = json.loads((output / "summary.json").read_text(encoding="utf-8"))
-    def list_others(options):
-        return {name: value for name, value in options.items() if not name.startswith("dead-point-margin")}
-    if list_others(result["options"]) != list_others(summary["options"]):
+    if split_margins(result["options"])[0] != problem:
         return {**NONE, "end": "other stages"}  # the solver made them shorter: another problem
     return {"converged": result["converged"], "cost": result["cost"],
             "violation": result["constraints"]["largest_violation"], "iterations": result["iterations"],

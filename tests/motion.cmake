@@ -1,6 +1,7 @@
 bielle_test(walk SOURCES test_walk.cpp LIBS bielle_motion)
 bielle_test(commanded_walk SOURCES test_commanded_walk.cpp LIBS bielle_motion)
 bielle_test(kinematic_guess SOURCES test_kinematic_guess.cpp LIBS bielle_motion)
+bielle_test(mended_guess SOURCES test_mended_guess.cpp LIBS bielle_motion bielle_analysis)
 bielle_test(run SOURCES test_run.cpp LIBS bielle_motion)
 bielle_test(stairs SOURCES test_stairs.cpp LIBS bielle_motion)
 bielle_test(obstacles SOURCES test_obstacles.cpp LIBS bielle_motion)
@@ -17,7 +18,7 @@ bielle_test(serial_tables SOURCES test_serial_tables.cpp LIBS bielle_motion biel
 bielle_test(dead_points SOURCES test_dead_points.cpp LIBS bielle_motion bielle_robots)
 bielle_test(formulations SOURCES test_formulations.cpp LIBS bielle_motion)
 # Whole motions: minutes under sanitizers.
-set_tests_properties(walk periodic_motion kinematic_guess run stairs obstacles goals jump limits feasibility sequence timed_motions PROPERTIES LABELS system)
+set_tests_properties(walk periodic_motion kinematic_guess mended_guess run stairs obstacles goals jump limits feasibility sequence timed_motions PROPERTIES LABELS system)
 bielle_test(hostile_numbers SOURCES test_hostile_numbers.cpp LIBS bielle_results)
 set_tests_properties(hostile_numbers PROPERTIES LABELS system)
 bielle_test(objectives SOURCES test_objectives.cpp LIBS bielle_results)

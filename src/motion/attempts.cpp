@@ -5,6 +5,7 @@
 
 #include "motion/applied_options.h"
 #include "motion/half_cycle.h"
+#include "motion/mended_guess.h"
 #include "motion/periodic_motion.h"
 #include "solve/peak_problem.h"
 
@@ -112,15 +113,6 @@ Solution join(Solution first, Solution second) {
   return std::move(better);
 }
 
-// The posture at the start, carried along with the base of the guess.
-ShootingTrajectory holdPosture(const RobotProblem& problem, ShootingTrajectory trajectory) {
-  const Model& model = problem.model();
-  const int base = model.hasFreeFlyer() ? 7 : 0, joints = model.nq() - base;
-  const VectorXd posture = problem.initialState().segment(base, joints);
-  for (VectorXd& x : trajectory.xs) x.segment(base, joints) = posture;
-  return trajectory;
-}
-
 }  // namespace
 
 Solution solveAlone(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
@@ -134,7 +126,8 @@ Solution solveAlone(const Motion& motion, const FddpOptions& options, const Fddp
   };
   Solution result = attempt(motion, options, options.multiple_shooting ? patient : observer, start);
   if (result.summary.termination == FddpTermination::Failed && result.summary.iterations == 0) {
-    start = {holdPosture(*motion.problem, std::move(start.trajectory)), {}};
+    restNodes(*motion.problem, start.trajectory);
+    start.multipliers = {};
     result = attempt(motion, options, observer, start);
   }
   lost = lost && result.summary.termination == FddpTermination::Interrupted;

@@ -8,7 +8,7 @@ namespace bielle {
 Solution attempt(const Motion& motion, const FddpOptions& solver, const FddpObserver& observer,
                  const StartingPoint& start);
 
-// One, and another one if that cannot begin, from the posture at the start; if it ends as infeasible, from a larger regularization or
+// One, and another one if that cannot begin, from nodes at rest; if it ends as infeasible, from a larger regularization or
 // without multiple shooting; or if that has come nowhere after 80 iterations.
 Solution solveAlone(const Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                     StartingPoint start);

@@ -5,6 +5,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/record.h"
+#include "motion/mended_guess.h"
 
 namespace bielle {
 namespace {
@@ -49,8 +50,8 @@ Vector3d calcWayToFeet(const Model& model, Workspace& ws, const ContactPhase& ph
 }
 
 // Moves the base over the ground so that the feet are where the motion has them, unless they slip no farther than in a solved
-// motion: states then stay consistent with velocities, and a solution stays one.
-void carryToFeet(const Motion& motion, std::vector<VectorXd>& xs) {
+// motion: states then stay consistent with velocities, and a solution stays one. Returns whether they slipped.
+bool carryToFeet(const Motion& motion, std::vector<VectorXd>& xs) {
   constexpr double kSlip = 5e-4;  // m
   const Model& model = motion.problem->model();
   Workspace ws(model);
@@ -60,9 +61,10 @@ void carryToFeet(const Motion& motion, std::vector<VectorXd>& xs) {
     ways.push_back(calcWayToFeet(model, ws, motion.schedule.getPhase(static_cast<int>(k)), xs[k]));
     farthest = std::max(farthest, ways.back().norm());
   }
-  if (farthest <= kSlip) return;
+  if (farthest <= kSlip) return false;
   for (size_t k = 0; k < ways.size(); ++k)
     if (model.hasFreeFlyer()) xs[k].head<3>() += ways[k];
+  return true;
 }
 
 // Time scales of phases of free duration, from a record of as many nodes.
@@ -109,7 +111,10 @@ StartingPoint makeStart(const MotionRecord& record, const Motion& motion) {
     if (k + 1 < nodes)
       trajectory.us[k].head(model.nu()) = record.u.row(matchRow(k, nodes - 1, record.u.rows())).transpose();
   }
-  carryToFeet(motion, trajectory.xs);
+  if (carryToFeet(motion, trajectory.xs)) {
+    leadPastDeadPoints(motion, trajectory.xs);
+    standOnFeet(motion, trajectory.xs);
+  }
   if (record.time.size() == nodes) setTimeScales(record, *motion.problem, trajectory);
   return start;
 }

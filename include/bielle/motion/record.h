@@ -51,8 +51,9 @@ Slip calcSlip(const Motion& motion, const MotionTrack& track);
 
 /// Where a solve of a motion begins, from states and torques of a record of the same robot. If the lengths agree, node by
 /// node, with the recorded durations where phases are free; otherwise each node takes the recorded one at the same
-/// fraction of the duration. If stance feet are more than 0.5 mm away from their places in the new motion, the base is
-/// moved there. Multipliers are those of the record.
+/// fraction of the duration. If stance feet are more than 0.5 mm away from their places in the new motion, it is mended: the base is
+/// moved there, linkages beyond their margins from dead points are led past them, and postures change by as little as feet at their
+/// places and closed loops need. Multipliers are those of the record.
 /// \throws InputError when the coordinates or motors differ, or the record contains numbers that are not finite
 StartingPoint makeStart(const MotionRecord& record, const Motion& motion);
 
