@@ -6,6 +6,7 @@
 
 #include "control/clock.h"
 #include "control/policy_stages.h"
+#include "solve/team.h"
 
 namespace bielle {
 namespace {
@@ -14,9 +15,14 @@ constexpr int kAhead = 3;             // stages of a policy: what is left when s
 constexpr int kAheadIfLate = 8;       // or where they may come late
 constexpr int kFirstIterations = 10;  // of the solve before the start
 
+// In real time one core is left to control, which would otherwise interrupt a solve at every instant.
+int chooseThreads(const PredictiveOptions& options) {
+  return options.threads > 0 || !options.own_thread ? options.threads : std::max(1, getDefaultThreads() - 1);
+}
+
 RecedingOptions makeSolverOptions(const PredictiveOptions& options, const RobotSize& size, int iterations) {
   RecedingOptions out;
-  out.threads = options.threads;
+  out.threads = chooseThreads(options);
   out.iterations = iterations;
   out.initial_regularization = out.min_regularization = options.regularization / (size.torque * size.torque);
   out.state_regularization_ratio = 0;  // of angles, lengths and speeds, which no common number suits
@@ -147,7 +153,7 @@ Receding WindowPlanner::makeSolver(int iterations) const {
 // From a guess that stands still, step by step to the end.
 void WindowPlanner::solveFromRest() {
   FddpOptions options;
-  options.threads = options_.threads;
+  options.threads = chooseThreads(options_);
   options.initial_regularization = kGuessRegularization;
   trajectory_ = bielle::solve(window_, std::move(trajectory_), options).trajectory;
 }

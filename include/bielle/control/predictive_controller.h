@@ -58,7 +58,8 @@ struct PredictiveOptions {
   /// Motors brake before the transmission of a linkage falls below this share of that at the start, or exceeds its reciprocal.
   /// Use a smaller value than the motion's margin (LimitOptions::dead_point_margin); 0: they do not brake.
   double dead_point_stop = 0.075;
-  int threads = 0;  ///< 0: all; at most 1024. Results are bitwise independent of it.
+  /// 0: all, or with own_thread all but one, which control has; at most 1024. Results are bitwise independent of it.
+  int threads = 0;
   /// Solves run in a separate thread; results then depend on its speed.
   bool own_thread = false;
   /// Time that a solve is given, s, from its measurement on: another one begins in a stage that leaves so much. Without a
