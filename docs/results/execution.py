@@ -383,8 +383,8 @@ nine stand, and so do all of them in MuJoCo's world (in simulated time). At comm
 with those of that time, 25 equal points that bear half of the moment about their normal, 144 stand by today's program (in simulated
 time): soles are not what lost them."""),
     ("Motions in real time", "worlds_real_time", lambda: """`--control mpc --real-time`, world and controller on the same
-two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls. Bipetto's
-fall did not recur: the same descent stood in five further runs."""),
+two cores: a solve takes the time that it takes, and the world does not wait. Seconds until a robot falls. At commit b61d0a5a
+Bipetto fell going down in MuJoCo's world, in one of six runs."""),
     ("Pushes in real time", "pushes_real_time", lambda: f"""Pushes of 10 N s from eight directions at ten instants of one
 step, with `--real-time`, by what the controller knows: the true state, or real sensors.
 {share("pushes_real_time")}."""),
@@ -397,8 +397,8 @@ policy. What needs no measurement is *prepared before*, median; where that is la
 wait. Units are those of [`bielle bench`](../speed.md). `update` is what computes torques every millisecond; the time to a
 new policy counts from the measurement that it was solved for. The goal is missed where a figure exceeds it. 99 %, the worst
 and the stages without a solve depend on how often the machine takes a core away, which is told below the table. At commit
-2ae571a6, when the same machine did so longer and more often, medians were 42 to 78 units, 99 % up to 244, the worst 638, and
-up to 13 stages had no solve."""),
+f0939d42, on a machine whose unit was twice as long, medians were 31 to 40 units, 99 % up to 101, and one thread had 33 and 61.
+All rows but the last are with as many threads as cores; by default, there is one fewer since, on two cores as in the last row."""),
 ]
 
 
