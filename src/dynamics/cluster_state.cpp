@@ -6,6 +6,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/closure_change.h"
 #include "dynamics/idle_spins.h"
+#include "dynamics/nearby_closing.h"
 #include "math/small_dense.h"
 #include "model/joint.h"
 
@@ -110,11 +111,24 @@ T updateResidual(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
   return largest + 0 * sum;
 }
 
+// Calls take(k, A(row, k)) from a column on. Lanes mostly name the same row, which is found out once for all columns.
+template <typename T, typename Take>
+void visitRow(const MatrixX<T>& A, const typename LogicOf<T>::Index& row, Eigen::Index first, const Take& take) {
+  if constexpr (!std::is_same_v<T, double>) {
+    if (isUniform(row)) {
+      const T* entry = &A(row[0], first);
+      for (Eigen::Index k = first; k < A.cols(); ++k, entry += A.outerStride()) take(k, *entry);
+      return;
+    }
+  }
+  for (Eigen::Index k = first; k < A.cols(); ++k) take(k, getEntry(&A(0, k), row));
+}
+
 // Selects the given rows of a matrix.
 template <typename T>
 void selectRows(const MatrixX<T>& all, const std::vector<typename LogicOf<T>::Index>& rows, MatrixX<T>& out) {
-  for (Eigen::Index k = 0; k < all.cols(); ++k)
-    for (size_t i = 0; i < rows.size(); ++i) out(i, k) = getEntry(&all(0, k), rows[i]);
+  for (size_t i = 0; i < rows.size(); ++i)
+    visitRow(all, rows[i], 0, [&](Eigen::Index k, const T& entry) { out(static_cast<Eigen::Index>(i), k) = entry; });
 }
 
 // J W^{-1/2} = [L, 0] Q^T with Q = Q_1 Q_2 ..., Q_p = I - beta v v^T, the v in the columns of `reflectors`. Rows are
@@ -144,7 +158,7 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
     }
     basis.rows[p] = row;
     T* v = &scratch.reflectors(0, p);
-    for (int k = p; k < n; ++k) v[k] = getEntry(&E(0, k), row);
+    visitRow(E, row, p, [v](Eigen::Index k, const T& entry) { v[k] = entry; });
     // Computes E x for the row x, including |x|^2, and from it E v with v = x - pivot e_p.
     for (Eigen::Index r = 0; r < E.rows(); r += kChunk) {
       Rows sum = Rows::Zero();
@@ -167,8 +181,10 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
     for (int r = 0; r < m; ++r) rest[r] -= E(r, p) * E(r, p);
     setEntry(rest.data(), row, taken);
   }
-  for (int k = 0; k < rank; ++k)
-    for (int p = k; p < rank; ++p) basis.L(p, k) = getEntry(&E(0, k), basis.rows[p]);
+  for (int p = 0; p < rank; ++p)
+    visitRow(E, basis.rows[p], 0, [&](Eigen::Index k, const T& entry) {
+      if (k <= p) basis.L(p, k) = entry;
+    });
   // The remainder must be nothing but rounding.
   T left = 0;
   for (int r = 0; r < m; ++r) {
@@ -282,22 +298,57 @@ typename LogicOf<T>::Mask updateClusterState(const ReducedCluster& cluster, Clus
   return updateBases(cluster, scratch, out);
 }
 
-// Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays. A lane that has
-// converged is left unchanged.
+namespace {
+
+// scratch.correction <- the step of Newton's method for it: with scratch.newton where it is refreshed, else with the matrix at the start.
 template <typename T>
-typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
-                                       const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
-                                       const VectorX<T>& zeta_guess, ClusterStateOf<T>& out) {
+void solveNewton(const ClusterBasisOf<T>& start, const typename LogicOf<T>::Mask& refreshed,
+                 ClusterScratchOf<T>& scratch) {
+  VectorX<T>& correction = scratch.correction;
+  if (!any(refreshed)) {
+    solveGram(start, correction);
+    return;
+  }
+  auto nearby = scratch.rest.head(correction.size());
+  if (any(!refreshed)) {
+    nearby = correction;
+    solveGram(start, nearby);
+  }
+  solveFactorized(scratch.newton, scratch.pivots, correction);
+  if (any(!refreshed))
+    for (Eigen::Index r = 0; r < correction.size(); ++r) correction[r] = select(refreshed, correction[r], nearby[r]);
+}
+
+// Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays; from nearby with that of
+// q_0, whose factors are there, as long as that converges as fast. A lane that has converged is left unchanged.
+template <typename T>
+typename LogicOf<T>::Mask closeFrom(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                    const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
+                                    const VectorX<T>& zeta_guess, bool is_nearby, ClusterStateOf<T>& out) {
   using Mask = typename LogicOf<T>::Mask;
-  for (Eigen::Index k = 0; k < start.J.cols(); ++k) scratch.JW.col(k) = start.J.col(k) * cluster.inverse_metric[k];
+  const auto updateProducts = [&] {
+    for (Eigen::Index k = 0; k < start.J.cols(); ++k) scratch.JW.col(k) = start.J.col(k) * cluster.inverse_metric[k];
+  };
+  if (!is_nearby) updateProducts();
+  // step += s W^{-1} J(q_0)^T zeta, from nearby mostly without the products, and always rounded in the same way.
+  const auto addToStep = [&](const VectorX<T>& zeta, double s) {
+    if (!is_nearby) {
+      addSmallProductTransposed(scratch.JW, zeta, out.step, s);
+      return;
+    }
+    auto along = scratch.reflectors.col(0);
+    along.setZero();
+    addSmallProductTransposed(start.J, zeta, along, s);
+    for (Eigen::Index k = 0; k < along.size(); ++k) out.step[k] += along[k] * cluster.inverse_metric[k];
+  };
   out.step = d;
   out.zeta.setZero();
   if (zeta_guess.size()) {
     out.zeta = zeta_guess;
-    addSmallProductTransposed(scratch.JW, out.zeta, out.step, -1);
+    addToStep(out.zeta, -1);
   }
-  const Mask never = T(0) < T(0);
-  Mask closed = never, failed = never;
+  const Mask never = T(0) < T(0), always = T(0) <= T(0);
+  Mask closed = never, failed = never, refreshed = never;
   T previous = 0;
   constexpr int kMaxIterations = 30;
   for (int i = 0; i <= kMaxIterations; ++i) {
@@ -312,20 +363,38 @@ typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScr
     closed = closed || gap <= kClosedTolerance || (stalled && gap <= kAcceptedTolerance);
     const Mask active = !(closed || failed);
     if (!any(active) || i == kMaxIterations) break;
-    const Mask slow = i > 0 ? active && gap > 0.05 * previous : active;
+    const Mask slow = i > 0 ? active && gap > 0.05 * previous : is_nearby ? never : active;
+    if (is_nearby && any(slow)) updateProducts();
     if (any(slow)) failed = failed || (slow && !updateNewton(cluster, scratch, start, slow));
+    refreshed = refreshed || slow;
     previous = gap;
     for (size_t r = 0; r < start.rows.size(); ++r)
       scratch.correction[r] = getEntry(scratch.residual.data(), start.rows[r]);
     // The residual falls by J dq (notation.h), and dq = -W^{-1} J(q_0)^T dzeta.
-    solveFactorized(scratch.newton, scratch.pivots, scratch.correction);
+    solveNewton<T>(start, is_nearby ? refreshed : always, scratch);
     for (Eigen::Index r = 0; r < out.zeta.size(); ++r)
       scratch.correction[r] = select(active && !failed, scratch.correction[r], T(0));
     out.zeta -= scratch.correction;
-    addSmallProductTransposed(scratch.JW, scratch.correction, out.step);
+    addToStep(scratch.correction, 1);
   }
   scratch.closed = closed;
   return any(closed) ? closed && updateBases(cluster, scratch, out) : closed;
+}
+
+}  // namespace
+
+template <typename T>
+typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                       const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
+                                       const VectorX<T>& zeta_guess, ClusterStateOf<T>& out) {
+  return closeFrom(cluster, scratch, start, d, zeta_guess, false, out);
+}
+
+template <typename T>
+typename LogicOf<T>::Mask closeNearbyCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                             const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
+                                             const VectorX<T>& zeta_guess, ClusterStateOf<T>& out) {
+  return closeFrom(cluster, scratch, start, d, zeta_guess, true, out);
 }
 
 template <typename T>
@@ -368,6 +437,10 @@ template bool closeCluster(const ReducedCluster&, ClusterScratch&, const Cluster
                            ClusterState&);
 template LaneMask closeCluster(const ReducedCluster&, ClusterScratchOf<Lanes>&, const ClusterBasisOf<Lanes>&,
                                ArgumentsOf<Lanes>::ConstVector, const VectorX<Lanes>&, ClusterStateOf<Lanes>&);
+template bool closeNearbyCluster(const ReducedCluster&, ClusterScratch&, const ClusterBasis&, ConstVectorRef,
+                                 const VectorXd&, ClusterState&);
+template LaneMask closeNearbyCluster(const ReducedCluster&, ClusterScratchOf<Lanes>&, const ClusterBasisOf<Lanes>&,
+                                     ArgumentsOf<Lanes>::ConstVector, const VectorX<Lanes>&, ClusterStateOf<Lanes>&);
 template std::string describeFailure(const ReducedCluster&, const ClusterScratch&, int);
 template std::string describeFailure(const ReducedCluster&, const ClusterScratchOf<Lanes>&, int);
 template struct ClusterBasisOf<double>;

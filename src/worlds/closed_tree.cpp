@@ -8,6 +8,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "dynamics/energy.h"
 #include "dynamics/joint_force.h"
+#include "dynamics/nearby_closing.h"
 #include "dynamics/whole_turns.h"
 #include "math/small_dense.h"
 #include "model/joint.h"
@@ -30,6 +31,31 @@ void multiplyTransposed(const MatrixX<T>& A, const VectorX<T>& x, Out&& out) {
     out.setZero();
     addSmallProductTransposed(A, x, out);
   }
+}
+
+// updateVelocities() and updateDrift(), without what derivatives alone need.
+template <typename T>
+void updateMotion(const Model& model, WorkspaceOf<T>& ws, const VectorX<T>& v) {
+  ws.v = v;
+  ws.a.setZero();
+  ws.A[0] << -model.gravity().cast<T>(), Vector3<T>::Zero();
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    const bool sequential = joint.kind == JointKind::Universal;
+    Vector6<T> V = ws.V[joint.parent], A = ws.A[joint.parent];
+    if (!sequential && joint.nv > 1)
+      for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) V += ws.J.col(k) * v[k];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) {
+      const Vector6<T> J = ws.J.col(k), dJ = crossMotion(V, J);
+      ws.dJ.col(k) = dJ;
+      A += dJ * v[k];
+      if (sequential || joint.nv == 1) V += J * v[k];
+    }
+    ws.V[i] = V;
+    ws.A[i] = A;
+    if (model.bodies()[i].inertia.mass > 0) ws.h[i].noalias() = ws.Y[i] * V;
+  }
+  ws.stage = WorkspaceStage::Velocity;
 }
 
 template <typename T>
@@ -210,7 +236,7 @@ MaskOf<T> ClosedTreeOf<T>::driftAtOnce(const T& h, const Mask& which, bool is_la
       assignLanes(!done, Vector::Zero(c.d.size()), c.d);
       assignLanes(!done, Vector::Zero(c.zeta.size()), c.zeta);
     }
-    const Mask closed = closeCluster<T>(c.cluster, c.scratch, state_.clusters[i].basis, c.d, c.zeta, c.next);
+    const Mask closed = closeNearbyCluster<T>(c.cluster, c.scratch, state_.clusters[i].basis, c.d, c.zeta, c.next);
     if (is_last) describe(i, done && !closed);
     done = done && closed;
     if (!any(done)) return done;
@@ -348,8 +374,7 @@ template <typename T>
 void ClosedTreeOf<T>::updateLoads(const Vector& tau, const Vector& dw, const Mask& which) {
   v_foreseen_ = state_.v;
   addReduced(dw, v_foreseen_);
-  updateVelocities<T>(model_, ws_, v_foreseen_);
-  updateDrift(model_, ws_);
+  updateMotion(model_, ws_, v_foreseen_);
   a_d_.setZero();
   for (size_t i = 0; i < clusters_.size(); ++i) {
     Cluster& c = clusters_[i];

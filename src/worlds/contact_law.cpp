@@ -67,8 +67,7 @@ T calcNorm(const Vector3<T>& x) {
 }
 
 template <typename T>
-Vector3<T> shorten(const Vector3<T>& vector, const T& length) {
-  const T norm = calcNorm(vector);
+Vector3<T> shorten(const Vector3<T>& vector, const T& norm, const T& length) {
   const auto is_longer = norm > length;
   if (!any(is_longer)) return vector;
   return select(is_longer, Vector3<T>(vector * (length / norm)), vector);
@@ -149,11 +148,13 @@ ContactForceOf<T> calcContactForce(const TouchOf<T>& touch, const T& mu, const C
   out.shift = 0.5 * h * (velocity - step.before);
   const Vector3<T> shift = x + out.shift - anchor, sliding = velocity + approach * n;
   const Vector3<T> held = -shear_stiffness * (shift - n.dot(shift) * n);
-  out.spring = shorten<T>(held, limit);
-  const Vector3<T> wanted = out.spring - shear_damping * sliding, friction = shorten<T>(wanted, limit);
+  const T stretch = calcNorm(held);
+  out.spring = shorten<T>(held, stretch, limit);
+  const Vector3<T> wanted = out.spring - shear_damping * sliding;
+  const T size = calcNorm(wanted);
+  const Vector3<T> friction = shorten<T>(wanted, size, limit);
   out.force = normal.force * n + friction;
   out.elastic = 0.5 * stiffness * mean.depth * mean.depth + 0.5 * out.spring.squaredNorm() / shear_stiffness;
-  const T stretch = calcNorm(held), size = calcNorm(wanted);
   const auto drags = stretch > limit, slips = size > limit;
   out.slides = touches && (drags || slips);
   if (with_damping) {

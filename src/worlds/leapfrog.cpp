@@ -49,6 +49,25 @@ T calcLargestOf(const VectorX<T>& x) {
   return largest + 0 * sum;
 }
 
+// Factors of A as those of factorizeSmall(), but without swaps, which lanes would do each for itself. \returns where they are sound:
+// where pivots stay well above zero, as they do while the symmetric part of A is positive definite
+template <typename T>
+MaskOf<T> factorizeInOrder(const VectorX<T>& least, MatrixX<T>& A) {
+  const auto n = static_cast<int>(A.rows());
+  auto sound = makeMask<T>(true);
+  for (int p = 0; p < n; ++p) {
+    const T* __restrict pivot = &A(0, p);
+    sound = sound && pivot[p] > least[p];
+    const T inverse = 1 / pivot[p];
+    for (int c = p + 1; c < n; ++c) {
+      T* __restrict x = &A(0, c);
+      const T f = x[p] *= inverse;
+      for (int r = p + 1; r < n; ++r) x[r] -= f * pivot[r];
+    }
+  }
+  return sound;
+}
+
 template <typename T>
 void assignMoment(const MaskOf<T>& mask, const typename LeapfrogOf<T>::Moment& from,
                   typename LeapfrogOf<T>::Moment& to) {
@@ -90,15 +109,17 @@ LeapfrogOf<T>::LeapfrogOf(const Model& model, const WorldOptions& options, const
       touches_(contacts_.points.size()),
       places_(contacts_.points.size(), Vector3<T>::Zero()),
       stop_forces_(contacts_.stops.size(), T(0)),
+      stop_rates_(stop_forces_),
       rods_(model, tree_, options.wear.frictions),
       on_bodies_(model.numBodies(), Vector6<T>::Zero()),
       factors_(tree_.size()),
-      pivots_(tree_.size()) {
+      pivots_(tree_.size()),
+      swaps_(tree_.size()) {
   u_.setZero(model.nu());
   tau_.setZero(model.nv());
   for (Vector* x : {&w_mean_, &dw_, &correction_, &residual_, &start_, &loads_, &product_, &moment_.half_last})
     x->setZero(tree_.size());
-  for (MatrixX<T>* x : {&damping_, &system_}) x->setZero(tree_.size(), tree_.size());
+  for (MatrixX<T>* x : {&damping_, &system_, &swapped_}) x->setZero(tree_.size(), tree_.size());
   moment_.wrenches.assign(model.contacts().size(), Vector6<T>::Zero());
   moment_.rod_forces.setZero(static_cast<Eigen::Index>(rods_.closures().size()));
   on_dofs_.setZero(model.nv());
@@ -310,6 +331,8 @@ MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
     for (; i < points.size() && points[i].contact == tip; ++i)
       steps_[i] = {h, linear(twist) + angular(twist).cross(places_[i])};
   }
+  for (size_t i = 0; i < contacts_.stops.size(); ++i)
+    stop_rates_[i] = calcRate(contacts_.stops[i].dof, tree_.reducedVelocity());
   com_ = getPlace(pushed_body_, model_.bodies()[pushed_body_].inertia.com.cast<T>());
   rods_.update(tree_);
   const Mask solved = solve(h, which);
@@ -380,7 +403,20 @@ void LeapfrogOf<T>::factorize(const T& h) {
       return;
     }
   }
-  factorizeSmall(system_, pivots_);
+  if constexpr (!std::is_same_v<T, double>) {
+    constexpr double kLeastPivot = 1e-4;  // over that of M^ alone
+    for (size_t p = 0; p < pivots_.size(); ++p) pivots_[p] = makeIndex<T>(static_cast<int>(p));
+    product_ = kLeastPivot * tree_.massMatrix().diagonal();
+    const Mask sound = factorizeInOrder(product_, system_);
+    if (all(sound)) return;
+    swapped_ = tree_.massMatrix();
+    swapped_ += T(0.5 * h) * damping_;
+    factorizeSmall(swapped_, swaps_);
+    assignLanes(!sound, swapped_, system_);
+    for (size_t p = 0; p < pivots_.size(); ++p) pivots_[p] = select(sound, pivots_[p], swaps_[p]);
+  } else {
+    factorizeSmall(system_, pivots_);
+  }
 }
 
 template <typename T>
@@ -542,8 +578,7 @@ void LeapfrogOf<T>::addStops(const Vector& w, Vector& loads, MatrixX<T>* damping
   for (size_t i = 0; i < contacts_.stops.size(); ++i) {
     const JointStop& stop = contacts_.stops[i];
     const T q = tree_.configuration()[stop.coordinate];
-    const T before = calcRate(stop.dof, tree_.reducedVelocity());  // in the first half of the step
-    StopForceOf<T> force = calcStopForce<T>(stop, q, calcRate(stop.dof, w), {moment_.length, before});
+    StopForceOf<T> force = calcStopForce<T>(stop, q, calcRate(stop.dof, w), {moment_.length, stop_rates_[i]});
     for (T StopForceOf<T>::*part : {&StopForceOf<T>::force, &StopForceOf<T>::elastic, &StopForceOf<T>::damping})
       force.*part *= mass_ratio_;
     stop_forces_[i] = force.force;

@@ -121,11 +121,11 @@ class LeapfrogOf {
   T friction_, mass_ratio_ = 1;
   ClosedTreeOf<T> tree_;
   ContactSetOf<T> contacts_;
-  std::vector<ContactForceOf<T>> forces_;  // of the last step, per point
-  std::vector<ContactStepOf<T>> steps_;    // of the points
-  std::vector<TouchOf<T>> touches_;        // at places_
-  std::vector<Vector3<T>> places_;         // where they acted, m (world)
-  std::vector<T> stop_forces_;
+  std::vector<ContactForceOf<T>> forces_;    // of the last step, per point
+  std::vector<ContactStepOf<T>> steps_;      // of the points
+  std::vector<TouchOf<T>> touches_;          // at places_
+  std::vector<Vector3<T>> places_;           // where they acted, m (world)
+  std::vector<T> stop_forces_, stop_rates_;  // rates: in the first half of the step
   RodPivotsOf<T> rods_;
   std::vector<Vector6<T>> on_bodies_;
   Vector on_dofs_;                                                   // nv
@@ -133,10 +133,10 @@ class LeapfrogOf {
   Vector3<T> push_ = Vector3<T>::Zero(), com_ = Vector3<T>::Zero();  // N; of the pushed body, m
   bool is_pushed_ = false;
   Vector w_mean_, dw_, correction_, residual_, start_, loads_, product_;  // size
-  MatrixX<T> damping_, system_;                                           // size x size
+  MatrixX<T> damping_, system_, swapped_;                                 // size x size
   bool slides_ = false;  // whether damping_ is not symmetric, or negative
   Eigen::LLT<MatrixXd> factors_;
-  std::vector<typename LogicOf<T>::Index> pivots_;  // size; of system_
+  std::vector<typename LogicOf<T>::Index> pivots_, swaps_;  // size; of system_ and swapped_
   Moment moment_, moment_kept_, moment_before_;
   Points points_kept_, points_before_;
   std::array<Trouble, kLanesOf<T>> trouble_{};
