@@ -1,4 +1,5 @@
 // The report of `bielle bench` is complete. Nothing here depends on speed.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>
@@ -27,15 +28,40 @@ TEST_CASE("bench: many worlds are measured on one thread and on two") {
   BenchOptions options;
   options.extent = BenchExtent::Quick;
   const BenchReport report = runBatchBench(loadOwn("bipetto").model, options);
-  REQUIRE(report.batch.size() == 8);
+  REQUIRE(report.batch.size() == 12);
   for (size_t i = 0; i < report.batch.size(); ++i) {
     const BatchTime& t = report.batch[i];
-    CHECK(t.falls == (i >= 4));
+    CHECK(t.motion == (i < 4 ? BatchMotion::Stand : i < 8 ? BatchMotion::Walk : BatchMotion::Fall));
     CHECK(t.time_step == (i % 4 < 2 ? 1e-3 : 2.5e-4));
     CHECK(t.threads == 1 + static_cast<int>(i % 2));
-    CHECK((t.rate > 0 && t.rounds >= (t.falls ? 0 : 1) && t.rounds < 20 && t.broken == 0));
+    CHECK((t.rate > 0 && t.rounds >= (t.motion == BatchMotion::Fall ? 0 : 1) && t.rounds < 20 && t.broken == 0));
   }
   CHECK(report.nodes.empty());
+}
+
+TEST_CASE("bench: worlds of a walk begin all over it and follow it") {
+  const Model model = loadOwn("bipetto").model;
+  BatchTask task(model, BatchMotion::Walk);
+  constexpr int kWorlds = 8;
+  double first = 1, last = 0, largest = 0;
+  for (int i = 0; i < kWorlds; ++i) {
+    first = std::min(first, task.makeConfiguration(i)[0]);
+    last = std::max(last, task.makeConfiguration(i)[0]);
+    largest = std::max(largest, task.makeVelocity(i)[0]);
+  }
+  CHECK(last - first > 0.3);  // of 0.48 m
+  CHECK(largest > 0.3);
+  const BatchSpeed speed = measureBatch(task, kWorlds, 0.2, 1e-3, 1);
+  CHECK(speed.broken == 0);
+  CHECK((speed.deviation > 0 && speed.deviation < 0.05));  // rad; the legs swing by half a radian
+  // The plan goes on, and its torques depend on the state.
+  const VectorXd q = task.makeConfiguration(0), v = task.makeVelocity(0);
+  CHECK(task.calcDeviation(0, 0, q) < 1e-9);
+  CHECK(task.calcDeviation(200, 0, q) > 0.05);
+  const VectorXd u = task.calcTorques(0, 0, q, v);
+  VectorXd moved = v;
+  moved[model.motors()[0].dof] += 1;
+  CHECK((task.calcTorques(0, 0, q, moved) - u).norm() > 0.1);
 }
 
 TEST_CASE("bench: every work is measured, in both formulations") {

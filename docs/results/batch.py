@@ -2,7 +2,9 @@
 """Writes docs/results/batch.md and docs/images/batch.svg: the speed of many worlds at once, by bielle-batch-speed beside the
 command.
 
-    docs/results/batch.py [--bielle build/bin/bielle] [--rounds 9] [--quick]
+    docs/results/batch.py [--bielle build/bin/bielle] [--rounds 9] [--speed] [--quick]
+
+--speed: steps per second alone; other sections of the page stay as they are.
 
 Processor time, each kind of world in turn: other programs on the machine lengthen all alike, more or less.
 """
@@ -26,6 +28,9 @@ ROBOTS = {"Bipetto": ["--robot", common.SOURCE / "robots/bipetto"], "Cleobot": [
 STEPS = (2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2)  # s
 PRECISE = 1e-3  # rad or m
 GOALS = {(8, 1e-3): 8, (8, 2.5e-4): 12, (4, 1e-3): 4, (4, 2.5e-4): 6}
+
+
+MOTIONS = {"stands": [], "walks": ["--walks"], "falls": ["--falls"]}
 
 
 def measure(program, *options):
@@ -79,13 +84,13 @@ ends. The goal is less than 5 % of a step for what `World.step` adds.""")
                 for row in report["rows"]])
 
 
-def add_threads(page, stands, falls):
+def add_threads(page, reports):
     page.heading("Two threads")
     page.add("""Wall clock of one thread over that of two, of twice as many worlds as above, in turn; the goal is 1.9. It needs a
 machine that does nothing else.""")
     page.table(["robots", "step [ms]", "two threads over one (least to most)"],
-               [[name, f"{1e3 * row['time step [s]']:g}", f"{row['median']:.2f} ({row['least']:.2f} to {row['most']:.2f})"]
-                for name, report in (("stand", stands), ("fall", falls)) for row in report["threads"]])
+               [[name[:-1], f"{1e3 * row['time step [s]']:g}", f"{row['median']:.2f} ({row['least']:.2f} to {row['most']:.2f})"]
+                for name, report in reports.items() for row in report["threads"]])
 
 
 def find_best(runs, world):
@@ -165,7 +170,7 @@ def show_error(run):
     return "breaks off" if run["error"] is None or run["error"] > 1 else f"{run['error']:.1e}, {run['gap [m]']:.1e}"
 
 
-def describe_goals(report):
+def describe_goals(motion, report):
     parts = []
     for step in dict.fromkeys(row["time step [s]"] for row in report["runs"]):
         runs = {row["world"]: row["median"] for row in report["runs"] if row["time step [s]"] == step}
@@ -173,14 +178,25 @@ def describe_goals(report):
         if goal:
             verdict = "met" if ratio >= goal else "missed"
             parts.append(f"{goal} times MuJoCo's steps at {1e3 * step:g} ms: {ratio:.1f}, {verdict}")
+    return f"Goals for a robot that {motion}: " + "; ".join(parts) + "."
+
+
+def describe_memory(report):
     memory = report["memory [kB]"]
-    parts.append(f"less than 30 kB a world: {memory:.1f}, {'met' if memory < 30 else 'missed'}")
-    return "Goals for a robot that stands: " + "; ".join(parts) + "."
+    return f"Memory of 4,096 worlds: {memory:.1f} kB each; the goal is less than 30, {'met' if memory < 30 else 'missed'}."
+
+
+def describe_walk(report):
+    """How far the worlds keep to the plan, so that it is a walk that is measured."""
+    worst = {name: max(row["deviation"] for row in report["runs"] if row["world"] == name) for name in ("many", "mujoco")}
+    return f"""From the plan, no coordinate is farther than {worst['many']:.3f} rad or m at the end in Bielle's worlds, and
+{worst['mujoco']:.3f} in MuJoCo's."""
 
 
 def main():
     parser = common.make_parser(__doc__)
     parser.add_argument("--rounds", type=int, default=9, help="runs of each kind of world")
+    parser.add_argument("--speed", action="store_true", help="measure steps per second alone, and keep the other sections")
     arguments = parser.parse_args()
     command = shutil.which(arguments.bielle) or arguments.bielle
     program = os.path.join(os.path.dirname(os.path.realpath(command)), "bielle-batch-speed")
@@ -188,11 +204,11 @@ def main():
     if not arguments.quick:
         options = ["--rounds", arguments.rounds, "--worlds", 32, "--seconds", 0.2]
     robot = common.SOURCE / "robots/bipetto"
-    stands, falls = (measure(program, "--robot", robot, *options, *more) for more in ([], ["--falls"]))
+    reports = {motion: measure(program, "--robot", robot, *options, *more) for motion, more in MOTIONS.items()}
     page = common.Page(__file__, "Many worlds at once", common.describe_run(arguments.commit))
     load = os.getloadavg()[0]
     page.add(f"""Steps per second of processor time on one thread, all in turn, medians; `validation/batch` measures them. The
-library is compiled for this processor, with registers of {REGISTERS[stands['register']]}. The load average was {load:.1f}. Torques change every millisecond.
+library is compiled for this processor, with registers of {REGISTERS[reports['stands']['register']]}. The load average was {load:.1f}. Torques change every millisecond.
 MuJoCo runs the file that `bielle convert --to mjcf` writes, with closures and contacts as soft as its time step allows.""")
     page.add("[Other builds and engines](batch_builds.md) and [where pushed walks end](batch_ends.md) have pages of their own.")
     if load > 1.5:  # it counts itself
@@ -200,15 +216,26 @@ MuJoCo runs the file that `bielle convert --to mjcf` writes, with closures and c
     page.heading("Bipetto stands")
     page.add("""Springs and dampers on its motors hold a posture; pushes of different size at the trunk, for 50 ms, make the
 worlds differ. A round of Newton's method is one for all robots of a register, per step.""")
-    add_table(page, stands)
-    page.add(describe_goals(stands))
+    add_table(page, reports["stands"])
+    page.add(describe_goals("stands", reports["stands"]))
+    page.add(describe_memory(reports["stands"]))
+    page.heading("Bipetto walks")
+    page.add(f"""At 0.4 m/s, by the torques and the gains of a plan, each world from another of its instants on, so that in a register
+some stand on both feet while others swing one or land. All kinds of worlds carry out the same ones, each with the torques that its
+own state asks for. {describe_walk(reports["walks"])}""")
+    add_table(page, reports["walks"])
+    page.add(describe_goals("walks", reports["walks"]))
     page.heading("Bipetto falls")
     page.add("""Limp robots are dropped from 5 cm with random velocities of the trunk of up to 1 m/s and 1 rad/s. Soles land and
 slide, joints run into stops, and steps are halved, at other times in every world: a register goes as slowly as its slowest robot.
 MuJoCo's steps are never halved.""")
-    add_table(page, falls)
+    add_table(page, reports["falls"])
+    if arguments.speed:
+        page.keep("Precision", "Two threads", "From Python")
+        page.write(arguments.quick)
+        return
     add_precision(page, program, arguments.quick)
-    add_threads(page, stands, falls)
+    add_threads(page, reports)
     if overhead := measure_overhead(command, 8 if arguments.quick else 256):
         add_overhead(page, overhead)
     page.write(arguments.quick)

@@ -4,6 +4,7 @@ older version of Bielle. What it measures depends on what it is given:
 
     docs/results/batch_builds.py [--bielle build/bin/bielle] [--avx2 bielle-batch-speed] [--older DIRECTORY] [--rounds 7] [--quick]
 
+Sections that it is not given anything for stay as the page has them.
 --avx2: this program of a build with -DBIELLE_NATIVE=OFF -DBUILD_SHARED_LIBS=OFF -DCMAKE_CXX_FLAGS=-march=x86-64-v3.
 --older: the directory `python` of a build of an older version, whose package `bielle` has `World(count=)`; OMP_NUM_THREADS sets its
 threads. MuJoCo 3 is npm's @mujoco/mujoco, if $BIELLE_NODE_MODULES is the directory of modules that has it.
@@ -28,14 +29,14 @@ def find_beside(command, name):
 
 def add_speed(page, program, options, sentence):
     robot = ["--robot", common.SOURCE / "robots/bipetto"]
-    stands, falls = (batch.measure(program, *robot, *options, *more) for more in ([], ["--falls"]))
-    page.add(f"Registers of {batch.REGISTERS[stands['register']]}. {sentence}")
-    page.add("Bipetto stands; the worlds are those of [the page on speed](batch.md#bipetto-stands):")
-    batch.add_table(page, stands)
-    page.add(batch.describe_goals(stands))
-    page.add("Bipetto [falls](batch.md#bipetto-falls):")
-    batch.add_table(page, falls)
-    return stands, falls
+    reports = {motion: batch.measure(program, *robot, *options, *more) for motion, more in batch.MOTIONS.items()}
+    page.add(f"Registers of {batch.REGISTERS[reports['stands']['register']]}. {sentence} The worlds are those of [the page on speed](batch.md).")
+    for motion, report in reports.items():
+        page.add(f"Bipetto [{motion}](batch.md#bipetto-{motion}):")
+        batch.add_table(page, report)
+        if motion != "falls":
+            page.add(batch.describe_goals(motion, report))
+    return reports
 
 
 def list_rates(report):
@@ -43,9 +44,9 @@ def list_rates(report):
 
 
 def compare_registers(wide, narrow):
-    shares = [[b / a for a, b in zip(list_rates(one), list_rates(other))] for one, other in zip(wide, narrow)]
-    return f"""Eight worlds take two registers of AVX2: of the steps with those of AVX-512 above, it takes
-{min(shares[0]):.0%} to {max(shares[0]):.0%} where Bipetto stands, and {min(shares[1]):.0%} to {max(shares[1]):.0%} where it falls."""
+    shares = {motion: [b / a for a, b in zip(list_rates(wide[motion]), list_rates(narrow[motion]))] for motion in wide}
+    parts = [f"{min(share):.0%} to {max(share):.0%} where Bipetto {motion}" for motion, share in shares.items()]
+    return f"Eight worlds take two registers of AVX2: of the steps with those of AVX-512 above, it takes {', '.join(parts)}."
 
 
 def add_others(page, program, quick):
@@ -74,7 +75,6 @@ def stand(package, threads, quick):
 
 
 def add_older(page, older, newer, rounds, quick):
-    page.heading("Over an older version")
     page.add(f"""{WORLDS} Bipettos stand in `bielle.World(model, count={WORLDS})` at 1 ms (`docs/results/batch_stand.py`): steps per
 second of processor time of both packages in turn, medians of {rounds} rounds, least to most. The goal is {GOAL_OLDER} times as
 many.""")
@@ -104,22 +104,30 @@ def main():
     page = common.Page(__file__, "Many worlds at once: other builds and engines", common.describe_run(arguments.commit))
     page.add(f"""Processor time, everything in turn in one run, so that other programs on the machine lengthen all alike, more or
 less; the load average was {os.getloadavg()[0]:.1f} at the beginning. [The page on speed](batch.md) tells what is measured.""")
+    newest, avx2, over = "Beside the newest MuJoCo", "AVX2", "Over an older version"
     wide = None
     if batch.find_newest():
-        page.heading("Beside the newest MuJoCo")
+        page.heading(newest)
         wide = add_speed(page, find_beside(command, "bielle-batch-speed"), options, """MuJoCo 3 is npm's, WebAssembly in node, which is
 slower than native code. Its clock runs for a millisecond of steps at a time, between which it talks to the program that measures and
 finds its caches cold: steps of 0.25 ms tell more of it than those of 1 ms.""")
+    else:
+        page.keep(newest)
     os.environ.pop("BIELLE_NODE_MODULES", None)  # once is enough: it takes seconds to begin
     if arguments.avx2:
-        page.heading("AVX2")
+        page.heading(avx2)
         narrow = add_speed(page, arguments.avx2, options, "MuJoCo is the same library as elsewhere.")
         if wide:
             page.add(compare_registers(wide, narrow))
         add_others(page, arguments.avx2, arguments.quick)
+    else:
+        page.keep(avx2)
     if arguments.older:
+        page.heading(over)
         newer = pathlib.Path(find_beside(command, "")).parent / "python"
         add_older(page, arguments.older, newer, arguments.rounds, arguments.quick)
+    else:
+        page.keep(over)
     page.write(arguments.quick)
 
 

@@ -146,6 +146,23 @@ class Page:
         self.lines += ["", "| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
         self.lines += ["| " + " | ".join(row) + " |" for row in rows]
 
+    def keep(self, *headings):
+        """Sections as the page has them, where this run does not measure them again; each says which run did."""
+        if not self.path.exists():
+            return
+        old = self.path.read_text(encoding="utf-8").splitlines()
+        run = old[2].strip("*").partition(". Written by")[0]
+        for heading in headings:
+            if f"## {heading}" not in old:
+                continue
+            start = old.index(f"## {heading}")
+            end = next((k for k in range(start + 1, len(old)) if old[k].startswith("## ")), len(old))
+            section = "\n".join(old[start + 1 : end]).strip()
+            self.heading(heading)
+            if not section.startswith("*Of "):
+                self.add(f"*Of {run}.*")
+            self.lines += ["", section]
+
     def write(self, quick):
         text = "\n".join(self.lines) + "\n"
         if quick:

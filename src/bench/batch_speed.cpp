@@ -6,6 +6,9 @@
 #include <random>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+#include "bielle/motion/registry.h"
+#include "bielle/motion/solve.h"
 #include "bielle/worlds/batch.h"
 #include "dynamics/largest_gaps.h"
 #include "math/lane_registers.h"
@@ -17,45 +20,96 @@ double readWallClock() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+// The plan, then once more from there for gains with small penalties (PlanControl::Gains).
+Policy makeWalk(const Model& model) {
+  MotionRequest request = findMotion("", "walk").request;
+  request.options.set("speed", 0.4);
+  request.options.set("steps", 4);
+  Solution solution = solve(makeMotion(model, request));
+  SolveOptions options;
+  options.solver = FddpOptions();
+  options.start = StartingPoint{solution.trajectory};
+  options.refine = false;
+  solution = solve(solution.motion, options);
+  if (!solution.converged())
+    throw InputError(model.name(), "walk at 0.4 m/s",
+                     std::string("its solve ended as: ") + getName(solution.summary.termination),
+                     "give a robot that walks so, such as bipetto");
+  return makePolicy(solution);
+}
+
 }  // namespace
 
-BatchTask::BatchTask(const Model& model, bool falls) : model_(model), falls_(falls), hold_(model) {}
+const char* getName(BatchMotion motion) {
+  return motion == BatchMotion::Stand ? "stand" : motion == BatchMotion::Walk ? "walk" : "fall";
+}
 
-VectorXd BatchTask::makeConfiguration() const {
+BatchTask::BatchTask(const Model& model, BatchMotion motion) : model_(model), motion_(motion), hold_(model) {
+  if (motion == BatchMotion::Walk) policy_ = makeWalk(model);
+}
+
+// Any number of worlds are about evenly spread over the walk.
+const Policy::Stage& BatchTask::getStart(int world) const {
+  constexpr double kGolden = 0.6180339887498949;
+  const double share = std::fmod((world + 1) * kGolden, 1);
+  return policy_->stages()[static_cast<size_t>(share * static_cast<double>(policy_->stages().size()))];
+}
+
+VectorXd BatchTask::makeConfiguration(int world) const {
+  if (policy_) return getStart(world).q;
   VectorXd q = hold_.posture();
-  if (falls_) q[2] += 0.05;
+  if (motion_ == BatchMotion::Fall) q[2] += 0.05;
   return q;
 }
 
 VectorXd BatchTask::makeVelocity(int world) const {
+  if (policy_) return getStart(world).v;
   VectorXd v = VectorXd::Zero(model_.nv());
   std::mt19937 generator(static_cast<unsigned>(world));
   std::uniform_real_distribution<double> any(-1, 1);
-  for (int i = 0; i < 6 && falls_; ++i) v[i] = any(generator);
+  for (int i = 0; i < 6 && motion_ == BatchMotion::Fall; ++i) v[i] = any(generator);
   return v;
 }
 
-VectorXd BatchTask::calcTorques(ConstVectorRef q, ConstVectorRef v) const {
-  if (falls_) return VectorXd::Zero(model_.nu());
-  return hold_.calcTorques(q, v);
+VectorXd BatchTask::calcTorques(int tick, int world, ConstVectorRef q, ConstVectorRef v) {
+  if (motion_ == BatchMotion::Stand) return hold_.calcTorques(q, v);
+  VectorXd u = VectorXd::Zero(model_.nu());
+  if (!policy_) return u;
+  measured_.time = getStart(world).start + tick * kTick;
+  measured_.q = q;
+  measured_.v = v;
+  policy_->update(measured_, u);
+  return u;
 }
 
-double BatchTask::calcPush(int tick, int world) const { return falls_ || tick >= 50 ? 0 : 10.0 / (1 + world); }
+double BatchTask::calcPush(int tick, int world) const {
+  return motion_ == BatchMotion::Fall || tick >= 50 ? 0 : 10.0 / (1 + world);
+}
 
-BatchSpeed measureBatch(const BatchTask& task, int worlds, double seconds, double time_step, int threads) {
+double BatchTask::calcDeviation(int tick, int world, ConstVectorRef q) const {
+  VectorXd planned = makeConfiguration(world), rates(model_.nv());
+  if (policy_) policy_->getReference(getStart(world).start + tick * kTick, planned, rates);
+  return model_.difference(planned, q).lpNorm<Eigen::Infinity>();
+}
+
+BatchSpeed measureBatch(BatchTask& task, int worlds, double seconds, double time_step, int threads) {
   const Model& model = task.model();
   worlds::WorldBatchOptions options;
   options.world.world.time_step = time_step;
   options.threads = threads;
   worlds::WorldBatch batch(model, worlds, options);
   MatrixXd v(model.nv(), worlds), u(model.nu(), worlds), push = MatrixXd::Zero(3, worlds);
-  for (int i = 0; i < worlds; ++i) v.col(i) = task.makeVelocity(i);
-  batch.reset(task.makeConfiguration().replicate(1, worlds), v);
+  MatrixXd q(model.nq(), worlds);
+  for (int i = 0; i < worlds; ++i) {
+    q.col(i) = task.makeConfiguration(i);
+    v.col(i) = task.makeVelocity(i);
+  }
+  batch.reset(q, v);
   BatchSpeed out;
   const int ticks = static_cast<int>(std::lround(seconds / BatchTask::kTick));
   for (int t = 0; t < ticks; ++t) {
     for (int i = 0; i < worlds; ++i) {
-      u.col(i) = task.calcTorques(batch.configurations().col(i), batch.velocities().col(i));
+      u.col(i) = task.calcTorques(t, i, batch.configurations().col(i), batch.velocities().col(i));
       push(0, i) = task.calcPush(t, i);
     }
     const double processor = readProcessorClock(), wall = readWallClock();
@@ -68,6 +122,7 @@ BatchSpeed measureBatch(const BatchTask& task, int worlds, double seconds, doubl
   for (int i = 0; i < worlds; ++i) {
     out.broken += !batch.ok(i);
     out.gap = std::max(out.gap, calcLargestGap(model, batch.configurations().col(i)));
+    out.deviation = std::max(out.deviation, task.calcDeviation(ticks, i, batch.configurations().col(i)));
     out.least_height = std::min(out.least_height, batch.configurations()(2, i));
   }
   return out;

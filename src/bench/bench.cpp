@@ -5,7 +5,6 @@
 #include <cmath>
 #include <fstream>
 
-#include "bench/batch_speed.h"
 #include "bench/receding_horizon.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/motion/locomotion.h"
@@ -174,7 +173,7 @@ class Bench {
   BenchReport runBatch() {
     describe();
     measureUnit();
-    for (bool falls : {false, true}) measureWorlds(falls);
+    for (BatchMotion motion : {BatchMotion::Stand, BatchMotion::Walk, BatchMotion::Fall}) measureWorlds(motion);
     return report_;
   }
 
@@ -332,12 +331,12 @@ class Bench {
     }
   }
 
-  void measureWorlds(bool falls) {
-    if (options_.progress) options_.progress(falls ? "robots that fall" : "robots that stand");
-    const BatchTask task(model_, falls);
+  void measureWorlds(BatchMotion motion) {
+    if (options_.progress) options_.progress(std::string("robots that ") + getName(motion));
+    BatchTask task(model_, motion);
     for (double time_step : {1e-3, 2.5e-4}) {
       std::vector<BatchTime> times;
-      for (int threads : threads()) times.push_back({falls, time_step, threads});
+      for (int threads : threads()) times.push_back({motion, time_step, threads});
       for (int i = 0; i < (whole_ ? 5 : 1); ++i)
         for (BatchTime& time : times) {
           const BatchSpeed speed =
@@ -345,6 +344,7 @@ class Bench {
           time.rate = std::max(time.rate, speed.steps / speed.wall);
           time.rounds = speed.rounds;
           time.broken = speed.broken;
+          time.deviation = speed.deviation;
         }
       report_.batch.insert(report_.batch.end(), times.begin(), times.end());
     }

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/batch_speed.h"
 #include "bielle/motion/motion.h"
 
 namespace bielle {
@@ -87,14 +88,15 @@ struct SizeTime {
   double seconds = 0;
 };
 
-/// Many worlds at once (batch_speed.h), the run of the least wall clock of several, in turn.
+/// Many worlds at once, the run of the least wall clock of several, in turn.
 struct BatchTime {
-  bool falls = false;
+  BatchMotion motion = BatchMotion::Stand;
   double time_step = 0;  ///< s
   int threads = 1;
-  double rate = 0;    ///< steps of all worlds per second
-  int broken = 0;     ///< worlds that broke off
-  double rounds = 0;  ///< of Newton's method, of a register per step
+  double rate = 0;       ///< steps of all worlds per second
+  int broken = 0;        ///< worlds that broke off
+  double rounds = 0;     ///< of Newton's method, of a register per step
+  double deviation = 0;  ///< BatchTask::calcDeviation() at the end, the largest
 };
 inline constexpr int kBatchWorlds = 64;
 

@@ -107,14 +107,15 @@ Json describeWorlds(const BenchReport& report) {
   double single = 0;
   for (const BatchTime& t : report.batch) {
     if (t.threads == 1) single = t.rate;
-    list.push_back({{"robots", t.falls ? "fall" : "stand"},
+    list.push_back({{"robots", getName(t.motion)},
                     {"step [ms]", 1e3 * t.time_step},
                     {"threads", t.threads},
                     {"steps [1/s]", round3(t.rate)},
                     {"ratio to 1 thread", round3(t.rate / single)},
                     {"real time", round3(t.rate * t.time_step)},
                     {"rounds of Newton", round3(t.rounds)},
-                    {"broke off", t.broken}});
+                    {"broke off", t.broken},
+                    {"deviation", round3(t.deviation)}});
   }
   return list;
 }
@@ -187,7 +188,8 @@ void addBench(CLI::App& command, Action& action) {
       "least of several repetitions. Whole solves run once. The receding horizon reports the median, 99th percentile\n"
       "and worst of its shifts, and the same of the undisturbed shifts, during which no other program took the\n"
       "processor. --batch reports the fastest of five runs; rounds of Newton are those of a register of robots, per\n"
-      "step. Progress is reported on the standard error. Takes a few minutes.\n"
+      "step, the deviation is that of the farthest coordinate from the plan, or from where it began, rad or m.\n"
+      "Progress is reported on the standard error. Takes a few minutes.\n"
       "Examples:\n"
       "  bielle bench\n"
       "  bielle bench --threads 4 --json > bench.json");

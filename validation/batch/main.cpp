@@ -1,4 +1,4 @@
-// bielle-batch-speed: steps per second of processor time of a robot that stands, or lies fallen: many worlds at once, one after the
+// bielle-batch-speed: steps per second of processor time of a robot that stands, walks or falls: many worlds at once, one after the
 // other, and MuJoCo on the file that we export, in turn: the one that is linked and, where $BIELLE_NODE_MODULES has it, npm's.
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -31,32 +31,35 @@ struct Arguments {
   std::vector<double> time_steps = {1e-3, 2.5e-4};
   int worlds = 32, rounds = 5, four_bars = 0;
   double seconds = 0.2;
-  bool falls = false, precision = false;
+  bool walks = false, falls = false, precision = false;
+
+  // Those that walk are at different instants of it, so that all of them are needed for a fair comparison.
+  int countSingle() const { return walks ? worlds : std::max(1, worlds / 16); }
 };
 
 struct Speed {
   double rate = 0;  // steps per second of processor time
   double gap = 0;   // largest of the closures at the end, m
-  double least_height = 0, rounds = 0;
+  double least_height = 0, rounds = 0, deviation = 0;
 };
 
-Speed runBatch(const BatchTask& task, const Arguments& arguments, double h) {
+Speed runBatch(BatchTask& task, const Arguments& arguments, double h) {
   const BatchSpeed speed = measureBatch(task, arguments.worlds, arguments.seconds, h, 1);
   if (speed.broken > 0) std::cerr << speed.broken << " worlds broke off\n";
-  return {speed.steps / speed.processor, speed.gap, speed.least_height, speed.rounds};
+  return {speed.steps / speed.processor, speed.gap, speed.least_height, speed.rounds, speed.deviation};
 }
 
-Speed runSingle(const Model& model, const BatchTask& task, const Arguments& arguments, double h) {
+Speed runSingle(const Model& model, BatchTask& task, const Arguments& arguments, double h) {
   BielleWorldOptions options;
   options.world.time_step = h;
   const auto world = makeBielleWorld(model, options);
-  const int ticks = static_cast<int>(arguments.seconds / kTick), n = std::max(1, arguments.worlds / 16);
-  Speed out{0, 0, 1, 0};
+  const int ticks = static_cast<int>(arguments.seconds / kTick), n = arguments.countSingle();
+  Speed out{0, 0, 1, 0, 0};
   double spent = 0;
   for (int i = 0; i < n; ++i) {
-    world->reset(task.makeConfiguration(), task.makeVelocity(i));
+    world->reset(task.makeConfiguration(i), task.makeVelocity(i));
     for (int t = 0; t < ticks; ++t) {
-      world->setTorques(task.calcTorques(world->configuration(), world->velocity()));
+      world->setTorques(task.calcTorques(t, i, world->configuration(), world->velocity()));
       world->setPush(Vector3d(task.calcPush(t, i), 0, 0));
       const double start = readProcessorClock();
       world->advance(kTick);
@@ -64,27 +67,28 @@ Speed runSingle(const Model& model, const BatchTask& task, const Arguments& argu
     }
     out.gap = std::max(out.gap, world->gap());
     out.least_height = std::min(out.least_height, world->configuration()[2]);
+    out.deviation = std::max(out.deviation, task.calcDeviation(ticks, i, world->configuration()));
   }
   out.rate = std::round(kTick / h) * ticks * n / spent;
   return out;
 }
 
 // Nothing but mj_step().
-Speed runMujoco(const Model& model, const BatchTask& task, const Arguments& arguments, double h) {
+Speed runMujoco(const Model& model, BatchTask& task, const Arguments& arguments, double h) {
   MjcfOptions options;
   options.time_step = h;
   MujocoModel mujoco(model, findClosedConfiguration(model).q, options);
   const auto data = mujoco.makeData();
-  const int ticks = static_cast<int>(arguments.seconds / kTick), n = std::max(1, arguments.worlds / 16);
+  const int ticks = static_cast<int>(arguments.seconds / kTick), n = arguments.countSingle();
   const int steps = static_cast<int>(std::round(kTick / h));
-  Speed out{0, 0, 1, 0};
+  Speed out{0, 0, 1, 0, 0};
   double spent = 0;
   for (int i = 0; i < n; ++i) {
-    VectorXd q = task.makeConfiguration(), v = task.makeVelocity(i);
+    VectorXd q = task.makeConfiguration(i), v = task.makeVelocity(i);
     mj_resetData(mujoco.get(), data.get());
     mujoco.setState(q, v, *data);
     for (int t = 0; t < ticks; ++t) {
-      const VectorXd u = task.calcTorques(q, v);
+      const VectorXd u = task.calcTorques(t, i, q, v);
       for (int m = 0; m < model.nu(); ++m)
         data->ctrl[m] = model.motors()[m].clampEffort(u[m], v[model.motors()[m].dof]);
       data->xfrc_applied[6 * mujoco.getBody(1)] = task.calcPush(t, i);
@@ -95,13 +99,14 @@ Speed runMujoco(const Model& model, const BatchTask& task, const Arguments& argu
     }
     out.gap = std::max(out.gap, calcLargestGap(model, q));
     out.least_height = std::min(out.least_height, q[2]);
+    out.deviation = std::max(out.deviation, task.calcDeviation(ticks, i, q));
   }
   out.rate = static_cast<double>(steps) * ticks * n / spent;
   return out;
 }
 
 // The newest one, by npm, with the same coordinates.
-Speed runMujoco3(const Model& model, const BatchTask& task, const Arguments& arguments, double h) {
+Speed runMujoco3(const Model& model, BatchTask& task, const Arguments& arguments, double h) {
   MjcfOptions options;
   options.time_step = h;
   const VectorXd closed = findClosedConfiguration(model).q;
@@ -109,16 +114,16 @@ Speed runMujoco3(const Model& model, const BatchTask& task, const Arguments& arg
   const auto data = mujoco.makeData();
   loops::Mujoco3 newest(formatMjcf(model, closed, options).xml, loops::Mujoco3Integrator::Euler);
   Eigen::Map<VectorXd> qpos(data->qpos, mujoco.get()->nq), qvel(data->qvel, mujoco.get()->nv);
-  const int ticks = static_cast<int>(arguments.seconds / kTick), n = std::max(1, arguments.worlds / 16);
+  const int ticks = static_cast<int>(arguments.seconds / kTick), n = arguments.countSingle();
   const int steps = static_cast<int>(std::round(kTick / h));
-  Speed out{0, 0, 1, 0};
+  Speed out{0, 0, 1, 0, 0};
   double spent = 0;
   for (int i = 0; i < n; ++i) {
-    VectorXd q = task.makeConfiguration(), v = task.makeVelocity(i), forces = VectorXd::Zero(qvel.size());
+    VectorXd q = task.makeConfiguration(i), v = task.makeVelocity(i), forces = VectorXd::Zero(qvel.size());
     mujoco.setState(q, v, *data);
     newest.start(qpos, qvel);
     for (int t = 0; t < ticks; ++t) {
-      const VectorXd u = task.calcTorques(q, v);
+      const VectorXd u = task.calcTorques(t, i, q, v);
       for (int m = 0; m < model.nu(); ++m) {
         const Motor& motor = model.motors()[m];
         forces[mujoco.getDof(motor.joint)] = motor.clampEffort(u[m], v[motor.dof]);
@@ -132,6 +137,7 @@ Speed runMujoco3(const Model& model, const BatchTask& task, const Arguments& arg
     spent += newest.cpu();
     out.gap = std::max(out.gap, calcLargestGap(model, q));
     out.least_height = std::min(out.least_height, q[2]);
+    out.deviation = std::max(out.deviation, task.calcDeviation(ticks, i, q));
   }
   out.rate = static_cast<double>(steps) * ticks * n / spent;
   return out;
@@ -190,7 +196,8 @@ int main(int argc, char** argv) {
   app.add_option("--worlds", arguments.worlds)->check(CLI::PositiveNumber);
   app.add_option("--rounds", arguments.rounds, "runs of each, in turn")->check(CLI::PositiveNumber);
   app.add_option("--seconds", arguments.seconds, "simulated, of a run")->check(CLI::PositiveNumber);
-  app.add_flag("--falls", arguments.falls, "limp robots that are dropped");
+  CLI::Option* walks = app.add_flag("--walks", arguments.walks, "at 0.4 m/s, by the gains of a plan");
+  app.add_flag("--falls", arguments.falls, "limp robots that are dropped")->excludes(walks);
   app.add_flag("--precision", arguments.precision, "errors by time step, of a second of a robot that is pushed");
   CLI11_PARSE(app, argc, argv);
   const Model model = loadModel(arguments);
@@ -198,7 +205,7 @@ int main(int argc, char** argv) {
     printPrecision(model, arguments);
     return 0;
   }
-  const BatchTask task(model, arguments.falls);
+  BatchTask task(model, arguments.walks ? BatchMotion::Walk : arguments.falls ? BatchMotion::Fall : BatchMotion::Stand);
   using Run = std::function<Speed(double)>;
   std::map<std::string, Run> runs = {{"many", [&](double h) { return runBatch(task, arguments, h); }},
                                      {"single", [&](double h) { return runSingle(model, task, arguments, h); }},
@@ -218,6 +225,7 @@ int main(int argc, char** argv) {
                              {"most", all.back().rate},
                              {"gap [m]", all.front().gap},
                              {"height [m]", all.front().least_height},
+                             {"deviation", all.front().deviation},
                              {"rounds", all.front().rounds}});
     }
   }

@@ -22,7 +22,7 @@ using worlds::PostureHold;
 constexpr double kSample = 0.01, kPushed = 0.05;  // s
 
 // Joints at each sample, a column per world and sample; and the time that the steps took.
-struct Motion {
+struct JointMotion {
   MatrixXd joints;
   double processor = 0, gap = 0;
 };
@@ -54,10 +54,10 @@ class Task {
   double calcPush(int sample, int world) const {
     return sample * kSample < kPushed ? options_.push * (1 - world / (2.0 * options_.worlds)) : 0;
   }
-  Motion makeMotion(int worlds) const {
+  JointMotion makeMotion(int worlds) const {
     return {MatrixXd::Zero(static_cast<Eigen::Index>(coordinates_.size()), worlds * numSamples()), 0, 0};
   }
-  void record(ConstVectorRef q, int sample, int world, int worlds, Motion& out) const {
+  void record(ConstVectorRef q, int sample, int world, int worlds, JointMotion& out) const {
     for (size_t i = 0; i < coordinates_.size(); ++i)
       out.joints(static_cast<Eigen::Index>(i), sample * worlds + world) = q[coordinates_[i]];
     out.gap = std::max(out.gap, calcLargestGap(model_, q));
@@ -78,7 +78,7 @@ class Task {
   std::vector<int> coordinates_;
 };
 
-Motion runBatch(const Task& task, int count, double h) {
+JointMotion runBatch(const Task& task, int count, double h) {
   const Model& model = task.model();
   worlds::WorldBatchOptions options;
   options.world.world.time_step = h;
@@ -86,7 +86,7 @@ Motion runBatch(const Task& task, int count, double h) {
   worlds::WorldBatch batch(model, count, options);
   MatrixXd push = MatrixXd::Zero(3, count);
   batch.reset(task.posture().replicate(1, count), MatrixXd::Zero(model.nv(), count));
-  Motion out = task.makeMotion(count);
+  JointMotion out = task.makeMotion(count);
   for (int t = 0; t < task.numSamples(); ++t) {
     for (int i = 0; i < count; ++i) push(0, i) = task.calcPush(t, i);
     const double start = readProcessorClock();
@@ -97,7 +97,7 @@ Motion runBatch(const Task& task, int count, double h) {
   return out;
 }
 
-Motion runMujoco(const Task& task, int count, double h, int integrator) {
+JointMotion runMujoco(const Task& task, int count, double h, int integrator) {
   const Model& model = task.model();
   MjcfOptions options;
   options.time_step = h;
@@ -105,7 +105,7 @@ Motion runMujoco(const Task& task, int count, double h, int integrator) {
   mujoco.get()->opt.integrator = integrator;
   const auto data = mujoco.makeData();
   const int steps = static_cast<int>(std::lround(kSample / h));
-  Motion out = task.makeMotion(count);
+  JointMotion out = task.makeMotion(count);
   for (int i = 0; i < count; ++i) {
     VectorXd q = task.posture(), v = VectorXd::Zero(model.nv());
     mj_resetData(mujoco.get(), data.get());
@@ -123,22 +123,22 @@ Motion runMujoco(const Task& task, int count, double h, int integrator) {
 }
 
 // The largest deviation of a joint from where it is at the first sample.
-double calcMove(const Motion& motion, int count) {
+double calcMove(const JointMotion& motion, int count) {
   const auto samples = motion.joints.cols() / count;
   return (motion.joints - motion.joints.leftCols(count).replicate(1, samples)).cwiseAbs().maxCoeff();
 }
 
 // The first worlds alone.
-Motion selectWorlds(const Motion& motion, int count, int first) {
+JointMotion selectWorlds(const JointMotion& motion, int count, int first) {
   const auto samples = motion.joints.cols() / count;
-  Motion out{MatrixXd(motion.joints.rows(), samples * first), 0, 0};
+  JointMotion out{MatrixXd(motion.joints.rows(), samples * first), 0, 0};
   for (Eigen::Index t = 0; t < samples; ++t)
     out.joints.middleCols(t * first, first) = motion.joints.middleCols(t * count, first);
   return out;
 }
 
 // Infinite where one of the two is no number.
-double calcError(const Motion& motion, const Motion& converged) {
+double calcError(const JointMotion& motion, const JointMotion& converged) {
   const MatrixXd difference = motion.joints - converged.joints;
   return difference.allFinite() ? difference.cwiseAbs().maxCoeff() : std::numeric_limits<double>::infinity();
 }
@@ -148,15 +148,15 @@ double calcError(const Motion& motion, const Motion& converged) {
 std::vector<Precision> measurePrecision(const Model& model, const PrecisionOptions& options) {
   const Task task(model, options);
   std::vector<Precision> out;
-  const auto add = [&](const std::string& name, int count, const Motion& reference, const auto& run) {
-    const Motion converged = run(options.finest);
+  const auto add = [&](const std::string& name, int count, const JointMotion& reference, const auto& run) {
+    const JointMotion converged = run(options.finest);
     for (const double h : options.time_steps) {
       Precision row{name, h};
       row.error = row.gap = std::numeric_limits<double>::infinity();
       row.moves = calcMove(converged, count);
       row.apart = reference.joints.size() > 0 ? calcError(converged, reference) : 0;
       try {
-        const Motion motion = run(h);
+        const JointMotion motion = run(h);
         row.error = calcError(motion, converged);
         row.gap = motion.gap;
         row.rate = count * options.seconds / motion.processor;
@@ -167,8 +167,8 @@ std::vector<Precision> measurePrecision(const Model& model, const PrecisionOptio
     }
     return converged;
   };
-  const Motion many = add("many", options.worlds, {}, [&](double h) { return runBatch(task, options.worlds, h); });
-  const Motion same = selectWorlds(many, options.worlds, options.mujoco_worlds);
+  const JointMotion many = add("many", options.worlds, {}, [&](double h) { return runBatch(task, options.worlds, h); });
+  const JointMotion same = selectWorlds(many, options.worlds, options.mujoco_worlds);
   for (const auto& [name, integrator] :
        {std::pair{"mujoco, Euler", mjINT_EULER}, {"mujoco, implicit", mjINT_IMPLICIT}, {"mujoco, RK4", mjINT_RK4}})
     add(name, options.mujoco_worlds, same,
