@@ -124,6 +124,20 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
   checkError(makeSwing("", "<compiler coordinate=\"global\"/>"), "compiler (line 1)", "its coordinates are global");
 }
 
+TEST_CASE("sites of MuJoCo that look like the ends of an open loop are told, unless an equality closes it") {
+  const std::string equality = "<equality><connect site1=\"closing_k_1\" site2=\"closing_k_2\"/></equality>";
+  const auto load = [](const std::string& in_root) {
+    const RobotDirectory directory;
+    return loadRobot(directory.write("swing.xml", makeSwing("<site name=\"closing_k_1\" pos=\"0 0 .1\"/>", in_root,
+                                                            "<site name=\"closing_k_2\" pos=\"0 0 1.1\"/>")));
+  };
+  const LoadedRobot open = load("");
+  REQUIRE(open.warnings.size() == 1);
+  CHECK_THAT(open.warnings[0], Catch::Contains("closures: [{name: k, type: 3d, frames: [closing_k_1, closing_k_2]}]"));
+  for (const std::string& warning : load(equality).warnings)
+    CHECK_THAT(warning, !Catch::Contains("look like the ends"));
+}
+
 TEST_CASE("hinges in place of a ball make its rotation, locked and next to it") {
   Joint joint;
   joint.name = "ball";

@@ -9,6 +9,7 @@
 #include "bielle/robots/robot_loader.h"
 #include "formats/sdf.h"
 #include "get_error.h"
+#include "math/constants.h"
 #include "model/number_text.h"
 #include "robot_difference.h"
 #include "robot_directory.h"
@@ -349,7 +350,7 @@ TEST_CASE("<mimic> of SDF 1.11 is a coupler, though libsdformat leaves it out; a
              Catch::Contains("<multiplier> is not a finite number"));
 }
 
-TEST_CASE("inertia that SDF makes up is told, and such as libsdformat would not compute is refused") {
+TEST_CASE("inertia that SDF makes up is told") {
   const std::string whole = makeFourBar(""), mass = "<mass>2</mass>";
   const auto change = [&whole](const std::string& from, const std::string& to) {
     std::string text = whole;
@@ -362,15 +363,71 @@ TEST_CASE("inertia that SDF makes up is told, and such as libsdformat would not 
                                     "</child></joint>")),
                 "): it has no <inertial>: its mass is 1 kg"));
   CHECK_FALSE(warnsOf(loadSdf(whole), "1 kg"));
-  for (const char* computed : {"<inertial auto=\"true\"><density>7800</density>", "<inertial><density>7800</density>"})
-    CHECK_THAT(getError([&] { loadSdf(change("<inertial>", computed)); }),
-               Catch::Contains("link 'a' (line 3): its inertia is to be computed") && Catch::Contains("give <mass>"));
+  CHECK(warnsOf(loadSdf(change("<inertial>", "<inertial><density>7800</density>")), "<inertial> <density> (line 3)"));
   CHECK(warnsOf(loadSdf(change("</inertial>", "<fluid_added_mass/></inertial>")),
                 "<inertial> <fluid_added_mass> (line 3)"));
   CHECK(warnsOf(
       loadSdf(replaceOnce(whole, "<child>c</child><axis><xyz>0 1 0</xyz></axis>",
                           "<child>c</child><axis><xyz>0 1 0</xyz><limit><stiffness>9</stiffness></limit></axis>")),
       "<limit> <stiffness>"));
+}
+
+TEST_CASE("frames of SDF that look like the ends of an open loop are told") {
+  const std::string tip = "\"><pose>0 0 1 0 0 0</pose></frame>";
+  const std::string open = makeFourBar(
+      "<frame name=\"closing_k_1\" attached_to=\"b" + tip + "<frame name=\"closing_k_2\" attached_to=\"c" + tip, "");
+  const std::string remedy = "closures: [{name: k, type: 3d, frames: [closing_k_1, closing_k_2]}]";
+  CHECK(warnsOf(loadSdf(open), remedy));
+  const RobotDirectory directory;
+  directory.write("robot.sdf", open);
+  const LoadedRobot closed = loadRobot(directory.write("robot.yaml", "model: robot.sdf\n" + remedy + "\n"));
+  CHECK_FALSE(warnsOf(closed, "look like the ends"));
+  CHECK(closed.model.closures().size() == 1);
+}
+
+TEST_CASE("<inertial auto> of SDF 1.11 is that of the collisions") {
+  // A bob of two densities: a box, and a ball a metre below its middle, drawn from a frame on the link.
+  const auto make = [](const std::string& inertial, const std::string& more) {
+    return "<sdf version=\"1.11\"><model name=\"m\"><link name=\"a\"><pose>0 0 3 0 0 0</pose>\n" + inertial +
+           "<collision name=\"box\"><pose>0.1 0 0 0 0 1.5707963267948966</pose><geometry><box><size>0.1 0.2 0.3</size>"
+           "</box></geometry></collision>\n<collision name=\"ball\"><density>2000</density><pose relative_to=\"f\"/>"
+           "<geometry><sphere><radius>0.05</radius></sphere></geometry></collision>" +
+           more +
+           "</link><frame name=\"f\" attached_to=\"a\"><pose>0.1 0 -1 0 0 0</pose></frame><joint name=\"j\" "
+           "type=\"revolute\"><parent>world</parent><child>a</child><axis><xyz>0 1 "
+           "0</xyz></axis></joint></model></sdf>";
+  };
+  const auto check = [&](const std::string& inertial, double density, double scale) {
+    CAPTURE(inertial);
+    const LoadedRobot robot = loadSdf(make(inertial, ""));
+    const Inertia& inertia = robot.model.bodies().back().inertia;
+    const double box = scale * density * 0.006, ball = scale * 2000 * 4 / 3 * kPi * 1.25e-4, whole = box + ball;
+    CHECK(inertia.mass == Approx(whole));
+    CHECK(inertia.com.isApprox(Vector3d(0.1, 0, -ball / whole), 1e-12));
+    const double apart = box * ball / whole, of_ball = 0.4 * ball * 0.0025;
+    const Vector3d moments(box / 12 * 0.10 + of_ball + apart, box / 12 * 0.13 + of_ball + apart,
+                           box / 12 * 0.05 + of_ball);
+    CHECK(inertia.I_com.isApprox(Matrix3d(moments.asDiagonal()), 1e-9));
+    CHECK_FALSE(warnsOf(robot, "1 kg"));
+  };
+  check("<inertial auto=\"true\"/>", 1000, 1);
+  check("<inertial auto=\"1\"><density>500</density><pose>9 9 9 0 0 0</pose></inertial>", 500, 1);
+  check("<inertial auto=\"true\"><mass>3</mass></inertial>", 1000, 3 / (6 + 2000 * 4 / 3. * kPi * 1.25e-4));
+  const auto refuse = [&](const std::string& inertial, const std::string& more, const std::string& text) {
+    CHECK_THAT(getError([&] { loadSdf(make(inertial, more)); }), Catch::Contains(text));
+  };
+  refuse("<inertial auto=\"true\"/>",
+         "<collision name=\"floor\"><geometry><plane><normal>0 0 1</normal></plane></geometry></collision>",
+         "link 'a': collision 'floor' (line 3): inertia is to be computed from it");
+  refuse("<inertial auto=\"true\"><density>-1</density></inertial>", "",
+         "link 'a': <density> (line 2): it is no positive number; correct it");
+  CHECK_THAT(getError([&] {
+               loadSdf(
+                   "<sdf version=\"1.11\"><model name=\"m\"><link name=\"a\"><inertial auto=\"true\"/></link>"
+                   "<link name=\"b\"/><joint name=\"j\" type=\"revolute\"><parent>a</parent><child>b</child>"
+                   "<axis><xyz>0 1 0</xyz></axis></joint></model></sdf>");
+             }),
+             Catch::Contains("link 'a' (line 1): its inertia is to be computed from its collisions"));
 }
 
 TEST_CASE("SDF files that are no robot are errors with a remedy") {

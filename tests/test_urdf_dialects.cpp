@@ -343,6 +343,14 @@ TEST_CASE("URDF dialects: balls, a world of another name, ends of loops, and ele
   const LoadedRobot closed = loadUrdf(ends, remedy + "\n");
   CHECK(closed.warnings.empty());
   checkMobility(closed.model, 1);
+  {  // by a file of another name
+    const RobotDirectory directory;
+    directory.write("drawn.urdf", "<robot name=\"r\">" + ends + "</robot>");
+    const LoadedRobot completed =
+        loadRobot(directory.write("robot.yaml", "model: drawn.urdf\nbase: fixed\n" + remedy + "\n"));
+    CHECK(completed.warnings.empty());
+    checkMobility(completed.model, 1);
+  }
 
   std::string dependent = writeFourBar();
   dependent.replace(dependent.find("<joint name=\"pin_b\""), 6, "<joint independent=\"false\"");

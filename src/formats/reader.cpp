@@ -106,10 +106,7 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   const std::filesystem::path loops = findLoopClosures(path);
   if (own.closures.empty() && files.yaml.closures.empty() && !loops.empty())
     readLoopClosures(loops.string(), files.urdf, files.yaml);
-  if (!has_settings) {
-    warnOfOpenLoops(files.urdf, files.yaml);
-    return files;
-  }
+  if (!has_settings) return files;
   if (!own.models.empty() || own.generator || own.composed)
     throw InputError(own.path,
                      own.composed    ? "key 'tree'"
@@ -118,7 +115,6 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
                      "there is a URDF beside this file, " + path.string(),
                      "remove the key, or move the file to another directory");
   complete(own, files.yaml);
-  warnOfOpenLoops(files.urdf, files.yaml);
   return files;
 }
 
@@ -182,7 +178,9 @@ LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& option
   // So that all messages name a file alike.
   const std::filesystem::path path = std::filesystem::path(findRobotFile(name_or_path)).lexically_normal();
   LoadedRobot robot;
-  robot.model = combineFiles(readRobotFiles(path), options.base, &robot);
+  RobotFiles files = readRobotFiles(path);
+  warnOfOpenLoops(files.urdf, files.yaml);
+  robot.model = combineFiles(std::move(files), options.base, &robot);
   robot.file = std::filesystem::absolute(path).lexically_normal().string();
   robot.directory = path.has_parent_path() ? path.parent_path().string() : ".";
   return robot;

@@ -39,7 +39,9 @@ void readTransmissions(const XMLElement& robot, UrdfFile& tree, YamlFile& settin
 bool readMimicPlugin(const XMLElement& plugin, UrdfFile& tree);
 
 /// onshape-to-robot marks the ends of loops by frames closing_NAME_1 and closing_NAME_2, others by frames ..cl4_1 and ..cl4_2 (or loop,
-/// closure), and by nothing else: those that no closure names are told; and so are dependent joints of URDF+ without any closure.
+/// closure), and by nothing else, in all formats: those that no closure names are told; and so are dependent joints of URDF+
+/// without any closure.
+/// \param settings  with what completes the robot
 void warnOfOpenLoops(UrdfFile& tree, const YamlFile& settings);
 
 }  // namespace bielle

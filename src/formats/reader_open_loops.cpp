@@ -1,4 +1,4 @@
-// Loops of a URDF that are marked, but not closed.
+// Loops of a file that are marked, but not closed.
 #include <algorithm>
 
 #include "formats/reader_dialects.h"

@@ -65,6 +65,7 @@ class SdfReader {
   // reader_sdf_shapes.cpp
   void readShapes(const sdf::Link& link);
   std::optional<Visual> readGeometry(const sdf::Geometry& geometry, const std::string& element);
+  void computeInertia(const XMLElement& link, const XMLElement& inertial);
 
   // reader_sdf_drake.cpp
   void readDrake(const XMLElement& model);

@@ -28,6 +28,8 @@ void SdfReader::noteElements(const XMLElement& element) {
     if (own.rfind("drake:", 0) == 0 && tag == "model") continue;  // reader_sdf_drake.cpp
     if (harmless.count(own))
       notes_.addHarmless(path_, "<" + tag + "> <" + own + ">", e->GetLineNum());
+    else if (own == "density" && element.BoolAttribute("auto"))  // of <inertial>
+      continue;
     else if (own == "plugin" && e->FirstChildElement("joint") && e->FirstChildElement("mimicJoint"))  // is read
       continue;
     else if (!read.at(tag).count(own))
@@ -52,20 +54,14 @@ void SdfReader::checkVersion(const XMLElement& root) {
     tree_.warnings.push_back(path_ + ": version " + version + " is later than " + SDF_PROTOCOL_VERSION +
                              ", the last one that libsdformat " SDF_MAJOR_VERSION_STR
                              " reads: elements that came after it have "
-                             "no effect, but for <mimic>");
+                             "no effect, but for <mimic> and <inertial auto>");
 }
 
 // What the specification puts where a file says nothing of a link's inertia, which is hardly ever meant.
 void SdfReader::checkInertia(const XMLElement& link) {
   const std::string name = "link '" + getAttribute(&link, "name") + "'";
   const XMLElement* inertial = link.FirstChildElement("inertial");
-  if (inertial)
-    for (const char* computed : {"auto", "density", "auto_inertia_params"})
-      if (inertial->Attribute(computed) || inertial->FirstChildElement(computed))
-        fail(name + " (line " + std::to_string(inertial->GetLineNum()) + ")",
-             "its inertia is to be computed from its shapes (<inertial> " + std::string(computed) +
-                 "), which libsdformat " SDF_MAJOR_VERSION_STR " does not do",
-             "give <mass> and <inertia>; `gz sdf --print --expand-auto-inertials` of a later version writes them");
+  if (inertial && inertial->BoolAttribute("auto")) return computeInertia(link, *inertial);
   std::string missing;
   if (!inertial)
     missing = "it has no <inertial>: its mass is 1 kg and its moments of inertia are 1 kg m²";

@@ -1,10 +1,33 @@
-// What SDF files draw and let collide.
+// What SDF files draw and let collide, and the inertia that is to be computed from it.
 #include <filesystem>
 
+#include "bielle/model/error.h"
 #include "formats/mesh.h"
+#include "formats/mesh_inertia.h"
 #include "formats/reader_sdf.h"
+#include "model/number_text.h"
 
 namespace bielle {
+namespace {
+
+constexpr double kSdfDensity = 1000;  // kg/m^3, by the specification of SDF
+
+// Volume and moments per mass, in its own frame; none for what has no volume here.
+std::optional<Inertia> calcSolid(const sdf::Geometry& geometry) {
+  if (const sdf::Box* box = geometry.BoxShape())
+    return calcPrimitiveInertia("box", {box->Size().X() / 2, box->Size().Y() / 2, box->Size().Z() / 2});
+  if (const sdf::Sphere* sphere = geometry.SphereShape())
+    return calcPrimitiveInertia("sphere", {sphere->Radius(), 0, 0});
+  if (const sdf::Cylinder* cylinder = geometry.CylinderShape())
+    return calcPrimitiveInertia("cylinder", {cylinder->Radius(), cylinder->Length() / 2, 0});
+  if (const sdf::Capsule* capsule = geometry.CapsuleShape())
+    return calcPrimitiveInertia("capsule", {capsule->Radius(), capsule->Length() / 2, 0});
+  if (const sdf::Ellipsoid* ellipsoid = geometry.EllipsoidShape())
+    return calcPrimitiveInertia("ellipsoid", {ellipsoid->Radii().X(), ellipsoid->Radii().Y(), ellipsoid->Radii().Z()});
+  return {};
+}
+
+}  // namespace
 
 // None for what has no shape here.
 std::optional<Visual> SdfReader::readGeometry(const sdf::Geometry& geometry, const std::string& element) {
@@ -68,6 +91,44 @@ void SdfReader::readShapes(const sdf::Link& link) {
     shape->fitted = false;
     out.shapes.push_back(*shape);
   }
+}
+
+// <inertial auto="true"> of SDF 1.11, which libsdformat 12 does not know: from the collisions and their densities, scaled to the
+// mass if there is one.
+void SdfReader::computeInertia(const XMLElement& link, const XMLElement& inertial) {
+  const std::string name = getAttribute(&link, "name");
+  const auto get = [&](const XMLElement& e, const char* tag, double usual) {
+    const XMLElement* given = e.FirstChildElement(tag);
+    if (!given) return usual;
+    std::vector<double> numbers;
+    const char* text = given->GetText();
+    if (!parseNumbers(text ? text : "", numbers) || numbers.size() != 1 || !(numbers[0] > 0))
+      fail("link '" + name + "': <" + tag + "> (line " + std::to_string(given->GetLineNum()) + ")",
+           "it is no positive number", "correct it");
+    return numbers[0];
+  };
+  const double density = get(inertial, "density", kSdfDensity), mass = get(inertial, "mass", 0);
+  const sdf::Link& own = *model_->LinkByName(name);
+  Inertia sum;
+  for (const XMLElement* e : getChildren(link, "collision")) {
+    const sdf::Collision* collision = own.CollisionByName(getAttribute(e, "name"));
+    std::optional<Inertia> solid = collision ? calcSolid(*collision->Geom()) : std::nullopt;
+    if (!solid)
+      fail("link '" + name + "': collision '" + getAttribute(e, "name") + "' (line " + std::to_string(e->GetLineNum()) +
+               ")",
+           "inertia is to be computed from it (<inertial auto>), but only boxes, spheres, cylinders, capsules and "
+           "ellipsoids are solids here",
+           "give <mass> and <inertia>; `gz sdf --print --expand-auto-inertials` writes them");
+    solid->mass *= get(*e, "density", density);
+    solid->I_com *= solid->mass;
+    sum = sum + solid->transformed(getPlaceOn(*collision, name));
+  }
+  if (!(sum.mass > 0))
+    fail("link '" + name + "' (line " + std::to_string(inertial.GetLineNum()) + ")",
+         "its inertia is to be computed from its collisions (<inertial auto>), and it has none",
+         "give it some, or <mass> and <inertia>");
+  if (mass > 0) sum.I_com *= mass / sum.mass, sum.mass = mass;
+  tree_.links.at(name).inertia = sum;
 }
 
 }  // namespace bielle
