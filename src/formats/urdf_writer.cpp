@@ -1,5 +1,6 @@
 #include "formats/urdf_writer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -180,18 +181,16 @@ class UrdfWriter {
                upper = model_.upperLimits().segment(joint.idx_v, joint.nv),
                velocity = model_.velocityLimits().segment(joint.idx_v, joint.nv);
     if (for_drake_) return writeDrakeLimits(joint, lower, upper, velocity, e);
-    const bool ranged = lower.allFinite() && upper.allFinite();
-    const bool open = lower.array().isInf().all() && upper.array().isInf().all();
+    const bool ranged = !(lower.array().isInf().all() && upper.array().isInf().all());
     const bool slow = velocity.allFinite();
-    if ((!ranged && !open) || (joint.nv != 1 && (ranged || slow)))
-      refuseToWrite(model_, "joint '" + joint.name + "'",
-                    "it has a limit on one side only, or several coordinates with limits");
+    if (joint.nv != 1 && (ranged || slow))
+      refuseToWrite(model_, "joint '" + joint.name + "'", "it has several coordinates with limits");
     const double effort = warnings_ ? getEffortLimit(joint) : HUGE_VAL;
     if (!ranged && !slow && std::isinf(effort) && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
     XMLElement& limit = addElement(e, "limit");
     if (joint.nv == 1 && joint.kind != JointKind::Continuous)
-      setAttributes(limit, {{"lower", formatExact(ranged ? lower[0] : -kNone)},
-                            {"upper", formatExact(ranged ? upper[0] : kNone)}});
+      setAttributes(limit, {{"lower", formatExact(std::max(lower[0], -kNone))},
+                            {"upper", formatExact(std::min(upper[0], kNone))}});
     setAttributes(limit, {{"effort", formatExact(std::isfinite(effort) ? effort : kNone)},
                           {"velocity", formatExact(slow ? velocity[0] : kNone)}});
   }
