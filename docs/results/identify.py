@@ -23,7 +23,7 @@ PERIOD, DURATION = 1e-3, 10  # s, of each log
 ENCODER = 2 * math.pi / 2**14
 TORQUE_NOISE = 0.02  # N m
 GAINS = {"hip": (100.0, 3.0), "knee": (40.0, 1.0), "ankle": (20.0, 0.4)}  # N m/rad, N m s/rad
-AMPLITUDES = {"hipy": 0.6, "hip": 0.2, "knee": 0.3, "ankle": 0.25}  # rad
+AMPLITUDES = {"hipy": 0.6, "hip": 0.2, "knee": 0.5, "ankle": 0.25}  # rad
 WEIGHT, AHEAD = 2.0, 0.12  # kg, m
 ARMATURE = 0.02  # kg m^2, of rotors behind their gears
 FILTER = 0.2  # of speeds, per reading
@@ -325,7 +325,11 @@ def main():
         f"""It hangs on a stand, its feet in the air, and every motor swings to and fro at its own rate: {DURATION} s with 2 kg ahead of
         each ankle and {DURATION} s with 2 kg behind it, of which the model knows nothing, so that the loads of play change sides; and
         {DURATION} s without. Encoders have 14 bits, torques noise of {TORQUE_NOISE} N m, rows come at 1 kHz. Lengths, offsets and play are
-        found from the first two, masses and friction from the last.""")
+        found from the first two, masses and friction from the last.""",
+        f"""Motors of the knees swing by {AMPLITUDES['knee']} rad. By 0.3 rad, everything else alike, one of the twelve offsets is 0.032° off,
+        four standard deviations: along so little of the linkage's curve an offset is nearly a length, and of joints that turn by less
+        than a step of the encoder from row to row, readings repeat, which standard deviations take for independent. Encoders that do
+        not round leave 0.0007° even then.""")
     worlds = ["bielle"] if arguments.quick else ["mujoco", "bielle"]
     found = {}
     for world in worlds:
