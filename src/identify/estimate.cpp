@@ -47,6 +47,20 @@ double calcNoise(long told, const VectorXd& r, int seen) {
   return left > 0 ? std::sqrt(r.squaredNorm() / left) : 1;
 }
 
+// Eq. (4), of all unknowns: by scale, squared.
+VectorXd calcStretchVariances(const Sight& sight, const MatrixXd& J, const VectorXd& d, const VectorXd& r) {
+  VectorXd sum = VectorXd::Zero(d.size());
+  const MatrixXd V = sight.V.leftCols(sight.seen);
+  const VectorXd inverse = sight.s.head(sight.seen).cwiseAbs2().cwiseInverse();
+  const Eigen::Index count = std::min<Eigen::Index>(kStretches, r.size());
+  for (Eigen::Index b = 0; b < count; ++b) {
+    const Eigen::Index first = b * r.size() / count, size = (b + 1) * r.size() / count - first;
+    const VectorXd g = d.cwiseProduct(J.middleRows(first, size).transpose() * r.segment(first, size));
+    sum += VectorXd(V * inverse.cwiseProduct(V.transpose() * g)).cwiseAbs2();
+  }
+  return sum;
+}
+
 // The rows of a basis of what is not seen, each with as few unknowns as possible: reduced by elimination.
 std::vector<Combination> listUnseen(const Sight& sight, const VectorXd& d, const std::vector<Unknown>& unknowns) {
   MatrixXd rows = sight.V.rightCols(sight.V.cols() - sight.seen).transpose();
@@ -177,14 +191,16 @@ Estimate estimate(const EstimateProblem& problem, const EstimateOptions& options
   }
   out.noise = sight.noise;
   out.unknowns = problem.unknowns;
+  const VectorXd stretches = calcStretchVariances(sight, J, d, r);
   for (Eigen::Index i = 0; i < d.size(); ++i) {
     Unknown& unknown = out.unknowns[static_cast<size_t>(i)];
     unknown.after = unknown.before + out.x[i];
     const Eigen::Index unseen = d.size() - sight.seen;
     const double part = sight.V.row(i).tail(unseen).squaredNorm();
     unknown.is_seen = part <= kLeastPart * kLeastPart;
-    double variance = part;
+    double variance = 0;
     for (int j = 0; j < sight.seen; ++j) variance += std::pow(sight.noise * sight.V(i, j) / sight.s[j], 2);
+    variance = std::max(variance, stretches[i]) + part;
     unknown.deviation = unknown.is_seen ? d[i] * std::sqrt(variance) : std::numeric_limits<double>::infinity();
     if (d[i] == 0) unknown.is_seen = true, unknown.deviation = 0;
   }

@@ -12,6 +12,10 @@
 /// its deviation below 1. The search goes along seen combinations alone; the others keep their values. An unknown is seen if
 /// it has no part in the others, up to kLeastPart of its scale, which then adds to its deviation:
 ///     deviation_i^2 = d_i^2 (sum over seen (sigma V_ij / s_j)^2 + sum over others V_ij^2)                            (3)
+/// The first sum takes residuals for independent. Those of encoders that round, or of filters, repeat from row to row. With
+/// g_b = diag(d) J^T r over stretch b of kStretches of the log, which hardly depend on each other, it is at least
+///     sum over b ((V diag(1/s^2) V^T g_b)_i)^2     of seen combinations,                                             (4)
+/// the same for independent residuals (batch means).
 #include <functional>
 #include <string>
 #include <utility>
@@ -23,6 +27,7 @@
 namespace bielle {
 
 constexpr double kLeastSeen = 1e-7, kLeastPart = 1e-3;
+constexpr int kStretches = 100;
 constexpr double kShareOfLength = 0.1, kAngleOffset = 0.1, kLengthOffset = 0.01;  // scales: 1, rad, m
 
 /// One number of x.
