@@ -376,4 +376,21 @@ TEST_CASE("batch: what it cannot take is refused, and nothing is stepped") {
   CHECK((batch.velocities() - starts.v).cwiseAbs().maxCoeff() < 1e-9);
 }
 
+TEST_CASE("batch: a world whose loops are open where it is reset says so, and the others step") {
+  const Model& model = getBipetto();
+  Start starts = makeStarts(model, 3, 3);
+  const Joint& knee = model.joints()[model.findJoint("knee_right")];
+  starts.q(knee.idx_q, 1) += 1e-3;
+  starts.q(knee.idx_q, 2) += 1e-9;
+  WorldBatch batch(model, 3, makeBatchOptions(1e-3));
+  batch.reset(starts.q, starts.v);
+  CHECK((batch.ok(0) && !batch.ok(1) && batch.ok(2)));
+  CHECK_THAT(batch.message(1), Catch::Contains("loops are open by") && Catch::Contains("give a closed configuration"));
+  batch.step(starts.u, starts.push, 2e-3);
+  CHECK(batch.times() == Vector3d(2e-3, 0, 2e-3));
+  starts.q(knee.idx_q, 1) -= 1e-3;
+  batch.reset(starts.q, starts.v, {0, 1, 0});
+  CHECK(batch.ok(1));
+}
+
 }  // namespace bielle::worlds

@@ -10,6 +10,8 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
+#include "dynamics/largest_gaps.h"
+#include "model/number_text.h"
 #include "solve/team.h"
 #include "worlds/batch_parameters.h"
 #include "worlds/contact_law.h"
@@ -85,6 +87,7 @@ struct WorldBatch::Data {
   void takeSteps(Worker& worker, size_t group, const MatrixView& u, const MatrixView& push, double duration);
   void mark(const std::vector<char>& where);
   void start(const MatrixView& q, const MatrixView& v);
+  void refuseOpen(const MatrixView& q);
   bool shiftToHeight(const MatrixView& q);
   void setGrounds(const std::vector<std::shared_ptr<const Ground>>& grounds);
 
@@ -233,6 +236,7 @@ void WorldBatch::reset(const MatrixView& q, const MatrixView& v, const std::vect
       throw std::invalid_argument("worlds: the state of world " + std::to_string(i) +
                                   " has a number that is not finite; give a closed configuration and a velocity");
   d.start(q, v);
+  d.refuseOpen(q);
   if (d.shiftToHeight(q)) d.start(d.q, v);
 }
 
@@ -255,6 +259,20 @@ void WorldBatch::Data::start(const MatrixView& q0, const MatrixView& v0) {
     }
     read(worker, group, done);
   });
+}
+
+// The first drift would close the loops of these worlds, and they would begin elsewhere than asked.
+void WorldBatch::Data::refuseOpen(const MatrixView& q) {
+  constexpr double kOpen = 1e-6;  // m or rad: more than rounding, or a file of few digits, leaves
+  for (int i = 0; i < count; ++i) {
+    if (!marks[i] || !is_ok[i] || !parameters.rod_changes.col(i).isZero(0)) continue;
+    updatePlacements(model, ws, q.col(i));
+    const ClosureGap gap = calcLargestGaps(model, ws);
+    if (gap.position <= kOpen && gap.angle <= kOpen) continue;
+    is_ok[i] = false;
+    messages[i] = "its loops are open by " + formatNumber(gap.position, "%.3g") + " m and " +
+                  formatNumber(gap.angle, "%.3g") + " rad where it was reset; give a closed configuration";
+  }
 }
 
 // Where the loops of a world were closed for its own rods, its feet are no longer where they were given. \returns whether any q has

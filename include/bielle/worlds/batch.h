@@ -53,7 +53,8 @@ class WorldBatch {
   WorldBatch& operator=(WorldBatch&&) noexcept;
 
   /// Sets closed configurations q (nq x count) and velocities v (nv x count) that keep them closed, of all worlds or of those that
-  /// `where` (count) marks; their time starts from zero. Where a world has other rods than the model, its loops are closed from
+  /// `where` (count) marks; their time starts from zero. A world whose loops are open there by more than 1e-6 m or rad is not ok().
+  /// Where a world has other rods than the model, its loops are closed from
   /// there, light links moving rather than heavy ones, and a free robot is shifted so that its lowest corner of a sole is as high as
   /// it was; a q that its own loops close stays.
   /// \throws std::invalid_argument for a wrong shape, or a number of theirs that is not finite; nothing has changed then
