@@ -1,6 +1,7 @@
 #!/bin/bash
 # run.sh [SECONDS [TARGET...]]: runs the fuzz targets of build-fuzz one after the other (default: all, 600 s each) on the
-# shipped files, and tells what came out. Findings are kept in build-fuzz/findings, corpora in build-fuzz/corpus.
+# shipped files and what is in tests/fuzz/corpora, and tells what came out. Findings are kept in build-fuzz/findings, corpora in
+# build-fuzz/corpus; keep.sh packs them.
 set -euo pipefail
 export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -46,6 +47,8 @@ fi
 status=0
 for target in "${targets[@]}"; do
   mkdir -p "$build/corpus/$target"
+  kept=$root/tests/fuzz/corpora/$target.tar.xz
+  [ ! -e "$kept" ] || tar -xf "$kept" -C "$build/corpus"
   log=$build/fuzz_$target.log
   dictionary=()
   case $target in
