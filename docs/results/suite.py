@@ -181,7 +181,8 @@ in the files, of costs, constraints, equations of motion, steps, loops and URDF;
 ({origin}). Times are processor times of the command, reading and writing included. A run succeeds if it converges, holds its
 constraints and costs at most one per cent more than the best one of its variant. *Solved within twice the time*: of the fastest
 variant for the same problem and guess, with success. *Failed*: the dynamics cannot be computed; with Euler steps, some guesses
-have no first iteration, because a loop does not close.""")
+have no first iteration, because a loop does not close. Only *exact loops* are of this program and these problems: for the others,
+guesses were not mended, and every linkage had the same margin.""")
     rows = []
     for variant, ratios in profiles.items():
         ours = [run for run in runs if run["variant"] == variant]
