@@ -197,6 +197,10 @@ guesses were not mended, and every linkage had the same margin.""")
     if figure:
         draw(profiles, count)
         page.lines += ["", "![performance profiles](../images/suite.svg)"]
+    page.add("""In turn on one machine (commit 1fb9baff, 2026-12-01, AMD EPYC, 2 cores, with other work), the first eight guesses of each
+problem with the margins of 3bf0e583: that solves 85 of 96, this program 95. Where both do, the median time is 1.31 and 0.83 s, a
+ratio of 0.63; of the pairs, 0.71 in the median, half of them between 0.58 and 0.85. Stairs take 0.62 of the time, the walk at 1 m/s
+0.58.""")
     page.heading("By problem")
     page.add("Successes, and the median time of these [s].")
     variants = list(profiles)
