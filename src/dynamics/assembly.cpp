@@ -32,19 +32,39 @@ class HardConditions {
       : model_(model), problem_(problem), set_(makeConstraintSet(model)), ws_(model), held_(held) {
     rows_ = set_.rows;
     for (const FrameTarget& target : problem.frames) rows_ += static_cast<int>(target.mask.count());
+    for (const Closure& closure : set_.closures)
+      columns_.insert(columns_.end(), static_cast<size_t>(getRows(closure.kind)), &closure.dofs);
+    for (const FrameTarget& target : problem.frames)
+      columns_.insert(columns_.end(), static_cast<size_t>(target.mask.count()), &model.supportDofs(target.body));
     H.setZero(rows_, model.nv());
     h.setZero(rows_);
   }
 
-  int rows() const { return rows_; }
+  HardConditions(const HardConditions&) = delete;  // columns are those of its closures
 
-  void update(const VectorXd& q) {
-    updatePositions(model_, ws_, q);
+  int rows() const { return rows_; }
+  // Of each row of H: where it may have entries.
+  const std::vector<const std::vector<int>*>& columns() const { return columns_; }
+
+  // h alone: what searches along a step need.
+  void updateResidual(const VectorXd& q) {
+    updatePlacements(model_, ws_, q);
+    for (size_t c = 0; c < set_.closures.size(); ++c)
+      h.segment(set_.offsets[c], getRows(set_.closures[c].kind)) = calcClosureResidual(ws_, set_.closures[c]);
+    int row = set_.rows;
+    for (const FrameTarget& target : problem_.frames) {
+      const Vector6d error = calcError(target);
+      for (int i = 0; i < 6; ++i)
+        if (target.mask[i]) h[row++] = error[i];
+    }
+  }
+
+  // H where h is.
+  void updateJacobian() {
+    updateColumns(model_, ws_);
     for (size_t c = 0; c < set_.closures.size(); ++c) {
       const Closure& closure = set_.closures[c];
-      const int row = set_.offsets[c], n = getRows(closure.kind);
-      h.segment(row, n) = calcClosureResidual(ws_, closure);
-      calcClosureResidualJacobian(ws_, closure, H.middleRows(row, n));
+      calcClosureResidualJacobian(ws_, closure, H.middleRows(set_.offsets[c], getRows(closure.kind)));
     }
     int row = set_.rows;
     for (const FrameTarget& target : problem_.frames) row = updateTarget(target, row);
@@ -75,20 +95,22 @@ class HardConditions {
   VectorXd h;
 
  private:
-  int updateTarget(const FrameTarget& target, int row) {
+  Vector6d calcError(const FrameTarget& target) const {
     const SE3 X = getPlacement(ws_, target.body, target.X_BF);
     Vector6d error;
     error.head<3>() = X.p - target.X_WT.p;
     error.tail<3>() = log3(target.X_WT.R.transpose() * X.R);
-    const Matrix3d dlog = calcRightJacobianInverse3(error.tail<3>());
+    return error;
+  }
+
+  int updateTarget(const FrameTarget& target, int row) {
+    const Matrix3d R = getPlacement(ws_, target.body, target.X_BF).R;
+    const Matrix3d dlog = calcRightJacobianInverse3(Vector3d(log3(target.X_WT.R.transpose() * R)));
     Matrix6Xd J = calcFrameJacobian(model_, ws_, target.body, target.X_BF);
-    J.topRows<3>() = (X.R * J.topRows<3>()).eval();
+    J.topRows<3>() = (R * J.topRows<3>()).eval();
     J.bottomRows<3>() = (dlog * J.bottomRows<3>()).eval();
-    for (int i = 0; i < 6; ++i) {
-      if (!target.mask[i]) continue;
-      h[row] = error[i];
-      H.row(row++) = J.row(i);
-    }
+    for (int i = 0; i < 6; ++i)
+      if (target.mask[i]) H.row(row++) = J.row(i);
     return row;
   }
 
@@ -98,6 +120,7 @@ class HardConditions {
   Workspace ws_;
   bool held_;
   int rows_ = 0;
+  std::vector<const std::vector<int>*> columns_;
 };
 
 // Rows and columns of a matrix that its entries connect, those without entries left out.
@@ -105,7 +128,8 @@ struct MatrixBlock {
   std::vector<int> rows, columns;
 };
 
-std::vector<MatrixBlock> listBlocks(const MatrixXd& H) {
+// \param columns  of each row: where it may have entries
+std::vector<MatrixBlock> listBlocks(const MatrixXd& H, const std::vector<const std::vector<int>*>& columns) {
   std::vector<int> owners(static_cast<size_t>(H.cols()));  // of columns: each leads to one that stands for its block
   std::iota(owners.begin(), owners.end(), 0);
   const auto findOwner = [&](int column) {
@@ -113,8 +137,8 @@ std::vector<MatrixBlock> listBlocks(const MatrixXd& H) {
     return column;
   };
   std::vector<int> of_rows(static_cast<size_t>(H.rows()), -1);  // a column of the row's block
-  for (int j = 0; j < H.cols(); ++j)
-    for (int i = 0; i < H.rows(); ++i) {
+  for (int i = 0; i < H.rows(); ++i)
+    for (int j : *columns[static_cast<size_t>(i)]) {
       if (H(i, j) == 0) continue;
       int& column = of_rows[static_cast<size_t>(i)];
       if (column < 0) column = j;
@@ -147,9 +171,10 @@ VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, do
 }
 
 // The first term of Eq. (1) alone. The pseudo-inverse of H is made of those of its blocks: the legs under a base that is held.
-VectorXd calcShortestStep(const MatrixXd& H, const VectorXd& h, double damping, double rank_tolerance) {
+VectorXd calcShortestStep(const HardConditions& conditions, const VectorXd& h, double damping, double rank_tolerance) {
+  const MatrixXd& H = conditions.H;
   VectorXd step = VectorXd::Zero(H.cols());
-  for (const MatrixBlock& block : listBlocks(H)) {
+  for (const MatrixBlock& block : listBlocks(H, conditions.columns())) {
     const MatrixXd A = H(block.rows, block.columns);
     const VectorXd b = h(block.rows);
     if (damping > 0) {
@@ -170,18 +195,19 @@ VectorXd calcShortestStep(const MatrixXd& H, const VectorXd& h, double damping, 
 bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options, const VectorXd& offset,
              HardConditions& conditions, AssemblyResult& result) {
   const VectorXd weights = problem.weights.size() ? problem.weights : VectorXd::Ones(model.nv());
-  conditions.update(result.q);
+  conditions.updateResidual(result.q);
   double error = (conditions.h - offset).norm();
   std::vector<double> errors;  // only with patience
   for (int i = 0; i < options.max_iterations; ++i, ++result.iterations) {
     const bool met = conditions.rows() == 0 || calcLargest(conditions.h - offset) <= options.tolerance;
     if (met && options.step == AssemblyStep::Shortest) return true;  // nothing else is wished
+    conditions.updateJacobian();
     const double damping = std::min(0.1, error);
     // A preference far from the feasible set (e.g. an overstretched leg) can make the iterates cycle: it fades.
     const double wish_gain = std::pow(0.8, std::max(0, i - kFullWishIterations));
     const double shrink = error < 1e-3 ? 0.0 : 0.3 * damping;
     VectorXd step = options.step == AssemblyStep::Shortest
-                        ? calcShortestStep(conditions.H, conditions.h - offset, shrink, options.rank_tolerance)
+                        ? calcShortestStep(conditions, conditions.h - offset, shrink, options.rank_tolerance)
                         : calcStep(conditions.H, conditions.h - offset, model.difference(result.q, problem.q_ref),
                                    wish_gain, weights, shrink, options.rank_tolerance);
     const double largest = calcLargest(step);
@@ -192,7 +218,7 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
     VectorXd q_new;
     for (int halving = 0; halving < 8; ++halving, step *= 0.5) {
       q_new = model.integrate(result.q, step);
-      conditions.update(q_new);
+      conditions.updateResidual(q_new);
       if ((conditions.h - offset).norm() <= 1.5 * error + 1e-3) break;
     }
     result.q = q_new;
@@ -214,14 +240,14 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& given, const 
   model.normalize(result.q);
   std::tie(result.worst, result.message) = findTargetsApart(model, problem.frames);
   if (!result.message.empty()) {
-    conditions.update(result.q);
+    conditions.updateResidual(result.q);
     result.gap = conditions.calcLoopGap();
     return result;
   }
   bool closed = iterate(model, problem, options, VectorXd::Zero(conditions.rows()), conditions, result);
   if (!closed) {
     AssemblyResult best = result;
-    conditions.update(problem.q_ref);
+    conditions.updateResidual(problem.q_ref);
     const VectorXd start = conditions.h;
     result.q = problem.q_ref;
     for (int step = 1; step <= options.continuation_steps; ++step) {
@@ -230,13 +256,13 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& given, const 
       if (!closed) break;
     }
     if (!closed) {  // report the closer of the two attempts
-      conditions.update(result.q);
+      conditions.updateResidual(result.q);
       const double error = conditions.h.norm();
-      conditions.update(best.q);
+      conditions.updateResidual(best.q);
       if (conditions.h.norm() < error || !std::isfinite(error)) result.q = best.q;
     }
   }
-  conditions.update(result.q);
+  conditions.updateResidual(result.q);
   const auto [worst, gap] = conditions.findWorst();
   result.worst = worst;
   result.gap = conditions.calcLoopGap();
@@ -272,7 +298,8 @@ AssemblyResult refineAssembly(const Model& model, const AssemblyProblem& problem
   result.q = near;
   double last = std::numeric_limits<double>::infinity();
   for (result.iterations = 0; result.iterations < kMost; ++result.iterations) {
-    conditions.update(result.q);
+    conditions.updateResidual(result.q);
+    conditions.updateJacobian();
     const VectorXd wish = model.difference(result.q, problem.q_ref);
     VectorXd step = wish;
     if (conditions.rows() > 0) {
@@ -292,7 +319,7 @@ AssemblyResult refineAssembly(const Model& model, const AssemblyProblem& problem
     last = size;
     if (size == 0) break;
   }
-  conditions.update(result.q);
+  conditions.updateResidual(result.q);
   result.gap = conditions.calcLoopGap();
   const bool met = conditions.rows() == 0 || calcLargest(conditions.h) <= options.tolerance;
   if (met && last < kShort) result.status = NumericalStatus::Ok;

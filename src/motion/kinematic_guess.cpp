@@ -9,6 +9,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/assembly_refinement.h"
 #include "dynamics/linkage_workspace.h"
+#include "dynamics/target_reach.h"
 
 namespace bielle {
 namespace {
@@ -21,6 +22,12 @@ class FeetPlacer {
     options_.step = AssemblyStep::Shortest;
     options_.max_iterations = 15;
     options_.continuation_steps = 0;
+    FrameTarget base;
+    base.body = 1;
+    for (const std::array<bool, 2>& flat : {std::array{false, false}, std::array{true, true}}) {
+      const AssemblyProblem problem = makeProblem(stance.feet, flat, stance.q);
+      for (size_t i = 0; i < 2; ++i) spans_[i][flat[i] ? 1 : 0] = calcSpan(model, base, problem.frames[i]);
+    }
   }
 
   // None where no posture is found, after dozens of assemblies. Beside a posture that was found, the stance leads to others only
@@ -165,10 +172,22 @@ class FeetPlacer {
   // \param flat  soles that are parallel to what is planned
   std::optional<Posture> assemble(const VectorXd& base, const std::array<SE3, 2>& feet, const std::array<bool, 2>& flat,
                                   const VectorXd& start) {
+    if (!spansLegs(base, feet, flat)) return {};
     AssemblyProblem problem = makeProblem(feet, flat, start);
     problem.q_ref.head<7>() = base;
     options_.patience = flat[0] && flat[1] ? 2 : 0;  // soles that are free to turn often pass postures that are worse
     return accept(assembleUnderBase(model_, problem, options_));
+  }
+
+  // Whether straight legs are long enough, wherever else their linkages have them.
+  bool spansLegs(const VectorXd& base, const std::array<SE3, 2>& feet, const std::array<bool, 2>& flat) const {
+    const SE3 X_WB{Eigen::Quaterniond(base[6], base[3], base[4], base[5]).toRotationMatrix(), base.head<3>()};
+    for (size_t i = 0; i < 2; ++i) {
+      const Span& span = spans_[i][flat[i] ? 1 : 0];
+      const SE3 X_WF = feet[i] * model_.contacts()[stance_.contacts[i]].X_BF.inverse();
+      if (!span.bridges((X_WB.act(span.one) - X_WF.act(span.other)).norm())) return false;
+    }
+    return true;
   }
 
   // Keeps ranges of joints, and linkages on their side of dead points.
@@ -201,7 +220,8 @@ class FeetPlacer {
   const Stance& stance_;
   std::vector<Linkage> linkages_;
   LinkageWorkspaces memory_;
-  double height_ = 0;  // of the centre of mass over the feet
+  double height_ = 0;                         // of the centre of mass over the feet
+  std::array<std::array<Span, 2>, 2> spans_;  // of left and right leg, from the base to a sole that may tilt, or not
   AssemblyOptions options_;
 };
 
