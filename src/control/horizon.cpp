@@ -24,8 +24,8 @@ void describe(OptionFields& f, PredictiveOptions& o) {
       "dead_point_stop", o.dead_point_stop, "1", {0, 1},
       "motors brake before the transmission of a linkage reaches this share of that at the start, or the reciprocal");
   f.integer("threads", o.threads, {0, kMostThreads},
-            "number of threads of predictive control; 0: all, or with own_thread all but one, which control has; "
-            "results do not depend on it");
+            "number of threads of predictive control; 0: all, in real time (own_thread) all but one; results do not "
+            "depend on it");
   f.flag("own_thread", o.own_thread, "solves run in parallel with control; results then depend on their speed");
   f.number(
       "solve_time", o.solve_time, "s", kNotNegative,
