@@ -349,7 +349,7 @@ touchdown, and the largest opening of a closure. Bielle's world closes loops exa
 seconds until a robot falls by the torques of its plan alone (`open`), by gains and by predictive control (`mpc`). Under
 predictive control a swinging foot keeps to its path wherever there are steps, up to where it lands; before, heels came down on
 the edge of the step above: Bipetto's turned by up to 0.5 rad, Cleobot's by 0.24. Earlier, Bipetto fell going down (2.25 s in
-Bielle's world, 3.15 in MuJoCo's) and Cleobot going back (1.08 and 1.10 s) under gains, and Cleobot going down in MuJoCo's world
+Bielle's and Simbody's worlds, 3.15 in MuJoCo's) and Cleobot going back (1.07 to 1.10 s) under gains, and Cleobot going down in MuJoCo's world
 under predictive control (1.47 s)."""),
     ("Real sensors", "sensors", lambda: """`--sensors real`, seed 1, gains; outcomes as above. Errors are
 those of the estimated trunk, root mean squares; drift is that over the ground at the end."""),
