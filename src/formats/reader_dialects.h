@@ -17,8 +17,9 @@
 /// value> times that to <predecessor link>.
 ///
 /// Motors: `<transmission>` of ros_control, also inside <ros2_control> and in the words of pr2_mechanism. A SimpleTransmission is a
-/// motor with a gear; a joint of <ros2_control> with a <command_interface> that no transmission names has a motor without one. A DifferentialTransmission and a FourBarLinkageTransmission are two rotors, next to massless, each with a
-/// motor, and two couplers between rotors and joints, with reductions n and offsets o:
+/// motor with a gear; a joint of <ros2_control> with a <command_interface> that no transmission names has a motor without one. A
+/// DifferentialTransmission and a FourBarLinkageTransmission are two rotors, next to massless, each with a motor, and two couplers
+/// between rotors and joints, with reductions n and offsets o:
 ///
 ///     x_a1 = n_a1 (n_j1 (x_j1 - o_1) + n_j2 (x_j2 - o_2)),  x_a2 = n_a2 (n_j1 (x_j1 - o_1) - n_j2 (x_j2 - o_2))       differential
 ///     x_a1 = n_a1 n_j1 (x_j1 - o_1),                        x_a2 = n_a2 (n_j2 (x_j2 - o_2) + x_j1 - o_1)              four-bar

@@ -10,8 +10,8 @@ class FddpSolve : private FddpIterations {
   FddpSolve(const FddpOptions& options, const ShootingProblem& problem, ShootingTrajectory& trajectory,
             const FddpObserver& observer, FddpMemory& memory)
       : FddpIterations(options, options.max_iterations, problem, trajectory, observer, memory),
-        shoots_(options.multiple_shooting),
-        acceptable_decrease_(options.acceptable_decrease) {}
+        acceptable_decrease_(options.acceptable_decrease),
+        shoots_(options.multiple_shooting) {}
 
   FddpSummary run();
 
