@@ -6,6 +6,7 @@
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/builder.h"
+#include "loop_jacobian.h"
 #include "mechanisms.h"
 
 namespace bielle::testing {
@@ -95,12 +96,7 @@ MatrixXd differentiateModel(const Model& model, const std::vector<ModelVariation
 }
 
 std::vector<int> chooseKept(const Model& model, const VectorXd& q) {
-  Workspace ws(model);
-  updatePositions(model, ws, q);
-  const ConstraintSet loops = makeConstraintSet(model);
-  MatrixXd J = MatrixXd::Zero(loops.rows, model.nv());
-  for (size_t c = 0; c < loops.closures.size(); ++c)
-    calcClosureJacobian(ws, loops.closures[c], J.middleRows(loops.offsets[c], getRows(loops.closures[c].kind)));
+  const MatrixXd J = calcLoopJacobian(model, q);
   // Pivots first are the dofs that the loops determine best.
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(1e-7);

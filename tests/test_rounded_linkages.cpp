@@ -9,6 +9,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/robots/robot_loader.h"
 #include "dynamics/rounded_linkages.h"
+#include "loop_jacobian.h"
 #include "math/decompositions.h"
 #include "math/so3.h"
 #include "published_robots.h"
@@ -28,16 +29,6 @@ AssemblyResult turnTo(const Model& model, const VectorXd& q, double angle) {
   problem.weights = VectorXd::Constant(model.nv(), 1e-6);
   problem.weights[0] = 1;
   return assemble(model, problem);
-}
-
-MatrixXd calcLoopJacobian(const Model& model, const VectorXd& q) {
-  Workspace ws(model);
-  updatePositions(model, ws, q);
-  const ConstraintSet set = makeConstraintSet(model);
-  MatrixXd J = MatrixXd::Zero(set.rows, model.nv());
-  for (size_t c = 0; c < set.closures.size(); ++c)
-    calcClosureJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
-  return J;
 }
 
 // Singular values, and the way that the linkage goes per way of its first joint.

@@ -12,6 +12,7 @@
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/rounded_linkages.h"
+#include "loop_jacobian.h"
 #include "math/decompositions.h"
 #include "rounded_families.h"
 
@@ -46,13 +47,7 @@ struct Going {
   VectorXd ratio;
 };
 Going calcGoing(const Model& model, const VectorXd& q) {
-  Workspace ws(model);
-  updatePositions(model, ws, q);
-  const ConstraintSet set = makeConstraintSet(model);
-  MatrixXd J = MatrixXd::Zero(set.rows, model.nv());
-  for (size_t c = 0; c < set.closures.size(); ++c)
-    calcClosureJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
-  const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<MatrixXd> svd(calcLoopJacobian(model, q), Eigen::ComputeFullU | Eigen::ComputeFullV);
   const VectorXd way = svd.matrixV().rightCols(1);
   return {svd.singularValues()[model.nv() - 2], way / way[0]};
 }

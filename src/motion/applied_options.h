@@ -1,6 +1,7 @@
 #pragma once
 /// \file What the options of a problem (bielle/motion/problem_options.h) make of the stages of a motion.
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "bielle/motion/motion.h"
@@ -17,6 +18,9 @@ VectorXd getVelocityLimits(const Model& model, const LimitOptions& options);
 
 /// Power limits by motor (nu), W, likewise; infinite where there is none.
 VectorXd getPowerLimits(const Model& model, const LimitOptions& options);
+
+/// The margin that the transmission of a linkage keeps from its dead points: its own, where that is larger than that of all.
+double getDeadPointMargin(const LimitOptions& options, const std::string& linkage);
 
 /// The limits of a model, as its file and the options give them.
 class Limits {

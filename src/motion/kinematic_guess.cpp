@@ -117,8 +117,7 @@ class FeetPlacer {
   double height() const { return height_; }
 
  private:
-  static constexpr double kEasyTransmission = 0.5;  // well before the dead points
-  static constexpr double kFar = 0.24;              // of the base, over the height of the centre of mass
+  static constexpr double kFar = 0.24;  // of the base, over the height of the centre of mass
 
   struct Posture {
     VectorXd q;

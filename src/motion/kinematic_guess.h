@@ -22,6 +22,7 @@ struct PlannedPosture {
 /// the posture before; then all soles may tilt. If that fails too, the joints are those of the stance.
 std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const std::vector<PlannedPosture>& postures);
 inline constexpr double kLeastTransmission = 0.15;
+inline constexpr double kEasyTransmission = 0.5;  ///< well before the dead points
 
 /// How high the centre of mass can be over a foot with a flat sole while the base keeps its rotation: as far as joints have range
 /// and linkages are well before their dead points (transmissions from 0.5 to 2). Found by moving the base of a stance, as far ahead and

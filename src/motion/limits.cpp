@@ -108,8 +108,8 @@ std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd
   std::vector<PathConstraint> bounds;
   std::map<std::string, double> margins = options.dead_point_margins;
   for (const Linkage& linkage : listLinkages(model, q0)) {
-    double margin = options.dead_point_margin;
-    if (const auto own = margins.extract(linkage.output)) margin = std::max(margin, own.mapped());
+    margins.erase(linkage.output);
+    const double margin = getDeadPointMargin(options, linkage.output);
     if (margin == 0) continue;
     bounds.push_back(makeBound("dead points of " + linkage.output, margin, 1 / margin, makeTransmission(linkage)));
     bounds.back().scale[0] = 1;
@@ -125,6 +125,12 @@ void append(const std::vector<PathConstraint>& bounds, std::vector<PathConstrain
 }
 
 }  // namespace
+
+double getDeadPointMargin(const LimitOptions& options, const std::string& linkage) {
+  const auto own = options.dead_point_margins.find(linkage);
+  return own == options.dead_point_margins.end() ? options.dead_point_margin
+                                                 : std::max(options.dead_point_margin, own->second);
+}
 
 Limits::Limits(const Model& model, const LimitOptions& options, const VectorXd& q0)
     : efforts_(VectorXd::Constant(model.nu(), kNone)) {

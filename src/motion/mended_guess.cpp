@@ -5,16 +5,11 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/linkage.h"
 #include "dynamics/reduction.h"
+#include "motion/applied_options.h"
+#include "motion/kinematic_guess.h"
 
 namespace bielle {
 namespace {
-
-constexpr double kWellBefore = 0.5;  // transmission, or its inverse, where a linkage is well before its dead points
-
-double getMargin(const LimitOptions& limits, const Linkage& linkage) {
-  const auto own = limits.dead_point_margins.find(linkage.output);
-  return std::max(limits.dead_point_margin, own == limits.dead_point_margins.end() ? 0 : own->second);
-}
 
 // The joints of a linkage, on the way from one posture to another.
 void moveJoints(const Model& model, const Linkage& linkage, const VectorXd& from, const VectorXd& to, double share,
@@ -39,13 +34,13 @@ void leadPastDeadPoints(const Motion& motion, std::vector<VectorXd>& xs) {
   if (!limits.enforced || (limits.dead_point_margin == 0 && limits.dead_point_margins.empty())) return;
   const VectorXd start = motion.problem->initialState().head(nq);
   for (const Linkage& linkage : listLinkages(model, start)) {
-    const double margin = getMargin(limits, linkage);
+    const double margin = getDeadPointMargin(limits, linkage.output);
     if (linkage.isDirect() || margin == 0) continue;
     const auto isWithin = [&](int node, double least) {
       const double transmission = calcTransmission(linkage, model, xs[node].head(nq));
       return transmission >= least && transmission <= 1 / least;
     };
-    const double well = std::max(margin, kWellBefore);
+    const double well = std::max(margin, kEasyTransmission);
     for (int first = 0; first < num_nodes; ++first) {
       if (isWithin(first, well)) continue;
       int after = first;

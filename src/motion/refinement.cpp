@@ -8,6 +8,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "math/largest.h"
+#include "motion/applied_options.h"
 
 namespace bielle {
 namespace {
@@ -166,9 +167,7 @@ std::optional<RefinedMotion> keepFromDeadPoints(const Motion& solved, const Moti
   if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
   bool larger = false;
   for (const auto& [linkage, needed] : findMargins(solved, record)) {
-    const auto own = limits.dead_point_margins.find(linkage);
-    const double given = own == limits.dead_point_margins.end() ? 0 : own->second;
-    if (needed <= std::max(limits.dead_point_margin, given)) continue;
+    if (needed <= getDeadPointMargin(limits, linkage)) continue;
     limits.dead_point_margins[linkage] = needed;
     larger = true;
   }
