@@ -148,6 +148,11 @@ def calc_transmission(n, r):
     return (sign * np.sqrt(np.maximum(0, np.linalg.det(transpose(Q) @ Q))) / r["reference_volume"])[:, None]
 
 
+def calc_transmission_arctan(n, r):
+    rho = calc_transmission(n, r)
+    return np.arctan(rho) + np.where(rho < -1, np.pi, 0)
+
+
 def calc_electrical_power(n, r):
     loss, drive, back = (np.array(r[key]) for key in ("losses", "drive", "back"))
     p = n.u * n.speeds
@@ -177,7 +182,7 @@ RESIDUALS = {
     "wrench_cone": lambda n, r: get_force(n, r) @ np.array(r["matrix"]).T,
     "joint_position": get_positions,
     "joint_velocity": lambda n, r: n.state.v[:, r["dofs"]],
-    "transmission": calc_transmission,
+    "transmission_arctan": calc_transmission_arctan,
     "motor_power": lambda n, r: n.u[:, r["motors"]] * n.state.v[:, [n.problem.mechanism.motor_dofs[m]
                                                                    for m in r["motors"]]],
     "motor_voltage": lambda n, r: n.u[:, r["motors"]] * r["per_effort"] + n.speeds[:, r["motors"]] * r["per_speed"],

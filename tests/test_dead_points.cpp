@@ -5,15 +5,19 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/linkage.h"
 #include "bielle/model/error.h"
+#include "bielle/ocp/cost.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/solve/fddp.h"
+#include "check_residual.h"
 #include "math/constants.h"
 #include "problem_probe.h"
 #include "solve_in_place.h"
 
 using namespace bielle;
+using bielle::testing::TestNode;
 
 namespace {
 
@@ -177,6 +181,44 @@ TEST_CASE("dead points of the motor: inertia carries the linkage through") {
   CAPTURE(drift[0], drift[1]);
   CHECK(drift[0] < 0.05);
   CHECK(drift[1] < 0.6 * drift[0]);
+}
+
+TEST_CASE("dead points of the motor: the arctangent of the transmission goes through them") {
+  FourBarChainOptions options;
+  options.motor = FourBarMotor::Rocker;
+  const FourBarChain chain = makeFourBarChain(options);
+  const Model& model = chain.model;
+  const ConstraintSet set = makeConstraintSet(model);
+  const auto residual =
+      makeTransmissionArctan(makeLinkage(model, chain.q_closed, {model.joints()[model.dofs()[kCrank].joint].name}));
+  TestNode node(model, set);
+  const VectorXd v = VectorXd::Zero(model.nv()), lambda = VectorXd::Zero(set.rows);
+  const auto close = [&](double crank) {
+    options.crank_angle = crank;
+    return makeFourBarChain(options).q_closed;
+  };
+  const double h = 1e-5;
+  double last = 0;
+  int crossed = 0, wrapped = 0;
+  for (int i = 0; i <= 720; ++i) {
+    const double crank = 0.1 + 2 * kPi * i / 720;
+    const VectorXd before = close(crank - h), q = close(crank), after = close(crank + h);
+    const double change = node.calc(*residual, after, v, lambda)[0] - node.calc(*residual, before, v, lambda)[0];
+    const double angle = node.calc(*residual, q, v, lambda)[0];
+    MatrixXd row = MatrixXd::Zero(1, model.nv()), unused = row;
+    VectorXd no_time(1);
+    residual->calcJacobian(node.view(), {row, unused, unused, unused, unused, no_time});
+    CAPTURE(crank, angle, change / (2 * h));
+    if (std::abs(change) < 1) {
+      CHECK(std::abs(change / (2 * h)) < 10);
+      CHECK((row * model.difference(before, after))(0, 0) == Approx(change).epsilon(1e-6).margin(1e-12));
+    }
+    if (i > 0) wrapped += std::abs(angle - last) > 1;
+    if (i > 0) crossed += std::abs(angle - last) < 1 && (angle - kPi / 2) * (last - kPi / 2) < 0;
+    last = angle;
+  }
+  CHECK(crossed == 2);  // crank and coupler in line, twice a turn
+  CHECK(wrapped == 0);
 }
 
 TEST_CASE("dead points of the motor: an optimal motion goes through them") {

@@ -79,7 +79,7 @@ double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const
 double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
                         VectorRef gradient);
 // Eq. (3): a row of nv, of which the entries of the linkage are written.
-void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model,
+double calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model,
                               const Workspace& robot, MatrixRef row, const LoopBases* bases);
 
 // transmission.cpp, for dead_points.cpp

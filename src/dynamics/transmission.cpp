@@ -330,15 +330,17 @@ double calcTransmission(const Linkage& linkage, const Model& model, ConstVectorR
   return calcTransmission(linkage, memory, model, q);
 }
 
-void calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model,
-                              const Workspace& robot, MatrixRef row, const LoopBases* bases) {
+double calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model,
+                                const Workspace& robot, MatrixRef row, const LoopBases* bases) {
   LinkageWorkspace& s = memory.get(linkage);
   gatherConfiguration(model, *linkage.cluster, robot.q, s.q);
   const std::vector<int>& dofs = linkage.cluster->dofs;
   for (int dof : dofs) row(0, dof) = 0;
-  if (!updateBasis(linkage, s, &robot, bases) || !updateTangent(linkage, s)) return;
+  if (!updateBasis(linkage, s, &robot, bases)) return 0;
+  if (!updateTangent(linkage, s)) return std::numeric_limits<double>::infinity();
   updateDerivative(linkage, s, getCluster(linkage, bases));
   for (size_t k = 0; k < dofs.size(); ++k) row(0, dofs[k]) = s.derivative[static_cast<Eigen::Index>(k)];
+  return evaluate(linkage, s.Q);
 }
 
 const MatrixXd& selectMoving(const Linkage& linkage, LinkageWorkspace& s, const MatrixXd& basis) {

@@ -111,7 +111,8 @@ std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd
     margins.erase(linkage.output);
     const double margin = getDeadPointMargin(options, linkage.output);
     if (margin == 0) continue;
-    bounds.push_back(makeBound("dead points of " + linkage.output, margin, 1 / margin, makeTransmission(linkage)));
+    bounds.push_back(makeBound("dead points of " + linkage.output, std::atan(margin), std::atan(1 / margin),
+                               makeTransmissionArctan(linkage)));
     bounds.back().scale[0] = 1;
   }
   if (!margins.empty())

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "dynamics/linkage_workspace.h"
 #include "dynamics/reduction.h"
 #include "ocp/residual_data.h"
@@ -5,17 +7,21 @@
 namespace bielle {
 namespace {
 
-class TransmissionResidual : public DescribedResidual {
+class TransmissionArctan : public DescribedResidual {
  public:
-  explicit TransmissionResidual(const Linkage& linkage) : linkage_(linkage) {}
+  explicit TransmissionArctan(const Linkage& linkage) : linkage_(linkage) {}
   int size() const override { return 1; }
   void calc(const NodeView& node, VectorRef r) const override {
     LinkageWorkspaces own;
-    r[0] = calcTransmission(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws, node.loops);
+    const double rho =
+        calcTransmission(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws, node.loops);
+    r[0] = std::atan(rho) + (rho < -1 ? M_PI : 0);
   }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     LinkageWorkspaces own;
-    calcTransmissionJacobian(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws, rows.q, node.loops);
+    const double rho = calcTransmissionJacobian(linkage_, node.linkages ? *node.linkages : own, node.model, node.ws,
+                                                rows.q, node.loops);
+    for (int dof : linkage_.cluster->dofs) rows.q(0, dof) /= 1 + rho * rho;
   }
   ResidualData describe() const override {
     const ReducedCluster& cluster = *linkage_.cluster;
@@ -25,7 +31,7 @@ class TransmissionResidual : public DescribedResidual {
     };
     std::vector<int> bodies;
     for (const Closure& twist : linkage_.bodies) bodies.push_back(cluster.joints[twist.body1 - 1]);
-    ResidualData data{"transmission",
+    ResidualData data{"transmission_arctan",
                       {{"closures", cluster.closure_indices},
                        {"dofs", cluster.dofs},
                        {"motor_dofs", inModel(linkage_.motor_dofs)},
@@ -45,8 +51,8 @@ class TransmissionResidual : public DescribedResidual {
 
 }  // namespace
 
-std::unique_ptr<Residual> makeTransmission(const Linkage& linkage) {
-  return std::make_unique<TransmissionResidual>(linkage);
+std::unique_ptr<Residual> makeTransmissionArctan(const Linkage& linkage) {
+  return std::make_unique<TransmissionArctan>(linkage);
 }
 
 }  // namespace bielle
