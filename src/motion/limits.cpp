@@ -9,6 +9,9 @@ namespace bielle {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
+// rad of the arctangent of a transmission that count as 1: near dead points motors need little torque, which draws motions beyond
+// them before constraints hold.
+constexpr double kUnitAngle = 0.03;
 
 PathConstraint makeBound(const std::string& name, double lower, double upper, std::unique_ptr<Residual> residual) {
   const auto make = [](double value) { return VectorXd::Constant(1, value); };
@@ -113,7 +116,7 @@ std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd
     if (margin == 0) continue;
     bounds.push_back(makeBound("dead points of " + linkage.output, std::atan(margin), std::atan(1 / margin),
                                makeTransmissionArctan(linkage)));
-    bounds.back().scale[0] = 1;
+    bounds.back().scale[0] = kUnitAngle;
   }
   if (!margins.empty())
     requireOption(false, "dead_point_margin", "there is no linkage of '" + margins.begin()->first + "'",
