@@ -78,9 +78,10 @@ double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const
 // The same with its derivative by the motors (nu), which the other joints follow.
 double calcTransmission(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model, ConstVectorRef q,
                         VectorRef gradient);
-// Eq. (3): a row of nv, of which the entries of the linkage are written.
+// Eq. (3): a row of nv, of which the entries of the linkage are written. Returns (2): 0 without a basis, infinite without a motion
+// of the motors, where the entries are 0.
 double calcTransmissionJacobian(const Linkage& linkage, LinkageWorkspaces& memory, const Model& model,
-                              const Workspace& robot, MatrixRef row, const LoopBases* bases);
+                                const Workspace& robot, MatrixRef row, const LoopBases* bases);
 
 // transmission.cpp, for dead_points.cpp
 // Whether Q_0 is neither zero nor infinite.
