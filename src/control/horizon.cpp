@@ -6,6 +6,7 @@
 
 #include "bielle/model/error.h"
 #include "control/window_grid.h"
+#include "motion/applied_options.h"
 #include "motion/robot_size.h"
 #include "solve/fddp_checks.h"
 
@@ -243,7 +244,9 @@ Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOp
   plan.stages.back() = StageSpec();
   plan.stages.back().state = makeEndCost(model, plan.q_end, selectMainJoints(model), options);
   plan.goals.clear();
-  return makeMotion(model, std::move(plan), problem);
+  ProblemOptions windows = problem;
+  windows.limits = softenDeadPoints(windows.limits);
+  return makeMotion(model, std::move(plan), windows);
 }
 
 std::unique_ptr<Horizon> makeMotionHorizon(const Motion& motion, const ShootingTrajectory& plan,

@@ -9,9 +9,6 @@ namespace bielle {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
-// rad of the arctangent of a transmission that count as 1: near dead points motors need little torque, which draws motions beyond
-// them before constraints hold.
-constexpr double kUnitAngle = 0.03;
 
 PathConstraint makeBound(const std::string& name, double lower, double upper, std::unique_ptr<Residual> residual) {
   const auto make = [](double value) { return VectorXd::Constant(1, value); };
@@ -116,7 +113,7 @@ std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd
     if (margin == 0) continue;
     bounds.push_back(makeBound("dead points of " + linkage.output, std::atan(margin), std::atan(1 / margin),
                                makeTransmissionArctan(linkage)));
-    bounds.back().scale[0] = kUnitAngle;
+    bounds.back().scale[0] = options.dead_point_unit;
   }
   if (!margins.empty())
     requireOption(false, "dead_point_margin", "there is no linkage of '" + margins.begin()->first + "'",
@@ -134,6 +131,11 @@ double getDeadPointMargin(const LimitOptions& options, const std::string& linkag
   const auto own = options.dead_point_margins.find(linkage);
   return own == options.dead_point_margins.end() ? options.dead_point_margin
                                                  : std::max(options.dead_point_margin, own->second);
+}
+
+LimitOptions softenDeadPoints(LimitOptions options) {
+  options.dead_point_unit = 1;
+  return options;
 }
 
 Limits::Limits(const Model& model, const LimitOptions& options, const VectorXd& q0)
