@@ -30,6 +30,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   const IpoptSolution found = solveByIpopt(motion, guess, arguments.options);
   const FddpSummary& solver = found.solution.summary;
   writeResult(arguments.output, makeResult(makeRunInfo(summary.run.robot, robot, command), found.solution));
+  for (const std::string& row : found.dropped) std::cout << "redundant, and left out: " << row << "\n";
   std::cout << motion.name << " of " << summary.run.robot << ": " << solver.message << ", cost " << solver.cost << ", "
             << solver.iterations << " iterations, " << solver.seconds << " s, violation " << solver.violation << "\n";
   return found.solution.converged() ? kConverged : kNotConverged;
@@ -42,6 +43,12 @@ void addOptions(CLI::App& app, Arguments& arguments) {
       ->required();
   app.add_option("--start", arguments.start,
                  "directory of a result to start from (default: SOLVED, the optimum itself)");
+  app.add_option(
+         "--transcription", arguments.options.transcription,
+         "multiple-shooting of our steps, or collocation over all joints, closures being constraints of every node")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, IpoptTranscription>{{"multiple-shooting", IpoptTranscription::MultipleShooting},
+                                                    {"collocation", IpoptTranscription::Collocation}}));
   app.add_option("--hessian", arguments.options.hessian, "gauss-newton or l-bfgs")
       ->transform(CLI::CheckedTransformer(std::map<std::string, IpoptHessian>{
           {"gauss-newton", IpoptHessian::GaussNewton}, {"l-bfgs", IpoptHessian::Lbfgs}}));
@@ -72,7 +79,8 @@ void addOptions(CLI::App& app, Arguments& arguments) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "Solves the problem of a solved motion with IPOPT, by direct multiple shooting with exact first derivatives."};
+      "Solves the problem of a solved motion with IPOPT, by direct multiple shooting or collocation with exact first "
+      "derivatives."};
   app.name("bielle-ipopt");
   app.failure_message(bielle::cli::describeFailure);
   Arguments arguments;

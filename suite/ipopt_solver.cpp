@@ -9,6 +9,7 @@
 #include <ctime>
 
 #include "bielle/model/error.h"
+#include "collocation.h"
 #include "multiple_shooting.h"
 
 namespace bielle {
@@ -21,10 +22,10 @@ constexpr double kNone = 1e20;  // of a bound that there is not: beyond nlp_uppe
 
 double getProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-// What IPOPT asks for, from a MultipleShooting, and what it finds.
-class ShootingProgram : public Ipopt::TNLP {
+// What IPOPT asks for, from a NonlinearProgram, and what it finds.
+class ProgramAdapter : public Ipopt::TNLP {
  public:
-  explicit ShootingProgram(MultipleShooting& program) : program_(program), begin_(getProcessorSeconds()) {}
+  explicit ProgramAdapter(NonlinearProgram& program) : program_(program), begin_(getProcessorSeconds()) {}
 
   VectorXd z, multipliers;  // at the end
   std::vector<FddpIteration> log;
@@ -105,13 +106,13 @@ class ShootingProgram : public Ipopt::TNLP {
  private:
   static Eigen::Map<const VectorXd> map(const Number* x, Index n) { return {x, n}; }
   static Eigen::Map<VectorXd> map(Number* x, Index n) { return {x, n}; }
-  static bool put(const MultipleShooting::Entries& entries, Index* rows, Index* columns) {
+  static bool put(const NonlinearProgram::Entries& entries, Index* rows, Index* columns) {
     std::copy(entries.rows.begin(), entries.rows.end(), rows);
     std::copy(entries.columns.begin(), entries.columns.end(), columns);
     return true;
   }
 
-  MultipleShooting& program_;
+  NonlinearProgram& program_;
   double begin_;
 };
 
@@ -200,12 +201,21 @@ const std::vector<std::pair<std::string, std::string>>& listIpoptOptions() {
 
 IpoptSolution solveByIpopt(const Motion& motion, const ShootingTrajectory& guess, const IpoptOptions& options) {
   const double begin = getProcessorSeconds();
-  MultipleShooting program(*motion.problem, guess);
-  ShootingProgram* const adapter = new ShootingProgram(program);
+  std::unique_ptr<NonlinearProgram> owned;
+  std::vector<std::string> dropped;
+  if (options.transcription == IpoptTranscription::Collocation) {
+    auto collocation = std::make_unique<Collocation>(*motion.problem, guess);
+    dropped = collocation->listDropped();
+    owned = std::move(collocation);
+  } else {
+    owned = std::make_unique<MultipleShooting>(*motion.problem, guess);
+  }
+  NonlinearProgram& program = *owned;
+  ProgramAdapter* const adapter = new ProgramAdapter(program);
   const Ipopt::SmartPtr<Ipopt::TNLP> owner = adapter;
   const Ipopt::SmartPtr<Ipopt::IpoptApplication> solver = IpoptApplicationFactory();
   setOptions(*solver, options);
-  IpoptSolution out{{motion, guess, {}}, "failed"};
+  IpoptSolution out{{motion, guess, {}}, "failed", dropped};
   FddpSummary& summary = out.solution.summary;
   if (const auto status = solver->Initialize(); status != Ipopt::Solve_Succeeded)
     throw InputError("", "IPOPT", "it refuses its options", "leave out those that were given");

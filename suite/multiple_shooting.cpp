@@ -2,10 +2,8 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
-#include "bielle/model/error.h"
 #include "model/joint.h"
 
 namespace bielle {
@@ -63,129 +61,60 @@ NumericalStatus Charts::calc(const RowMatrixXd& P, const VectorXd& xg, const Vec
 }
 
 MultipleShooting::MultipleShooting(const RobotProblem& problem, ShootingTrajectory guess)
-    : problem_(problem), guess_(std::move(guess)), charts_(problem), scratch_(problem.makeScratch()) {
-  if (problem.hasFreeTimings())
-    throw InputError(problem.model().name(), "shooting problem", "durations are variables",
-                     "make the motion without free durations");
-  guess_.xs.front() = problem.initialState();
+    : NonlinearProgram(problem, std::move(guess)), charts_(problem) {
   listNodes();
-  listBounds();
   listEntries();
-  for (size_t k = 0; k < guess_.us.size(); ++k) {
-    const Node& node = nodes_[k];
-    guess_.us[k] = guess_.us[k]
-                       .cwiseMax(variables_.lower.segment(node.u, node.nu))
-                       .cwiseMin(variables_.upper.segment(node.u, node.nu));
-  }
-  trajectory_ = guess_;
-  std::vector<EvaluateTask> tasks;
+  start_.setZero(variables_.lower.size());
+  for (size_t k = 0; k < guess_.us.size(); ++k) start_.segment(places_[k].u, places_[k].nu) = guess_.us[k];
   for (size_t k = 0; k < nodes_.size(); ++k) {
-    guesses_.push_back(problem.makeEvaluation());
     evaluations_.push_back(problem.makeEvaluation());
     d_.push_back(VectorXd::Zero(problem.tangentSize(static_cast<int>(k))));
     ahead_.push_back(d_.back());
-    EvaluateTask task;
-    task.node = static_cast<int>(k);
-    task.x = &guess_.xs[k];
-    task.u = k < guess_.us.size() ? &guess_.us[k] : nullptr;
-    task.out = guesses_.back().get();
-    tasks.push_back(task);
-  }
-  problem.evaluate(tasks.data(), static_cast<int>(tasks.size()), scratch_.get());
-  for (size_t k = 1; k < nodes_.size(); ++k) {
     const auto& at = static_cast<const RobotEvaluation&>(*guesses_[k]);
-    if (at.status != NumericalStatus::Ok) continue;  // and so at the start, which evaluate() tells
+    if (k == 0 || at.status != NumericalStatus::Ok) continue;  // and so at the start, which evaluate() tells
     problem.mapGains(at, RowMatrixXd::Identity(nodes_[k].nd, nodes_[k].nd), nodes_[k].P);
   }
 }
 
 void MultipleShooting::listNodes() {
-  const int N = problem_.numStages();
   int variable = 0, row = 0;
-  for (int k = 0; k <= N; ++k) {
+  for (size_t k = 0; k < places_.size(); ++k) {
+    const int index = static_cast<int>(k);
+    Place& place = places_[k];
     Node node;
     node.d = variable;
-    node.nd = k > 0 ? problem_.tangentSize(k) : 0;
-    node.u = node.d + node.nd;
-    node.nu = k < N ? problem_.controlSize(k) : 0;
-    variable = node.u + node.nu;
-    const int size = problem_.constraintSize(k);
-    node.wanted.assign(size, true);
-    VectorXd lower(size), upper(size);
-    problem_.getConstraintBounds(k, lower, upper);
-    int first = 0;
-    for (const PathConstraint& constraint : problem_.spec(k).path_constraints) {
-      const Residual& residual = *constraint.residual;
-      const bool of_controls = residual.needsForces() || residual.needsControls() || residual.needsSpeeds();
-      for (int i = first; i < first + residual.size(); ++i) {
-        if ((k == 0 && !of_controls) || (std::isinf(lower[i]) && std::isinf(upper[i]))) continue;
-        node.kept.push_back(i);
-        node.of_controls.push_back(of_controls);
-      }
-      first += residual.size();
-    }
-    node.c = row;
-    node.s = node.c + static_cast<int>(node.kept.size());
-    row = node.s + (k < N ? problem_.tangentSize(k + 1) : 0);
+    node.nd = k > 0 ? problem_.tangentSize(index) : 0;
+    place.u = node.d + node.nd;
+    variable = place.u + place.nu;
+    place.c = row;
+    node.s = place.c + place.numRows();
+    row = node.s + (k + 1 < places_.size() ? problem_.tangentSize(index + 1) : 0);
     nodes_.push_back(std::move(node));
   }
-  for (Bounds* bounds : {&variables_, &rows_}) {
-    const int size = bounds == &rows_ ? row : variable;
-    bounds->lower.setConstant(size, bounds == &rows_ ? 0 : -kInfinite);
-    bounds->upper.setConstant(size, bounds == &rows_ ? 0 : kInfinite);
-  }
-}
-
-void MultipleShooting::listBounds() {
-  for (size_t k = 0; k < nodes_.size(); ++k) {
-    const Node& node = nodes_[k];
-    const int index = static_cast<int>(k);
-    if (node.nu > 0)
-      problem_.getControlBounds(index, variables_.lower.segment(node.u, node.nu),
-                                variables_.upper.segment(node.u, node.nu));
-    VectorXd lower(node.wanted.size()), upper(node.wanted.size());
-    problem_.getConstraintBounds(index, lower, upper);
-    for (size_t i = 0; i < node.kept.size(); ++i) {
-      rows_.lower[node.c + static_cast<int>(i)] = lower[node.kept[i]];
-      rows_.upper[node.c + static_cast<int>(i)] = upper[node.kept[i]];
-    }
-  }
+  setBounds(variable, row);
 }
 
 // In the order in which getJacobian() and getHessian() write.
 void MultipleShooting::listEntries() {
-  const auto addRow = [this](int row, const Node& node, bool of_controls) {
-    for (int j = 0; of_controls && j < node.nu; ++j) jacobian_.add(row, node.u + j);
-    for (int j = 0; j < node.nd; ++j) jacobian_.add(row, node.d + j);
+  const auto addRow = [this](int row, size_t k, bool of_controls) {
+    for (int j = 0; of_controls && j < places_[k].nu; ++j) jacobian_.add(row, places_[k].u + j);
+    for (int j = 0; j < nodes_[k].nd; ++j) jacobian_.add(row, nodes_[k].d + j);
   };
   for (size_t k = 0; k < nodes_.size(); ++k) {
     const Node& node = nodes_[k];
-    for (size_t i = 0; i < node.kept.size(); ++i) addRow(node.c + static_cast<int>(i), node, node.of_controls[i]);
+    const Place& place = places_[k];
+    for (int i = 0; i < place.numRows(); ++i) addRow(place.c + i, k, dependsOnControls(*place.residuals[i]));
     for (int i = 0; k + 1 < nodes_.size() && i < nodes_[k + 1].nd; ++i) {
-      addRow(node.s + i, node, true);
+      addRow(node.s + i, k, true);
       jacobian_.add(node.s + i, nodes_[k + 1].d + i);
     }
-    const int size = node.nd + node.nu;  // d_k, then u_k
+    const int size = node.nd + place.nu;  // d_k, then u_k
     for (int j = 0; j < size; ++j)
       for (int i = j; i < size; ++i) hessian_.add(node.d + i, node.d + j);
   }
 }
 
-VectorXd MultipleShooting::start() const {
-  VectorXd z = VectorXd::Zero(variables_.lower.size());
-  for (size_t k = 0; k < guess_.us.size(); ++k) z.segment(nodes_[k].u, nodes_[k].nu) = guess_.us[k];
-  return z;
-}
-
-bool MultipleShooting::fail(const std::string& why) {
-  failure_ = why;
-  return false;
-}
-
-bool MultipleShooting::evaluate(ConstVectorRef z) {
-  if (z_.size() == z.size() && z_ == z) return evaluated_;
-  z_ = z;
-  evaluated_ = linearized_ = false;
+bool MultipleShooting::update() {
   const int count = static_cast<int>(nodes_.size());
   std::vector<IntegrateTask> sums;
   std::vector<EvaluateTask> tasks(count);
@@ -197,13 +126,13 @@ bool MultipleShooting::evaluate(ConstVectorRef z) {
     task.x = &trajectory_.xs[k];
     task.out = evaluations_[k].get();
     if (k + 1 < count) {
-      trajectory_.us[k] = z.segment(node.u, node.nu);
+      trajectory_.us[k] = z_.segment(places_[k].u, places_[k].nu);
       task.u = &trajectory_.us[k];
     }
     if (k == 0) continue;
     if (guesses_[k]->status != NumericalStatus::Ok)
       return fail("the guess cannot be evaluated at node " + std::to_string(k) + ": " + guesses_[k]->failure);
-    d_[k] = z.segment(node.d, node.nd);
+    d_[k] = z_.segment(node.d, node.nd);
     sums.push_back({k, guesses_[k].get(), &d_[k], &trajectory_.xs[k]});
     differences.push_back({k, guesses_[k].get(), &evaluations_[k - 1]->x_next, &ahead_[k]});
   }
@@ -217,24 +146,23 @@ bool MultipleShooting::evaluate(ConstVectorRef z) {
   problem_.difference(differences.data(), static_cast<int>(differences.size()), scratch_.get());
   for (const VectorXd& ahead : ahead_)
     if (!ahead.allFinite()) return fail("a step leads too far from the guess");
-  return evaluated_ = true;
+  return true;
 }
 
-bool MultipleShooting::linearize(ConstVectorRef z) {
-  if (!evaluate(z)) return false;
-  if (linearized_) return true;
+bool MultipleShooting::differentiate() {
   const int count = static_cast<int>(nodes_.size());
   std::vector<LinearizeTask> tasks(count);
   for (int k = 0; k < count; ++k) {
     Node& node = nodes_[k];
+    const Place& place = places_[k];
     const int ndx = problem_.tangentSize(k), next = k + 1 < count ? problem_.tangentSize(k + 1) : 0;
-    if (!node.model.hasSizes(ndx, node.nu, next)) node.model.resize(ndx, node.nu, next);
-    node.model.setRows(static_cast<int>(node.wanted.size()));
+    if (!node.model.hasSizes(ndx, place.nu, next)) node.model.resize(ndx, place.nu, next);
+    node.model.setRows(static_cast<int>(place.wanted.size()));
     LinearizeTask& task = tasks[k];
     task.node = k;
     task.at = evaluations_[k].get();
     task.next = k + 1 < count ? guesses_[k + 1].get() : nullptr;
-    task.rows = &node.wanted;
+    task.rows = &place.wanted;
     task.out = &node.model;
   }
   problem_.linearize(tasks.data(), count, scratch_.get());
@@ -246,27 +174,18 @@ bool MultipleShooting::linearize(ConstVectorRef z) {
     if (status != NumericalStatus::Ok)
       return fail("the coordinates about the guess end before node " + std::to_string(k) + ": " + getMessage(status));
   }
-  return linearized_ = true;
-}
-
-double MultipleShooting::calcCost() const {
-  double sum = 0;
-  for (const auto& at : evaluations_) sum += at->cost;
-  return sum;
+  return true;
 }
 
 void MultipleShooting::getRows(VectorRef out) const {
-  for (size_t k = 0; k < nodes_.size(); ++k) {
-    const Node& node = nodes_[k];
-    for (size_t i = 0; i < node.kept.size(); ++i)
-      out[node.c + static_cast<int>(i)] = evaluations_[k]->constraints[node.kept[i]];
-    if (k + 1 < nodes_.size()) out.segment(node.s, nodes_[k + 1].nd) = ahead_[k + 1] - d_[k + 1];
-  }
+  getPathRows(out);
+  for (size_t k = 0; k + 1 < nodes_.size(); ++k) out.segment(nodes_[k].s, nodes_[k + 1].nd) = ahead_[k + 1] - d_[k + 1];
 }
 
 void MultipleShooting::getGradient(VectorRef out) const {
-  for (const Node& node : nodes_) {
-    if (node.nu > 0) out.segment(node.u, node.nu) = node.model.lu;
+  for (size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    if (places_[k].nu > 0) out.segment(places_[k].u, places_[k].nu) = node.model.lu;
     if (node.nd > 0) out.segment(node.d, node.nd) = node.T.transpose() * node.model.lx;
   }
 }
@@ -279,18 +198,19 @@ void MultipleShooting::getJacobian(VectorRef values) const {
   };
   for (size_t k = 0; k < nodes_.size(); ++k) {
     const Node& node = nodes_[k];
+    const Place& place = places_[k];
     const ConstMatrixMap Ct = node.model.Ct(), Ft = node.model.Ft();
     MatrixXd by_c(node.nd, Ct.cols()), by_s(node.nd, Ft.cols());  // by d_k
     if (node.nd > 0) {
       by_c = node.T.transpose() * Ct.bottomRows(node.nd);
       by_s = node.T.transpose() * Ft.bottomRows(node.nd);
     }
-    for (size_t i = 0; i < node.kept.size(); ++i) {
-      if (node.of_controls[i]) add(Ct.col(node.kept[i]).head(node.nu));
-      add(by_c.col(node.kept[i]));
+    for (int i = 0; i < place.numRows(); ++i) {
+      if (dependsOnControls(*place.residuals[i])) add(Ct.col(place.kept[i]).head(place.nu));
+      add(by_c.col(place.kept[i]));
     }
     for (int i = 0; i < Ft.cols(); ++i) {
-      add(Ft.col(i).head(node.nu));
+      add(Ft.col(i).head(place.nu));
       add(by_s.col(i));
       values[at++] = -1;
     }
@@ -299,8 +219,9 @@ void MultipleShooting::getJacobian(VectorRef values) const {
 
 void MultipleShooting::getHessian(VectorRef values) const {
   Eigen::Index at = 0;
-  for (const Node& node : nodes_) {
-    const int nd = node.nd, nu = node.nu;
+  for (size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    const int nd = node.nd, nu = places_[k].nu;
     MatrixXd H(nd + nu, nd + nu);  // of d_k, then u_k
     H.bottomRightCorner(nu, nu) = node.model.luu();
     if (nd > 0) {
@@ -313,29 +234,6 @@ void MultipleShooting::getHessian(VectorRef values) const {
       at += nd + nu - j;
     }
   }
-}
-
-Multipliers MultipleShooting::expand(ConstVectorRef multipliers) const {
-  Multipliers out;
-  for (const Node& node : nodes_) {
-    out.values.push_back(VectorXd::Zero(static_cast<Eigen::Index>(node.wanted.size())));
-    for (size_t i = 0; i < node.kept.size(); ++i)
-      out.values.back()[node.kept[i]] = multipliers[node.c + static_cast<int>(i)];
-  }
-  return out;
-}
-
-double MultipleShooting::calcViolation() const {
-  double worst = 0;
-  for (size_t k = 0; k < nodes_.size(); ++k) {
-    const Node& node = nodes_[k];
-    for (size_t i = 0; i < node.kept.size(); ++i) {
-      const int row = node.c + static_cast<int>(i);
-      const double c = evaluations_[k]->constraints[node.kept[i]];
-      worst = std::max({worst, rows_.lower[row] - c, c - rows_.upper[row]});
-    }
-  }
-  return worst;
 }
 
 double MultipleShooting::calcGap() const {

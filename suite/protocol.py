@@ -40,6 +40,8 @@ VARIANTS = {
 IPOPT = {
     "IPOPT, Gauss-Newton": ["--hessian", "gauss-newton"],
     "IPOPT, L-BFGS": ["--hessian", "l-bfgs"],
+    "IPOPT, collocation, Gauss-Newton": ["--transcription", "collocation", "--hessian", "gauss-newton"],
+    "IPOPT, collocation, L-BFGS": ["--transcription", "collocation", "--hessian", "l-bfgs"],
 }
 KEEP_MARGINS = ["--dead-point-margin", "0.1499999"]  # hardly less than the default: those of linkages then stay as they are
 STARTS = ("optimum", "unperturbed")  # besides numbers of guesses: where the archive ends and where it began
@@ -175,7 +177,7 @@ def main():
                         "archive, or `unperturbed`, where it began")
     parser.add_argument("--seed", type=int, default=0, help="of the guesses")
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=[*VARIANTS, *IPOPT], metavar="NAME",
-                        help="some of: " + "; ".join([*VARIANTS, *IPOPT]) + "; all but the last two by default")
+                        help="some of: " + "; ".join([*VARIANTS, *IPOPT]) + "; all but those of IPOPT by default")
     parser.add_argument("--until", type=parse_time, metavar="HH:MM", help="begin no run after this time of today, UTC")
     arguments = parser.parse_args()
     lines = (arguments.directory / "index.jsonl").read_text(encoding="utf-8").splitlines()
@@ -204,7 +206,7 @@ def main():
                                 "limit": arguments.seconds}
                         file.write(json.dumps(line) + "\n")
                         file.flush()
-                        print(f"{trial!s:3} {name:40} {variant:25} {outcome['end']:20} {outcome['iterations'] or 0:4} "
+                        print(f"{trial!s:3} {name:40} {variant:32} {outcome['end']:20} {outcome['iterations'] or 0:4} "
                               f"{outcome['seconds'] or 0:8.2f} s", flush=True)
     return 0
 

@@ -29,7 +29,7 @@ inline StageSpec makeStage(std::mt19937& rng, const Model& model, const VectorXd
   const BodyFrame frame{model.numBodies() - 1, randomPlacement(rng)};
   stage.costs.push_back({"velocity", 1, quadratic(6), makeFrameVelocity(frame, randomVector(rng, 6))});
   for (int c = 0; c < static_cast<int>(stage.constraints.closures.size()); ++c) {
-    const int rows = getRows(stage.constraints.closures[c].kind);
+    const int rows = countForces(stage.constraints, c);
     stage.costs.push_back(
         {"force", 1e-2, quadratic(rows), makeContactForce(stage.constraints, c, randomVector(rng, rows, 5))});
     if (c < stage.constraints.num_loops) continue;

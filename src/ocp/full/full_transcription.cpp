@@ -3,6 +3,7 @@
 #include "dynamics/linkage_workspace.h"
 #include "math/lane_product.h"
 #include "model/joint.h"
+#include "ocp/full/full_state_cost.h"
 #include "ocp/full/full_step.h"
 
 namespace bielle {
@@ -71,7 +72,6 @@ class FullTranscription : public Transcription {
  private:
   void evaluate(EvaluateTask& task, FullScratch& scratch) const;
   NumericalStatus updateImpactStep(int node, FullEvaluation& at) const;
-  double calcStateCost(const StateCost& state, const FullEvaluation& at, VectorXd& difference) const;
 
   void linearize(LinearizeTask& task, FullScratch& scratch) const;
   void setImpact(const FullEvaluation& at, StageModel& out) const;
@@ -80,7 +80,6 @@ class FullTranscription : public Transcription {
   void addSpeedResiduals(int node, const FullEvaluation& at, FullScratch& scratch) const;
   void setControlResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
   void setScaleResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
-  void addStateCost(int node, const FullEvaluation& at, VectorXd& difference, StageModel& out) const;
 
   void calcDifference(const VectorXd& x0, const VectorXd& x1, VectorRef dx) const {
     const int nq = model_.nq(), nv = model_.nv();
@@ -105,7 +104,8 @@ void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const
   } else {
     updateNode(model_, at.x, at.ws);
   }
-  if (specs_[node].state.weight != 0) at.state_cost = calcStateCost(specs_[node].state, at, scratch.difference);
+  if (specs_[node].state.weight != 0)
+    at.state_cost = calcStateCost(model_, specs_[node].state, at.ws.q, at.ws.v, scratch.difference);
   if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
   costs_[node].calc(
       {model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds, nullptr, &scratch.linkages},
@@ -123,19 +123,6 @@ NumericalStatus FullTranscription::updateImpactStep(int node, FullEvaluation& at
   at.x_next.head(model_.nq()) = at.ws.q;
   at.x_next.segment(model_.nq(), model_.nv()) = at.impact->v_plus;
   return status;
-}
-
-double FullTranscription::calcStateCost(const StateCost& state, const FullEvaluation& at, VectorXd& difference) const {
-  const int nv = model_.nv();
-  model_.difference(state.q_ref, at.ws.q, difference);
-  double sum = difference.cwiseAbs2().dot(state.weights.head(nv)) +
-               (at.ws.v - state.v_ref).cwiseAbs2().dot(state.weights.tail(nv));
-  if (model_.hasFreeFlyer())
-    for (const int i : {0, 3}) {
-      const Vector3d d = difference.segment<3>(i), e = at.ws.v.segment<3>(i) - state.v_ref.segment<3>(i);
-      sum += d.dot(state.calcCoupling(i) * d) + e.dot(state.calcCoupling(nv + i) * e);
-    }
-  return 0.5 * state.weight * sum;
 }
 
 void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) const {
@@ -166,7 +153,9 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
   }
   out.cost = at.cost;
   setResiduals(node, at, task.rows, scratch, out);
-  addStateCost(node, at, scratch.difference, out);
+  MatrixMap lxx = out.lxx();
+  addStateCost(model_, specs_[node].state, costs_[node].getScale(at), at.ws.q, at.ws.v, scratch.difference,
+               out.lx.tail(2 * model_.nv()), lxx.bottomRightCorner(2 * model_.nv(), 2 * model_.nv()));
   if (isRunning(node)) costs_[node].addControlCost(at, out);
   if (place.isFree()) addTimeScaleCost(countLeading(model_, place), at, scratch.no_squares, out);
   if (isFinite(out)) task.status = NumericalStatus::Ok;
@@ -293,38 +282,6 @@ void FullTranscription::setScaleResiduals(int node, const FullEvaluation& at, Fu
   Rs.array() *= hessian.array();
   H.row(nu).head(nu).noalias() = Rs.transpose() * Ru;
   H.col(nu).tail(2 * nv).noalias() = Rx.transpose() * Rs;
-}
-
-void FullTranscription::addStateCost(int node, const FullEvaluation& at, VectorXd& difference, StageModel& out) const {
-  const StateCost& state = specs_[node].state;
-  if (state.weight == 0) return;
-  const int nv = model_.nv();
-  const double w = costs_[node].getScale(at) * state.weight;
-  model_.difference(state.q_ref, at.ws.q, difference);
-  auto lx = out.lx.tail(2 * nv);
-  MatrixMap all = out.lxx();
-  auto lxx = all.bottomRightCorner(2 * nv, 2 * nv);
-  lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(at.ws.v - state.v_ref);
-  lxx.diagonal().tail(nv) += w * state.weights.tail(nv);
-  if (model_.hasFreeFlyer())
-    for (const int i : {0, 3}) {
-      const Matrix3d C = w * state.calcCoupling(nv + i);
-      lx.segment<3>(nv + i) += C * (at.ws.v.segment<3>(i) - state.v_ref.segment<3>(i));
-      lxx.block<3, 3>(nv + i, nv + i) += C;
-    }
-  for (const Joint& joint : model_.joints()) {
-    const int i = joint.idx_v, n = joint.nv;
-    if (n == 0) continue;
-    const JointVector weights = w * state.weights.segment(i, n);
-    const JointVector d = difference.segment(i, n);
-    JointMatrix J(n, n);
-    calcJointDifferenceJacobian(joint, d, J);
-    JointMatrix WJ = weights.asDiagonal() * J;
-    if (i == 0 && model_.hasFreeFlyer())
-      for (const int k : {0, 3}) WJ.middleRows<3>(k) += w * state.calcCoupling(k) * J.middleRows<3>(k);
-    lx.segment(i, n).noalias() += WJ.transpose() * d;
-    lxx.block(i, i, n, n).noalias() += J.transpose() * WJ;
-  }
 }
 
 std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const NodeList& nodes) {
