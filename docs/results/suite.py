@@ -235,7 +235,7 @@ def add_other(page, problems):
     origin, runs = read_table("suite_ipopt")
     page.heading("IPOPT")
     page.add(f"""The same problems by IPOPT, as [the suite](../suite.md#ipopt) describes it, one thread, on a machine with other work
-({origin}). Problems and optima are those of that commit, which may have changed since the tables above. Costs are told over our
+({origin}; collocation is of the latter). Problems and optima are those of the commit of a run, and may have changed. Costs are told over our
 optimum of the same problem; *the same* is within 1e-6. Of iterates that violate a constraint or leave a gap of more than 1e-8 the
 violation is told, too: their costs say little.""")
     for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs):
@@ -245,7 +245,8 @@ violation is told, too: their costs say little.""")
         rows = []
         for row in problems:
             cells = [these.get((row["problem"], variant)) for variant in variants]
-            rows.append([show_problem(row["problem"]), *(show_end(run) if run else "not measured" for run in cells)])
+            if any(cells):
+                rows.append([show_problem(row["problem"]), *(show_end(run) if run else "not measured" for run in cells)])
         page.table(["problem", *variants], rows)
     converged = [run for run in runs if run["variant"].startswith(OTHER) and run["converged"] == "True"]
     shot = [run for run in converged if not run["variant"].startswith(COLLOCATION)]
@@ -253,7 +254,8 @@ violation is told, too: their costs say little.""")
     better = sorted({run["problem"] for run, ratio in zip(shot, ours) if ratio < -1e-6})
     page.add(f"""Of the {len(shot)} runs of multiple shooting that converged, {sum(abs(ratio) <= 1e-6 for ratio in ours)} ended at our
 optimum and {sum(ratio < -1e-6 for ratio in ours)} at a better one{": " + ", ".join(map(show_problem, better)) if better else ""}.
-{describe_collocation(runs)} Not measured: other guesses, and five of each with 200 s.""")
+{describe_collocation(runs)} Not measured: other guesses, and five of each with 200 s;
+collocation of most problems.""")
 
 
 def describe_collocation(runs):
