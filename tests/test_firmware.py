@@ -301,6 +301,46 @@ class FirmwareTest(unittest.TestCase):
         self.assertLessEqual(n[0], 60)
         self.assertEqual(n[2:], [1, 3])
 
+    def test_hinges_that_cross_are_one_universal_joint(self):
+        """An ankle in a file of MuJoCo, whose rods hang on a cross each: the motors in closed form, as published for such ankles."""
+        place = os.path.join(self.place, "crossing")
+        os.makedirs(place)
+        for name, text in (("ankle.xml", CROSSING), ("ankle.yaml", "model: ankle.xml\nserial_joints: [pitch, roll]\n")):
+            with open(os.path.join(place, name), "w") as file:
+                file.write(text)
+        maps = os.path.join(place, "maps")
+        convert(os.path.join(place, "ankle.yaml"), maps, "--to", "c", "--postures", "400", "--range", "pitch", "-0.5", "0.5", "--range", "roll",
+                "-0.2", "0.2")
+        for compiler in COMPILERS:
+            self.assertIn(": ok", run(build_test(maps, "pitch_roll", compiler)).stdout)
+        with open(os.path.join(maps, "pitch_roll.h")) as file:
+            text = file.read()
+        self.assertIn("held at a distance: u1x, u2x\n", text)
+        self.assertRegex(text, r"joint_to_motor: closed form; .* 2 roots, 6 trig")
+
+        def turn_y(angle, p):
+            c, s = math.cos(angle), math.sin(angle)
+            return c * p[0] + s * p[2], p[1], c * p[2] - s * p[0]
+
+        # Hinges of the cranks, from there the rods' upper ends, their lower ends on the foot, and their upper ends from these: at zero.
+        ankle = Linkage(maps, "pitch_roll")
+        for joints in ((-0.3, 0.1), (0.25, -0.2), (0.5, 0.2), (-0.5, -0.2), (0, 0)):
+            at = (ctypes.c_double * 16)()
+            self.assertEqual(ankle.call("joint_to_motor", (ctypes.c_double * 2)(*joints), None, at, result=ctypes.c_int), OK)
+            for i, (hinge, crank, foot, rod) in enumerate((((-0.002, 0.036, 0.212), (-0.04, 0, 0.002), (-0.055, 0.03, 0.025), (0.01, 0.004, 0.2)),
+                                                           ((-0.004, -0.04, 0.15), (-0.04, 0, 0.003), (-0.055, -0.032, 0.025), (0.008, -0.006, 0.14)))):
+                c, s = math.cos(joints[1]), math.sin(joints[1])
+                end = turn_y(joints[0], (foot[0] + 0.004, c * foot[1] - s * foot[2], s * foot[1] + c * foot[2] - 0.015))
+                apart = [e - h for e, h in zip(end, hinge)]
+                # The anchors are where the file's posture has them, a little off the rods' drawn ends.
+                start = (foot[0] + 0.004, foot[1], foot[2] - 0.015)
+                length = math.dist([h + k for h, k in zip(hinge, crank)], start)
+                A = crank[0] * apart[0] + crank[2] * apart[2]
+                B = crank[2] * apart[0] - crank[0] * apart[2]
+                C = (sum(x * x for x in apart) + sum(x * x for x in crank) - length**2) / 2 - crank[1] * apart[1]
+                middle, off = math.atan2(B, A), math.acos(C / math.hypot(A, B))
+                self.assertLess(min(abs((at[2 + i] - middle - sign * off + math.pi) % (2 * math.pi) - math.pi) for sign in (1, -1)), 1e-12)
+
     def test_out_of_range_and_no_numbers(self):
         for value, expected in ((self.high + 0.1, self.high), (self.low - 5, self.low), (math.inf, self.high), (math.nan, self.low)):
             status, joint, motor, _ = self.linkage.solve("joint_to_motor", value)

@@ -78,6 +78,49 @@ Scalar cos(const Scalar& a) { return a.isConstant() ? Scalar(std::cos(getConstan
 Scalar atan2(const Scalar& y, const Scalar& x) { return makeNode(Op::Atan2, {y, x}); }
 Scalar min(const Scalar& a, const Scalar& b) { return makeNode(Op::Min, {a, b}); }
 
+namespace {
+
+struct Sum {
+  Scalar rest = 0;
+  double constant = 0;
+};
+
+Sum split(const Scalar& formula) {
+  const Node& node = formula.node();
+  const auto get = [&](size_t i) { return split(node.operands[i]); };
+  switch (node.op) {
+    case Op::Constant:
+      return {0, node.constant};
+    case Op::Negate: {
+      const Sum a = get(0);
+      return {-a.rest, -a.constant};
+    }
+    case Op::Add: {
+      const Sum a = get(0), b = get(1);
+      return {a.rest + b.rest, a.constant + b.constant};
+    }
+    case Op::Subtract: {
+      const Sum a = get(0), b = get(1);
+      return {a.rest - b.rest, a.constant - b.constant};
+    }
+    case Op::Multiply: {
+      const Scalar& factor = node.operands[0];
+      const Sum b = factor.isConstant() ? get(1) : Sum();
+      if (b.constant == 0) return {formula, 0};
+      return {factor * b.rest, getConstant(factor) * b.constant};
+    }
+    default:
+      return {formula, 0};
+  }
+}
+
+}  // namespace
+
+Scalar gatherConstants(const Scalar& formula) {
+  const Sum sum = split(formula);
+  return sum.rest + sum.constant;
+}
+
 Scalar Derivative::operator()(const Scalar& formula) {
   if (const auto known = known_.find(&formula.node()); known != known_.end()) return known->second;
   const Scalar derived = derive(formula.node());

@@ -51,6 +51,8 @@ Scalar sin(const Scalar& a);
 Scalar cos(const Scalar& a);
 Scalar atan2(const Scalar& y, const Scalar& x);
 Scalar min(const Scalar& a, const Scalar& b);
+// The same formula, of whose sum all constants are one: large ones that cancel do so before they are rounded.
+Scalar gatherConstants(const Scalar& formula);
 
 // Forward differentiation: the derivatives of formulas while their inputs change at given rates.
 class Derivative {

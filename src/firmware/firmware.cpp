@@ -84,10 +84,12 @@ FirmwareText formatFirmware(const Model& model, ConstVectorRef q, const Firmware
     names.insert(names.end(), linkage.joint_names.begin(), linkage.joint_names.end());
   }
   if (all.empty())
-    throw InputError(model.name(), "linkages",
-                     "none has motors that move as many serial joints" +
-                         (out.warnings.empty() ? std::string() : " (" + out.warnings.front() + ")"),
-                     "list as many of its joints with one coordinate under `serial_joints` as it has motors");
+    throw InputError(
+        model.name(), "linkages",
+        "none has motors that move as many serial joints" +
+            (out.warnings.empty() ? std::string() : " (" + out.warnings.front() + ")"),
+        "list as many of its joints with one coordinate under `serial_joints` as it has motors, in the robot's YAML "
+        "file; a file of MuJoCo gets one, with the key `model: FILE`");
   for (const auto& [joint, range] : options.ranges)
     if (!contains(names, joint))
       throw InputError(model.name(), "--range " + joint, "it is no serial joint of a linkage",

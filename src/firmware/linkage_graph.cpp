@@ -1,7 +1,6 @@
 #include "firmware/linkage_graph.h"
 
 #include <algorithm>
-#include <functional>
 #include <map>
 #include <numeric>
 
@@ -13,6 +12,9 @@
 
 namespace bielle::firmware {
 namespace {
+
+constexpr double kLeastAngle = 0.1;  // rad, between axes that cross
+constexpr double kMeeting = 1e-9;    // m, between lines that meet
 
 // The end of a rod (or of half a strut) at an edge: its point in a group.
 Vector3d getPoint(const Edge& edge, int group, double along) {
@@ -37,6 +39,7 @@ LinkageGraph::LinkageGraph(const Model& model, const Linkage& linkage, ConstVect
   markNeeded();
   weld();
   addEdges();
+  joinHinges();
   while (removeRod()) {
   }
   for (const Closure& closure : loops_.closures())
@@ -132,6 +135,16 @@ std::vector<int> LinkageGraph::listEdges(int group) const {
   return out;
 }
 
+// Centres of mass of its bodies, in the group.
+void LinkageGraph::visitMasses(int group, const std::function<void(const Vector3d& com, double mass)>& visit) const {
+  for (int body = 1; body < loops_.numBodies(); ++body) {
+    if (getGroup(body) != group) continue;
+    const Inertia& inertia =
+        model_.bodies()[static_cast<size_t>(cluster_.joints[static_cast<size_t>(body) - 1])].inertia;
+    if (inertia.mass != 0) visit(place(body).act(inertia.com), inertia.mass);
+  }
+}
+
 // What else holds a body: a distance, a point spring.
 bool LinkageGraph::isHeldOtherwise(int group) const {
   for (const RodDistance& distance : distances)
@@ -143,6 +156,43 @@ bool LinkageGraph::isHeldOtherwise(int group) const {
     for (int body : {spring.body1, spring.body2})
       if (const int own = toCluster(body); own > 0 && getGroup(own) == group) return true;
   return false;
+}
+
+// A body with nothing but two hinges whose axes meet is the cross of a universal joint. With both frames moved to where they meet,
+// and R_12 of the second hinge in the first one, its motion is R(n_1, q_1) R(R_12 n_2, q_2) R_12.
+void LinkageGraph::joinHinges() {
+  for (int group = 1; group < loops_.numBodies(); ++group) {
+    if (getGroup(group) != group || getGroup(0) == group || isHeldOtherwise(group)) continue;
+    const std::vector<int> ends = listEdges(group);
+    if (ends.size() != 2) continue;
+    Edge &one = edges[static_cast<size_t>(ends[0])], &two = edges[static_cast<size_t>(ends[1])];
+    const int a = one.other(group), b = two.other(group);
+    if (!isEnd(one) || !isEnd(two) || !one.isHinge() || !two.isHinge() || a == b) continue;
+    const SE3 X_12 = one.in(group).inverse() * two.in(group);
+    const Vector3d axis2 = X_12.R * two.axis, normal = one.axis.cross(axis2);
+    if (normal.norm() < kLeastAngle || std::abs(X_12.p.dot(normal)) > kMeeting) continue;
+    Edge both;
+    both.name = one.name + "_" + two.name;
+    both.kind = JointKind::Universal;
+    both.axis = one.a == a ? one.axis : Vector3d(-one.axis);
+    both.axis2 = two.b == b ? axis2 : Vector3d(-axis2);
+    both.q = Eigen::Vector2d(one.q[0], two.q[0]);
+    both.a = a;
+    both.b = b;
+    const double square = normal.squaredNorm();
+    both.X_a = one.in(a);
+    both.X_a.p = one.in(a).act(X_12.p.cross(axis2).dot(normal) / square * one.axis);
+    both.X_b.R = two.in(b).R * X_12.R.transpose();
+    both.X_b.p = two.in(b).act(X_12.p.cross(one.axis).dot(normal) / square * two.axis);
+    const Vector3d centre = one.in(group).act(X_12.p.cross(axis2).dot(normal) / square * one.axis);
+    visitMasses(group, [&](const Vector3d& com, double mass) {
+      ignored_offset = std::max(ignored_offset, (com - centre).norm());
+      masses.push_back({a, both.X_a.p, mass});
+    });
+    gone_.insert(group);
+    one.used = two.used = false;
+    edges.push_back(both);
+  }
 }
 
 // Of hinges with parallel axes, points at the same height; of a hinge and a centre, as high as the centre.
@@ -247,17 +297,13 @@ void LinkageGraph::finishRod(RodDistance distance, const std::vector<int>& ends,
   // Weights of the bodies on the line. A strut is split where its mass is at the reference.
   const Vector3d line = p2 - p1;
   for (const auto& [group, X] : parts)
-    for (int body = 1; body < loops_.numBodies(); ++body) {
-      if (getGroup(body) != group) continue;
-      const Inertia& inertia =
-          model_.bodies()[static_cast<size_t>(cluster_.joints[static_cast<size_t>(body) - 1])].inertia;
-      if (inertia.mass == 0) continue;
-      const Vector3d c = (X * place(body)).act(inertia.com) - p1;
+    visitMasses(group, [&, &X = X](const Vector3d& com, double mass) {
+      const Vector3d c = X.act(com) - p1;
       const double share = c.dot(line) / line.squaredNorm();
       ignored_offset = std::max(ignored_offset, (c - share * line).norm());
-      masses.push_back({distance.a, distance.pa, inertia.mass * (1 - share)});
-      masses.push_back({distance.b, distance.pb, inertia.mass * share});
-    }
+      masses.push_back({distance.a, distance.pa, mass * (1 - share)});
+      masses.push_back({distance.b, distance.pb, mass * share});
+    });
   for (const auto& [group, X] : parts) gone_.insert(group);
   distances.push_back(distance);
 }

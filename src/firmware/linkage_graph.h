@@ -1,9 +1,10 @@
 #pragma once
 // What holds the bodies of a linkage together, with as few coordinates as possible.
 //
-// Bodies that are welded are one group. A rod that touches two others by balls, universal joints or parallel hinges holds two
+// Bodies that are welded are one group, and two hinges whose axes meet in a body without anything else a universal joint. A rod that touches two others by balls, universal joints or parallel hinges holds two
 // points at a distance: one equation, and no coordinate. So does a strut with a slide between its ends, whose length is the slide's.
 // Of what remains, a spanning tree with the fewest coordinates is chosen anew; each other joint closes a loop.
+#include <functional>
 #include <set>
 #include <string>
 #include <utility>
@@ -84,7 +85,9 @@ class LinkageGraph {
   void addEdge(Edge edge, int body1, const SE3& X_1, int body2, const SE3& X_2);
   void addEdges();
   std::vector<int> listEdges(int group) const;
+  void visitMasses(int group, const std::function<void(const Vector3d& com, double mass)>& visit) const;
   bool isHeldOtherwise(int group) const;
+  void joinHinges();
   bool findHeights(const Edge& one, int group1, const Edge& two, int group2, const SE3& X_12, double& h1,
                    double& h2) const;
   bool isConnectedWithout(const std::vector<int>& without, const std::set<int>& groups) const;

@@ -156,14 +156,32 @@ class MechanismBuilder {
   }
   // A point at the end of a path in the group at its begin, with fewer operations.
   Vector3s carryPoint(const std::vector<Step>& path, const Vector3s& point) const {
-    Vector3s p = point;
+    return carry(path, {point, dot(point, point)}).p;
+  }
+
+  // A point, and the square of its distance from the origin, as a sum of products in which the rod's length and the distance of
+  // its pivots can cancel.
+  struct Place {
+    Vector3s p;
+    Scalar square;
+  };
+  static Place move(const SE3& X, const Place& x) {
+    const SE3s there = toScalars(X);
+    return {there.act(x.p), x.square + dot(there.p, there.p) + 2 * dot(toScalars((X.R.transpose() * X.p).eval()), x.p)};
+  }
+  static Place move(const Edge& edge, const SE3s& motion, const Place& x) {
+    const Vector3s p = motion.act(x.p);
+    const bool turns = edge.isHinge() || edge.kind == JointKind::Universal;
+    return {p, turns ? x.square : dot(p, p)};
+  }
+  Place carry(const std::vector<Step>& path, Place x) const {
     for (size_t i = path.size(); i-- > 0;) {
       const Edge& edge = graph_.edges[static_cast<size_t>(path[i].edge)];
       const SE3s J = calcMotion(edge);
-      p = path[i].forward ? toScalars(edge.X_a).act(J.act(toScalars(edge.X_b.inverse()).act(p)))
-                          : toScalars(edge.X_b).act(J.inverse().act(toScalars(edge.X_a.inverse()).act(p)));
+      x = path[i].forward ? move(edge.X_a, move(edge, J, move(edge.X_b.inverse(), x)))
+                          : move(edge.X_b, move(edge, J.inverse(), move(edge.X_a.inverse(), x)));
     }
-    return p;
+    return x;
   }
   static std::vector<Step> reverse(std::vector<Step> path) {
     std::reverse(path.begin(), path.end());
@@ -240,15 +258,17 @@ class MechanismBuilder {
   // Both sides of a distance at an edge of its chain: its points in the frames of the joint.
   struct Sides {
     Vector3s a, b;
+    Scalar squares;  // |a|^2 + |b|^2
   };
   Sides calcSides(const RodDistance& distance, const std::vector<Step>& path, size_t at) const {
     const auto here = path.begin() + static_cast<std::ptrdiff_t>(at);
     const Edge& edge = graph_.edges[static_cast<size_t>(here->edge)];
-    const Vector3s one = carryPoint(reverse({path.begin(), here}), toScalars(distance.pa)),
-                   two = carryPoint({here + 1, path.end()}, toScalars(distance.pb));
-    const bool forward = here->forward;
-    return {toScalars(edge.X_a.inverse()).act(forward ? one : two),
-            toScalars(edge.X_b.inverse()).act(forward ? two : one)};
+    const auto start = [](const Vector3d& point) { return Place{toScalars(point), point.squaredNorm()}; };
+    const Place one = carry(reverse({path.begin(), here}), start(distance.pa)),
+                two = carry({here + 1, path.end()}, start(distance.pb));
+    const Place a = move(edge.X_a.inverse(), here->forward ? one : two),
+                b = move(edge.X_b.inverse(), here->forward ? two : one);
+    return {a.p, b.p, a.square + b.square};
   }
 
   void addDistances() {
@@ -270,8 +290,11 @@ class MechanismBuilder {
       }
       const size_t middle = path.size() / 2;
       const Sides sides = calcSides(distance, path, middle);
-      const Vector3s gap = sides.a - calcMotion(graph_.edges[static_cast<size_t>(path[middle].edge)]).act(sides.b);
-      equation.rows = {Scalar(0.5 / length) * (dot(gap, gap) - square)};
+      const Edge& turned = graph_.edges[static_cast<size_t>(path[middle].edge)];
+      const Vector3s b = calcMotion(turned).act(sides.b), gap = sides.a - b;
+      const bool turns = turned.isHinge() || turned.kind == JointKind::Universal;
+      const Scalar gap_square = turns ? sides.squares - 2 * dot(sides.a, b) : dot(gap, gap);
+      equation.rows = {Scalar(0.5 / length) * gatherConstants(gap_square - square)};
       for (size_t i = 0; i < path.size(); ++i) addRoots(distance, path, i, square, equation);
       if (distance.slide >= 0) {
         ClosedForm& form = equation.solved[graph_.edges[static_cast<size_t>(distance.slide)].coordinates[0]];
@@ -295,7 +318,7 @@ class MechanismBuilder {
       const Scalar along = dot(n, sides.b);
       const Vector3s across = b - n * along;
       const Scalar A = 2 * dot(sides.a, across), B = 2 * dot(sides.a, cross(n, b)),
-                   C = dot(sides.a, sides.a) + (dot(sides.b, sides.b) - square) - 2 * (dot(n, sides.a) * along);
+                   C = gatherConstants(sides.squares - square - 2 * (dot(n, sides.a) * along));
       form.radicand = A * A + B * B - C * C;
       const Scalar w = sqrt(form.radicand);
       form.roots = {edge.q[0] + atan2(B * C + A * w, A * C - B * w), edge.q[0] + atan2(B * C - A * w, A * C + B * w)};
