@@ -215,7 +215,7 @@ TEST_CASE("generators: every body is possible, the loops close, mobility is what
 TEST_CASE("generators: references are assembled with the angles that they give, and those of robots that come along") {
   for (const Generator& generator : listGenerators()) {
     CAPTURE(generator.name);
-    CHECK(checkReferences({generator.make(generator.parameters), {}, "", ""}).empty());
+    CHECK(checkReferences({generator.make(generator.parameters), {}, "", "", {}, {}}).empty());
   }
   for (const std::string& name : listRobots()) {
     CAPTURE(name);

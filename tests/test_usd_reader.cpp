@@ -404,6 +404,8 @@ TEST_CASE("USD files that are no robot are errors with line, prim and remedy") {
         "prim '/b/m' (line 5): the mass of body 'b' is to be computed from it, a Mesh; give physics:mass");
   check(head + "def Xform \"b\"\n{\nfloat xformOp:shear = 1\nuniform token[] xformOpOrder = [\"xformOp:shear\"]\n}\n",
         "its xformOpOrder has the unknown operation 'xformOp:shear'");
+  check(head + "def Xform \"b\"\n{\nuniform token[] xformOpOrder = [\"xformOp:translate\"]\n}\n",
+        "prim '/b' (line 5): xformOpOrder has 'xformOp:translate', which the prim does not have; give it");
   std::string locked, schemas;
   for (const char* axis : {"transX", "transY", "transZ", "rotX"}) {
     locked += std::string("float limit:") + axis + ":physics:low = 1\nfloat limit:" + axis + ":physics:high = -1\n";

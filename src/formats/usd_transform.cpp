@@ -1,5 +1,6 @@
 #include "formats/usd_transform.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bielle/model/error.h"
@@ -142,6 +143,10 @@ UsdTransform calcUsdTransform(const std::string& path, const UsdPrim& prim, bool
     }
     if (name.rfind("xformOp:", 0) != 0)
       failUsd(path, prim, *order, "has '" + name + "', which is no xformOp", "correct it");
+    if (std::none_of(prim.properties.begin(), prim.properties.end(),
+                     [&](const UsdProperty& p) { return p.name == name; }))
+      failUsd(path, prim, *order, "has '" + name + "', which the prim does not have",
+              "give it that attribute, or leave it out of the order");
     const UsdTransform own = Operation(path, prim, name).calc();
     if (is_inverse && !(std::abs(own.topLeftCorner<3, 3>().determinant()) > 0))
       failUsd(path, prim, *order, "inverts '" + name + "', which flattens", "correct it");
