@@ -25,23 +25,24 @@ std::vector<RodBearing> makeRodBearings(const Model& model, const std::vector<Ro
 template <typename T>
 struct RodTorqueOf {
   Vector3<T> torque;      ///< against w, N m
-  Matrix3<T> resistance;  ///< -d torque / dw; with stiction it may be indefinite
+  T slope = 0, fall = 0;  ///< -d torque / dw = slope 1 - fall w w^T; with stiction it may be indefinite
 };
 
 /// Eq. (1). \param force  |lambda|, N   \param w  rad/s
 template <typename T>
 RodTorqueOf<T> calcRodTorque(const RodFriction& law, const T& force, const Vector3<T>& w) {
   using std::sqrt;
-  RodTorqueOf<T> out{Vector3<T>::Zero(), Matrix3<T>::Zero()};
+  RodTorqueOf<T> out;
   const T square = w.squaredNorm();
   const auto add = [&](double level, double speed) {
-    const T size = sqrt(square + speed * speed), slope = law.radius * level * force / size;
-    out.torque -= slope * w;
-    out.resistance += slope * (Matrix3<T>::Identity() - w * w.transpose() / (size * size));
+    const T size = square + speed * speed, slope = law.radius * level * force / sqrt(size);
+    out.slope += slope;
+    out.fall += slope / size;
   };
   const double excess = law.stiction - law.coefficient;
   add(excess > 0 ? law.stiction : law.coefficient, law.friction_speed);
   if (excess > 0) add(-excess, law.stribeck_speed);
+  out.torque = -out.slope * w;
   return out;
 }
 

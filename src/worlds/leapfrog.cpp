@@ -16,6 +16,7 @@ namespace {
 
 constexpr int kMaxNewton = 20;
 constexpr double kNewtonTolerance = 1e-10;  // of a change of velocity, relative to 1 (m/s, rad/s) and the largest
+constexpr double kForesight = 0.01;         // of a second correction over the first: the third is foreseen
 constexpr double kLeastShare = 1.0 / 64;    // of a Newton step that must lower the residual
 constexpr int kMostHalvings = 10;           // of a step
 constexpr double kSpan = 20;                // steps between closed ends, to which it returns to halve them
@@ -374,6 +375,7 @@ MaskOf<T> LeapfrogOf<T>::solve(const T& h, const Mask& which) {
     factorize(h);
     updateCorrection();
     start_ = dw_;
+    const T first = calcLargestOf<T>(correction_);
     T share = 1, next = 0;
     for (Mask tried = active;;) {
       assignLanes(tried, start_ + share * correction_, dw_);
@@ -382,9 +384,13 @@ MaskOf<T> LeapfrogOf<T>::solve(const T& h, const Mask& which) {
       if (!any(tried)) break;
       share = select(tried, T(0.5 * share), share);
     }
-    updateCorrection();  // with the same matrix: good enough to tell whether another one is needed
+    // With the same matrix: good enough to tell whether another one is needed. Of a smooth residual the next such correction, and
+    // what is left, is smaller by twice as much as this one is (Deuflhard, Newton Methods for Nonlinear Problems, 2.1).
+    updateCorrection();
     assignLanes(active, calcLargestOf<T>(correction_), amount_);
-    const Mask converged = active && amount_ < kNewtonTolerance * (1 + calcLargestOf<T>(dw_));
+    const T enough = kNewtonTolerance * (1 + calcLargestOf<T>(dw_));
+    const Mask falls = T(1) <= share && amount_ < kForesight * first;
+    const Mask converged = active && (amount_ < enough || (falls && 2 * amount_ * amount_ < enough * first));
     assignLanes(converged, dw_ + correction_, dw_);
     solved = solved || converged;
     active = active && !converged && next < size;
@@ -400,7 +406,8 @@ void LeapfrogOf<T>::factorize(const T& h) {
   if constexpr (std::is_same_v<T, double>) {
     if (!slides_) {
       factors_.compute(system_);
-      return;
+      if (factors_.info() == Eigen::Success) return;
+      slides_ = true;
     }
   }
   if constexpr (!std::is_same_v<T, double>) {
@@ -472,8 +479,7 @@ void LeapfrogOf<T>::addForces(const Vector& w, Vector& loads, MatrixX<T>* dampin
   addContacts(w, loads, damping);
   addStops(w, loads, damping);
   addJoints(w, loads, damping);
-  const bool is_indefinite = rods_.add(moment_.rod_forces, w, loads, damping);
-  slides_ = slides_ || (damping && is_indefinite);
+  rods_.add(moment_.rod_forces, w, loads, damping);
 }
 
 // Of a coordinate.
@@ -487,7 +493,6 @@ T LeapfrogOf<T>::calcRate(int dof, const Vector& w) const {
 // A force on a coordinate, and its resistance if there is a matrix for it.
 template <typename T>
 void LeapfrogOf<T>::addRow(int dof, const T& force, const T& resistance, Vector& loads, MatrixX<T>* damping) {
-  if (damping) slides_ = slides_ || any(resistance < T(0));
   tree_.visitRow(dof, [&](int k, const T& entry) {
     loads[k] += entry * force;
     if (damping) tree_.visitRow(dof, [&](int l, const T& other) { (*damping)(k, l) += entry * resistance * other; });

@@ -134,7 +134,7 @@ class LeapfrogOf {
   bool is_pushed_ = false;
   Vector w_mean_, dw_, correction_, residual_, start_, loads_, product_;  // size
   MatrixX<T> damping_, system_, swapped_;                                 // size x size
-  bool slides_ = false;  // whether damping_ is not symmetric, or negative
+  bool slides_ = false;  // whether the system is not symmetric, or not positive
   Eigen::LLT<MatrixXd> factors_;
   std::vector<typename LogicOf<T>::Index> pivots_, swaps_;  // size; of system_ and swapped_
   Moment moment_, moment_kept_, moment_before_;

@@ -11,7 +11,6 @@ RodPivotsOf<T>::RodPivotsOf(const Model& model, const ClosedTreeOf<T>& tree, con
     : bearings_(makeRodBearings(model, frictions)) {
   for (size_t b = 0; b < bearings_.size(); ++b) {
     closures_.push_back(bearings_[b].closure);
-    sticks_ = sticks_ || bearings_[b].law.stiction > bearings_[b].law.coefficient;
     for (const RodBearing::Pivot& dofs : bearings_[b].pivots) {
       Pivot& pivot = pivots_.emplace_back();
       pivot.bearing = static_cast<Eigen::Index>(b);
@@ -35,7 +34,7 @@ void RodPivotsOf<T>::update(const ClosedTreeOf<T>& tree) {
 }
 
 template <typename T>
-bool RodPivotsOf<T>::add(const Vector& forces, const Vector& w, Vector& loads, MatrixX<T>* damping) {
+void RodPivotsOf<T>::add(const Vector& forces, const Vector& w, Vector& loads, MatrixX<T>* damping) {
   for (Pivot& pivot : pivots_) {
     Vector3<T> rate = Vector3<T>::Zero();
     for (size_t o = 0; o < pivot.outer.size(); ++o) rate += w[pivot.outer[o]] * pivot.turns[o];
@@ -44,14 +43,14 @@ bool RodPivotsOf<T>::add(const Vector& forces, const Vector& w, Vector& loads, M
     pivot.torque = friction.torque;
     pivot.power = rate.dot(pivot.torque);
     for (size_t o = 0; o < pivot.outer.size(); ++o) {
-      loads[pivot.outer[o]] += pivot.turns[o].dot(pivot.torque);
+      const Vector3<T>& turn = pivot.turns[o];
+      loads[pivot.outer[o]] += turn.dot(pivot.torque);
       if (!damping) continue;
-      const Vector3<T> resisted = friction.resistance * pivot.turns[o];
+      const Vector3<T> resisted = friction.slope * turn - (friction.fall * rate.dot(turn)) * rate;
       for (size_t p = 0; p < pivot.outer.size(); ++p)
         (*damping)(pivot.outer[p], pivot.outer[o]) += pivot.turns[p].dot(resisted);
     }
   }
-  return sticks_;
 }
 
 template <typename T>

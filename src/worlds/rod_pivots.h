@@ -26,9 +26,8 @@ class RodPivotsOf {
   /// At the placements of the tree.
   void update(const ClosedTreeOf<T>& tree);
   /// Adds the friction at w (size) under the forces (one per closure, N) to loads (size) and, if it is given, to a
-  /// matrix of damping.
-  /// \returns whether that may be indefinite
-  bool add(const Vector& forces, const Vector& w, Vector& loads, MatrixX<T>* damping);
+  /// matrix of damping, which stiction may make indefinite.
+  void add(const Vector& forces, const Vector& w, Vector& loads, MatrixX<T>* damping);
   T power() const;                                                    ///< of the last add(), W
   void addToDofs(const ClosedTreeOf<T>& tree, Vector& forces) const;  ///< likewise, nv
 
@@ -44,7 +43,6 @@ class RodPivotsOf {
   const std::vector<RodBearing> bearings_;
   std::vector<int> closures_;
   std::vector<Pivot> pivots_;
-  bool sticks_ = false;
 };
 
 }  // namespace bielle::worlds
