@@ -341,6 +341,16 @@ class FirmwareTest(unittest.TestCase):
                 middle, off = math.atan2(B, A), math.acos(C / math.hypot(A, B))
                 self.assertLess(min(abs((at[2 + i] - middle - sign * off + math.pi) % (2 * math.pi) - math.pi) for sign in (1, -1)), 1e-12)
 
+    def test_rods_in_single_precision(self):
+        """The length of a rod and the distance of its pivots cancel before they are rounded; iterations are enough for the last to be small."""
+        for part, most in (("four_bar", 3e-6), ("stephenson", 6e-6)):
+            robot, maps = os.path.join(self.place, part), os.path.join(self.place, part + "_maps")
+            run(BIELLE, "generate", "leg_biped", "--set", "knee=" + part, "--set", "ankle=serial", "--set", "hip=serial", "-o", robot)
+            convert(robot, maps, "--to", "c", "--precision", "float", "--postures", "4000")
+            self.assertIn(": ok", run(build_test(maps, "knee_left")).stdout)
+            with open(os.path.join(maps, "knee_left.h")) as file:
+                self.assertLess(read_header(file.read())[0], most)
+
     def test_out_of_range_and_no_numbers(self):
         for value, expected in ((self.high + 0.1, self.high), (self.low - 5, self.low), (math.inf, self.high), (math.nan, self.low)):
             status, joint, motor, _ = self.linkage.solve("joint_to_motor", value)

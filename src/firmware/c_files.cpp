@@ -127,7 +127,7 @@ class CWriter {
               "; ++n) {\n    REAL d[" + U + "];\n" + indent(loop.body) + "    last = 0;\n    for (k = 0; k < " + U +
               "; ++k) {\n      d[k] = limit(d[k], " + number(-kLongestStep) + ", " + number(kLongestStep) +
               ");\n      if (fabsFN(d[k]) > last) last = fabsFN(d[k]);\n    }\n" + moved + "  }\n  }\n";
-      body += "  if (!(last <= " + number(1e-3) + ")) return 0;\n";
+      body += "  if (!(last <= " + number(kSettled) + ")) return 0;\n";
       out += "  REAL last = 0;\n  int n, k;\n";
     } else {
       body = "  (void)guess;\n" + body;

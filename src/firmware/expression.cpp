@@ -193,6 +193,61 @@ Program::Program(const std::vector<Scalar>& outputs) {
   for (const Scalar& output : outputs) outputs_.push_back(add(output));
 }
 
+double estimateRounding(const Scalar& formula, const std::vector<double>& inputs) {
+  const Program program({formula});
+  std::vector<double> x, error;
+  for (const Program::Instruction& line : program.code()) {
+    const auto at = [&](int i) { return static_cast<size_t>(i); };
+    const double a = line.op == Op::Constant || line.op == Op::Input ? 0 : x[at(line.a)],
+                 b = line.b < 0 ? 0 : x[at(line.b)];
+    const double e_a = line.op == Op::Constant || line.op == Op::Input ? 0 : error[at(line.a)],
+                 e_b = line.b < 0 ? 0 : error[at(line.b)];
+    double value = 0, carried = e_a + e_b;  // as sums, sines and cosines carry errors on
+    switch (line.op) {
+      case Op::Constant:
+        value = line.constant;
+        break;
+      case Op::Input:
+        value = inputs[at(line.a)];
+        break;
+      case Op::Negate:
+        value = -a;
+        break;
+      case Op::Sqrt:
+        value = std::sqrt(std::max(a, 0.0)), carried = e_a / std::max(2 * value, 1e-9);
+        break;
+      case Op::Sin:
+        value = std::sin(a);
+        break;
+      case Op::Cos:
+        value = std::cos(a);
+        break;
+      case Op::Add:
+        value = a + b;
+        break;
+      case Op::Subtract:
+        value = a - b;
+        break;
+      case Op::Multiply:
+        value = a * b, carried = e_a * std::abs(b) + e_b * std::abs(a);
+        break;
+      case Op::Divide:
+        value = a / b, carried = (e_a + e_b * std::abs(value)) / std::abs(b);
+        break;
+      case Op::Atan2:
+        value = std::atan2(a, b), carried = (e_a * std::abs(b) + e_b * std::abs(a)) / (a * a + b * b);
+        break;
+      case Op::Min:
+        value = std::min(a, b);
+        break;
+    }
+    const bool is_exact = line.op == Op::Input || line.op == Op::Negate;
+    x.push_back(value);
+    error.push_back(carried + (is_exact ? 0 : std::abs(value)));
+  }
+  return error[static_cast<size_t>(program.outputs()[0])];
+}
+
 std::vector<bool> Program::findVarying(const std::vector<int>& inputs) const {
   std::vector<bool> out;
   for (const Instruction& line : code_) {

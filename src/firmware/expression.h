@@ -53,6 +53,8 @@ Scalar atan2(const Scalar& y, const Scalar& x);
 Scalar min(const Scalar& a, const Scalar& b);
 // The same formula, of whose sum all constants are one: large ones that cancel do so before they are rounded.
 Scalar gatherConstants(const Scalar& formula);
+// How far rounding moves a formula at these inputs, to first order, over the unit of rounding.
+double estimateRounding(const Scalar& formula, const std::vector<double>& inputs);
 
 // Forward differentiation: the derivatives of formulas while their inputs change at given rates.
 class Derivative {

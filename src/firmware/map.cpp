@@ -269,38 +269,43 @@ class Meter {
         }()) {}
 
   // What the code makes of a posture of which only the joints, or only the motors, are known.
-  std::vector<T> evaluate(bool from_joints, const VectorXd& given, int iterations) const {
+  Evaluated<T> evaluate(bool from_joints, const VectorXd& given, int iterations) const {
     const int first = from_joints ? 0 : map_.size();
     std::vector<T> z(map_.mechanism.coordinates.size());
     for (Index i = 0; i < given.size(); ++i) z[static_cast<size_t>(first + i)] = static_cast<T>(given[i]);
-    return (from_joints ? inverse_ : direct_).template evaluate<T>(std::move(z), iterations).z;
+    return (from_joints ? inverse_ : direct_).template evaluate<T>(std::move(z), iterations);
   }
 
-  // The fewest iterations whose error in the samples another one does not halve. 0: it does not come near
+  // The fewest iterations whose error in the samples another one does not halve, and whose last step the code takes for the last
+  // one. 0: it does not come near
   int findIterations(bool from_joints) const {
     const double enough = 8 * std::numeric_limits<T>::epsilon();
     double before = INFINITY;
+    bool was_settled = false;
     for (int n = 1; n <= 12; ++n) {
-      double error = 0;
+      double error = 0, last = 0;
       for (const VectorXd& z : map_.samples) {
         const VectorXd given = z.segment(from_joints ? 0 : map_.size(), map_.size());
-        const std::vector<T> found = evaluate(from_joints, given, n);
+        const Evaluated<T> found = evaluate(from_joints, given, n);
+        last = std::max(last, static_cast<double>(found.last));
         const Index wanted = from_joints ? map_.size() : 0;
         for (Index c = wanted; c < wanted + map_.size(); ++c)
-          error = std::max(error, std::abs(static_cast<double>(found[static_cast<size_t>(c)]) - z[c]));
+          error = std::max(error, std::abs(static_cast<double>(found.z[static_cast<size_t>(c)]) - z[c]));
         if (!std::isfinite(error)) return 0;
       }
-      if (error < enough) return n;
-      if (error > 0.5 * before && error < 1e-3) return n - 1;
+      const bool is_settled = last < kSettled / 2;
+      if (error < enough && is_settled) return n;
+      if (error > 0.5 * before && error < 1e-3 && was_settled) return n - 1;
       before = error;
+      was_settled = is_settled;
     }
     return 0;
   }
 
   void add(const ExactPosture& exact, MapErrors& errors) const {
     const auto round = [](const VectorXd& x) { return x.cast<T>().template cast<double>().eval(); };
-    const std::vector<T> there = evaluate(true, exact.joints, map_.inverse.iterations),
-                         back = evaluate(false, exact.motors, map_.direct.iterations);
+    const std::vector<T> there = evaluate(true, exact.joints, map_.inverse.iterations).z,
+                         back = evaluate(false, exact.motors, map_.direct.iterations).z;
     // What is given was rounded; that is no error of the map.
     const VectorXd motors = exact.motors + exact.R * (round(exact.joints) - exact.joints),
                    joints = exact.joints + exact.R.lu().solve(round(exact.motors) - exact.motors);

@@ -271,6 +271,18 @@ class MechanismBuilder {
     return {a.p, b.p, a.square + b.square};
   }
 
+  // Of two formulas for the same, the one that rounding moves less about the reference.
+  Scalar chooseExact(const Scalar& one, const Scalar& other) const {
+    double errors[2] = {0, 0};
+    for (const double way : {0.0, 0.3, -0.3}) {
+      std::vector<double> at;
+      for (const Coordinate& coordinate : out_.coordinates) at.push_back(coordinate.reference + way);
+      errors[0] += estimateRounding(one, at);
+      errors[1] += estimateRounding(other, at);
+    }
+    return errors[1] < errors[0] ? other : one;
+  }
+
   void addDistances() {
     for (const RodDistance& distance : graph_.distances)
       if (distance.slide >= 0) use(graph_.edges[static_cast<size_t>(distance.slide)]);
@@ -293,8 +305,9 @@ class MechanismBuilder {
       const Edge& turned = graph_.edges[static_cast<size_t>(path[middle].edge)];
       const Vector3s b = calcMotion(turned).act(sides.b), gap = sides.a - b;
       const bool turns = turned.isHinge() || turned.kind == JointKind::Universal;
-      const Scalar gap_square = turns ? sides.squares - 2 * dot(sides.a, b) : dot(gap, gap);
-      equation.rows = {Scalar(0.5 / length) * gatherConstants(gap_square - square)};
+      const Scalar row = dot(gap, gap) - square,
+                   sum = turns ? gatherConstants(sides.squares - 2 * dot(sides.a, b) - square) : row;
+      equation.rows = {Scalar(0.5 / length) * chooseExact(row, sum)};
       for (size_t i = 0; i < path.size(); ++i) addRoots(distance, path, i, square, equation);
       if (distance.slide >= 0) {
         ClosedForm& form = equation.solved[graph_.edges[static_cast<size_t>(distance.slide)].coordinates[0]];
@@ -318,7 +331,9 @@ class MechanismBuilder {
       const Scalar along = dot(n, sides.b);
       const Vector3s across = b - n * along;
       const Scalar A = 2 * dot(sides.a, across), B = 2 * dot(sides.a, cross(n, b)),
-                   C = gatherConstants(sides.squares - square - 2 * (dot(n, sides.a) * along));
+                   rest = 2 * (dot(n, sides.a) * along),
+                   C = chooseExact(dot(sides.a, sides.a) + (dot(sides.b, sides.b) - square) - rest,
+                                   gatherConstants(sides.squares - square - rest));
       form.radicand = A * A + B * B - C * C;
       const Scalar w = sqrt(form.radicand);
       form.roots = {edge.q[0] + atan2(B * C + A * w, A * C - B * w), edge.q[0] + atan2(B * C - A * w, A * C + B * w)};

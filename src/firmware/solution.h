@@ -62,6 +62,7 @@ struct SolutionPrograms {
 };
 
 constexpr double kLongestStep = 0.5;  // rad or m
+constexpr double kSettled = 1e-3;     // the last step of what is reached
 
 template <typename T>
 Evaluated<T> SolutionPrograms::evaluate(std::vector<T> z, int iterations) const {
