@@ -132,9 +132,9 @@ void selectRows(const MatrixX<T>& all, const std::vector<typename LogicOf<T>::In
 }
 
 // J W^{-1/2} = [L, 0] Q^T with Q = Q_1 Q_2 ..., Q_p = I - beta v v^T, the v in the columns of `reflectors`. Rows are
-// taken by their remainder after the rows before, largest first. False when the rank differs from the cluster's.
+// taken by their remainder after the rows before, largest first, or from nearby in their order. False when the rank differs from the cluster's.
 template <typename T>
-typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, bool is_nearby, ClusterScratchOf<T>& scratch,
                                     ClusterBasisOf<T>& basis) {
   using std::abs;
   using std::sqrt;
@@ -146,16 +146,24 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
   const int m = static_cast<int>(rest.size()), n = static_cast<int>(E.cols()), rank = cluster.rank;
   for (int k = 0; k < n; ++k) E.col(k).head(m) = scratch.J_all.col(k) * cluster.inverse_root[k];
   rest = E.topRows(m).rowwise().squaredNorm();
-  T first = 0, last = 0;
-  auto regular = T(0) <= T(0);
-  for (int p = 0; p < rank; ++p) {
+  // Of what is left; the first one of rows that are equally long.
+  const auto findLongest = [&](T& most) {
     auto row = makeIndex<T>(0);
-    T most = rest[0];
+    most = rest[0];
     for (int r = 1; r < m; ++r) {
       const auto larger = rest[r] > (1 + kTie) * most;
       most = select(larger, rest[r], most);
       row = select(larger, r, row);
     }
+    return row;
+  };
+  const bool keeps_order = is_nearby && m == rank;
+  T most = 0, last = 0;
+  findLongest(most);
+  const T first = sqrt(most);
+  auto regular = T(0) <= T(0);
+  for (int p = 0; p < rank; ++p) {
+    const auto row = keeps_order ? makeIndex<T>(p) : findLongest(most);
     basis.rows[p] = row;
     T* v = &scratch.reflectors(0, p);
     visitRow(E, row, p, [v](Eigen::Index k, const T& entry) { v[k] = entry; });
@@ -166,7 +174,6 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
       products.template segment<kChunk>(r).array() = sum;
     }
     const T norm = sqrt(getEntry(products.data(), row)), pivot = select(v[p] > kTie * norm, -norm, norm);
-    if (p == 0) first = norm;
     regular = regular && norm > kRankTolerance * first;
     if (!any(regular)) return regular;
     last = norm;
@@ -215,14 +222,14 @@ typename LogicOf<T>::Mask updateNewton(const ReducedCluster& cluster, ClusterScr
 
 // Eq. (1): N = W^{-1/2} Q_2 with the last columns of Q, and L L^T = J W^{-1} J^T.
 template <typename T>
-typename LogicOf<T>::Mask updateBases(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+typename LogicOf<T>::Mask updateBases(const ReducedCluster& cluster, bool is_nearby, ClusterScratchOf<T>& scratch,
                                       ClusterStateOf<T>& out) {
   const int rank = cluster.rank, size = cluster.size, n = static_cast<int>(cluster.metric.size());
   ClusterBasisOf<T>& basis = out.basis;
   out.placements = scratch.ws.X_WB;
   updateColumns(cluster.model, scratch.ws);
   updateJacobian(cluster, scratch);
-  const auto regular = factorize(cluster, scratch, basis);
+  const auto regular = factorize(cluster, is_nearby, scratch, basis);
   if (!any(regular)) return regular;
   MatrixX<T>& N = basis.N;
   N.setZero();
@@ -289,16 +296,16 @@ void loadClusterState(const ReducedCluster& cluster, const ClusterState& state, 
   updateColumns(cluster.model, scratch.ws);
 }
 
+namespace {
+
 template <typename T>
-typename LogicOf<T>::Mask updateClusterState(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
-                                             typename ArgumentsOf<T>::ConstVector q, ClusterStateOf<T>& out) {
+typename LogicOf<T>::Mask updateAt(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                   typename ArgumentsOf<T>::ConstVector q, bool is_nearby, ClusterStateOf<T>& out) {
   scratch.closed = T(0) <= T(0);
   out.basis.q = q;
   updatePlacements<T>(cluster.model, scratch.ws, out.basis.q);
-  return updateBases(cluster, scratch, out);
+  return updateBases(cluster, is_nearby, scratch, out);
 }
-
-namespace {
 
 // scratch.correction <- the step of Newton's method for it: with scratch.newton where it is refreshed, else with the matrix at the start.
 template <typename T>
@@ -378,10 +385,22 @@ typename LogicOf<T>::Mask closeFrom(const ReducedCluster& cluster, ClusterScratc
     addToStep(scratch.correction, 1);
   }
   scratch.closed = closed;
-  return any(closed) ? closed && updateBases(cluster, scratch, out) : closed;
+  return any(closed) ? closed && updateBases(cluster, is_nearby, scratch, out) : closed;
 }
 
 }  // namespace
+
+template <typename T>
+typename LogicOf<T>::Mask updateClusterState(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                             typename ArgumentsOf<T>::ConstVector q, ClusterStateOf<T>& out) {
+  return updateAt(cluster, scratch, q, false, out);
+}
+
+template <typename T>
+typename LogicOf<T>::Mask updateNearbyCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                              typename ArgumentsOf<T>::ConstVector q, ClusterStateOf<T>& out) {
+  return updateAt(cluster, scratch, q, true, out);
+}
 
 template <typename T>
 typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
@@ -433,6 +452,9 @@ template struct ClusterStateOf<Lanes>;
 template bool updateClusterState(const ReducedCluster&, ClusterScratch&, ConstVectorRef, ClusterState&);
 template LaneMask updateClusterState(const ReducedCluster&, ClusterScratchOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
                                      ClusterStateOf<Lanes>&);
+template bool updateNearbyCluster(const ReducedCluster&, ClusterScratch&, ConstVectorRef, ClusterState&);
+template LaneMask updateNearbyCluster(const ReducedCluster&, ClusterScratchOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
+                                      ClusterStateOf<Lanes>&);
 template bool closeCluster(const ReducedCluster&, ClusterScratch&, const ClusterBasis&, ConstVectorRef, const VectorXd&,
                            ClusterState&);
 template LaneMask closeCluster(const ReducedCluster&, ClusterScratchOf<Lanes>&, const ClusterBasisOf<Lanes>&,

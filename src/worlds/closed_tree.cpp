@@ -104,7 +104,7 @@ ClosedTreeOf<T>::ClosedTreeOf(const Model& model, ConstVectorRef q, const std::v
     clusters_.back().scratch.changes = &state_.changes;
     lifts_.push_back({&clusters_.back().motion, nullptr});
     state_.clusters.emplace_back(cluster);
-    state_.drifts.push_back(Vector::Zero(cluster.rank));
+    for (auto* each : {&state_.drifts, &state_.thirds}) each->push_back(Vector::Zero(cluster.rank));
   }
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model.joints()[reduction_.free_joints[i]];
@@ -163,9 +163,10 @@ template <typename T>
 MaskOf<T> ClosedTreeOf<T>::renew(size_t cluster, const Mask& which) {
   Cluster& c = clusters_[cluster];
   gatherConfiguration<T>(model_, c.cluster, state_.q, c.next.basis.q);
-  const Mask regular = updateClusterState<T>(c.cluster, c.scratch, c.next.basis.q, c.next);
+  const Mask regular = updateNearbyCluster<T>(c.cluster, c.scratch, c.next.basis.q, c.next);
   takeNext(which, cluster);
-  assignLanes(which, Vector::Zero(c.cluster.rank), state_.drifts[cluster]);  // of another state
+  for (auto* each : {&state_.drifts, &state_.thirds})  // of another state
+    assignLanes(which, Vector::Zero(c.cluster.rank), (*each)[cluster]);
   return regular;
 }
 
@@ -205,7 +206,8 @@ MaskOf<T> ClosedTreeOf<T>::closeChanged(size_t cluster, const Mask& which) {
   const Mask changed = which && findChanged(cluster);
   if (!any(changed)) return which;
   c.d.setZero();
-  const Mask closed = closeCluster<T>(c.cluster, c.scratch, state_.clusters[cluster].basis, c.d, Vector(), c.next);
+  const Mask closed =
+      closeNearbyCluster<T>(c.cluster, c.scratch, state_.clusters[cluster].basis, c.d, Vector(), c.next);
   takeNext(changed && closed, cluster);
   q_next_ = state_.q;
   scatterConfiguration<T>(model_, c.cluster, state_.clusters[cluster].basis.q, q_next_);
@@ -230,8 +232,8 @@ MaskOf<T> ClosedTreeOf<T>::driftAtOnce(const T& h, const Mask& which, bool is_la
     Cluster& c = clusters_[i];
     gather(c.cluster.dofs, state_.v, c.d);
     c.d *= h;
-    // To second order the closures open by h^2/2 times their drift.
-    c.zeta = -0.5 * h * h * state_.drifts[i];
+    // To second order the closures open by h^2/2 times their drift; beyond that, much as in the last one.
+    c.zeta = h * h * (h * state_.thirds[i] - 0.5 * state_.drifts[i]);
     if (!all(done)) {  // the others close at once
       assignLanes(!done, Vector::Zero(c.d.size()), c.d);
       assignLanes(!done, Vector::Zero(c.zeta.size()), c.zeta);
@@ -247,6 +249,8 @@ MaskOf<T> ClosedTreeOf<T>::driftAtOnce(const T& h, const Mask& which, bool is_la
     auto w = w_next_.segment(c.cluster.offset, c.cluster.size);
     multiplyTransposed<T>(c.next.basis.WN, c.next.step, w);
     w /= h;
+    c.zeta = (c.next.zeta / (h * h) + 0.5 * state_.drifts[i]) / h;
+    assignLanes(done, c.zeta, state_.thirds[i]);
     takeNext(done, i);
     scatterConfiguration<T>(model_, c.cluster, state_.clusters[i].basis.q, q_next_);
   }

@@ -35,7 +35,8 @@ class ClosedTreeOf {
     Vector q, turns, v, w;                    ///< nq, nq, nv, size
     std::vector<ClusterStateOf<T>> clusters;  ///< at q
     std::vector<Vector> drifts;               ///< rank: (J W^{-1} J^T)^{-1} times the drift of the closures
-    Vector mass_factors, armature;            ///< numBodies, empty where all are 1; nv
+    std::vector<Vector> thirds;     ///< rank: what beyond that closed them last, over the cube of the duration
+    Vector mass_factors, armature;  ///< numBodies, empty where all are 1; nv
     std::vector<ClosureChangeOf<T>> changes;  ///< of the closures; empty where all are those of the model
   };
 

@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kMaxNewton = 20;
 constexpr double kNewtonTolerance = 1e-10;  // of a change of velocity, relative to 1 (m/s, rad/s) and the largest
-constexpr double kForesight = 0.01;         // of a second correction over the first: the third is foreseen
+constexpr int kMostNearby = 2;              // steps more with the factors of one, where they promise to suffice:
+constexpr double kNearby = 0.1;             // to leave less than this of the tolerance
 constexpr double kLeastShare = 1.0 / 64;    // of a Newton step that must lower the residual
 constexpr int kMostHalvings = 10;           // of a step
 constexpr double kSpan = 20;                // steps between closed ends, to which it returns to halve them
@@ -338,9 +339,6 @@ MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
   rods_.update(tree_);
   const Mask solved = solve(h, which);
   if (!any(solved)) return solved;
-  w_mean_ = tree_.reducedVelocity() + 0.5 * dw_;
-  loads_.setZero();
-  addForces(w_mean_, loads_, nullptr);
   const T before = moment_.works.sum();
   book(h);
   // At the middle, the mean of before and after the kick.
@@ -361,8 +359,9 @@ MaskOf<T> LeapfrogOf<T>::kick(const T& h, const Mask& which) {
   return done;
 }
 
-// Newton's method on Eq. (1), with shorter steps where they do not lower the residual. A robot whose forces are found, or not, stays
-// as it is.
+// Newton's method on Eq. (1), with shorter steps where they do not lower the residual. Further steps with the factors of a step d_1 are
+// each |d_2| / |d_1| times as long as the one before: where few of them suffice, no new factors are needed. A robot is solved where
+// its forces ask for no other correction; whether it is solved or given up, it stays as it is.
 template <typename T>
 MaskOf<T> LeapfrogOf<T>::solve(const T& h, const Mask& which) {
   note(Trouble::Forces, which);
@@ -374,8 +373,8 @@ MaskOf<T> LeapfrogOf<T>::solve(const T& h, const Mask& which) {
     ++rounds_;
     factorize(h);
     updateCorrection();
-    start_ = dw_;
     const T first = calcLargestOf<T>(correction_);
+    start_ = dw_;
     T share = 1, next = 0;
     for (Mask tried = active;;) {
       assignLanes(tried, start_ + share * correction_, dw_);
@@ -384,16 +383,20 @@ MaskOf<T> LeapfrogOf<T>::solve(const T& h, const Mask& which) {
       if (!any(tried)) break;
       share = select(tried, T(0.5 * share), share);
     }
-    // With the same matrix: good enough to tell whether another one is needed. Of a smooth residual the next such correction, and
-    // what is left, is smaller by twice as much as this one is (Deuflhard, Newton Methods for Nonlinear Problems, 2.1).
     updateCorrection();
-    assignLanes(active, calcLargestOf<T>(correction_), amount_);
-    const T enough = kNewtonTolerance * (1 + calcLargestOf<T>(dw_));
-    const Mask falls = T(1) <= share && amount_ < kForesight * first;
-    const Mask converged = active && (amount_ < enough || (falls && 2 * amount_ * amount_ < enough * first));
-    assignLanes(converged, dw_ + correction_, dw_);
-    solved = solved || converged;
-    active = active && !converged && next < size;
+    const T second = calcLargestOf<T>(correction_), least = kNewtonTolerance * (1 + calcLargestOf<T>(dw_));
+    assignLanes(active, second, amount_);
+    const T ratio = second / (share * first);
+    Mask near = active && (second < least || ratio * ratio * second < kNearby * least);
+    for (int k = 0; k < kMostNearby && any(near); ++k) {
+      assignLanes(near, dw_ + correction_, dw_);
+      next = select(near, updateResidual(h, nullptr), next);
+      updateCorrection();
+      assignLanes(near, calcLargestOf<T>(correction_), amount_);
+      solved = solved || (near && amount_ < least);
+      near = near && !solved;
+    }
+    active = active && !solved && next < size;
     if (any(active)) size = updateResidual(h, &damping_);
   }
   return solved;
