@@ -48,18 +48,20 @@ inline worlds::WorldBatchOptions makeBatchOptions(double time_step, int threads 
 
 // Velocities of all worlds after a duration (nv x count), less those of single worlds.
 // \param makeAlone  the single world, or what takes its place, by the number of a world of the batch
+// \param other      where the single worlds start, or null: where those of the batch do
 template <class MakeWorld>
 MatrixXd subtractAlone(const Model& model, const worlds::WorldParameters& parameters, const MakeWorld& makeAlone,
-                       const BatchStart& starts, double time_step, double duration) {
+                       const BatchStart& starts, double time_step, double duration, const BatchStart* other = nullptr) {
   const auto count = static_cast<int>(starts.q.cols());
   worlds::WorldBatch batch(model, count, makeBatchOptions(time_step));
   batch.set(parameters);
   batch.reset(starts.q, starts.v);
   CHECK(batch.step(starts.u, starts.push, duration));
   MatrixXd out = batch.velocities();
+  const BatchStart& alone = other ? *other : starts;
   for (int i = 0; i < count; ++i) {
     const std::unique_ptr<worlds::World> world = makeAlone(i);
-    world->reset(starts.q.col(i), starts.v.col(i));
+    world->reset(alone.q.col(i), alone.v.col(i));
     world->setTorques(starts.u.col(i));
     world->setPush(starts.push.col(i));
     REQUIRE(world->advance(duration));

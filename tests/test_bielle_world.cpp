@@ -409,6 +409,29 @@ TEST_CASE("worlds: speeds at which nothing can go on end with a message, in ever
       }
 }
 
+TEST_CASE("bielle world: loops that are open where it is reset are told, as is that it was not reset") {
+  const Model model = bielle::testing::loadOwn("fourbar").model;
+  const VectorXd q = findClosedConfiguration(model).q, v = VectorXd::Zero(model.nv());
+  for (const double tolerance : {0.0, 1e-9}) {
+    CAPTURE(tolerance);
+    WorldOptions options;
+    options.tolerance = tolerance;
+    const auto world = makeOwnWorld(model, options);
+    CHECK_FALSE(world->advance(0.01));
+    CHECK(world->message() == "it has not been reset");
+    VectorXd open = q;
+    open[0] += 1e-3;
+    world->reset(open, v);
+    CHECK_THAT(world->message(),
+               Catch::StartsWith("its loops are open by ") && Catch::EndsWith("a closed configuration"));
+    CHECK_FALSE(world->advance(0.01));
+    CHECK((world->time() == 0 && world->configuration() == open));
+    open[0] = q[0] + 1e-9;
+    world->reset(open, v);
+    CHECK(world->advance(0.01));
+  }
+}
+
 TEST_CASE("bielle world: angles of joints of all kinds may have grown for long") {
   std::mt19937 generator(2);
   for (const JointKind kind : {JointKind::Revolute, JointKind::Universal, JointKind::Planar}) {

@@ -63,7 +63,7 @@ class HeldWorlds {
       return;
     }
     for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(make(engine, *model_, options));
-    ok_.assign(worlds_.size(), true);
+    ok_.assign(worlds_.size(), false);
   }
 
   // Many worlds start from the same state, or each from its own; all of them, or those of a mask.
@@ -79,7 +79,7 @@ class HeldWorlds {
     run([&](World& world, Eigen::Index i) {
       if (chosen[i] == 0) return;
       world.reset(q0.col(i), v0.col(i));
-      ok_[i] = true;
+      ok_[i] = world.message().empty();
     });
     return observe();
   }
@@ -444,7 +444,7 @@ void bindWorlds(py::module_& module) {
       .def_property_readonly("engine", &HeldWorlds::engine, "its name")
       .def("reset", &HeldWorlds::reset, py::arg("q"), py::arg("v"), py::arg("where") = py::none(),
            "Sets closed configurations (nq,) and velocities (nv,) that keep them closed; everything else starts "
-           "again.\n\n"
+           "again. Where loops are open, a world of 'bielle' is not ok, and its message tells how far.\n\n"
            "where: (count,), True for the worlds that are reset while the others stay unchanged; None: all. Returns "
            "the WorldState.")
       .def("step", &HeldWorlds::step, py::arg("u"), py::arg("duration"), py::arg("push") = py::make_tuple(0, 0, 0),

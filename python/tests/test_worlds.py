@@ -91,6 +91,21 @@ def test_torques_that_are_not_finite_break_one_world_off(model):
         single.step(u[1], 0.01)
 
 
+def test_open_loops_are_told(model):
+    """Where a world is reset, alone or among others; as is a world that was not reset."""
+    q, v, u = model.standing(), np.zeros(model.nv), np.zeros(model.nu)
+    torn = q.copy()
+    torn[list(model.q_names).index("knee_right")] += 1e-3
+    for options in ({}, {"tolerance": 1e-8}, {"count": 1}):
+        world = bielle.World(model, **options)
+        message = lambda world=world: np.ravel(world.message)[0]  # noqa: E731
+        assert not world.step(u, 1e-3).ok and message() == "it has not been reset"
+        state = world.reset(torn, v)
+        assert not state.ok and message().startswith("its loops are open by ")
+        assert not world.step(u, 1e-3).ok and np.array_equal(np.ravel(state.q), torn)
+        assert world.reset(q, v).ok and world.step(u, 1e-3).ok
+
+
 def test_worlds_stand_on_grounds_of_their_own_and_stay_when_they_are_left_out(model):
     high, low = (bielle.Ground(steps=[bielle.GroundStep(top=[0, 0, z], length=4, width=4)]) for z in (0.01, 0))
     world = bielle.World(model, count=9, time_step=1e-3, ground=low, threads=1)

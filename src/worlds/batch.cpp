@@ -10,13 +10,12 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
-#include "dynamics/largest_gaps.h"
-#include "model/number_text.h"
 #include "solve/team.h"
 #include "worlds/batch_parameters.h"
 #include "worlds/contact_law.h"
 #include "worlds/leapfrog.h"
 #include "worlds/left_out.h"
+#include "worlds/open_loops.h"
 #include "worlds/torque_pipe.h"
 
 namespace bielle::worlds {
@@ -261,17 +260,11 @@ void WorldBatch::Data::start(const MatrixView& q0, const MatrixView& v0) {
   });
 }
 
-// The first drift would close the loops of these worlds, and they would begin elsewhere than asked.
 void WorldBatch::Data::refuseOpen(const MatrixView& q) {
-  constexpr double kOpen = 1e-6;  // m or rad: more than rounding, or a file of few digits, leaves
   for (int i = 0; i < count; ++i) {
     if (!marks[i] || !is_ok[i] || !parameters.rod_changes.col(i).isZero(0)) continue;
-    updatePlacements(model, ws, q.col(i));
-    const ClosureGap gap = calcLargestGaps(model, ws);
-    if (gap.position <= kOpen && gap.angle <= kOpen) continue;
-    is_ok[i] = false;
-    messages[i] = "its loops are open by " + formatNumber(gap.position, "%.3g") + " m and " +
-                  formatNumber(gap.angle, "%.3g") + " rad where it was reset; give a closed configuration";
+    messages[i] = describeOpenLoops(model, ws, q.col(i));
+    is_ok[i] = messages[i].empty();
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include "worlds/leapfrog.h"
 #include "worlds/left_out.h"
+#include "worlds/open_loops.h"
 
 namespace bielle::worlds {
 namespace {
@@ -27,7 +28,7 @@ class BielleWorld : public World {
 
  private:
   void start() override {
-    if (!steps_.start(q_, v_, true)) fail(steps_.tree().failure());
+    message_ = steps_.start(q_, v_, true) ? describeOpenLoops(model_, ws_, q_) : steps_.tree().failure();
     readState();
     steps_.contacts().setStart([this](int body, const Vector3d& point) { return steps_.getPlace(body, point); },
                                [this](const JointStop& stop) { return q_[stop.coordinate]; });

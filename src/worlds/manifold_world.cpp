@@ -14,6 +14,7 @@
 #include "model/number_text.h"
 #include "worlds/contact_law.h"
 #include "worlds/left_out.h"
+#include "worlds/open_loops.h"
 #include "worlds/play_world.h"
 #include "worlds/rod_forces.h"
 
@@ -94,6 +95,8 @@ ManifoldWorld::ManifoldWorld(const Model& model, const ManifoldWorldOptions& opt
 }
 
 void ManifoldWorld::start() {
+  message_ = describeOpenLoops(model_, ws_, q_);
+  if (!message_.empty()) return;
   near_ = q_;
   turns_.setZero(model_.nq());
   leaveOutTurns(free_turns_, near_, turns_);

@@ -21,6 +21,7 @@ World::World(const Model& model, const WorldOptions& options)
       feet_(model.contacts().size()),
       wrenches_(feet_.size(), Vector6d::Zero()),
       touchdowns_(feet_.size(), Vector3d::Zero()) {
+  message_ = "it has not been reset";
   if (!options.wear.plays.empty()) throw std::logic_error("a world of a robot with play is made by makePlayWorld()");
 }
 

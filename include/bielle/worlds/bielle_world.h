@@ -54,7 +54,7 @@ struct BielleWorldOptions {
 inline constexpr double kBielleTimeStep = 2.5e-4;  ///< s
 
 /// advance() does not allocate. Its steps are those of the options or a little shorter, to reach its end, or halves of them, as
-/// above. If it breaks off, the state is that before the last steps, at time().
+/// above. If it breaks off, the state is that before the last steps, at time(). Both worlds refuse loops open by over 1e-6 m or rad.
 /// \throws InputError when the robot has no closed standing posture
 std::unique_ptr<World> makeBielleWorld(const Model& model, const BielleWorldOptions& options = {});
 
