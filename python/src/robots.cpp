@@ -19,7 +19,8 @@ Robot load(const std::string& name, const std::optional<std::string>& base) {
   LoadedRobot loaded = loadRobot(name, options);
   const std::vector<std::string> moved = checkReferences(loaded);
   loaded.warnings.insert(loaded.warnings.end(), moved.begin(), moved.end());
-  Robot robot{name};
+  Robot robot;
+  robot.name = name;
   for (const Play& play : loaded.wear.plays) robot.play.emplace_back(play.name, play.size);
   robot.rod_frictions = loaded.wear.frictions;
   robot.model = std::make_shared<Model>(std::move(loaded.model));

@@ -176,7 +176,7 @@ json describe(const Model& model) {
   return out;
 }
 
-std::unique_ptr<ProcessWorld> makeWorld(const Model& model, double time_step, const char* program) {
+[[maybe_unused]] std::unique_ptr<ProcessWorld> makeWorld(const Model& model, double time_step, const char* program) {
   checkParts(model);
   std::vector<int> order(static_cast<size_t>(model.nv()));
   std::iota(order.begin(), order.end(), 0);
