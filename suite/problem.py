@@ -148,9 +148,11 @@ def calc_transmission(n, r):
     return (sign * np.sqrt(np.maximum(0, np.linalg.det(transpose(Q) @ Q))) / r["reference_volume"])[:, None]
 
 
-def calc_transmission_arctan(n, r):
-    rho = calc_transmission(n, r)
-    return np.arctan(rho) + np.where(rho < -1, np.pi, 0)
+def continue_transmission(n, r):
+    """Above the largest one linearly in its arctangent, through the dead point of the motors."""
+    rho, largest = calc_transmission(n, r), r["largest"]
+    angle = np.arctan(rho) + np.where(rho < 0, np.pi, 0)
+    return np.where((rho > largest) | (rho < -1), largest + (1 + largest**2) * (angle - np.arctan(largest)), rho)
 
 
 def calc_electrical_power(n, r):
@@ -182,7 +184,7 @@ RESIDUALS = {
     "wrench_cone": lambda n, r: get_force(n, r) @ np.array(r["matrix"]).T,
     "joint_position": get_positions,
     "joint_velocity": lambda n, r: n.state.v[:, r["dofs"]],
-    "transmission_arctan": calc_transmission_arctan,
+    "transmission": continue_transmission,
     "motor_power": lambda n, r: n.u[:, r["motors"]] * n.state.v[:, [n.problem.mechanism.motor_dofs[m]
                                                                    for m in r["motors"]]],
     "motor_voltage": lambda n, r: n.u[:, r["motors"]] * r["per_effort"] + n.speeds[:, r["motors"]] * r["per_speed"],

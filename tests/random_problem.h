@@ -40,7 +40,7 @@ inline StageSpec makeStage(std::mt19937& rng, const Model& model, const VectorXd
                            std::move(cone)});
   }
   for (const Linkage& linkage : listLinkages(model, q))
-    stage.costs.push_back({"transmission", 1, quadratic(1), makeTransmissionArctan(linkage)});
+    stage.costs.push_back({"transmission", 1, quadratic(1), makeTransmission(linkage, 6)});
   return stage;
 }
 

@@ -232,7 +232,7 @@ TEST_CASE("motions that miss their differences where a linkage is near its dead 
   for (const PathConstraint& constraint : planned->problem->spec(deepest).path_constraints)
     if (constraint.name.find("dead points") == 0) {
       ++bounded;
-      CHECK(constraint.lower[0] == std::atan(kWideDeadPointMargin));
+      CHECK(constraint.lower[0] == kWideDeadPointMargin);
     }
   CHECK(bounded >= 2);
   ProblemOptions wide;

@@ -50,8 +50,8 @@ double measureTransmissions(const VectorXd& q) {
   double least = 1;
   VectorXd value(1);
   for (const Linkage& linkage : listLinkages(model, makeStandingPosture(model))) {
-    makeTransmissionArctan(linkage)->calc({model, ws, closures, none, none}, value);
-    least = std::min({least, std::tan(value[0]), 1 / std::tan(value[0])});
+    makeTransmission(linkage, 1e9)->calc({model, ws, closures, none, none}, value);
+    least = std::min({least, value[0], 1 / value[0]});
   }
   return least;
 }

@@ -75,7 +75,7 @@ def check_poisons(path):
     thousandth = lambda x: 1.001 * x
     cost = find_kind(path, "costs", "com_position")
     cone = find_kind(path, "constraints", "wrench_cone")
-    linkage = find_kind(path, "constraints", "transmission_arctan")
+    linkage = find_kind(path, "constraints", "transmission")
     for keys, make, noticed in (
             (("costs", cost, "weight"), thousandth, "cost"),
             (("costs", cost, "residual", "reference", 2), thousandth, "cost"),

@@ -6,7 +6,6 @@
 
 #include "bielle/model/error.h"
 #include "control/window_grid.h"
-#include "motion/applied_options.h"
 #include "motion/robot_size.h"
 #include "solve/fddp_checks.h"
 
@@ -244,9 +243,7 @@ Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOp
   plan.stages.back() = StageSpec();
   plan.stages.back().state = makeEndCost(model, plan.q_end, selectMainJoints(model), options);
   plan.goals.clear();
-  ProblemOptions windows = problem;
-  windows.limits = softenDeadPoints(windows.limits);
-  return makeMotion(model, std::move(plan), windows);
+  return makeMotion(model, std::move(plan), problem);
 }
 
 std::unique_ptr<Horizon> makeMotionHorizon(const Motion& motion, const ShootingTrajectory& plan,

@@ -22,9 +22,6 @@ VectorXd getPowerLimits(const Model& model, const LimitOptions& options);
 /// The margin that the transmission of a linkage keeps from its dead points: its own, where that is larger than that of all.
 double getDeadPointMargin(const LimitOptions& options, const std::string& linkage);
 
-/// The same for a solver whose penalty stays the same: what is beyond a margin by one radian counts as 1.
-LimitOptions softenDeadPoints(LimitOptions options);
-
 /// The limits of a model, as its file and the options give them.
 class Limits {
  public:

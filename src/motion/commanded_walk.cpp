@@ -51,7 +51,7 @@ CommandedWalk::CommandedWalk(const Model& model, const LocomotionOptions& option
       options_(complete(model, options, standing)),
       command_(std::move(command)),
       standing_(makeStance(model, options_, standing)),
-      limits_(std::make_shared<Limits>(model, softenDeadPoints(limits), standing_.q)),
+      limits_(std::make_shared<Limits>(model, limits, standing_.q)),
       feet_(standing_.feet),
       middle_(standing_.middle),
       com_(standing_.com) {

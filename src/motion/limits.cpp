@@ -111,9 +111,9 @@ std::vector<PathConstraint> listTransmissions(const Model& model, const VectorXd
     margins.erase(linkage.output);
     const double margin = getDeadPointMargin(options, linkage.output);
     if (margin == 0) continue;
-    bounds.push_back(makeBound("dead points of " + linkage.output, std::atan(margin), std::atan(1 / margin),
-                               makeTransmissionArctan(linkage)));
-    bounds.back().scale[0] = options.dead_point_unit;
+    bounds.push_back(
+        makeBound("dead points of " + linkage.output, margin, 1 / margin, makeTransmission(linkage, 1 / margin)));
+    bounds.back().scale[0] = 1;
   }
   if (!margins.empty())
     requireOption(false, "dead_point_margin", "there is no linkage of '" + margins.begin()->first + "'",
@@ -131,11 +131,6 @@ double getDeadPointMargin(const LimitOptions& options, const std::string& linkag
   const auto own = options.dead_point_margins.find(linkage);
   return own == options.dead_point_margins.end() ? options.dead_point_margin
                                                  : std::max(options.dead_point_margin, own->second);
-}
-
-LimitOptions softenDeadPoints(LimitOptions options) {
-  options.dead_point_unit = 1;
-  return options;
 }
 
 Limits::Limits(const Model& model, const LimitOptions& options, const VectorXd& q0)

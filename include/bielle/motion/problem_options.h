@@ -58,9 +58,6 @@ struct LimitOptions {
   std::map<std::string, double> powers;              ///< by motor, W; driving or braking
   double dead_point_margin = 0.15;                   ///< least share of the transmission at the start, below 1; 0: none
   std::map<std::string, double> dead_point_margins;  ///< by Linkage::output, where larger than that
-  /// Rad of the arctangent of the transmission beyond a margin that count as 1: near dead points motors need little torque, which
-  /// draws motions beyond them before constraints hold. Windows of predictive control, whose penalty stays the same, take 1.
-  double dead_point_unit = 0.1;
 
   bool areGiven() const { return !(efforts.empty() && velocities.empty() && powers.empty()); }
 };

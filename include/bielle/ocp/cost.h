@@ -122,10 +122,10 @@ std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constrain
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
 /// Velocity coordinates (n), rad/s or m/s.
 std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);
-/// The arctangent of the transmission of a linkage (linkage.h, Eq. 2), continuous from -pi/4 to 3 pi/4, rad: pi/4 at the
-/// reference, 0 at a dead point of the output, pi/2 at one of the motors. It is smooth, and nearly linear, on both sides of
-/// them, where the transmission itself is infinite or falls as slowly as it pleases.
-std::unique_ptr<Residual> makeTransmissionArctan(const Linkage& linkage);
+/// The transmission rho of a linkage, over that at its reference (1): 0 at a dead point of the output, infinite at one of the
+/// motors (linkage.h, Eq. 2). Above `largest`, positive, it goes on through the latter linearly in its arctangent, with the same
+/// slope: largest + (1 + largest^2) (atan rho - atan largest), where rho < -1 is beyond the dead point, up to 3 pi/4.
+std::unique_ptr<Residual> makeTransmission(const Linkage& linkage, double largest);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
 /// Voltages of motors, given by their indices in the model, from their torques and their speeds when the torques act, with the
