@@ -127,7 +127,7 @@ def split_margins(options):
 
 
 def run(bielle, entry, solved, start, output, options, longest):
-    """What a run leaves of itself: outcome, cost, violation, iterations, seconds."""
+    """What a run leaves of itself: outcome, cost, violation, iterations, seconds, and what these consist of."""
     summary = json.loads((solved / "summary.json").read_text(encoding="utf-8"))
     command = [bielle, "solve", entry["motion"], "--robot", summary["robot_file"], "--warm-start", start, "-o", output,
                "--threads", "1", "--max-iterations", ITERATIONS, "--quiet", "--no-check", "--no-report", *options]
@@ -146,7 +146,7 @@ def run(bielle, entry, solved, start, output, options, longest):
         return {**NONE, "end": "other stages"}  # the solver made them shorter: another problem
     return {"converged": result["converged"], "cost": result["cost"],
             "violation": result["constraints"]["largest_violation"], "iterations": result["iterations"],
-            "seconds": round(seconds, 3), "end": result["termination"]}
+            "seconds": round(seconds, 3), "end": result["termination"], "work": result["work"]}
 
 
 def run_ipopt(ipopt, solved, start, output, options, longest):

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Writes docs/results/suite.md and docs/images/suite.svg: the suite of problems, and the protocol of docs/suite.md.
+"""Writes docs/results/suite.md, docs/images/suite.svg and suite_parts.svg: the suite of problems, and the protocol of docs/suite.md.
 
     docs/results/suite.py                                 the page from the tables in docs/results/data
     docs/results/suite.py --record DIR RUNS.jsonl ...     first takes them from the suite's data set and adds runs of the
                                                           protocol, which replace earlier runs of the same guesses
+    docs/results/suite.py --record-work RUNS.jsonl ...    what the iterations of runs of the protocol consist of
     docs/results/suite.py --record-ipopt DIR RUNS.jsonl   the same of runs of IPOPT, and of ours beside them, into a table of
                                                           their own; nothing else changes
 
@@ -23,13 +24,17 @@ from common import show
 
 DATA = common.HERE / "data"
 IMAGE = common.SOURCE / "docs/images/suite.svg"
+PARTS_IMAGE = common.SOURCE / "docs/images/suite_parts.svg"
+PARTS = ["evaluate", "linearize", "sweep", "rollout", "search", "rest"]
 READER = common.SOURCE / "suite/problem.py"
 SUCCESS = 0.01  # over the least cost
 PROBLEMS = ["problem", "bodies", "velocities", "rows", "stages", "duration", "cost", "violation", "iterations", "reader"]
 RUNS = ["problem", "variant", "seed", "guess", "converged", "cost", "violation", "iterations", "seconds", "end"]
-OTHER, LIMIT = "IPOPT", 20  # variants that begin so; s of the protocol
+OTHER, LIMIT, LONG = "IPOPT", 20, 200  # variants that begin so; s of the protocol, and where IPOPT had more
 COLLOCATION = "IPOPT, collocation"  # likewise, of other steps than ours
 OTHER_RUNS = ["limit", *RUNS, "optimum"]
+COUNTS = ["linearizations", "sweeps", "rollouts", "searches"]
+WORK = ["problem", "guess", "iterations", "seconds", *COUNTS, *PARTS[:-1]]
 
 
 def write_table(name, run, columns, rows, data=DATA):
@@ -66,6 +71,12 @@ def record(directory, runs, run):
                      f"{max(value for _, value, bound in found if bound == reader.TOLERANCE):.1e}"])
     write_table("suite_problems", run, PROBLEMS, rows)
     add_runs("suite_runs", run, RUNS, 4, read_lines(runs))
+
+
+def record_work(runs, run):
+    """What converged runs did, without a judgement of them."""
+    add_runs("suite_work", run, WORK, 2, [{**line, **line["work"], **line["work"]["seconds"], "seconds": line["seconds"]}
+                                          for line in read_lines(runs) if line["converged"]])
 
 
 def read_lines(runs):
@@ -163,6 +174,55 @@ def show_problem(name):
     return "`" + name + "`"
 
 
+def draw_parts(works, problems):
+    import matplotlib
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "suite", "svg.fonttype": "none", "font.size": 9})
+    from matplotlib import pyplot
+    figure, axes = pyplot.subplots(figsize=(7.2, 3.6))
+    names = [row["problem"] for row in problems]
+    left = [0] * len(names)
+    for part in PARTS:
+        widths = [statistics.fmean(work[part] for work in works if work["problem"] == name) for name in names]
+        axes.barh(names, widths, 0.7, left, label=part)
+        left = [a + b for a, b in zip(left, widths)]
+    axes.tick_params(axis="y", labelsize=8)
+    axes.invert_yaxis()
+    axes.set_xlabel("processor time of a solve [s]")
+    axes.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(PARTS_IMAGE, metadata={"Date": None})
+    pyplot.close(figure)
+
+
+def add_work(page, problems, figure):
+    """What the iterations of converged runs consist of."""
+    origin, table = read_table("suite_work")
+    works = []
+    for row in table:
+        work = {key: float(row[key]) for key in WORK[2:]}
+        works.append({**work, "problem": row["problem"], "rest": work["seconds"] - sum(work[part] for part in PARTS[:-1])})
+    page.heading("What an iteration does")
+    page.add(f"""Of the first five guesses by *exact loops*, where these converge ({origin}), per iteration, in the mean:
+linearizations of a node, sweeps over all nodes, rollouts of a step in segments, searches of several steps in one piece, and what
+these take [ms] by the clock, on a machine with other work. *Rest* is the processor time less these: reading, writing, the guess,
+multipliers. Where there is more than one sweep, rows were held, multipliers renewed or a regularization raised
+([solver](../solver.md)).""")
+    rows = []
+    for row in problems:
+        ours = [work for work in works if work["problem"] == row["problem"]]
+
+        def find_mean(key, by=1):
+            return statistics.fmean(work[key] / work["iterations"] for work in ours) / by
+
+        rows.append([show_problem(row["problem"]), f"{find_mean('linearizations', int(row['stages'])):.2f}",
+                     *(f"{find_mean(key):.2f}" for key in COUNTS[1:]), *(f"{1000 * find_mean(part):.1f}" for part in PARTS)])
+    page.table(["problem", *COUNTS, *PARTS], rows)
+    if figure:
+        draw_parts(works, problems)
+        page.lines += ["", "![processor time of a solve by its parts](../images/suite_parts.svg)"]
+
+
 def make_page(figure):
     run, problems = read_table("suite_problems")
     origin, known = read_table("suite_runs")
@@ -202,6 +262,9 @@ guesses were not mended, and every linkage had the same margin.""")
 problem with the margins of 3bf0e583: that solves 85 of 96, this program 95. Where both do, the median time is 1.31 and 0.83 s, a
 ratio of 0.63; of the pairs, 0.71 in the median, half of them between 0.58 and 0.85. Stairs take 0.62 of the time, the walk at 1 m/s
 0.58.""")
+    page.add("""All guesses once more, while other programs ran (commit aa5d1b21, 2026-12-01, AMD EPYC, 2 cores): iterations are the same
+within one in the median, but 57 instead of 52 on stairs, and take 1.65 times as long, so that 20 s end more runs. With costs at most one
+per cent above the best of both commits 1158 succeed, 83 of the stairs, where 1166 and 88 did.""")
     page.heading("By problem")
     page.add("Successes, and the median time of these [s].")
     variants = list(profiles)
@@ -214,8 +277,29 @@ ratio of 0.63; of the pairs, 0.71 in the median, half of them between 0.58 and 0
             cells.append(f"{len(good)}" + (f", {statistics.median(good):.2f}" if good else ""))
         rows.append([show_problem(problem["problem"]), *cells])
     page.table(["problem", *variants], rows)
+    add_late(page, problems, runs)
+    add_work(page, problems, figure)
     add_other(page, problems)
     return page
+
+
+def add_late(page, problems, runs):
+    """What became of the runs that were too late at the older commit."""
+    before, now = ({(run["problem"], run["guess"]): run for run in runs if run["variant"] == variant}
+                   for variant in ("exact loops, 9b83832c", "exact loops"))
+    late = [key for key, run in before.items() if run["end"] == "too late"]
+    rows = []
+    for row in problems:
+        these = [now[key] for key in late if key[0] == row["problem"]]
+        good = [run for run in these if run["success"]]
+        others = [f"guess {run['guess']}: {run['end'].replace('_', ' ')}"
+                  + (f", {float(run['iterations']):.0f} iterations" if run["iterations"] else "")
+                  for run in these if not run["success"]]
+        if these:
+            rows.append([show_problem(row["problem"]), str(len(these)), str(len(good)),
+                         show(statistics.median(run["seconds"] for run in good) if good else None, "{:.2f}"), "; ".join(others)])
+    page.add(f"What became of the {len(late)} runs of 9b83832c that were too late:")
+    page.table(["problem", "too late", "succeed", "median time [s]", "the others"], rows)
 
 
 STARTS = {"optimum": "our optimum", "unperturbed": "the unperturbed guess"}
@@ -231,6 +315,25 @@ def show_end(run):
             + (f", violation {violation:.0e}" if violation > 1e-8 else ""))
 
 
+def add_long(page, problems, runs):
+    """Runs of IPOPT from several guesses with more time than the protocol has."""
+    variants = list(dict.fromkeys(run["variant"] for run in runs))
+    rows = []
+    for row in problems:
+        cells = [show_problem(row["problem"])]
+        for variant in variants:
+            ours = [run for run in runs if (run["problem"], run["variant"]) == (row["problem"], variant)]
+            good = [run for run in ours if run["converged"] == "True"]
+            ratios = [float(run["cost"]) / float(run["optimum"]) - 1 for run in good]
+            cells += [f"{len(good)} of {len(ours)}", ", ".join("the same" if abs(x) <= 1e-6 else f"{100 * x:+.2g} %" for x in ratios),
+                      *(f"{statistics.median(float(run[key]) for run in good):.0f}" if good else "" for key in ("iterations", "seconds"))]
+        rows.append(cells)
+    page.add(f"From the first five guesses, ended after {LONG} s: how many converge, their costs over our optimum, and the medians of "
+             "their iterations and seconds.")
+    page.table(["problem", *(f"{variant.removeprefix(OTHER + ', ')}: {title}" for variant in variants
+                             for title in ("converged", "costs", "iterations", "time [s]"))], rows)
+
+
 def add_other(page, problems):
     origin, runs = read_table("suite_ipopt")
     page.heading("IPOPT")
@@ -238,7 +341,10 @@ def add_other(page, problems):
 ({origin}; collocation is of the latter). Problems and optima are those of the commit of a run, and may have changed. Costs are told over our
 optimum of the same problem; *the same* is within 1e-6. Of iterates that violate a constraint or leave a gap of more than 1e-8 the
 violation is told, too: their costs say little.""")
-    for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs):
+    several = [run for run in runs if run["limit"] == str(LONG) and run["guess"].isdigit()]
+    if several:
+        add_long(page, problems, several)
+    for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs if run not in several):
         these = {(run["problem"], run["variant"]): run for run in runs if (run["guess"], run["limit"]) == (start, limit)}
         variants = list(dict.fromkeys(variant for _, variant in these))
         page.add(f"From {STARTS.get(start, f'guess {start}')}, ended after {limit} s:")
@@ -280,6 +386,7 @@ def run_quick(runner):
 def main():
     parser = common.make_parser(__doc__)
     parser.add_argument("--record", nargs="+", metavar="PATH", help="take the tables from a data set and files of runs")
+    parser.add_argument("--record-work", nargs="+", metavar="PATH", help="take what iterations consist of from files of runs")
     parser.add_argument("--record-ipopt", nargs="+", metavar="PATH", help="take the runs of IPOPT from a data set and files of runs")
     arguments = parser.parse_args()
     if arguments.quick:
@@ -287,6 +394,8 @@ def main():
         return
     if arguments.record:
         record(arguments.record[0], arguments.record[1:], common.describe_run(arguments.commit))
+    if arguments.record_work:
+        record_work(arguments.record_work, common.describe_run(arguments.commit))
     if arguments.record_ipopt:
         record_other(arguments.record_ipopt[0], arguments.record_ipopt[1:], common.describe_run(arguments.commit))
     make_page(figure=True).write(False)
