@@ -30,7 +30,7 @@ READER = common.SOURCE / "suite/problem.py"
 SUCCESS = 0.01  # over the least cost
 PROBLEMS = ["problem", "bodies", "velocities", "rows", "stages", "duration", "cost", "violation", "iterations", "reader"]
 RUNS = ["problem", "variant", "seed", "guess", "converged", "cost", "violation", "iterations", "seconds", "end"]
-OTHER, LIMIT, LONG = "IPOPT", 20, 200  # variants that begin so; s of the protocol, and where IPOPT had more
+OTHER, LIMIT = "IPOPT", 20  # variants that begin so; s of the protocol
 COLLOCATION = "IPOPT, collocation"  # likewise, of other steps than ours
 OTHER_RUNS = ["limit", *RUNS, "optimum"]
 COUNTS = ["linearizations", "sweeps", "rollouts", "searches"]
@@ -315,25 +315,6 @@ def show_end(run):
             + (f", violation {violation:.0e}" if violation > 1e-8 else ""))
 
 
-def add_long(page, problems, runs):
-    """Runs of IPOPT from several guesses with more time than the protocol has."""
-    variants = list(dict.fromkeys(run["variant"] for run in runs))
-    rows = []
-    for row in problems:
-        cells = [show_problem(row["problem"])]
-        for variant in variants:
-            ours = [run for run in runs if (run["problem"], run["variant"]) == (row["problem"], variant)]
-            good = [run for run in ours if run["converged"] == "True"]
-            ratios = [float(run["cost"]) / float(run["optimum"]) - 1 for run in good]
-            cells += [f"{len(good)} of {len(ours)}", ", ".join("the same" if abs(x) <= 1e-6 else f"{100 * x:+.2g} %" for x in ratios),
-                      *(f"{statistics.median(float(run[key]) for run in good):.0f}" if good else "" for key in ("iterations", "seconds"))]
-        rows.append(cells)
-    page.add(f"From the first five guesses, ended after {LONG} s: how many converge, their costs over our optimum, and the medians of "
-             "their iterations and seconds.")
-    page.table(["problem", *(f"{variant.removeprefix(OTHER + ', ')}: {title}" for variant in variants
-                             for title in ("converged", "costs", "iterations", "time [s]"))], rows)
-
-
 def add_other(page, problems):
     origin, runs = read_table("suite_ipopt")
     page.heading("IPOPT")
@@ -341,10 +322,7 @@ def add_other(page, problems):
 ({origin}; collocation is of the latter). Problems and optima are those of the commit of a run, and may have changed. Costs are told over our
 optimum of the same problem; *the same* is within 1e-6. Of iterates that violate a constraint or leave a gap of more than 1e-8 the
 violation is told, too: their costs say little.""")
-    several = [run for run in runs if run["limit"] == str(LONG) and run["guess"].isdigit()]
-    if several:
-        add_long(page, problems, several)
-    for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs if run not in several):
+    for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs):
         these = {(run["problem"], run["variant"]): run for run in runs if (run["guess"], run["limit"]) == (start, limit)}
         variants = list(dict.fromkeys(variant for _, variant in these))
         page.add(f"From {STARTS.get(start, f'guess {start}')}, ended after {limit} s:")
