@@ -123,8 +123,9 @@ std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vecto
 /// Velocity coordinates (n), rad/s or m/s.
 std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);
 /// The transmission rho of a linkage, over that at its reference (1): 0 at a dead point of the output, infinite at one of the
-/// motors (linkage.h, Eq. 2). Above `largest`, which is at least 1, it goes on through the latter linearly in its arctangent, with the
-/// same slope: largest + (1 + largest^2) (theta - atan(largest)), where theta = atan(rho), plus pi where rho < -1, past the dead point.
+/// motors (linkage.h, Eq. 2). Above `largest`, which is at least 1, it goes on through the latter linearly in its arctangent, with
+/// the same slope: largest + (1 + largest^2) (theta - atan(largest)), where theta = atan(rho), plus pi where rho < -1, past the
+/// dead point.
 std::unique_ptr<Residual> makeTransmission(const Linkage& linkage, double largest);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
