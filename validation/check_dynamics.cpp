@@ -93,18 +93,38 @@ void addDynamicsRows(CheckContext& context) {
     addLargest(position, stage.midpoint_rest, 1, k, record.v_names);
     differences.add(stage.finite_difference / acceleration, k);
   }
-  Worst com;
-  for (int k = 0; k <= context.motion.numStages(); ++k)
-    com.add((record.com.row(k).transpose() - context.trace.nodes[k].com).norm(), k);
   context.add(time, "time between nodes", "s", bounds.time);
-  context.add(com, "centre of mass, as recorded", "m", bounds.com);
   context.add(balance, "equations of motion", "of weight", bounds.motion_equations);
   context.add(accelerations, "accelerations, against Simbody's", "of largest", bounds.accelerations);
   context.add(velocity, "steps of the velocity", "m/s, rad/s", bounds.velocity_steps);
   context.add(position, "steps of the configuration", "m, rad", bounds.position_steps);
   context.add(differences, "finite differences of the velocity", "of largest", bounds.finite_differences);
   addCycleRow(context);
+}
+
+void addStateRows(CheckContext& context) {
+  Worst com;
+  for (int k = 0; k <= context.motion.numStages(); ++k)
+    com.add((context.motion.record.com.row(k).transpose() - context.trace.nodes[k].com).norm(), k);
+  context.add(com, "centre of mass, as recorded", "m", context.bounds.com);
   addClosureRows(context);
+}
+
+// Of a motion carried out, between any two of its nodes. Torques are those recorded, all along a stage.
+void addWorkRow(CheckContext& context) {
+  const Model& model = context.model();
+  const MotionRecord& record = context.motion.record;
+  double rest = 0, least = 0;  // energy less the work of the motors
+  Worst gained(CheckRow::Kind::Note);
+  for (int k = 0; k < context.motion.numStages(); ++k) {
+    const NodeTrace &here = context.trace.nodes[k], &next = context.trace.nodes[k + 1];
+    rest += next.kinetic + next.potential - here.kinetic - here.potential;
+    const VectorXd moved = model.difference(record.q.row(k).transpose(), record.q.row(k + 1).transpose());
+    for (int m = 0; m < model.nu(); ++m) rest -= record.u(k, m) * moved[model.motors()[m].dof];
+    gained.add(rest - least, k + 1);
+    least = getSmaller(least, rest);
+  }
+  context.add(gained, "energy, beyond the motors' work", "J", 0);
 }
 
 // The energy missing in the balance, Eq. (7) or (10), over what steps may lose or gain, Eq. (8) or (12).

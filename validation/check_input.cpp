@@ -8,6 +8,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/names.h"
 #include "bielle/motion/serial_model.h"
+#include "results/happened_summary.h"
 
 namespace bielle::validation {
 namespace {
@@ -81,6 +82,8 @@ std::vector<ContactTarget> CheckedMotion::getContacts(int phase) const {
 }
 
 bool CheckedMotion::stands(int contact, int node) const {
+  if (hasHappened())
+    return record.contact_wrenches.block<1, 6>(std::min(node, numStages() - 1), 6 * contact).squaredNorm() > 0;
   for (const MotionSummary::Stance& stance : summary.phases[findPhase(node)].stances)
     if (stance.contact == model.contacts()[contact].name) return true;
   return false;
@@ -98,7 +101,9 @@ void checkConsistency(const CheckedMotion& motion) {
 
 CheckedMotion readMotion(const std::string& directory) {
   CheckedMotion motion;
-  motion.summary = readSummary(directory);
+  const AnySummary summary = readAnySummary(directory);
+  motion.summary = summary.facts;
+  motion.world = summary.world;
   motion.record = readResultRecord(directory);
   const LoadedRobot robot = loadRobotOf(directory);
   motion.warnings = robot.warnings;

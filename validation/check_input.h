@@ -1,5 +1,6 @@
 #pragma once
 /// \file A motion read from its files.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ struct CheckedMotion {
   MotionSummary summary;
   MotionRecord record;
   std::vector<std::string> warnings;  ///< of its robot (loadRobotOf)
+  std::optional<std::string> world;   ///< where it was carried out; none: a plan
 
   int numStages() const { return static_cast<int>(record.time.size()) - 1; }
   /// Index of the phase of a node; the last node belongs to the last phase.
@@ -24,8 +26,9 @@ struct CheckedMotion {
   double getTimeStep(int stage) const { return summary.phases[findPhase(stage)].time_step; }
   /// Whether a stage is a rigid impact: no time passes, velocities jump.
   bool isImpact(int stage) const { return getTimeStep(stage) == 0; }
-  /// Whether a contact of the model stands on the ground at a node.
+  /// Whether a contact of the model stands on the ground at a node: as planned, or where it was pressed, if that is known.
   bool stands(int contact, int node) const;
+  bool hasHappened() const { return world.has_value(); }
 };
 
 /// Reads DIR/summary.json, DIR/trajectory.npz and the robot, from its file or, if that no longer exists, by its name.

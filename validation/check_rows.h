@@ -55,6 +55,8 @@ struct CheckContext {
 };
 
 void addDynamicsRows(CheckContext& context);
+void addStateRows(CheckContext& context);
+void addWorkRow(CheckContext& context);
 void addEnergyRows(CheckContext& context);
 void addStanceRows(CheckContext& context);
 void addSwingRows(CheckContext& context);

@@ -51,8 +51,7 @@ void addShapeRows(CheckContext& context) {
       (pair.of_two_legs ? legs : others).push_back(pair);
   const std::string nothing = "there are no two shapes";
   context.add(findNearest(context, legs, kind), "shapes: between the legs", "m", context.bounds.shapes, nothing);
-  context.add(findNearest(context, others, CheckRow::Kind::Note), "shapes: within legs and trunk", "m", 0,
-              nothing);
+  context.add(findNearest(context, others, CheckRow::Kind::Note), "shapes: within legs and trunk", "m", 0, nothing);
   if (model.hasFreeFlyer())
     context.add(findLowest(context, fitted, kind), "shapes: from the ground", "m", context.bounds.shapes,
                 "there is no shape");

@@ -50,7 +50,7 @@ struct StageTrace {
 
 struct MotionTrace {
   std::vector<NodeTrace> nodes;    ///< N + 1
-  std::vector<StageTrace> stages;  ///< N
+  std::vector<StageTrace> stages;  ///< N; empty ones of a motion carried out, whose steps are not recorded
 };
 
 /// The motion must be consistent and its numbers finite.

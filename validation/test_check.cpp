@@ -211,6 +211,52 @@ TEST_CASE("check: a foot that slides, and one that is said to be in the air") {
   CHECK(getValue(report, "landing velocity") < 0.02);
 }
 
+TEST_CASE("check: of a motion carried out, states and loops are judged, and the rest informs") {
+  CheckedMotion motion = getSquat().checked;
+  motion.world = "bielle";
+  motion.record.closure_wrenches.setConstant(std::nan(""));
+  const int node = 40, knee = motion.model.joints()[motion.model.findJoint("motor_knee_left")].idx_q;
+  const auto check = [](const CheckedMotion& checked, const Names& failures) {
+    const CheckReport report = checkMotion(checked);
+    INFO(print(report));
+    CHECK(getFailures(report) == failures);
+    CHECK(report.findRow("equations of motion") == nullptr);
+    return report;
+  };
+  check(motion, {});
+  CheckedMotion weak = motion, open = motion, moved = motion, unknown = motion;
+  weak.record.v.row(node).setConstant(0.1);  // feet slip, bodies run into each other
+  check(weak, {"loops: opening velocity"});
+  open.record.q(node, knee) += 1e-4;
+  check(open, {"centre of mass, as recorded", "loops: gap", "loops: gap, angle", "loops: opening velocity"});
+  open.world = "mujoco";
+  CHECK(getValue(check(open, {"centre of mass, as recorded"}), "loops: gap") > 1e-6);
+  moved.record.com(node, 2) += 1e-6;
+  check(moved, {"centre of mass, as recorded"});
+  unknown.record.contact_wrenches.setConstant(std::nan(""));
+  const CheckReport blind = check(unknown, {});
+  for (const char* name : {"standing feet: slip", "contact: tangential over normal", "contact: force in the air"})
+    CHECK_FALSE(blind.findRow(name)->value);
+  unknown.record.contact_wrenches(node, 2) = 1;
+  check(unknown, {"numbers not finite"});
+}
+
+TEST_CASE("check: a pendulum keeps its energy, but for the work of its motor and of a push") {
+  CheckedMotion motion = makePendulumMotion(0.01, true);
+  motion.world = "elsewhere";
+  const char* gained = "energy, beyond the motors' work";
+  CHECK(getValue(checkMotion(motion), gained) < 1e-6);
+  CheckedMotion driven = motion, pushed = motion;
+  driven.record.u.setConstant(2);  // had it acted against the swing, the rod would have ended with less
+  const double way = motion.record.q.col(0).maxCoeff() - motion.record.q.col(0).minCoeff();
+  CHECK(getValue(checkMotion(driven), gained) == Approx(2 * way).epsilon(0.01));
+  const double faster = 0.3, before = motion.record.v(50, 0);
+  pushed.record.v.col(0).tail(pushed.numStages() + 1 - 50).array() += faster;
+  const CheckReport report = checkMotion(pushed);
+  const double inertia = 1.3 * kLength * kLength / 3;
+  CHECK(getValue(report, gained) >= Approx(inertia * (before * faster + faster * faster / 2)).epsilon(1e-6));
+}
+
 TEST_CASE("check: limits of joints and motors, and soles that overlap") {
   const auto read = [](const char* name) {
     std::ifstream file(findBipetto() + "/" + name);

@@ -7,6 +7,7 @@
 #include "bielle/results/result.h"
 #include "formats/text_file.h"
 #include "results/ground_json.h"
+#include "results/happened_summary.h"
 #include "results/json_text.h"
 
 namespace bielle {
@@ -68,11 +69,25 @@ ObjectiveOptions readObjective(const Json& json) {
   return options;
 }
 
-MotionSummary read(const Json& json) {
+// What plans and motions carried out have alike.
+MotionSummary readFacts(const Json& json) {
   MotionSummary summary;
   summary.motion = json.at("motion");
   summary.run = {
       json.at("robot"), json.at("robot_file"), {}, parseBelief(json.at("model")), json.at("serial_armature")};
+  for (const Json& entry : json.at("phases")) {
+    MotionSummary::Phase phase{
+        entry.at("name"), readCount(entry.at("start_node")), readCount(entry.at("nodes")), entry.at("time_step_s"), {}};
+    for (const Json& contact : entry.at("contacts"))
+      phase.stances.push_back({contact.at("name"), readPlacement(contact)});
+    summary.phases.push_back(phase);
+  }
+  summary.ground = readGround(json.at("ground"));
+  return summary;
+}
+
+MotionSummary readPlan(const Json& json) {
+  MotionSummary summary = readFacts(json);
   const std::string formulation = json.at("formulation");
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
   const std::string step = json.at("step");
@@ -82,17 +97,9 @@ MotionSummary read(const Json& json) {
   summary.converged = json.at("converged");
   for (const auto& [name, value] : json.at("options").items()) summary.options.emplace_back(name, readOption(value));
   for (const Json& entry : json.at("goals")) summary.goals.push_back(readGoal(entry));
-  for (const Json& entry : json.at("phases")) {
-    MotionSummary::Phase phase{
-        entry.at("name"), readCount(entry.at("start_node")), readCount(entry.at("nodes")), entry.at("time_step_s"), {}};
-    for (const Json& contact : entry.at("contacts"))
-      phase.stances.push_back({contact.at("name"), readPlacement(contact)});
-    summary.phases.push_back(phase);
-  }
   for (const Json& entry : json.at("free_timings"))
     summary.timings.push_back({entry.at("phase"), readCount(entry.at("start_node")), entry.at("nominal_s"),
                                entry.at("chosen_s"), entry.at("lower_s"), entry.at("upper_s")});
-  summary.ground = readGround(json.at("ground"));
   return summary;
 }
 
@@ -118,20 +125,27 @@ std::vector<std::string> listPartMotions(const OptionValues& options) {
 
 }  // namespace
 
-MotionSummary readSummary(const std::string& directory) {
+AnySummary readAnySummary(const std::string& directory) {
   const std::string path = (std::filesystem::path(directory) / "summary.json").string();
   const std::string text = readTextFile(path, "give a directory that `bielle solve` wrote");
   try {
     const Json json = parseJson(text);
-    if (!json.contains("outcome")) {
-      MotionSummary summary = read(json);
-      summary.file = path;
-      return summary;
-    }
+    AnySummary summary;
+    if (json.contains("outcome")) summary.world = json.at("world").get<std::string>();
+    summary.facts = summary.world ? readFacts(json) : readPlan(json);
+    summary.facts.file = path;
+    return summary;
   } catch (const std::exception& error) {
     throw InputError(path, "file", describeJsonError(error), "recreate it with `bielle solve`");
   }
-  throw InputError(path, "motion", "it is a motion carried out, not a plan", "give the directory of `bielle solve`");
+}
+
+MotionSummary readSummary(const std::string& directory) {
+  const AnySummary summary = readAnySummary(directory);
+  if (summary.world)
+    throw InputError(summary.facts.file, "motion", "it is a motion carried out, not a plan",
+                     "give the directory of `bielle solve`");
+  return summary.facts;
 }
 
 MotionRequest remakeRequest(const MotionSummary& summary) {
