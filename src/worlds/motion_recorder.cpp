@@ -86,7 +86,6 @@ void MotionRecorder::noteAdvance(double seconds) {
   happened.world_seconds += seconds;
   happened.largest_gap = getLarger(happened.largest_gap, world_.gap());
   for (const FootReport& foot : world_.feet()) happened.largest_slip = getLarger(happened.largest_slip, foot.slip);
-  updatePlacements(model_, ws_, world_.configuration());
   for (size_t c = 0; c < world_.feet().size(); ++c) noteFoot(static_cast<int>(c));
 }
 
@@ -95,7 +94,7 @@ void MotionRecorder::noteFoot(int c) {
   constexpr double kLoaded = 0.25;  // of the weight
   constexpr int kPoints = 5;        // along each side
   const ContactFrame& contact = model_.contacts()[c];
-  const SE3 X_WF = getPlacement(ws_, contact.body, contact.X_BF);
+  const SE3& X_WF = world_.feet()[c].X_WF;
   const Vector3d normal = X_WF.R.transpose() * terrain_.find(X_WF.p.x(), X_WF.p.y()).normal;  // in the foot's axes
   if (normal.dot(world_.feet()[c].wrench.head<3>()) < kLoaded * model_.mass() * model_.gravity().norm()) return;
   if (contact.kind == ContactKind::Surface6D)

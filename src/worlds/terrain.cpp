@@ -64,11 +64,6 @@ static std::pair<double, double> calcSpan(const Top& top, const Eigen::Vector2d&
   return {middle - rise, middle + rise};
 }
 
-bool Terrain::Top::covers(double px, double py, double margin) const {
-  const double dx = px - x, dy = py - y;
-  return std::abs(cos * dx + sin * dy) <= half_length - margin && std::abs(cos * dy - sin * dx) <= half_width - margin;
-}
-
 Terrain::Terrain(const Ground& ground) : ground_(ground) {
   for (const GroundStep& step : ground.steps) {
     Top top;
@@ -102,18 +97,19 @@ void Terrain::fillGrid() {
     halves.push_back(half);
   }
   const Eigen::Vector2d size = high - low;
-  cell_ = std::max({edges / double(tops_.size()), size.maxCoeff() / 400, 1e-3});
-  columns_ = static_cast<int>(size.x() / cell_) + 2;
-  rows_ = static_cast<int>(size.y() / cell_) + 2;
+  const double cell = std::max({edges / double(tops_.size()), size.maxCoeff() / 400, 1e-3});
+  columns_ = static_cast<int>(size.x() / cell) + 2;
+  rows_ = static_cast<int>(size.y() / cell) + 2;
+  per_cell_ = 1 / cell;
   if (columns_ * rows_ > kLargestGrid)
     throw InputError("terrain", "the boxes of the ground", "it is out of range", "give fewer or larger boxes");
   // Sides of tiles lie in the middle of cells, so that few tiles share one.
-  corner_ = low - Eigen::Vector2d::Constant(0.5 * cell_);
+  corner_ = low - Eigen::Vector2d::Constant(0.5 * cell);
   std::vector<std::vector<int>> cells(columns_ * rows_);
   const auto clampTo = [](double at, int count) { return std::clamp(static_cast<int>(std::floor(at)), 0, count - 1); };
   for (size_t i = 0; i < tops_.size(); ++i) {
     const Eigen::Vector2d middle(tops_[i].x, tops_[i].y);
-    const Eigen::Vector2d from = (middle - halves[i] - corner_) / cell_, to = (middle + halves[i] - corner_) / cell_;
+    const Eigen::Vector2d from = (middle - halves[i] - corner_) / cell, to = (middle + halves[i] - corner_) / cell;
     for (int row = clampTo(from.y() - kMargin, rows_); row <= clampTo(to.y() + kMargin, rows_); ++row)
       for (int column = clampTo(from.x() - kMargin, columns_); column <= clampTo(to.x() + kMargin, columns_); ++column)
         cells[row * columns_ + column].push_back(static_cast<int>(i));
@@ -152,25 +148,20 @@ void Terrain::visit(const Eigen::Vector2d& low, const Eigen::Vector2d& high, con
         take(tops_[entries_[k]]);
 }
 
-int Terrain::findColumn(double x) const {
-  return std::clamp(static_cast<int>(std::floor((x - corner_.x()) / cell_)), 0, columns_ - 1);
-}
-
-int Terrain::findRow(double y) const {
-  return std::clamp(static_cast<int>(std::floor((y - corner_.y()) / cell_)), 0, rows_ - 1);
-}
-
 const Terrain::Top* Terrain::findTop(double x, double y) const {
-  const double column = (x - corner_.x()) / cell_, row = (y - corner_.y()) / cell_;
+  const double column = (x - corner_.x()) * per_cell_, row = (y - corner_.y()) * per_cell_;
   if (tops_.empty() || !(column > -1 && row > -1 && column < columns_ + 1 && row < rows_ + 1)) return nullptr;
-  const int cell = findRow(y) * columns_ + findColumn(x);
+  const int cell = findCell(row, rows_) * columns_ + findCell(column, columns_);
   const Top* highest = nullptr;
   double height = ground_.height;
   for (int k = starts_[cell]; k < starts_[cell + 1]; ++k) {
     const Top& top = tops_[entries_[k]];
-    if (!top.covers(x, y) || top.calcHeight(x, y) <= height) continue;
-    height = top.calcHeight(x, y);
+    if (!top.covers(x, y)) continue;
+    const double own = top.calcHeight(x, y);
+    if (own <= height) continue;
+    height = own;
     highest = &top;
+    if (top.is_highest && top.covers(x, y, kInside)) break;
   }
   return highest;
 }

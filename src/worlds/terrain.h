@@ -1,6 +1,8 @@
 #pragma once
 /// \file The ground of a world: quick heights and normals, and what of a sole it bears.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "bielle/dynamics/ground.h"
@@ -56,8 +58,12 @@ class Terrain {
     Eigen::Vector2d slope = Eigen::Vector2d::Zero();
     double height = 0;
     Vector3d normal = Vector3d::UnitZ();
-    bool is_highest = false;                                     // of all tops that overlap it, everywhere
-    bool covers(double px, double py, double margin = 0) const;  // margin: from its sides
+    bool is_highest = false;                                      // of all tops that overlap it, everywhere
+    bool covers(double px, double py, double margin = 0) const {  // margin: from its sides
+      const double dx = px - x, dy = py - y;
+      return std::abs(cos * dx + sin * dy) <= half_length - margin &&
+             std::abs(cos * dy - sin * dx) <= half_width - margin;
+    }
     double calcHeight(double px, double py) const { return height + slope.x() * px + slope.y() * py; }
   };
   void fillGrid();
@@ -67,15 +73,16 @@ class Terrain {
   Touch touchTop(const Top& top, const Vector3d& point) const {
     return {(top.calcHeight(point.x(), point.y()) - point.z()) * top.normal.z(), top.normal};
   }
-  int findColumn(double x) const;
-  int findRow(double y) const;
+  int findColumn(double x) const { return findCell((x - corner_.x()) * per_cell_, columns_); }
+  int findRow(double y) const { return findCell((y - corner_.y()) * per_cell_, rows_); }
+  static int findCell(double at, int count) { return at > 0 ? static_cast<int>(std::min(at, count - 1.0)) : 0; }
   // The highest top under a point, above the plane; null if there is none.
   const Top* findTop(double x, double y) const;
 
   Ground ground_;
   std::vector<Top> tops_;
   Eigen::Vector2d corner_ = Eigen::Vector2d::Zero();  // of the grid
-  double cell_ = 1;                                   // edge of a cell, m
+  double per_cell_ = 1;                               // over the edge of a cell, 1/m
   int columns_ = 0, rows_ = 0;
   std::vector<double> peaks_;          // highest of the tops of each cell, m
   std::vector<int> starts_, entries_;  // tops that may cover a cell: entries_[starts_[cell] .. starts_[cell + 1])

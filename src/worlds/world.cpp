@@ -109,6 +109,7 @@ void World::setFootWrench(int contact, const Vector6d& wrench) { wrenches_[conta
 
 void World::reportFoot(size_t contact, const SE3& X_WF) {
   FootReport& foot = feet_[contact];
+  foot.X_WF = X_WF;
   foot.wrench = X_WF.actInvForce(wrenches_[contact]);
   const bool touches = !wrenches_[contact].isZero(0);
   if (touches && !foot.touches) touchdowns_[contact] = X_WF.p;

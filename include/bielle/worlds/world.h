@@ -58,6 +58,7 @@ struct FootReport {
   Vector6d wrench = Vector6d::Zero();  ///< of the ground on the foot, in its contact frame (notation.h), N and N m
   double slip = 0;  ///< distance of the sole's centre along the ground from where it touched down, m; 0 in the air
   bool touches = false;
+  SE3 X_WF;  ///< placement of its contact frame in the world
 };
 
 /// One robot in one world. Not thread-safe; different worlds are independent. An engine derives from it (below).
