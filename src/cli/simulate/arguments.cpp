@@ -21,6 +21,7 @@ namespace {
 
 constexpr const char* kPushExample = "t=3,impulse=6,direction=90,duration=0.1";
 constexpr double kRealLookAhead = 36;  // ms
+constexpr double kRealTimeLead = 4;    // ms: most solves take less, and what comes late acts on arrival
 const std::vector<std::string> kControls = {"mpc", "gains", "open"}, kSensors = {"ideal", "real"};
 
 [[noreturn]] void refusePush(const std::string& text, const std::string& problem) {
@@ -120,7 +121,7 @@ void describeControl(OptionFields& fields, SimulateArguments& a) {
   fields.number(
       "lead", a.lead, "ms", {0, 1000},
       "how long before a stage predictive control measures the state that it solves for; less where the stage "
-      "before is shorter. 0: the whole stage before");
+      "before is shorter. 0: the whole stage before, the default unless --real-time is given (4)");
   fields.number("solve_time", a.solve_time, "ms", {0, 1000},
                 "time that each solve of predictive control is given: within a stage another one begins while "
                 "there is that much left. Except with --real-time, policies come into force only when it has passed, "
@@ -366,7 +367,7 @@ void parseOptions(SimulateArguments& arguments) {
   const bool is_real = arguments.sensors == Sensing::Real;
   PredictiveOptions& predictive = arguments.control.predictive;
   predictive.own_thread = arguments.execution.real_time;
-  predictive.lead = 1e-3 * arguments.lead;
+  predictive.lead = 1e-3 * arguments.lead.value_or(arguments.execution.real_time ? kRealTimeLead : 0);
   predictive.solve_time = 1e-3 * arguments.solve_time;
   predictive.look_ahead = 1e-3 * arguments.look_ahead.value_or(is_real ? kRealLookAhead : 0);
   arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};

@@ -42,7 +42,8 @@ struct SimulateArguments {
   std::optional<PlanControl> wanted_control;  // none: chosen for the motion, predictive where that can carry it out
   std::optional<Belief> belief;               // none: in the model of the motion
   ControlOptions control;
-  double lead = 0, solve_time = 0;  // ms
+  std::optional<double> lead;  // ms
+  double solve_time = 0;       // ms
   // Of what it is told.
   Sensing sensors = Sensing::Ideal;
   PerceptionOptions perception;

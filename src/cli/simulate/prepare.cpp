@@ -169,8 +169,7 @@ std::vector<std::string> listIdleInPlan(const SimulateArguments& arguments, cons
     idle.push_back("--rod-error has no effect: the robot has no closures");
   double longest = 0;  // s
   for (const Policy::Stage& stage : plan.policy.stages()) longest = std::max(longest, stage.duration);
-  const double lead = arguments.control.predictive.lead;
-  if (!plan.walk && lead > 0 && lead >= longest)
+  if (!plan.walk && arguments.lead && *arguments.lead > 0 && 1e-3 * *arguments.lead >= longest)
     idle.push_back("--lead has no effect: stages last " + formatNumber(1e3 * longest) + " ms at most");
   return idle;
 }
