@@ -84,7 +84,8 @@ class PredictiveController::Loop {
   // Whether the next instant of control, about a period from now, would be too late for the solve of the present stage.
   bool isDue(const Measurement& measurement) const {
     const double period = measurement.time - last_time_;
-    return solve_time_ > 0 || measurement.actionTime() + kPeriodShare * period + lead_ >= getStart(stage_ + 1);
+    return solve_time_ > 0 || was_late_ ||
+           measurement.actionTime() + kPeriodShare * period + lead_ >= getStart(stage_ + 1);
   }
 
   // Whether the present stage does, for another solve.
@@ -141,6 +142,7 @@ class PredictiveController::Loop {
     solution_.took.time = took.time;
     solution_.took.latency = took.latency;
     took = solution_.took;
+    was_late_ = thread_ && took.seconds > lead_;
     counts_.failed += !solved;
     counts_.early += solution_.early;
     counts_.late += solution_.late;
@@ -165,6 +167,7 @@ class PredictiveController::Loop {
   bool waits_ = false;                                           // it has no solve yet
   bool solves_ = false;                                          // a solve is under way
   bool drafted_ = false;                                         // its draft has been taken
+  bool was_late_ = false;                                        // the last one, so that the next one begins at once
   double advance_ = 0;                                           // of the clock of the motion, s
   double awaited_ = -1;  // the landing of a late foot, s of the motion; negative: none is late
   PredictiveCounts counts_;

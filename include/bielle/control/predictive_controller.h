@@ -22,8 +22,8 @@
 /// The rollout, which may shorten or reject that step, follows, and the policy of what has become of it replaces the first one.
 ///
 /// Either update() waits for the solve: the same measurements then give the same torques, on any machine. Or, for a robot, solves run
-/// in a separate thread, and update() never waits: a solution found after t_{k+1} takes effect on arrival, and where the next solve
-/// should have begun already, it begins then. With PredictiveOptions::solve_time solves begin with their stages; if a stage leaves
+/// in a separate thread, and update() never waits: a solution found after t_{k+1} takes effect on arrival, and the next solve begins
+/// then, whatever the lead. With PredictiveOptions::solve_time solves begin with their stages; if a stage leaves
 /// time for another one, that begins likewise, and replaces the first one's solution.
 ///
 /// Early landing: a foot on the ground in the second half of its swing (Measurement::contacts) has landed. The motion
