@@ -43,9 +43,9 @@ class PredictiveController::Loop {
   void update(const Measurement& measurement, VectorRef u) {
     const double time = measurement.time + kClockTolerance;
     if (solves_ && isDone(time))
-      receive();
+      receive(measurement);
     else if (solves_ && !drafted_ && isDrafted())
-      adopt(preview_.draft);
+      adopt(preview_.draft, measurement);
     if (next_.solved && time + measurement.delay >= getStart(next_.target)) {
       policy_->exchange(next_.stages, next_.u_hold);
       next_.solved = false;
@@ -112,16 +112,17 @@ class PredictiveController::Loop {
     const PredictiveSolve& took = solution_.took;
     const double left = std::min(end - measurement.actionTime(), lead_);
     counts_.missed += took.seconds > left || took.prepare + took.seconds > end - begin - measurement.delay;
-    receive();
+    receive(measurement);
   }
 
   // Of a draft, then of the solution: the policy awaits its stage, that of the solution instead of the draft's.
-  void adopt(WindowPlanner::Draft& draft) {
+  void adopt(WindowPlanner::Draft& draft, const Measurement& measurement) {
     const size_t place = getPlace();
     if (!drafted_) {
       stage_ += draft.skipped;
       advance_ = draft.advance;
       awaited_ = draft.awaited;
+      was_late_ = thread_ && measurement.actionTime() > getStart(draft.target) + kClockTolerance;
       if (counts_.last.size() < kSolves) counts_.last.emplace_back();
       counts_.last[place] = {};
       counts_.last[place].time = request_.measurement.time;
@@ -133,16 +134,15 @@ class PredictiveController::Loop {
     next_place_ = place;
   }
 
-  void receive() {
+  void receive(const Measurement& measurement) {
     if (thread_) thread_->setIdle();
     solves_ = false;
     const bool solved = solution_.solved;
-    adopt(solution_);
+    adopt(solution_, measurement);
     PredictiveSolve& took = counts_.last[getPlace()];
     solution_.took.time = took.time;
     solution_.took.latency = took.latency;
     took = solution_.took;
-    was_late_ = thread_ && took.seconds > lead_;
     counts_.failed += !solved;
     counts_.early += solution_.early;
     counts_.late += solution_.late;
