@@ -30,7 +30,7 @@ READER = common.SOURCE / "suite/problem.py"
 SUCCESS = 0.01  # over the least cost
 PROBLEMS = ["problem", "bodies", "velocities", "rows", "stages", "duration", "cost", "violation", "iterations", "reader"]
 RUNS = ["problem", "variant", "seed", "guess", "converged", "cost", "violation", "iterations", "seconds", "end"]
-OTHER, LIMIT = "IPOPT", 20  # variants that begin so; s of the protocol
+OTHER, LIMIT, LONG = "IPOPT", 20, 200  # variants that begin so; s of the protocol, and of a few guesses
 COLLOCATION = "IPOPT, collocation"  # likewise, of other steps than ours
 OTHER_RUNS = ["limit", *RUNS, "optimum"]
 COUNTS = ["linearizations", "sweeps", "rollouts", "searches"]
@@ -319,10 +319,11 @@ def add_other(page, problems):
     origin, runs = read_table("suite_ipopt")
     page.heading("IPOPT")
     page.add(f"""The same problems by IPOPT, as [the suite](../suite.md#ipopt) describes it, one thread, on a machine with other work
-({origin}; collocation is of the latter). Problems and optima are those of the commit of a run, and may have changed. Costs are told over our
-optimum of the same problem; *the same* is within 1e-6. Of iterates that violate a constraint or leave a gap of more than 1e-8 the
+({origin}; collocation is of 9e31f15f, {LONG} s from five guesses of 1fb5ed63). Problems and optima are those of the commit of a run,
+and may have changed. Costs are told over our optimum of the same problem; *the same* is within 1e-6. Of iterates that violate a constraint or leave a gap of more than 1e-8 the
 violation is told, too: their costs say little.""")
-    for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs):
+    add_long(page, problems, [run for run in runs if is_long(run)])
+    for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs if not is_long(run)):
         these = {(run["problem"], run["variant"]): run for run in runs if (run["guess"], run["limit"]) == (start, limit)}
         variants = list(dict.fromkeys(variant for _, variant in these))
         page.add(f"From {STARTS.get(start, f'guess {start}')}, ended after {limit} s:")
@@ -338,8 +339,36 @@ violation is told, too: their costs say little.""")
     better = sorted({run["problem"] for run, ratio in zip(shot, ours) if ratio < -1e-6})
     page.add(f"""Of the {len(shot)} runs of multiple shooting that converged, {sum(abs(ratio) <= 1e-6 for ratio in ours)} ended at our
 optimum and {sum(ratio < -1e-6 for ratio in ours)} at a better one{": " + ", ".join(map(show_problem, better)) if better else ""}.
-{describe_collocation(runs)} Not measured: other guesses, and five of each with 200 s;
-collocation of most problems.""")
+{describe_collocation(runs)} Not measured: collocation of most problems.""")
+
+
+def is_long(run):
+    """Whether it is one of five guesses that have ten times the time of the protocol."""
+    return run["guess"] not in STARTS and run["limit"] == str(LONG)
+
+
+def add_long(page, problems, runs):
+    variants = list(dict.fromkeys(run["variant"] for run in runs))
+    page.add(f"""From the first five guesses, ended after {LONG} s or 300 iterations: how many converged, holding every constraint to 1e-8, and
+where: at our optimum of the problem, or at one that costs more or less; of these, the medians of iterations and of the time [s].""")
+    rows = []
+    for row in problems:
+        cells = []
+        for variant in variants:
+            these = [run for run in runs if (run["problem"], run["variant"]) == (row["problem"], variant)]
+            good = [run for run in these if run["converged"] == "True" and float(run["violation"]) <= 1e-8]
+            ratios = [float(run["cost"]) / float(run["optimum"]) - 1 for run in good]
+            places = [("at it", sum(abs(ratio) <= 1e-6 for ratio in ratios)), ("costs less", sum(ratio < -1e-6 for ratio in ratios)),
+                      ("costs more", sum(ratio > 1e-6 for ratio in ratios))]
+            cells += [f"{len(good)} of {len(these)}", ", ".join(f"{count} {place}" for place, count in places if count) or "–",
+                      show(statistics.median(int(run["iterations"]) for run in good) if good else None, "{:.0f}"),
+                      show(statistics.median(float(run["seconds"]) for run in good) if good else None, "{:.1f}")]
+        rows.append([show_problem(row["problem"]), *cells])
+    page.table(["problem", *(head for variant in variants for head in (variant, "where", "iterations", "time [s]"))], rows)
+    counts = {variant: sum(run["converged"] == "True" and float(run["violation"]) <= 1e-8 for run in runs if run["variant"] == variant)
+              for variant in variants}
+    page.add("In all, of " + str(len(runs) // len(variants)) + " runs of each: "
+             + ", ".join(f"{count} by *{variant}*" for variant, count in counts.items()) + ".")
 
 
 def describe_collocation(runs):
