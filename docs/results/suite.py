@@ -320,8 +320,8 @@ def add_other(page, problems):
     page.heading("IPOPT")
     page.add(f"""The same problems by IPOPT, as [the suite](../suite.md#ipopt) describes it, one thread, on a machine with other work
 ({origin}; collocation is of 9e31f15f, {LONG} s from five guesses of 1fb5ed63). Problems and optima are those of the commit of a run,
-and may have changed. Costs are told over our optimum of the same problem; *the same* is within 1e-6. Of iterates that violate a constraint or leave a gap of more than 1e-8 the
-violation is told, too: their costs say little.""")
+and may have changed. Costs are told over our optimum of the same problem; *the same* is within 1e-6. Of iterates that violate a
+constraint or leave a gap of more than 1e-8 the violation is told, too: their costs say little.""")
     add_long(page, problems, [run for run in runs if is_long(run)])
     for start, limit in dict.fromkeys((run["guess"], run["limit"]) for run in runs if not is_long(run)):
         these = {(run["problem"], run["variant"]): run for run in runs if (run["guess"], run["limit"]) == (start, limit)}
