@@ -27,7 +27,7 @@ Worst findNotFinite(const CheckedMotion& motion) {
                                                                {"gap", &record.gap}};
   // Not every world tells forces.
   const auto mayBeUnknown = [&](const RowMatrixXd* table) {
-    return motion.hasHappened() && (table == &record.closure_wrenches || table == &record.contact_wrenches);
+    return motion.has_happened && (table == &record.closure_wrenches || table == &record.contact_wrenches);
   };
   Worst worst;
   int count = 0;
@@ -41,22 +41,6 @@ Worst findNotFinite(const CheckedMotion& motion) {
   for (Eigen::Index k = 0; k < record.time.size(); ++k)
     if (!std::isfinite(record.time[k])) worst.add(++count, static_cast<int>(k), "time");
   return worst;
-}
-
-// Whatever happened, states are those of this robot, and Bielle's own world keeps its loops closed. The rest tells what happened: a
-// fall is no error.
-void addHappenedRows(CheckContext& context) {
-  std::vector<CheckRow>& rows = context.rows;
-  addStateRows(context);
-  const size_t first = context.motion.world == "bielle" ? rows.size() : 2;  // after numbers and centre of mass
-  addWorkRow(context);
-  addStanceRows(context);
-  addSwingRows(context);
-  addShapeRows(context);
-  addLinkageRows(context);
-  addForceRows(context);
-  addLimitRows(context);
-  for (size_t i = first; i < rows.size(); ++i) rows[i].kind = CheckRow::Kind::Note;
 }
 
 }  // namespace
@@ -130,20 +114,23 @@ CheckReport checkMotion(const CheckedMotion& motion) {
   if (!not_finite.empty()) return report;
   const MotionTrace trace = traceMotion(motion);
   CheckContext context{motion, trace, bounds, report.rows};
-  if (motion.hasHappened()) {
-    addHappenedRows(context);
-    return report;
-  }
-  addDynamicsRows(context);
+  if (!motion.has_happened) addDynamicsRows(context);
   addStateRows(context);
-  addEnergyRows(context);
+  const size_t judged = report.rows.size();
+  if (motion.has_happened)
+    addWorkRow(context);
+  else
+    addEnergyRows(context);
   addStanceRows(context);
   addSwingRows(context);
   addShapeRows(context);
   addLinkageRows(context);
   addForceRows(context);
   addLimitRows(context);
-  addGoalRows(context);
+  if (motion.has_happened)  // a fall is no error
+    for (size_t i = judged; i < report.rows.size(); ++i) report.rows[i].kind = CheckRow::Kind::Note;
+  else
+    addGoalRows(context);
   return report;
 }
 

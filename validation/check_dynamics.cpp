@@ -34,10 +34,24 @@ double calcAccelerationScale(const CheckContext& context) {
   return getLarger(scale, 1e-12);
 }
 
+// The largest distance that a loop is open by: what is recorded of it, against Simbody's.
+void addGapRow(CheckContext& context) {
+  Worst gap;
+  for (int k = 0; k <= context.motion.numStages(); ++k) {
+    double largest = 0;
+    for (const Vector6d& each : context.trace.nodes[k].closures.gaps)
+      largest = getLarger(largest, each.head<3>().norm());
+    gap.add(std::abs(context.motion.record.gap(k, 0) - largest), k);
+  }
+  context.add(gap, "loops: gap, as recorded", "m", context.bounds.com);
+}
+
 void addClosureRows(CheckContext& context) {
   const Model& model = context.model();
   const bool reduced = context.motion.summary.formulation == Formulation::Reduced;
-  Worst position, angle, velocity;
+  // In worlds loops may be soft, have play, or rods that are not those of the model.
+  const Worst none(CheckRow::Kind::AtMost, context.motion.has_happened ? CheckRow::Kind::Note : CheckRow::Kind::AtMost);
+  Worst position = none, angle = none, velocity = none;
   for (size_t k = 0; k < context.trace.nodes.size(); ++k)
     for (size_t c = 0; c < model.closures().size(); ++c) {
       const int n = static_cast<int>(k);
@@ -107,6 +121,7 @@ void addStateRows(CheckContext& context) {
   for (int k = 0; k <= context.motion.numStages(); ++k)
     com.add((context.motion.record.com.row(k).transpose() - context.trace.nodes[k].com).norm(), k);
   context.add(com, "centre of mass, as recorded", "m", context.bounds.com);
+  if (context.motion.has_happened) addGapRow(context);
   addClosureRows(context);
 }
 

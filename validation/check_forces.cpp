@@ -153,7 +153,7 @@ void addForceRows(CheckContext& context) {
     for (int c = 0; c < static_cast<int>(model.contacts().size()); ++c) {
       const ContactFrame& contact = model.contacts()[c];
       const Vector6d wrench = context.motion.record.contact_wrenches.block<1, 6>(k, 6 * c).transpose();
-      if (context.motion.hasHappened() && !wrench.allFinite()) continue;  // not known
+      if (context.motion.has_happened && !wrench.allFinite()) continue;  // not known
       if (context.motion.stands(c, k))
         addWrench(contact, turnToGround(context, c, k, wrench), context, least_load, k, forces);
       else

@@ -82,7 +82,7 @@ std::vector<ContactTarget> CheckedMotion::getContacts(int phase) const {
 }
 
 bool CheckedMotion::stands(int contact, int node) const {
-  if (hasHappened())
+  if (has_happened)
     return record.contact_wrenches.block<1, 6>(std::min(node, numStages() - 1), 6 * contact).squaredNorm() > 0;
   for (const MotionSummary::Stance& stance : summary.phases[findPhase(node)].stances)
     if (stance.contact == model.contacts()[contact].name) return true;
@@ -103,7 +103,7 @@ CheckedMotion readMotion(const std::string& directory) {
   CheckedMotion motion;
   const AnySummary summary = readAnySummary(directory);
   motion.summary = summary.facts;
-  motion.world = summary.world;
+  motion.has_happened = summary.has_happened;
   motion.record = readResultRecord(directory);
   const LoadedRobot robot = loadRobotOf(directory);
   motion.warnings = robot.warnings;

@@ -1,6 +1,5 @@
 #pragma once
 /// \file A motion read from its files.
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +14,7 @@ struct CheckedMotion {
   MotionSummary summary;
   MotionRecord record;
   std::vector<std::string> warnings;  ///< of its robot (loadRobotOf)
-  std::optional<std::string> world;   ///< where it was carried out; none: a plan
+  bool has_happened = false;          ///< it was carried out or recorded; else it is a plan
 
   int numStages() const { return static_cast<int>(record.time.size()) - 1; }
   /// Index of the phase of a node; the last node belongs to the last phase.
@@ -28,7 +27,6 @@ struct CheckedMotion {
   bool isImpact(int stage) const { return getTimeStep(stage) == 0; }
   /// Whether a contact of the model stands on the ground at a node: as planned, or where it was pressed, if that is known.
   bool stands(int contact, int node) const;
-  bool hasHappened() const { return world.has_value(); }
 };
 
 /// Reads DIR/summary.json, DIR/trajectory.npz and the robot, from its file or, if that no longer exists, by its name.

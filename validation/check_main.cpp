@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
   ignoreClosedPipes();
   CLI::App app{
       "Checks a result of `bielle solve` from its files alone: forces and energies with Simbody's dynamics, steps, "
-      "loops, feet, friction, limits. Of a motion carried out or recorded, states and loops are judged, and the rest "
+      "loops, feet, friction, limits. Of a motion carried out or recorded, what is recorded is judged, and the rest "
       "informs. Exit status: 0 passed, 1 a check failed, 2 bad input."};
   app.failure_message(bielle::cli::describeFailure);
   app.name("bielle check");

@@ -75,7 +75,7 @@ class Tracer {
       SimbodyBridge& simbody = getBridge(motion_.findPhase(k));
       simbody.setState(q, v, calcMotorForces(motion_.model, u));
       out.nodes.push_back(traceNode(simbody, v));
-      if (motion_.hasHappened()) continue;
+      if (motion_.has_happened) continue;
       updateTangent(simbody);
       out.nodes.back().drift_power = v.dot(calcDriftForces(simbody));
       if (k > 0) traceArrival(k - 1, out.nodes[k - 1], out.nodes[k], out.stages[k - 1]);

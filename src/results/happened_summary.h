@@ -1,5 +1,4 @@
 #pragma once
-#include <optional>
 #include <string>
 
 #include "bielle/results/result.h"
@@ -10,10 +9,10 @@ namespace bielle {
 // The summary of a result of what happened, without what tells how it was solved.
 Json makeHappenedSummary(const MotionResult& result);
 
-// The summary of a plan or of what happened, then with the name of its world and without what only plans have.
+// The summary of a plan or of what happened, then without what only plans have.
 struct AnySummary {
   MotionSummary facts;
-  std::optional<std::string> world;  // none: a plan
+  bool has_happened = false;  // else it is a plan
 };
 
 // \throws InputError as readSummary()

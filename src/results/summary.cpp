@@ -131,8 +131,8 @@ AnySummary readAnySummary(const std::string& directory) {
   try {
     const Json json = parseJson(text);
     AnySummary summary;
-    if (json.contains("outcome")) summary.world = json.at("world").get<std::string>();
-    summary.facts = summary.world ? readFacts(json) : readPlan(json);
+    summary.has_happened = json.contains("outcome");
+    summary.facts = summary.has_happened ? readFacts(json) : readPlan(json);
     summary.facts.file = path;
     return summary;
   } catch (const std::exception& error) {
@@ -142,7 +142,7 @@ AnySummary readAnySummary(const std::string& directory) {
 
 MotionSummary readSummary(const std::string& directory) {
   const AnySummary summary = readAnySummary(directory);
-  if (summary.world)
+  if (summary.has_happened)
     throw InputError(summary.facts.file, "motion", "it is a motion carried out, not a plan",
                      "give the directory of `bielle solve`");
   return summary.facts;
