@@ -70,7 +70,7 @@ struct CheckBounds {
   double time = 1e-9;  ///< between nodes, s: rounding of their sum
   /// Eq. (1), over the weight of the robot (as N or N m): solves in double precision leave 1e-10.
   double motion_equations = 1e-7;
-  double com = 1e-9;  ///< recorded against Simbody's, and gaps of what was carried out, m: rounding
+  double com = 1e-9;  ///< recorded against Simbody's, m: rounding
   /// Recorded against those of (4), in the norm of (6), over the largest of the motion or free fall.
   double accelerations = 1e-3;
   double velocity_steps = 1e-6;  ///< Eqs. (2), (3), m/s or rad/s: gaps that a converged solver may leave

@@ -34,9 +34,10 @@ double calcAccelerationScale(const CheckContext& context) {
   return getLarger(scale, 1e-12);
 }
 
-// The largest distance that a loop is open by: what is recorded of it, against Simbody's.
+// The largest distance that a loop is open by: what is recorded of it, with the rods that the robot had, against Simbody's with those of
+// its files.
 void addGapRow(CheckContext& context) {
-  Worst gap;
+  Worst gap(CheckRow::Kind::AtMost, CheckRow::Kind::Note);
   for (int k = 0; k <= context.motion.numStages(); ++k) {
     double largest = 0;
     for (const Vector6d& each : context.trace.nodes[k].closures.gaps)

@@ -228,10 +228,10 @@ TEST_CASE("check: of a motion carried out, what its record tells is judged, and 
   weak.record.v.row(node).setConstant(0.1);  // feet slip, bodies run into each other
   check(weak, {});
   open.record.q(node, knee) += 1e-4;
-  CHECK(getValue(check(open, {"centre of mass, as recorded", "loops: gap, as recorded"}), "loops: gap") > 1e-6);
+  CHECK(getValue(check(open, {"centre of mass, as recorded"}), "loops: gap") > 1e-6);
   open.record = motion.record;
   open.record.gap(node, 0) += 1e-6;
-  check(open, {"loops: gap, as recorded"});
+  CHECK(getValue(check(open, {}), "loops: gap, as recorded") == Approx(1e-6).epsilon(0.01));
   moved.record.com(node, 2) += 1e-6;
   check(moved, {"centre of mass, as recorded"});
   unknown.record.contact_wrenches.setConstant(std::nan(""));
